@@ -1,0 +1,1 @@
+"""Regression from sensor readings to one rotation: linear, exact LMC-GPR and SPGP."""
