@@ -1,0 +1,1 @@
+"""Capture: devices, the daemon that records and publishes their frames, and its command."""

@@ -1,0 +1,94 @@
+"""What a capture device is, and where devices are found (entry-point group ``glovecal.devices``)."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import metadata
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from glovecal_client.errors import DeviceError, UnknownDevice
+
+DEVICE_GROUP = "glovecal.devices"
+
+
+def _no_values() -> np.ndarray:
+    return np.empty(0, np.float32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reading:
+    """What a device gives for one instant: raw values and the time they were taken."""
+
+    readings: np.ndarray
+    """Raw sensor values, float32, shape (S,)."""
+    monotonic_ns: int
+    """``time.monotonic_ns()`` when the reading was complete."""
+    wall_ns: int
+    """``time.time_ns()`` at the same instant."""
+    context: np.ndarray = field(default_factory=_no_values)
+    """Context values, float32, shape (C,); NaN where not measured."""
+    button: bool = False
+
+
+@runtime_checkable
+class Device(Protocol):
+    """A source of readings. It says what it produces before it is opened.
+
+    Two more attributes are looked at if the device has them: ``counts``, the pair of smallest and largest
+    raw value its hardware can send, and ``hand``, one of ``left``, ``right``, ``unknown``.
+    """
+
+    name: str
+    layout: str
+    sensors: tuple[str, ...]
+    context: tuple[str, ...]
+    simulated: bool
+    rate_hz: float
+
+    @classmethod
+    def from_options(cls, argument: str | None, options: Mapping[str, str]) -> Device:
+        """Build it from ``--device NAME:ARGUMENT --option key=value``. Raises BadOption."""
+        ...
+
+    def open(self) -> None:
+        """Start, also again after a close. Raises DeviceLost if not there, DeviceError if it cannot work."""
+        ...
+
+    def close(self) -> None:
+        """Stop and let go of the hardware; harmless when already closed."""
+        ...
+
+    def read(self, timeout_s: float) -> Reading | None:
+        """The next reading, or None if there was none in time. Raises DeviceLost when it is gone."""
+        ...
+
+
+def device_names() -> list[str]:
+    """Names of all installed devices."""
+    return sorted({point.name for point in metadata.entry_points(group=DEVICE_GROUP)})
+
+
+def build_device(text: str, options: Mapping[str, str] | None = None) -> Device:
+    """The device written ``NAME`` or ``NAME:ARGUMENT``, not yet opened. Raises UnknownDevice, DeviceError."""
+    name, colon, argument = text.partition(":")
+    return _device_class(name).from_options(argument if colon else None, options or {})
+
+
+def _device_class(name: str) -> type[Device]:
+    for point in metadata.entry_points(group=DEVICE_GROUP):
+        if point.name == name:
+            try:
+                return point.load()
+            except ImportError as error:
+                raise DeviceError(
+                    f"device {name!r} cannot be loaded: {error}. A serial glove needs pyserial: "
+                    "pip install 'glovecal-client[capture]'"
+                ) from error
+    known = device_names()
+    near = difflib.get_close_matches(name, known, n=1)
+    hint = f"did you mean {near[0]!r}?" if near else f"installed are {', '.join(known) or 'none'}"
+    raise UnknownDevice(f"no device {name!r}; {hint}")

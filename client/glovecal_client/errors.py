@@ -1,0 +1,68 @@
+"""Every error a caller of the client can meet, drawn along the question the caller asks.
+
+    ClientError
+    ├── BadName             a site, glove, subject or option cannot be used as written
+    ├── WireError           a message is not what its format says; throw it away
+    ├── DeviceError         a capture device cannot do what was asked
+    │   ├── UnknownDevice   no device of that name is installed
+    │   ├── BadOption       a device was given an option it cannot use
+    │   └── DeviceLost      the device was there and is gone (unplugged); open it again
+    ├── DamagedLog          a recording cannot be read at all (a damaged tail is repaired instead)
+    ├── CaptureRefused      capture must not start (another publisher has the glove)
+    ├── NoAnswer            nobody answered a query; the sentence says what was asked
+    └── ServiceError        the service answered a REST call with a problem (status, title, detail)
+
+Messages name the thing, the value and what would be right.
+"""
+
+from __future__ import annotations
+
+
+class ClientError(Exception):
+    """Base of all errors raised on purpose by the client."""
+
+
+class BadName(ClientError, ValueError):
+    """A site, glove, subject or other name cannot be used as written."""
+
+
+class WireError(ClientError, ValueError):
+    """A message is not what its format says; nothing of it was used."""
+
+
+class DeviceError(ClientError):
+    """A capture device cannot do what was asked."""
+
+
+class UnknownDevice(DeviceError):
+    """No capture device of that name is installed."""
+
+
+class BadOption(DeviceError, ValueError):
+    """A device was given an argument or option that it cannot use."""
+
+
+class DeviceLost(DeviceError):
+    """The device was there and is gone, as when its cable is pulled; close and open to bring it back."""
+
+
+class DamagedLog(ClientError):
+    """A recording cannot be read at all; a damaged tail alone is cut off instead."""
+
+
+class CaptureRefused(ClientError):
+    """Capture must not start, for example because another publisher already has the glove."""
+
+
+class NoAnswer(ClientError):
+    """Nobody answered a query, or the answer was empty."""
+
+
+class ServiceError(ClientError):
+    """The service answered a REST call with a problem (RFC 9457): ``status``, ``title``, ``detail``."""
+
+    def __init__(self, status: int, title: str, detail: str = "") -> None:
+        super().__init__(f"{title} ({status}): {detail}" if detail else f"{title} ({status})")
+        self.status = status
+        self.title = title
+        self.detail = detail

@@ -1,0 +1,31 @@
+"""Which names are allowed in keys and paths (sites, gloves, subjects) and for channels (sensors, context).
+
+The rule is the same as in glovecal_models, which the client must not import; a test holds the two together.
+"""
+
+from __future__ import annotations
+
+import re
+
+from glovecal_client.errors import BadName
+
+IDENTIFIER = re.compile(r"[a-z0-9][a-z0-9_-]{0,63}\Z")
+CHANNEL = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}\Z")
+
+
+def check_identifier(name: str, what: str) -> str:
+    """Return ``name`` or raise BadName; identifiers go into keys, paths and URLs."""
+    if not IDENTIFIER.match(name):
+        raise BadName(
+            f"{what}: {name!r} is not allowed; use a-z, 0-9, _ and -, at most 64, not starting with _ or -"
+        )
+    return name
+
+
+def check_channel_name(name: str, what: str) -> str:
+    """Return ``name`` or raise BadName; channels are letters, digits and underscores."""
+    if not CHANNEL.match(name):
+        raise BadName(
+            f"{what}: {name!r} is not a channel name (a letter, then letters, digits, _; at most 64)"
+        )
+    return name

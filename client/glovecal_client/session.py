@@ -1,0 +1,104 @@
+"""zenoh sessions with nothing left to chance: explicit endpoints, no scouting, always closed.
+
+Everything at the edge (capture, subscribers, tools) is a client of one router, which the service runs:
+peers do not relay for each other since zenoh 1.9.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import zenoh
+
+from glovecal_client.errors import NoAnswer
+
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+MAX_PUT_BYTES = 65536
+"""The router drops larger puts at its door; our largest message, a pose, has under 10 kB."""
+
+_ATTEMPT_MS = 1000
+
+
+def client_config(endpoints: Sequence[str] = (DEFAULT_ENDPOINT,)) -> zenoh.Config:
+    """A client of the router at ``endpoints``; nothing is bound, no scouting, no shared memory."""
+    return _config("client", {"connect/endpoints": list(endpoints), "connect/timeout_ms": _ATTEMPT_MS})
+
+
+def router_config(
+    endpoints: Sequence[str] = (DEFAULT_ENDPOINT,), *, max_put_bytes: int = MAX_PUT_BYTES
+) -> zenoh.Config:
+    """A router that listens on ``endpoints`` and refuses puts over ``max_put_bytes``."""
+    limit = {
+        "id": "oversized-puts",
+        "flows": ["ingress"],
+        "messages": ["put"],
+        "key_exprs": ["**"],
+        "size_limit": max_put_bytes,
+    }
+    return _config(
+        "router", {"listen/endpoints": list(endpoints), "connect/endpoints": [], "low_pass_filter": [limit]}
+    )
+
+
+def _config(mode: str, settings: dict[str, Any]) -> zenoh.Config:
+    config = zenoh.Config()
+    common = {
+        "mode": mode,
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        "transport/shared_memory/enabled": False,
+    }
+    for path, value in (common | settings).items():
+        config.insert_json5(path, json.dumps(value))
+    return config
+
+
+@contextmanager
+def open_client(
+    endpoints: Sequence[str] = (DEFAULT_ENDPOINT,),
+    *,
+    wait_s: float | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Iterator[zenoh.Session]:
+    """A client session that is closed at the end of the ``with`` block.
+
+    Waits for the router: for ever with ``wait_s=None``, else that many seconds, then raises NoAnswer.
+    ``cancelled`` is asked between attempts, about once a second; when true, raises NoAnswer too.
+    """
+    session = _connect(endpoints, wait_s, cancelled)
+    try:
+        yield session
+    finally:
+        session.close()
+
+
+def _connect(
+    endpoints: Sequence[str], wait_s: float | None, cancelled: Callable[[], bool] | None
+) -> zenoh.Session:
+    started = time.monotonic()
+    while True:
+        try:
+            return zenoh.open(client_config(endpoints))
+        except zenoh.ZError as error:
+            late = wait_s is not None and time.monotonic() - started >= wait_s
+            if late or (cancelled is not None and cancelled()):
+                raise NoAnswer(
+                    f"no router at {', '.join(endpoints)}; is the service running? ({error})"
+                ) from error
+            time.sleep(0.05)
+
+
+@contextmanager
+def open_router(
+    endpoints: Sequence[str] = (DEFAULT_ENDPOINT,), *, max_put_bytes: int = MAX_PUT_BYTES
+) -> Iterator[zenoh.Session]:
+    """A router session (itself a full participant) that is closed at the end of the ``with`` block."""
+    session = zenoh.open(router_config(endpoints, max_put_bytes=max_put_bytes))
+    try:
+        yield session
+    finally:
+        session.close()

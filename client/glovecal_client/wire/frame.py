@@ -1,0 +1,120 @@
+"""Frame, version 1: one set of raw readings on the wire and in the log (layout in README.md)."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+from enum import IntFlag
+
+import numpy as np
+
+from glovecal_client.errors import WireError
+from glovecal_client.wire.checksum import CHECKSUM_BYTES, check_seal, sealed
+
+FRAME_ENCODING = "application/octet-stream;glovecal.frame.v1"
+MAX_SENSORS = 1024
+MAX_CONTEXT = 256
+
+_MAGIC = b"GLVF"
+_VERSION = 1
+_HEAD = struct.Struct("<4sBBHQqqQHH")
+MAX_FRAME_BYTES = _HEAD.size + 4 * (MAX_SENSORS + MAX_CONTEXT) + CHECKSUM_BYTES
+
+
+class FrameFlag(IntFlag):
+    """Bits of a frame's flags; a reader ignores bits it does not know."""
+
+    BUTTON = 1
+    SIMULATED = 2
+    REPAIRED = 4
+
+
+def _no_values() -> np.ndarray:
+    return np.empty(0, np.float32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One set of readings with its sequence number and times."""
+
+    sequence: int
+    """Counts from 0 in each run; u64."""
+    run_id: int
+    """Random number of one start of the capture daemon; u64."""
+    monotonic_ns: int
+    """Monotonic clock of the capture computer, nanoseconds; compare only inside one run."""
+    wall_ns: int
+    """Nanoseconds since 1970-01-01 UTC by the capture computer's clock."""
+    readings: np.ndarray
+    """Raw sensor values, float32, shape (S,), all finite."""
+    context: np.ndarray = field(default_factory=_no_values)
+    """Context values, float32, shape (C,); NaN where not measured."""
+    flags: int = 0
+
+    @property
+    def button(self) -> bool:
+        """The glove's button was down."""
+        return bool(self.flags & FrameFlag.BUTTON)
+
+    @property
+    def simulated(self) -> bool:
+        """The readings come from a simulation, not from a person."""
+        return bool(self.flags & FrameFlag.SIMULATED)
+
+    @property
+    def repaired(self) -> bool:
+        """The frame was fetched from the capture log after it was missed on the wire."""
+        return bool(self.flags & FrameFlag.REPAIRED)
+
+
+def encode_frame(frame: Frame) -> bytes:
+    """The frame as bytes. Raises WireError where a value does not fit the format."""
+    readings = np.asarray(frame.readings, dtype="<f4")
+    context = np.asarray(frame.context, dtype="<f4")
+    _check_values(readings, context)
+    try:
+        head = _HEAD.pack(
+            _MAGIC, _VERSION, frame.flags, len(readings), frame.sequence, frame.monotonic_ns,
+            frame.wall_ns, frame.run_id, len(context), 0,
+        )  # fmt: skip
+    except struct.error as error:
+        raise WireError(f"frame {frame.sequence}: a number does not fit its field: {error}") from error
+    return sealed(head + readings.tobytes() + context.tobytes())
+
+
+def decode_frame(message: bytes) -> Frame:
+    """The frame in ``message``. Raises WireError if it is not exactly one whole, undamaged frame."""
+    if len(message) < _HEAD.size + CHECKSUM_BYTES:
+        raise WireError(
+            f"frame: cut short, {len(message)} bytes; the smallest has {_HEAD.size + CHECKSUM_BYTES}"
+        )
+    magic, version, flags, sensors, sequence, monotonic_ns, wall_ns, run_id, contexts, _ = _HEAD.unpack_from(
+        message
+    )
+    if magic != _MAGIC:
+        raise WireError(f"frame: starts with {magic!r}, not {_MAGIC!r}")
+    if version != _VERSION:
+        raise WireError(f"frame: version {version}; this software reads version {_VERSION}")
+    expected = _HEAD.size + 4 * (sensors + contexts) + CHECKSUM_BYTES
+    if len(message) != expected:
+        raise WireError(
+            f"frame: {len(message)} bytes, but {sensors} sensors and {contexts} context need {expected}"
+        )
+    check_seal(message, "frame")
+    readings = np.frombuffer(message, "<f4", sensors, _HEAD.size)
+    context = np.frombuffer(message, "<f4", contexts, _HEAD.size + 4 * sensors)
+    _check_values(readings, context)
+    return Frame(sequence, run_id, monotonic_ns, wall_ns, readings, context, flags)
+
+
+def _check_values(readings: np.ndarray, context: np.ndarray) -> None:
+    if readings.ndim != 1 or not 1 <= len(readings) <= MAX_SENSORS:
+        raise WireError(f"frame: readings of shape {readings.shape}; allowed are 1 to {MAX_SENSORS} sensors")
+    if context.ndim != 1 or len(context) > MAX_CONTEXT:
+        raise WireError(f"frame: context of shape {context.shape}; allowed are 0 to {MAX_CONTEXT} values")
+    finite = np.isfinite(readings)
+    if not finite.all():
+        column = int(np.argmin(finite))
+        raise WireError(f"frame: sensor {column} reads {readings[column]}; readings must be finite numbers")
+    if np.isinf(context).any():
+        raise WireError("frame: a context value is infinite; write NaN for not measured")

@@ -1,0 +1,166 @@
+"""Pose, version 1: calibrated rotations with their uncertainty (layout in README.md)."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+from enum import IntFlag
+
+import numpy as np
+
+from glovecal_client.errors import WireError
+from glovecal_client.wire.checksum import CHECKSUM_BYTES, check_seal, sealed
+
+POSE_ENCODING = "application/octet-stream;glovecal.pose.v1"
+MAX_ROTATIONS = 1024
+
+_MAGIC = b"GLVP"
+_VERSION = 1
+_HEAD = struct.Struct("<4sBBHQqqQQII32s")
+_NO_MODEL = bytes(32)
+MAX_POSE_BYTES = _HEAD.size + 9 * MAX_ROTATIONS + CHECKSUM_BYTES
+
+
+class PoseFlag(IntFlag):
+    """Bits of a pose's flags; a reader ignores bits it does not know."""
+
+    UNCALIBRATED = 1
+    STALE = 2
+    EXTRAPOLATING = 4
+    TOO_UNCERTAIN = 8
+    STATE_RESET = 16
+    SIMULATED = 32
+
+
+class RotationFlag(IntFlag):
+    """Bits of one rotation's flags."""
+
+    EXTRAPOLATING = 1
+    TOO_UNCERTAIN = 2
+    BY_RULE = 4
+
+
+def _no_values() -> np.ndarray:
+    return np.empty(0, np.float32)
+
+
+def _no_flags() -> np.ndarray:
+    return np.empty(0, np.uint8)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pose:
+    """Calibrated rotations made from one frame. An uncalibrated pose has no rotations."""
+
+    sequence: int
+    """Sequence number of the source frame."""
+    run_id: int
+    monotonic_ns: int
+    """Monotonic time of the source frame on the capture computer."""
+    wall_ns: int
+    """Wall time of the source frame on the capture computer."""
+    degrees: np.ndarray = field(default_factory=_no_values)
+    """Rotations in degrees, float32, shape (R,), in the order given by ``pose/meta``."""
+    deviations: np.ndarray = field(default_factory=_no_values)
+    """Standard deviation of each rotation in degrees, float32, shape (R,)."""
+    rotation_flags: np.ndarray = field(default_factory=_no_flags)
+    """RotationFlag bits, uint8, shape (R,)."""
+    model_sha256: str | None = None
+    """64 hexadecimal digits naming the calibration model, None if there is none."""
+    flags: int = 0
+    """PoseFlag bits."""
+    skipped: int = 0
+    """Frames of this run that the service has skipped so far."""
+    age_us: int = 0
+    """Microseconds from the service's receipt of the frame to publication."""
+
+    @property
+    def uncalibrated(self) -> bool:
+        return bool(self.flags & PoseFlag.UNCALIBRATED)
+
+    @property
+    def stale(self) -> bool:
+        return bool(self.flags & PoseFlag.STALE)
+
+    @property
+    def extrapolating(self) -> bool:
+        return bool(self.flags & PoseFlag.EXTRAPOLATING)
+
+    @property
+    def too_uncertain(self) -> bool:
+        return bool(self.flags & PoseFlag.TOO_UNCERTAIN)
+
+    @property
+    def state_reset(self) -> bool:
+        return bool(self.flags & PoseFlag.STATE_RESET)
+
+    @property
+    def simulated(self) -> bool:
+        return bool(self.flags & PoseFlag.SIMULATED)
+
+
+def encode_pose(pose: Pose) -> bytes:
+    """The pose as bytes. Raises WireError where a value does not fit the format."""
+    degrees = np.asarray(pose.degrees, dtype="<f4")
+    deviations = np.asarray(pose.deviations, dtype="<f4")
+    rotation_flags = np.asarray(pose.rotation_flags, dtype=np.uint8)
+    _check_values(degrees, deviations, rotation_flags)
+    try:
+        head = _HEAD.pack(
+            _MAGIC, _VERSION, pose.flags, len(degrees), pose.sequence, pose.monotonic_ns, pose.wall_ns,
+            pose.run_id, pose.skipped, pose.age_us, 0, _model_bytes(pose.model_sha256),
+        )  # fmt: skip
+    except struct.error as error:
+        raise WireError(f"pose {pose.sequence}: a number does not fit its field: {error}") from error
+    return sealed(head + degrees.tobytes() + deviations.tobytes() + rotation_flags.tobytes())
+
+
+def decode_pose(message: bytes) -> Pose:
+    """The pose in ``message``. Raises WireError if it is not exactly one whole, undamaged pose."""
+    if len(message) < _HEAD.size + CHECKSUM_BYTES:
+        raise WireError(
+            f"pose: cut short, {len(message)} bytes; the smallest has {_HEAD.size + CHECKSUM_BYTES}"
+        )
+    head = _HEAD.unpack_from(message)
+    magic, version, flags, count, sequence, monotonic_ns, wall_ns, run_id, skipped, age_us, _, model = head
+    if magic != _MAGIC:
+        raise WireError(f"pose: starts with {magic!r}, not {_MAGIC!r}")
+    if version != _VERSION:
+        raise WireError(f"pose: version {version}; this software reads version {_VERSION}")
+    expected = _HEAD.size + 9 * count + CHECKSUM_BYTES
+    if len(message) != expected:
+        raise WireError(f"pose: {len(message)} bytes, but {count} rotations need {expected}")
+    check_seal(message, "pose")
+    degrees = np.frombuffer(message, "<f4", count, _HEAD.size)
+    deviations = np.frombuffer(message, "<f4", count, _HEAD.size + 4 * count)
+    rotation_flags = np.frombuffer(message, np.uint8, count, _HEAD.size + 8 * count)
+    _check_values(degrees, deviations, rotation_flags)
+    return Pose(
+        sequence, run_id, monotonic_ns, wall_ns, degrees, deviations, rotation_flags,
+        None if model == _NO_MODEL else model.hex(), flags, skipped, age_us,
+    )  # fmt: skip
+
+
+def _model_bytes(sha256: str | None) -> bytes:
+    if sha256 is None:
+        return _NO_MODEL
+    try:
+        digest = bytes.fromhex(sha256)
+    except ValueError:
+        digest = b""
+    if len(digest) != 32 or digest == _NO_MODEL:
+        raise WireError(f"pose: model {sha256!r} is not a sha256 (64 hexadecimal digits)")
+    return digest
+
+
+def _check_values(degrees: np.ndarray, deviations: np.ndarray, rotation_flags: np.ndarray) -> None:
+    if degrees.ndim != 1 or len(degrees) > MAX_ROTATIONS:
+        raise WireError(f"pose: degrees of shape {degrees.shape}; allowed are 0 to {MAX_ROTATIONS} rotations")
+    if deviations.shape != degrees.shape or rotation_flags.shape != degrees.shape:
+        raise WireError(
+            f"pose: {len(degrees)} rotations, deviations {deviations.shape}, flags {rotation_flags.shape}"
+        )
+    if not (np.isfinite(degrees).all() and np.isfinite(deviations).all()):
+        raise WireError("pose: a rotation or its deviation is NaN or infinite; send no rotations instead")
+    if (deviations < 0).any():
+        raise WireError("pose: a standard deviation is negative")
