@@ -142,9 +142,7 @@ def _from_document(document: Mapping[str, Any], source: str) -> Layout:
         _require_known(names, sensors, f"rotation {rotation}", source)
         if not names:
             raise BadLayout(f"{source}: rotation {rotation} is read from no sensor; use [simulated] for that")
-        kind: CorrespondenceKind = (
-            "MSMR" if rotation in palm else "1S1R" if len(names) == 1 else "MS1R"
-        )
+        kind: CorrespondenceKind = "MSMR" if rotation in palm else "1S1R" if len(names) == 1 else "MS1R"
         built[rotation] = Correspondence(rotation, kind, names)
     for rotation, text in _table(document, "simulated", source).items():
         if rotation in built:
@@ -193,7 +191,9 @@ def _names(value: Any, what: str, source: str) -> tuple[str, ...]:
 def _require_known(names: Sequence[str], sensors: Sequence[str], what: str, source: str) -> None:
     missing = [name for name in names if name not in sensors]
     if missing:
-        raise BadLayout(f"{source}: {what} reads sensor {missing[0]!r}, but the sensors are {', '.join(sensors)}")
+        raise BadLayout(
+            f"{source}: {what} reads sensor {missing[0]!r}, but the sensors are {', '.join(sensors)}"
+        )
 
 
 def _counts(value: Any, source: str) -> tuple[float, float] | None:

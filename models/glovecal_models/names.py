@@ -13,12 +13,16 @@ IDENTIFIER = re.compile(r"[a-z0-9][a-z0-9_-]{0,63}\Z")
 def check_channel_name(name: str, what: str) -> str:
     """Return ``name`` or raise BadInput; channels are letters, digits and underscores."""
     if not CHANNEL.match(name):
-        raise BadInput(f"{what}: {name!r} is not a channel name (a letter, then letters, digits, _; at most 64)")
+        raise BadInput(
+            f"{what}: {name!r} is not a channel name (a letter, then letters, digits, _; at most 64)"
+        )
     return name
 
 
 def check_identifier(name: str, what: str) -> str:
     """Return ``name`` or raise BadInput; identifiers go into paths, keys and URLs."""
     if not IDENTIFIER.match(name):
-        raise BadInput(f"{what}: {name!r} is not allowed; use a-z, 0-9, _ and -, at most 64, not starting with _ or -")
+        raise BadInput(
+            f"{what}: {name!r} is not allowed; use a-z, 0-9, _ and -, at most 64, not starting with _ or -"
+        )
     return name

@@ -50,7 +50,9 @@ class Take:
         _require_increasing("time_s", self.time_s, self.name)
         _require_increasing("reference_time_s", self.reference_time_s, self.name)
         if not np.isfinite(self.readings).all():
-            raise BadInput(f"take {self.name!r}: readings hold NaN or infinity; every frame needs finite values")
+            raise BadInput(
+                f"take {self.name!r}: readings hold NaN or infinity; every frame needs finite values"
+            )
 
     @property
     def duration_s(self) -> float:
@@ -100,5 +102,6 @@ def _require_increasing(what: str, time: np.ndarray, take: str) -> None:
     if len(back):
         row = int(back[0])
         raise BadInput(
-            f"take {take!r}: {what} must increase, but row {row + 1} is {time[row + 1]:g} s after {time[row]:g} s"
+            f"take {take!r}: {what} must increase, "
+            f"but row {row + 1} is {time[row + 1]:g} s after {time[row]:g} s"
         )

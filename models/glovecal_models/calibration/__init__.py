@@ -1,0 +1,1 @@
+"""Whole-glove calibration models: training, prediction, artifact, comparison with measurements."""

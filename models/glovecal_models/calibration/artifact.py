@@ -1,0 +1,130 @@
+"""A calibration model as bytes: safetensors for the arrays, a JSON manifest in its header.
+
+The artifact is named by the sha256 of its bytes, so a changed byte is a changed name: whoever loads it
+checks the name first (``load`` does when it is given one). Nothing is unpickled.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+import safetensors
+import safetensors.numpy
+
+from glovecal_models.calibration.model import CalibrationModel, RotationModel
+from glovecal_models.calibration.regressor_kinds import restore_regressor
+from glovecal_models.errors import BadInput, DamagedArtifact
+from glovecal_models.layout import Layout
+
+FORMAT = "glovecal.model.v1"
+LARGEST_HEADER_BYTES = 8 << 20
+
+
+def model_id(artifact: bytes) -> str:
+    """The name of a model: sha256 of its artifact, 64 hexadecimal digits."""
+    return hashlib.sha256(artifact).hexdigest()
+
+
+def dump(model: CalibrationModel) -> bytes:
+    """The model as bytes. The same model always gives the same bytes."""
+    tensors: dict[str, np.ndarray] = {}
+    rotations = []
+    for item in model.rotations:
+        for name, array in item.regressor.arrays().items():
+            tensors[f"{item.rotation}.{name}"] = np.ascontiguousarray(array, dtype=np.float64)
+        tensors[f"{item.rotation}:input_low"] = np.ascontiguousarray(item.input_low, dtype=np.float64)
+        tensors[f"{item.rotation}:input_high"] = np.ascontiguousarray(item.input_high, dtype=np.float64)
+        rotations.append(
+            {
+                "rotation": item.rotation,
+                "correspondence": _correspondence_document(item),
+                "regressor": item.regressor.settings(),
+                "uncertain_above_deg": item.uncertain_above_deg,
+                "held_out_rmse_deg": item.held_out_rmse_deg,
+                "samples": item.samples,
+            }
+        )
+    manifest = {
+        "format": FORMAT,
+        "software": f"glovecal-models {version('glovecal-models')}",
+        "layout": model.layout.to_document(),
+        "subject": model.subject,
+        "method": model.method,
+        "takes": list(model.takes),
+        "parent": model.parent,
+        "error_estimate": dict(model.error_estimate),
+        "simulated": model.simulated,
+        "rotations": rotations,
+    }
+    text = json.dumps(manifest, sort_keys=True, allow_nan=False)
+    return safetensors.numpy.save(tensors, metadata={"manifest": text})
+
+
+def load(artifact: bytes, *, expected_id: str | None = None) -> CalibrationModel:
+    """Inverse of ``dump``. Raises DamagedArtifact when the bytes are not what ``expected_id`` names."""
+    name = (expected_id or model_id(artifact))[:12]
+    if expected_id is not None and model_id(artifact) != expected_id:
+        raise DamagedArtifact(
+            f"model {name}: its bytes hash to {model_id(artifact)[:12]}; the file was changed"
+        )
+    manifest = read_manifest(artifact)
+    try:
+        tensors = safetensors.numpy.load(artifact)
+        return _restore(manifest, tensors, name)
+    except (KeyError, TypeError, ValueError, BadInput, safetensors.SafetensorError) as error:
+        raise DamagedArtifact(f"model {name}: cannot be restored: {error}") from error
+
+
+def read_manifest(artifact: bytes) -> dict[str, Any]:
+    """The JSON manifest alone. Raises DamagedArtifact."""
+    length = int.from_bytes(artifact[:8], "little")
+    if len(artifact) < 8 or not 0 < length <= min(LARGEST_HEADER_BYTES, len(artifact) - 8):
+        raise DamagedArtifact(f"not a model artifact: header of {length} bytes in a file of {len(artifact)}")
+    try:
+        header = json.loads(artifact[8 : 8 + length])
+        manifest = json.loads(header["__metadata__"]["manifest"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise DamagedArtifact("not a model artifact: its header holds no manifest") from error
+    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
+        raise DamagedArtifact(f"not a {FORMAT} artifact")
+    return manifest
+
+
+def _restore(manifest: Mapping[str, Any], tensors: Mapping[str, np.ndarray], name: str) -> CalibrationModel:
+    for key, array in tensors.items():
+        if array.dtype != np.float64 or not np.isfinite(array).all():
+            raise DamagedArtifact(f"model {name}: array {key} must be finite float64")
+    return CalibrationModel(
+        layout=Layout.from_document(manifest["layout"]),
+        subject=str(manifest["subject"]),
+        method=str(manifest["method"]),
+        rotations=tuple(_restore_rotation(item, tensors) for item in manifest["rotations"]),
+        takes=tuple(str(item) for item in manifest["takes"]),
+        parent=manifest["parent"],
+        error_estimate=manifest["error_estimate"],
+        simulated=bool(manifest["simulated"]),
+    )
+
+
+def _restore_rotation(item: Mapping[str, Any], tensors: Mapping[str, np.ndarray]) -> RotationModel:
+    rotation = str(item["rotation"])
+    own = {key.split(".", 1)[1]: array for key, array in tensors.items() if key.split(".", 1)[0] == rotation}
+    held_out = item["held_out_rmse_deg"]
+    return RotationModel(
+        correspondence=Layout.from_document(item["correspondence"]).correspondences[0],
+        regressor=restore_regressor(own, item["regressor"]),
+        input_low=tensors[f"{rotation}:input_low"],
+        input_high=tensors[f"{rotation}:input_high"],
+        uncertain_above_deg=float(item["uncertain_above_deg"]),
+        held_out_rmse_deg=None if held_out is None else float(held_out),
+        samples=int(item["samples"]),
+    )
+
+
+def _correspondence_document(item: RotationModel) -> dict[str, Any]:
+    return Layout(item.rotation, item.correspondence.sensors, (item.correspondence,)).to_document()

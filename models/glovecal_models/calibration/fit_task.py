@@ -1,0 +1,107 @@
+"""One fit of one rotation: plain arrays in, plain arrays out, with a stable key.
+
+A service can spread tasks over worker processes, keep finished ones by their key, and repeat only what was
+in flight when it was killed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from glovecal_models.calibration.training_settings import Report, TrainingSettings
+from glovecal_models.regression.fast_lmc import fit_lmc_gpr
+from glovecal_models.regression.linear_regressor import fit_linear
+from glovecal_models.regression.regressor import Regressor
+from glovecal_models.regression.spgp import fit_spgp
+
+
+@dataclass(frozen=True)
+class FitTask:
+    """One fit: the whole of a rotation's samples (``fold`` None), or all but a held-out fold."""
+
+    rotation: str
+    fold: int | None
+    inputs: np.ndarray
+    target: np.ndarray
+    held_out_inputs: np.ndarray
+    held_out_target: np.ndarray
+    sensors: tuple[str, ...]
+    settings: TrainingSettings
+    key: str = field(default="")
+
+    def __post_init__(self) -> None:
+        if not self.key:
+            object.__setattr__(self, "key", _key(self))
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """What a task gives back, in the form a file can hold."""
+
+    rotation: str
+    fold: int | None
+    arrays: dict[str, np.ndarray]
+    settings: dict[str, Any]
+    held_out_squared_error: float
+    """Sum of squared errors on the held-out samples, degrees squared."""
+    held_out_count: int
+
+
+def run_task(
+    task: FitTask, *, cancelled: Callable[[], bool] | None = None, report: Report | None = None
+) -> FitResult:
+    """Fit one task. Raises Cancelled when ``cancelled()`` turns true, NotTrainable."""
+    regressor = _fit(task, cancelled, report)
+    error = 0.0
+    if len(task.held_out_target):
+        error = float(np.sum((regressor.predict(task.held_out_inputs).mean - task.held_out_target) ** 2))
+    return FitResult(
+        rotation=task.rotation,
+        fold=task.fold,
+        arrays=regressor.arrays(),
+        settings=regressor.settings(),
+        held_out_squared_error=error,
+        held_out_count=len(task.held_out_target),
+    )
+
+
+def _fit(task: FitTask, cancelled: Callable[[], bool] | None, report: Report | None) -> Regressor:
+    settings = task.settings
+    if settings.method == "linear":
+        return fit_linear(task.inputs, task.target)
+    start = fit_lmc_gpr(task.inputs, task.target, seed=settings.seed, cancelled=cancelled, report=report)
+    if settings.method == "lmc_gpr":
+        return start
+    return fit_spgp(
+        task.inputs,
+        task.target,
+        pseudo_inputs=settings.pseudo_inputs,
+        iterations=settings.iterations,
+        seed=settings.seed,
+        start=start,
+        cancelled=cancelled,
+        report=report,
+    )
+
+
+def _key(task: FitTask) -> str:
+    digest = hashlib.sha256()
+    facts = {
+        "rotation": task.rotation,
+        "fold": task.fold,
+        "sensors": task.sensors,
+        "settings": asdict(task.settings),
+        "software": version("glovecal-models"),
+    }
+    digest.update(json.dumps(facts, sort_keys=True).encode())
+    for array in (task.inputs, task.target, task.held_out_inputs, task.held_out_target):
+        digest.update(repr(array.shape).encode())
+        digest.update(np.ascontiguousarray(array, dtype=np.float64).tobytes())
+    return digest.hexdigest()

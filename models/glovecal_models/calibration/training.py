@@ -1,0 +1,114 @@
+"""Training a whole glove: plan, fit, assemble."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from glovecal_models.calibration.fit_task import FitResult, run_task
+from glovecal_models.calibration.model import CalibrationModel, RotationModel
+from glovecal_models.calibration.regressor_kinds import restore_regressor
+from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
+from glovecal_models.calibration.training_settings import Report, TrainingSettings
+from glovecal_models.layout import Correspondence, Layout
+from glovecal_models.regression.rule_regressor import RuleRegressor
+from glovecal_models.takes.take import Take
+
+
+def train(
+    takes: Sequence[Take],
+    layout: Layout,
+    subject: str,
+    settings: TrainingSettings | None = None,
+    *,
+    take_hashes: Sequence[str] = (),
+    parent: str | None = None,
+    cancelled: Callable[[], bool] | None = None,
+    report: Report | None = None,
+) -> CalibrationModel:
+    """Plan, fit and assemble in this process; a service spreads the same tasks over workers."""
+    plan = plan_training(takes, layout, subject, settings)
+    results = []
+    for done, task in enumerate(plan.tasks):
+        if report:
+            report(f"fitting {task.rotation}", done / len(plan.tasks))
+        results.append(run_task(task, cancelled=cancelled))
+    return assemble(plan, results, take_hashes=take_hashes, parent=parent)
+
+
+def assemble(
+    plan: TrainingPlan,
+    results: Sequence[FitResult],
+    *,
+    take_hashes: Sequence[str],
+    parent: str | None = None,
+) -> CalibrationModel:
+    """The model made of the finished fits of ``plan``, in any order."""
+    rotations = []
+    squared, count = 0.0, 0
+    for correspondence in plan.layout.correspondences:
+        name = correspondence.rotation
+        if name in plan.rules:
+            rotations.append(_rule_model(correspondence, plan.rules[name]))
+        elif name in plan.correspondences:
+            own = [result for result in results if result.rotation == name]
+            rotation, error, held_out = _rotation_model(plan, name, own)
+            rotations.append(rotation)
+            squared, count = squared + error, count + held_out
+    estimate: dict[str, Any] = {"how": _how_held_out(plan), "folds": plan.settings.folds}
+    if count:
+        estimate["rmse_deg"] = float(np.sqrt(squared / count))
+    return CalibrationModel(
+        layout=plan.layout,
+        subject=plan.subject,
+        method=plan.settings.method,
+        rotations=tuple(rotations),
+        takes=tuple(take_hashes),
+        parent=parent,
+        error_estimate=estimate,
+        simulated=plan.simulated,
+    )
+
+
+def _rule_model(correspondence: Correspondence, rule: RuleRegressor) -> RotationModel:
+    return RotationModel(
+        correspondence, rule, np.empty(0), np.empty(0), uncertain_above(rule.noise_variance), None, 0
+    )
+
+
+def _rotation_model(
+    plan: TrainingPlan, name: str, own: Sequence[FitResult]
+) -> tuple[RotationModel, float, int]:
+    whole = next(result for result in own if result.fold is None)
+    regressor = restore_regressor(whole.arrays, whole.settings)
+    squared = sum(result.held_out_squared_error for result in own)
+    count = sum(result.held_out_count for result in own)
+    task = next(task for task in plan.tasks if task.rotation == name and task.fold is None)
+    low, high = plan.ranges[name]
+    model = RotationModel(
+        correspondence=plan.correspondences[name],
+        regressor=regressor,
+        input_low=low,
+        input_high=high,
+        uncertain_above_deg=uncertain_above(regressor.noise_variance),
+        held_out_rmse_deg=float(np.sqrt(squared / count)) if count else None,
+        samples=len(task.target),
+    )
+    return model, squared, count
+
+
+def uncertain_above(noise_variance: float) -> float:
+    """The standard deviation (degrees) above which a prediction is "too uncertain to use".
+
+    Twice the measurement noise, at least 2 degrees: beyond it the model says less than one glance at the
+    reference would (Wang & Neff 2013, section 9: too large a variance should not be applied).
+    """
+    return max(2.0, 2.0 * float(np.sqrt(noise_variance)))
+
+
+def _how_held_out(plan: TrainingPlan) -> str:
+    if plan.settings.folds < 1:
+        return "not estimated"
+    return "whole takes left out" if plan.take_count > 1 else "stretches of the only take left out"

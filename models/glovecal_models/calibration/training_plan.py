@@ -1,0 +1,152 @@
+"""What will be fitted: samples gathered, representatives chosen, folds laid out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from glovecal_models.calibration.fit_task import FitTask
+from glovecal_models.calibration.folds import folds_over_takes
+from glovecal_models.calibration.linear_samples import linear_correspondence, linear_samples
+from glovecal_models.calibration.representative import representative_index
+from glovecal_models.calibration.samples import Samples, gather_samples, require_layout
+from glovecal_models.calibration.training_settings import METHODS, TrainingSettings
+from glovecal_models.errors import NotTrainable
+from glovecal_models.layout import Correspondence, Layout
+from glovecal_models.regression.rule_regressor import RuleRegressor
+from glovecal_models.regression.training_check import check_samples
+from glovecal_models.takes.take import Take
+
+
+@dataclass(frozen=True)
+class TrainingPlan:
+    """What will be fitted, and the sentences that say how the samples were chosen."""
+
+    layout: Layout
+    subject: str
+    settings: TrainingSettings
+    tasks: tuple[FitTask, ...]
+    correspondences: Mapping[str, Correspondence]
+    """Of each trained rotation; for a linear model its measuring sensor alone."""
+    rules: Mapping[str, RuleRegressor]
+    ranges: Mapping[str, tuple[np.ndarray, np.ndarray]]
+    sentences: tuple[str, ...]
+    take_count: int
+    simulated: bool
+
+
+def plan_training(
+    takes: Sequence[Take], layout: Layout, subject: str, settings: TrainingSettings | None = None
+) -> TrainingPlan:
+    """Gather samples, choose representatives, lay out the folds. Raises NotTrainable, LayoutMismatch.
+
+    A rotation that no take measured is left out of the model, unless the layout gives it a rule whose
+    rotations are trained; the plan's sentences say which.
+    """
+    settings = settings or TrainingSettings()
+    if settings.method not in METHODS:
+        raise NotTrainable(f"unknown method {settings.method!r}; known are {', '.join(METHODS)}")
+    for take in takes:
+        require_layout(take, layout)
+    tasks: list[FitTask] = []
+    chosen: dict[str, Correspondence] = {}
+    ranges: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+    unmeasured: list[Correspondence] = []
+    for correspondence in layout.correspondences:
+        if settings.method == "linear":
+            correspondence = linear_correspondence(correspondence)
+        samples = gather_samples(takes, correspondence)
+        if len(samples) == 0:
+            unmeasured.append(correspondence)
+            continue
+        check_samples(samples.inputs, samples.target, correspondence.inputs)
+        chosen[correspondence.rotation] = correspondence
+        ranges[correspondence.rotation] = (samples.inputs.min(axis=0), samples.inputs.max(axis=0))
+        tasks.extend(_tasks(correspondence, samples, settings))
+    if not tasks:
+        raise NotTrainable(
+            f"no reference angle for any rotation of layout {layout.name!r} in {len(takes)} takes; "
+            "import takes with r.ROTATION columns"
+        )
+    rules = _rules(unmeasured, chosen)
+    return TrainingPlan(
+        layout=layout,
+        subject=subject,
+        settings=settings,
+        tasks=tuple(tasks),
+        correspondences=chosen,
+        rules=rules,
+        ranges=ranges,
+        sentences=tuple(_sentences(takes, tasks, unmeasured, rules)),
+        take_count=len(takes),
+        simulated=any(take.simulated for take in takes),
+    )
+
+
+def _tasks(correspondence: Correspondence, samples: Samples, settings: TrainingSettings) -> list[FitTask]:
+    tasks = [_task(correspondence, samples, None, settings)]
+    for number, fold in enumerate(folds_over_takes(samples.take, settings.folds)):
+        kept = samples.select(~fold.held_out)
+        try:
+            check_samples(kept.inputs, kept.target, correspondence.inputs)
+        except NotTrainable:
+            continue  # what is left of the fold cannot carry a model: it says nothing about the error
+        task = _task(correspondence, kept, number, settings, held_out=samples.select(fold.held_out))
+        tasks.append(task)
+    return tasks
+
+
+def _task(
+    correspondence: Correspondence,
+    samples: Samples,
+    fold: int | None,
+    settings: TrainingSettings,
+    held_out: Samples | None = None,
+) -> FitTask:
+    if settings.method == "linear":
+        samples = linear_samples(samples)
+    index = representative_index(samples, settings.samples, seed=settings.seed)
+    return FitTask(
+        rotation=correspondence.rotation,
+        fold=fold,
+        inputs=samples.inputs[index],
+        target=samples.target[index],
+        held_out_inputs=held_out.inputs if held_out else np.empty((0, samples.inputs.shape[1])),
+        held_out_target=held_out.target if held_out else np.empty(0),
+        sensors=correspondence.inputs,
+        settings=settings,
+    )
+
+
+def _rules(
+    unmeasured: Sequence[Correspondence], trained: Mapping[str, Correspondence]
+) -> dict[str, RuleRegressor]:
+    rules = {}
+    for correspondence in unmeasured:
+        expression = correspondence.simulated
+        if expression and all(name in trained for name in expression.sensors):
+            weights = expression.weights(expression.sensors)
+            rules[correspondence.rotation] = RuleRegressor(expression.sensors, weights)
+    return rules
+
+
+def _sentences(
+    takes: Sequence[Take],
+    tasks: Sequence[FitTask],
+    unmeasured: Sequence[Correspondence],
+    rules: Mapping[str, RuleRegressor],
+) -> list[str]:
+    largest = max(len(task.target) for task in tasks if task.fold is None)
+    frames = sum(len(take.time_s) for take in takes)
+    sentences = [
+        f"Trained from {len(takes)} takes with {frames} frames; at most {largest} samples a rotation were "
+        "chosen, spread evenly over readings, angles and takes."
+    ]
+    if rules:
+        sentences.append(f"No take measured {', '.join(rules)}: computed by the layout's rule.")
+    left_out = [item.rotation for item in unmeasured if item.rotation not in rules]
+    if left_out:
+        sentences.append(f"No take measured {', '.join(left_out)}: left out of the model.")
+    return sentences

@@ -1,0 +1,28 @@
+"""How to train: the choices a caller may make, with defaults that work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from glovecal_models.calibration.representative import DEFAULT_SAMPLES
+
+Method = Literal["linear", "lmc_gpr", "spgp"]
+METHODS: tuple[Method, ...] = ("linear", "lmc_gpr", "spgp")
+Report = Callable[[str, float], None]
+"""Called with a sentence and the fraction done, 0 to 1."""
+
+
+@dataclass(frozen=True)
+class TrainingSettings:
+    """How to train. The defaults suit a CyberGlove; all of them enter each task's key."""
+
+    method: Method = "lmc_gpr"
+    samples: int = DEFAULT_SAMPLES
+    """Largest representative set for one rotation."""
+    folds: int = 3
+    """Held-out folds for the error estimate; 0 trains without one."""
+    pseudo_inputs: int = 100
+    iterations: int = 200
+    seed: int = 0
