@@ -1,0 +1,81 @@
+#!/usr/bin/env python3
+"""Glovecal's verbs. Needs python3 and pip, nothing else:
+
+    python3 do.py demo      calibrate a simulated glove over real zenoh, in under two minutes
+    python3 do.py serve     run the service (real time, REST) on this machine
+    python3 do.py glovecal  the command line: python3 do.py glovecal take list
+    python3 do.py test      the test suite
+    python3 do.py check     format, lint, types
+    python3 do.py bench     speed against other libraries, as ratios, with a picture
+
+uv is installed into .tools and the locked packages into .venv; nothing outside this folder is touched.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent
+TOOLS = ROOT / ".tools"
+ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+
+
+def uv() -> list[str]:
+    """The uv command, installed into .tools when it is not there yet."""
+    if not (TOOLS / "uv").is_dir():
+        print("installing uv into .tools ...", file=sys.stderr)
+        pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+        subprocess.run([*pip, "--target", str(TOOLS), "uv"], check=True)
+    return [str(TOOLS / "bin" / "uv")]
+
+
+def run(*command: str, groups: tuple[str, ...] = (), dev: bool = False) -> int:
+    """Run a command in the locked environment."""
+    options = ["run", "--frozen", "--all-packages", "--no-default-groups"]
+    for group in (*groups, *(("dev",) if dev else ())):
+        options += ["--group", group]
+    quiet = ["--quiet"] if (ROOT / ".venv").is_dir() else []
+    environment = {**os.environ, **ONE_THREAD, "UV_PYTHON_PREFERENCE": "only-system"}
+    return subprocess.run([*uv(), *quiet, *options, *command], cwd=ROOT, env=environment).returncode
+
+
+def demo(arguments: list[str]) -> int:
+    return run("glovecal", "demo", *arguments)
+
+
+def serve(arguments: list[str]) -> int:
+    return run("glovecal", "serve", *arguments)
+
+
+def glovecal(arguments: list[str]) -> int:
+    return run("glovecal", *arguments)
+
+
+def test(arguments: list[str]) -> int:
+    return run("pytest", *arguments, dev=True)
+
+
+def check(arguments: list[str]) -> int:
+    steps = (["ruff", "format", "--check", "."], ["ruff", "check", "."], ["pyright", *arguments])
+    return max(run(*step, dev=True) for step in steps)
+
+
+def bench(arguments: list[str]) -> int:
+    return run("python", "tests/bench/bench.py", *arguments, groups=("bench",))
+
+
+VERBS = {"demo": demo, "serve": serve, "glovecal": glovecal, "test": test, "check": check, "bench": bench}
+
+
+def main(arguments: list[str]) -> int:
+    if not arguments or arguments[0] not in VERBS:
+        print(__doc__)
+        return 0 if not arguments or arguments[0] in ("help", "-h", "--help") else 2
+    return VERBS[arguments[0]](arguments[1:])
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,82 @@
+"""The arrows of design.md: service -> models, service -> client; models and client know neither each other
+nor the service. Checked on the source, and by importing each distribution with the others forbidden."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCES = {
+    "models": ROOT / "models" / "glovecal_models",
+    "client": ROOT / "client" / "glovecal_client",
+    "service": ROOT / "service" / "glovecal_service",
+}
+FORBIDDEN = {
+    "models": {
+        "glovecal_client", "glovecal_service", "zenoh", "fastapi", "starlette", "uvicorn", "httpx",
+        "requests", "socket", "http", "urllib", "serial", "sqlalchemy", "distributed", "pydantic",
+    },
+    "client": {
+        "glovecal_models", "glovecal_service", "scipy", "fastapi", "starlette", "uvicorn", "pydantic",
+        "sqlalchemy", "distributed", "safetensors",
+    },
+    "service": set(),
+}  # fmt: skip
+PICKLES = {"pickle", "cPickle", "dill", "cloudpickle", "joblib", "shelve", "marshal"}
+
+
+def imports(path: Path) -> set[str]:
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            found.add(node.module.split(".")[0])
+    return found
+
+
+@pytest.mark.parametrize("distribution", SOURCES)
+def test_no_forbidden_import(distribution):
+    for path in sorted(SOURCES[distribution].rglob("*.py")):
+        wrong = imports(path) & (FORBIDDEN[distribution] | PICKLES)
+        assert not wrong, f"{path.relative_to(ROOT)} imports {sorted(wrong)}"
+
+
+@pytest.mark.parametrize("distribution", ["models", "client"])
+def test_every_module_imports_without_what_it_must_not_need(distribution):
+    """Optional extras (pyarrow, pyserial, httpx) must not be needed just to import a module."""
+    package = SOURCES[distribution]
+    names = [
+        ".".join(path.relative_to(package.parent).with_suffix("").parts)
+        for path in sorted(package.rglob("*.py"))
+        if path.name not in ("__init__.py", "env.py") and "migrations" not in path.parts
+    ]
+    blocked = sorted(
+        (FORBIDDEN[distribution] - {"socket", "http", "urllib"}) | {"pyarrow", "serial", "httpx"}
+    )
+    program = f"""
+import importlib, sys
+class Block:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in {blocked!r}:
+            raise ImportError("blocked: " + name)
+sys.meta_path.insert(0, Block())
+for name in {names!r}:
+    importlib.import_module(name)
+"""
+    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120)
+    assert result.returncode == 0, result.stderr
+
+
+def test_eval_and_exec_are_not_used():
+    for package in SOURCES.values():
+        for path in package.rglob("*.py"):
+            calls = [
+                node.func.id
+                for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+                if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+            ]
+            assert not {"eval", "exec", "compile"} & set(calls), path
