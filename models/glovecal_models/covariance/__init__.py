@@ -1,0 +1,1 @@
+"""Covariance functions of the calibration models; they compose with ``+``."""

@@ -1,0 +1,5 @@
+"""All built-in covariances, imported in one place so that an artifact can name any of them."""
+
+from glovecal_models.covariance.squared_exponential_ard import SquaredExponentialArd
+
+__all__ = ["SquaredExponentialArd"]

@@ -1,0 +1,90 @@
+"""What every trainer refuses before it starts, each with a sentence a user can act on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from glovecal_models.errors import NotTrainable
+
+_RELATIVE_STILLNESS = 1e-12
+
+
+def check_samples(
+    inputs: np.ndarray,
+    target: np.ndarray,
+    sensor_names: Sequence[str] | None = None,
+    *,
+    least: int | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return inputs (N, D) and target (N,) as float64, or raise NotTrainable.
+
+    ``least`` is the smallest usable number of samples (default: 3 (D + 1), at least 10).
+    Duplicate and collinear rows are welcome: 8-bit sensors always give them.
+    """
+    inputs, target = _as_numbers(inputs, "readings"), _as_numbers(target, "reference angles")
+    if inputs.ndim != 2 or target.shape != inputs.shape[:1] or inputs.shape[1] == 0:
+        raise NotTrainable(
+            f"readings have shape {inputs.shape} and reference angles {target.shape}; "
+            "expected (N, D) with at least one sensor, and (N,)"
+        )
+    names = _names(sensor_names, inputs.shape[1])
+    _check_finite(inputs, target, names)
+    _check_enough(len(target), inputs.shape[1], least)
+    for column, name in enumerate(names):
+        if _is_still(inputs[:, column]):
+            raise NotTrainable(
+                f"sensor {name} reads {inputs[0, column]:g} in all {len(target)} samples; "
+                "move the joint while recording, or take the sensor out of the correspondence"
+            )
+    if _is_still(target):
+        raise NotTrainable(
+            f"the reference angle is {target[0]:g} degrees in all {len(target)} samples; "
+            "a map can only be learned from a joint that moves"
+        )
+    return inputs, target
+
+
+def _as_numbers(values: np.ndarray, what: str) -> np.ndarray:
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise NotTrainable(f"{what} are not numbers: {error}") from None
+
+
+def _names(sensor_names: Sequence[str] | None, dimensions: int) -> list[str]:
+    if sensor_names is None:
+        return [f"number {column}" for column in range(1, dimensions + 1)]
+    if len(sensor_names) != dimensions:
+        raise NotTrainable(f"{len(sensor_names)} sensor names for {dimensions} columns of readings")
+    return list(sensor_names)
+
+
+def _check_finite(inputs: np.ndarray, target: np.ndarray, names: list[str]) -> None:
+    bad = np.argwhere(~np.isfinite(inputs))
+    if len(bad):
+        row, column = bad[0]
+        raise NotTrainable(
+            f"sensor {names[column]} reads {inputs[row, column]} in sample {row + 1}; "
+            f"{len(bad)} of {inputs.size} readings are not finite, training needs all of them"
+        )
+    bad_rows = np.flatnonzero(~np.isfinite(target))
+    if len(bad_rows):
+        raise NotTrainable(
+            f"the reference angle is {target[bad_rows[0]]} in sample {bad_rows[0] + 1}; "
+            f"leave out the {len(bad_rows)} samples where it was not measured"
+        )
+
+
+def _check_enough(samples: int, dimensions: int, least: int | None) -> None:
+    least = max(10, 3 * (dimensions + 1)) if least is None else least
+    if samples < least:
+        raise NotTrainable(
+            f"{samples} samples are too few for {dimensions} sensor{'s' if dimensions > 1 else ''}; "
+            f"at least {least} are needed"
+        )
+
+
+def _is_still(column: np.ndarray) -> bool:
+    return float(np.ptp(column)) <= _RELATIVE_STILLNESS * float(np.abs(column).max())
