@@ -1,0 +1,173 @@
+"""Reading a take table from CSV: UTF-8 (with or without a mark at its start), commas, decimal points."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from glovecal_models.errors import BadTakeTable
+from glovecal_models.takes.columns import Column, parse_header
+from glovecal_models.takes.raw_table import (
+    MOST_CELLS,
+    RawTable,
+    unusable_number,
+    unusable_text,
+    what_is_right,
+)
+
+_ROWS_AT_ONCE = 4096
+_FOREIGN_STARTS = {
+    b"\xff\xfe": "UTF-16 text; save it as UTF-8",
+    b"\xfe\xff": "UTF-16 text; save it as UTF-8",
+    b"PK\x03\x04": "a spreadsheet or archive; export it as CSV",
+    b"\x1f\x8b": "compressed with gzip; unpack it first",
+}
+
+
+def read_csv_table(path: Path) -> RawTable:
+    """The whole table, every cell checked. Raises BadTakeTable with file, line, column and value."""
+    _refuse_foreign_start(path)
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            return _read(csv.reader(stream, strict=True), path.name)
+    except UnicodeDecodeError as error:
+        raise _undecodable(path) from error
+
+
+def _read(reader, file: str) -> RawTable:  # csv.reader's type has no public name
+    rows = _numbered_rows(reader, file)
+    first = next(rows, None)
+    if first is None:
+        raise BadTakeTable("the file is empty", file=file)
+    columns = _parse_csv_header(first[1], file)
+    numbers: dict[str, list[np.ndarray]] = {c.header: [] for c in columns if not c.is_text}
+    texts: dict[str, list[str]] = {c.header: [] for c in columns if c.is_text}
+    lines: list[int] = []
+    while batch := list(islice(rows, _ROWS_AT_ONCE)):
+        at = [line for line, _ in batch]
+        cells = [row for _, row in batch]
+        _require_full_rows(cells, at, columns, file)
+        for column, values in zip(columns, zip(*cells, strict=True), strict=True):
+            if column.is_text:
+                texts[column.header].extend(_checked_texts(column, values, at, file))
+            else:
+                numbers[column.header].append(_parse_numbers(column, values, at, file))
+        lines.extend(at)
+        if len(lines) * len(columns) > MOST_CELLS:
+            raise BadTakeTable(f"more than {MOST_CELLS} cells; divide it into several files", file=file)
+    if not lines:
+        raise BadTakeTable("only a header, no rows", file=file, line=1)
+    joined = {header: np.concatenate(parts) for header, parts in numbers.items()}
+    return RawTable(file, tuple(columns), joined, texts, np.array(lines))
+
+
+def _numbered_rows(reader, file: str) -> Iterator[tuple[int, list[str]]]:
+    """Rows with the line each begins on; blank lines are passed over."""
+    begins = 1
+    while True:
+        try:
+            row = next(reader)
+        except StopIteration:
+            return
+        except csv.Error as error:
+            raise BadTakeTable(
+                f"cannot be read as CSV: {error}; a quote may be unclosed", file=file, line=begins
+            ) from error
+        if row:
+            yield begins, row
+        begins = reader.line_num + 1
+
+
+def _parse_csv_header(headers: Sequence[str], file: str) -> list[Column]:
+    for mark, name in ((";", "semicolons"), ("\t", "tabs")):
+        if len(headers) == 1 and mark in headers[0]:
+            raise BadTakeTable(
+                f"columns are separated by {name}; save the table with commas between columns "
+                "and points in decimal numbers",
+                file=file,
+                line=1,
+            )
+    return parse_header(headers, file)
+
+
+def _require_full_rows(
+    rows: Sequence[Sequence[str]], lines: Sequence[int], columns: Sequence[Column], file: str
+) -> None:
+    width = len(columns)
+    for row, line in zip(rows, lines, strict=True):
+        if len(row) != width:
+            decimal = " (decimal commas? write points)" if len(row) > width else ""
+            raise BadTakeTable(
+                f"{len(row)} cells, but the header has {width} columns{decimal}", file=file, line=line
+            )
+
+
+def _parse_numbers(column: Column, cells: Sequence[str], lines: Sequence[int], file: str) -> np.ndarray:
+    filled = [cell or "nan" for cell in cells] if column.may_be_empty and "" in cells else cells
+    together = "".join(cells)
+    plain = together.isascii() and "_" not in together  # float() also reads 1_000 and other scripts' digits
+    try:
+        if not plain:
+            raise ValueError
+        values = np.fromiter(map(float, filled), float, len(filled))
+    except ValueError:
+        index = next(i for i, cell in enumerate(filled) if not _is_number(cell))
+        raise _bad_cell(column, cells[index], lines[index], file) from None
+    unusable = unusable_number(column, values)
+    if unusable is not None:
+        raise _bad_cell(column, cells[unusable], lines[unusable], file)
+    return values
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return cell.isascii() and "_" not in cell
+
+
+def _bad_cell(column: Column, cell: str, line: int, file: str) -> BadTakeTable:
+    if not cell.strip():
+        found = "the cell is empty"
+    elif _is_number(cell):
+        found = f"{cell.strip()[:60]} is not finite"
+    else:
+        shown = cell if len(cell) <= 60 else f"{cell[:60]}... ({len(cell)} characters)"
+        found = f"{shown!r} is not a number"
+        if _is_number(cell.replace(",", ".", 1)):
+            found += " (write a decimal point, not a comma)"
+    return BadTakeTable(f"{found}; {what_is_right(column)}", file=file, line=line, column=column.header)
+
+
+def _checked_texts(column: Column, texts: Sequence[str], lines: Sequence[int], file: str) -> Sequence[str]:
+    unusable = unusable_text(column, texts)
+    if unusable is not None:
+        index, problem = unusable
+        raise BadTakeTable(problem, file=file, line=lines[index], column=column.header)
+    return texts
+
+
+def _refuse_foreign_start(path: Path) -> None:
+    with path.open("rb") as stream:
+        start = stream.read(4)
+    for mark, what in _FOREIGN_STARTS.items():
+        if start.startswith(mark):
+            raise BadTakeTable(f"this is {what}", file=path.name)
+
+
+def _undecodable(path: Path) -> BadTakeTable:
+    with path.open("rb") as stream:
+        for line, content in enumerate(stream, start=1):
+            try:
+                content.decode("utf-8")
+            except UnicodeDecodeError as error:
+                byte = content[error.start]
+                return BadTakeTable(
+                    f"byte 0x{byte:02x} is not UTF-8 text; save the table as UTF-8", file=path.name, line=line
+                )
+    return BadTakeTable("not UTF-8 text; save the table as UTF-8", file=path.name)

@@ -1,0 +1,81 @@
+"""A take table as it stands in a file: checked columns, not yet divided into takes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from glovecal_models.errors import BadTakeTable
+from glovecal_models.takes.columns import Column, ColumnKind
+
+MOST_CELLS = 50_000_000
+"""Larger tables are refused: about three hours of an 18-sensor glove with its reference at 120 Hz."""
+LONGEST_TEXT = 200
+
+
+@dataclass(frozen=True)
+class RawTable:
+    """Columns of equal length; numbers are float64 with NaN where a cell was empty."""
+
+    file: str
+    columns: tuple[Column, ...]
+    numbers: dict[str, np.ndarray]
+    texts: dict[str, list[str]]
+    lines: np.ndarray | None
+    """Line of each row in the file (1 is the header), None where a file has no lines."""
+
+    @property
+    def time_s(self) -> np.ndarray:
+        return self.numbers["time_s"]
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def names(self, kind: ColumnKind) -> tuple[str, ...]:
+        return tuple(column.name for column in self.columns if column.kind == kind)
+
+    def matrix(self, kind: ColumnKind, rows: np.ndarray) -> np.ndarray:
+        """The columns of one kind at ``rows``, shape (len(rows), number of columns)."""
+        headers = [column.header for column in self.columns if column.kind == kind]
+        if not headers:
+            return np.empty((len(rows), 0))
+        return np.column_stack([self.numbers[header][rows] for header in headers])
+
+    def error(self, problem: str, *, row: int | None = None, column: str | None = None) -> BadTakeTable:
+        """An error that names this file, the row's line and the column."""
+        if row is not None and self.lines is None:
+            problem = f"row {row + 1}: {problem}"
+        line = int(self.lines[row]) if row is not None and self.lines is not None else None
+        return BadTakeTable(problem, file=self.file, line=line, column=column)
+
+
+def unusable_number(column: Column, values: np.ndarray) -> int | None:
+    """Index of the first number the column must not hold, None if all are fine."""
+    bad = np.isinf(values) if column.may_be_empty else ~np.isfinite(values)
+    return int(np.argmax(bad)) if bad.any() else None
+
+
+def what_is_right(column: Column) -> str:
+    """What a cell of this numerical column should hold, as the end of a sentence."""
+    if column.kind == "time":
+        return "write the time in seconds"
+    if column.kind == "sensor":
+        return "every frame needs a finite reading"
+    return "write a number, or leave it empty where nothing was measured"
+
+
+def unusable_text(column: Column, texts: Sequence[str]) -> tuple[int, str] | None:
+    """Index and problem of the first text the column must not hold, None if all are fine."""
+    for text in dict.fromkeys(texts):
+        problem = ""
+        if len(text) > LONGEST_TEXT:
+            problem = f"a text of {len(text)} characters; at most {LONGEST_TEXT} are kept"
+        elif not text.isprintable():
+            problem = f"{text!r} holds characters that cannot be printed"
+        elif column.kind == "take" and not text.strip():
+            problem = "is empty; every row needs the name of its take"
+        if problem:
+            return list(texts).index(text), problem
+    return None
