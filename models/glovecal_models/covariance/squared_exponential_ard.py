@@ -20,7 +20,7 @@ class SquaredExponentialArd(Covariance):
         return ["log_signal_variance", *(f"log_relevance_{d}" for d in range(1, dimensions + 1))]
 
     def bounds(self, dimensions: int) -> list[tuple[float, float]]:
-        return [(-14.0, 14.0), *[(-14.0, 7.0)] * dimensions]
+        return [(-14.0, 9.0), *[(-14.0, 7.0)] * dimensions]
 
     def initial(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Half the target's variance, lengthscales of about the whole spread of the points."""

@@ -1,0 +1,145 @@
+"""Linear calibration: a plane through the samples, the baseline and a new subject's first model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.linalg import cholesky, lstsq, solve_triangular
+
+from glovecal_models.errors import BadInput, Cancelled, DamagedArtifact
+from glovecal_models.regression.regressor import Prediction
+from glovecal_models.regression.standardise import standardise
+from glovecal_models.regression.training_check import check_samples
+
+_PRIOR_SLOPE = 10.0
+"""How steep a direction nobody moved in could be, in target deviations per input deviation."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearRegressor:
+    """mean = slope . x + intercept, variance = |[x 1] @ variance_root|^2, x = (inputs - shift) / scale."""
+
+    input_shift: np.ndarray
+    """(D,), counts."""
+    input_scale: np.ndarray
+    """(D,), counts per working unit, positive."""
+    slope: np.ndarray
+    """(D,), degrees per working unit."""
+    intercept: float
+    """Degrees."""
+    variance_root: np.ndarray
+    """(D + 1, D + 1), root of the posterior covariance of slope and intercept, degrees."""
+    noise_variance: float
+    evidence: dict[str, Any] = field(default_factory=dict)
+    method: str = field(default="linear", init=False)
+
+    def predict(self, inputs: np.ndarray) -> Prediction:
+        """Mean and variance (without noise) at raw inputs (N, D); raises BadInput on a wrong shape."""
+        inputs = np.asarray(inputs, dtype=float)
+        if inputs.ndim != 2 or inputs.shape[1] != len(self.input_shift):
+            raise BadInput(f"readings have shape {inputs.shape}, expected (N, {len(self.input_shift)})")
+        x = (inputs - self.input_shift) / self.input_scale
+        spread = x @ self.variance_root[:-1] + self.variance_root[-1]
+        return Prediction(x @ self.slope + self.intercept, np.einsum("nr,nr->n", spread, spread))
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        return {name: np.ascontiguousarray(getattr(self, name), dtype=float) for name in _ARRAYS}
+
+    def settings(self) -> dict[str, Any]:
+        return {
+            "method": self.method,
+            "intercept": self.intercept,
+            "noise_variance": self.noise_variance,
+            "evidence": self.evidence,
+        }
+
+    @classmethod
+    def restore(cls, arrays: Mapping[str, np.ndarray], settings: Mapping[str, Any]) -> LinearRegressor:
+        """Inverse of ``arrays`` and ``settings``; raises DamagedArtifact on anything that does not fit."""
+        if set(arrays) != set(_ARRAYS):
+            raise DamagedArtifact(f"arrays are {sorted(arrays)}, expected {sorted(_ARRAYS)}")
+        dimensions = arrays["input_shift"].size
+        for name, array in arrays.items():
+            shape = (dimensions + 1,) * 2 if name == "variance_root" else (dimensions,)
+            if array.shape != shape or array.dtype != np.float64 or not np.isfinite(array).all():
+                raise DamagedArtifact(
+                    f"{name} is {array.dtype} {array.shape}, expected finite float64 {shape}"
+                )
+        if dimensions == 0 or not (arrays["input_scale"] > 0).all():
+            raise DamagedArtifact("input_scale must hold one positive number per sensor")
+        if settings.get("method") != "linear":
+            raise DamagedArtifact(f"method is {settings.get('method')!r}, expected linear")
+        evidence = settings.get("evidence", {})
+        if not isinstance(evidence, Mapping):
+            raise DamagedArtifact(f"evidence is {evidence!r}, expected an object")
+        return cls(
+            **arrays,
+            intercept=_number(settings, "intercept", -np.inf),
+            noise_variance=_number(settings, "noise_variance", 0.0),
+            evidence=dict(evidence),
+        )
+
+
+_ARRAYS = ("input_shift", "input_scale", "slope", "variance_root")
+
+
+def fit_linear(
+    inputs: np.ndarray,
+    target: np.ndarray,
+    *,
+    sensor_names: Sequence[str] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+    report: Callable[[str, float], None] | None = None,
+) -> LinearRegressor:
+    """Least squares, of least norm where collinear sensors leave it open; inputs (N, D), target (N,) degrees.
+
+    The mean has no ridge. The variance is the posterior of the plane under a slope prior so wide that it
+    only shows in directions the samples never moved in: there the plane is unknown, and says so.
+    Raises NotTrainable (at least D + 2 samples), Cancelled.
+    """
+    if cancelled is not None and cancelled():
+        raise Cancelled("training was stopped before the linear fit")
+    dimensions = np.shape(inputs)[1] if np.ndim(inputs) == 2 else 1
+    working = standardise(*check_samples(inputs, target, sensor_names, least=dimensions + 2))
+    basis = np.column_stack([working.x, np.ones(len(working.y))])
+    solution = lstsq(basis, working.y, cond=1e-10)
+    assert solution is not None
+    coefficients, rank = solution[0], int(solution[2])
+    residual = working.y - basis @ coefficients
+    noise = float(residual @ residual) / max(len(residual) - rank, 1)
+    scale = working.target_scale
+    if report is not None:
+        report("plane fitted", 1.0)
+    return LinearRegressor(
+        input_shift=working.input_shift,
+        input_scale=working.input_scale,
+        slope=scale * coefficients[:-1],
+        intercept=working.target_shift + scale * float(coefficients[-1]),
+        variance_root=scale * _posterior_root(basis, noise),
+        noise_variance=noise * scale**2,
+        evidence={"trainer": "linear", "samples": len(residual), "rank": rank},
+    )
+
+
+def _posterior_root(basis: np.ndarray, noise: float) -> np.ndarray:
+    """Root of (B^T B / noise + I / prior^2)^-1, computed without dividing by a noise of zero."""
+    noise = max(noise, 1e-12)
+    precision = basis.T @ basis + noise / _PRIOR_SLOPE**2 * np.eye(basis.shape[1])
+    precision += 1e-14 * len(basis) * np.eye(basis.shape[1])
+    lower = cholesky(precision, lower=True)
+    return np.sqrt(noise) * solve_triangular(lower, np.eye(len(lower)), lower=True).T
+
+
+def _number(settings: Mapping[str, Any], name: str, least: float) -> float:
+    value = settings.get(name)
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, (int, float))
+        or not np.isfinite(value)
+        or value < least
+    ):
+        raise DamagedArtifact(f"{name} is {value!r}, expected a finite number of at least {least:g}")
+    return float(value)
