@@ -1,0 +1,1 @@
+"""Runs queued jobs in worker processes; the database is the only memory."""

@@ -1,0 +1,63 @@
+"""The service's settings: environment variables ``GLOVECAL_*``, each with a default that is safe alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import Field, field_validator
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from glovecal_models.names import check_identifier
+
+
+class Settings(BaseSettings):
+    """Where data is kept, where the service listens, and how much it may take."""
+
+    model_config = SettingsConfigDict(env_prefix="GLOVECAL_", frozen=True, extra="ignore")
+
+    data: Path = Path("glovecal-data")
+    """Folder of the database, artifacts, uploads, recordings and fits."""
+    database: str | None = None
+    """SQLAlchemy URL, such as ``postgresql+psycopg://user@host/glovecal``; None: SQLite in ``data``."""
+    artifacts: str | None = None
+    """Object store URL, such as ``s3://bucket/prefix``; None: the folder ``artifacts`` in ``data``."""
+    zenoh: str = "tcp/127.0.0.1:7447"
+    """Endpoint of the router that the service runs."""
+    site: str = "lab"
+    """Second part of every zenoh key."""
+    host: str = "127.0.0.1"
+    port: int = Field(8600, ge=0, le=65535)
+    workers: int = Field(2, ge=1, le=256)
+    """Training processes, one thread each."""
+    scheduler: str | None = None
+    """Address of a Dask scheduler whose workers share ``data``; None: workers of our own, started lazily."""
+    upload_limit_mb: int = Field(256, ge=1)
+
+    @field_validator("site")
+    @classmethod
+    def _site_fits_into_a_key(cls, site: str) -> str:
+        return check_identifier(site, "GLOVECAL_SITE")
+
+    @property
+    def database_url(self) -> str:
+        return self.database or f"sqlite:///{self.data.resolve() / 'glovecal.sqlite3'}"
+
+    @property
+    def artifacts_folder(self) -> Path:
+        return self.data / "artifacts"
+
+    @property
+    def uploads_folder(self) -> Path:
+        return self.data / "uploads"
+
+    @property
+    def recordings_folder(self) -> Path:
+        return self.data / "recordings"
+
+    @property
+    def fits_folder(self) -> Path:
+        return self.data / "fits"
+
+    @property
+    def upload_limit_bytes(self) -> int:
+        return self.upload_limit_mb * 1_000_000

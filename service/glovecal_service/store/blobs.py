@@ -1,0 +1,159 @@
+"""Where artifacts lie: a local folder, or an object store such as S3 through obstore.
+
+obstore has a local store too, but that one renames without ``fsync`` (seen with strace, version 0.12.1): a
+power cut could leave an empty file under the right name. So the folder is written here.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Protocol
+
+import obstore
+import obstore.store
+
+from glovecal_models.errors import BadInput
+from glovecal_service.store.errors import StorageFull, StoreUnavailable
+
+TEMPORARY = ".writing-"
+ABANDONED_AFTER_S = 600.0
+"""A temporary file this old belongs to a process that was killed."""
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
+class Blobs(Protocol):
+    """Named byte strings, written whole or not at all."""
+
+    @property
+    def place(self) -> str:
+        """For messages: the folder or URL."""
+        ...
+
+    def write(self, name: str, content: bytes) -> None:
+        """Replace or create. Raises StorageFull."""
+        ...
+
+    def read(self, name: str) -> bytes | None:
+        """The content, None if there is none."""
+        ...
+
+    def exists(self, name: str) -> bool: ...
+
+
+class FolderBlobs:
+    """A local folder: temporary file, fsync, rename, fsync of the folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        with full_disk_named(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+        self._sweep()
+
+    @property
+    def place(self) -> str:
+        return str(self._folder)
+
+    def write(self, name: str, content: bytes) -> None:
+        write_durably(self._folder / name, content)
+
+    def read(self, name: str) -> bytes | None:
+        try:
+            return (self._folder / name).read_bytes()
+        except FileNotFoundError:
+            return None
+
+    def exists(self, name: str) -> bool:
+        return (self._folder / name).is_file()
+
+    def _sweep(self) -> None:
+        for leftover in self._folder.glob(f"{TEMPORARY}*"):
+            with suppress(OSError):
+                if time.time() - leftover.stat().st_mtime > ABANDONED_AFTER_S:
+                    leftover.unlink()
+
+
+class ObjectBlobs:
+    """A bucket or a prefix of one: ``s3://bucket/prefix``, credentials from the usual environment."""
+
+    def __init__(self, url: str) -> None:
+        try:
+            self._store = obstore.store.from_url(url)
+        except (obstore.exceptions.BaseError, ValueError, TypeError) as error:
+            raise BadInput(f"GLOVECAL_ARTIFACTS: {url!r} is not an object store: {error}") from error
+        self._url = url
+
+    @property
+    def place(self) -> str:
+        return self._url
+
+    def write(self, name: str, content: bytes) -> None:
+        with self._answering():
+            obstore.put(self._store, name, content)
+
+    def read(self, name: str) -> bytes | None:
+        with self._answering():
+            try:
+                return bytes(obstore.get(self._store, name).bytes())
+            except (FileNotFoundError, obstore.exceptions.NotFoundError):
+                return None
+
+    def exists(self, name: str) -> bool:
+        with self._answering():
+            try:
+                obstore.head(self._store, name)
+            except (FileNotFoundError, obstore.exceptions.NotFoundError):
+                return False
+            return True
+
+    @contextmanager
+    def _answering(self) -> Iterator[None]:
+        try:
+            yield
+        except obstore.exceptions.BaseError as error:
+            raise StoreUnavailable(f"the object store {self._url} does not answer: {error}") from error
+
+
+def write_durably(path: Path, content: bytes) -> None:
+    """Write ``content`` so that ``path`` holds all of it or is untouched, also after a power cut.
+
+    Raises StorageFull; then nothing is left behind.
+    """
+    temporary = path.parent / f"{TEMPORARY}{secrets.token_hex(8)}"
+    with full_disk_named(path.parent):
+        try:
+            with temporary.open("xb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.replace(path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+        _sync_folder(path.parent)
+
+
+@contextmanager
+def full_disk_named(folder: Path) -> Iterator[None]:
+    """Turn "no space left" into StorageFull."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in _NO_ROOM:
+            raise
+        raise StorageFull(f"no room left in {folder}; nothing was changed: free some disk space") from error
+
+
+def _sync_folder(folder: Path) -> None:
+    if os.name != "posix":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

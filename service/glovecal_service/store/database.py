@@ -1,0 +1,129 @@
+"""The connection to SQLite or PostgreSQL: how transactions begin, and what their failures mean.
+
+SQLite (https://sqlite.org/wal.html, https://sqlite.org/pragma.html): write-ahead log so that readers
+and one writer do not wait for each other; ``synchronous=FULL`` so that an acknowledged write survives a
+power cut; ``BEGIN IMMEDIATE`` for writing so that a transaction waits for the lock at its start instead of
+failing in its middle. Python's own transaction handling is switched off (``isolation_level=None``), or
+schema changes would commit half-way.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection, Engine, create_engine, event, make_url
+from sqlalchemy.exc import (
+    ArgumentError,
+    DatabaseError,
+    InterfaceError,
+    NoSuchModuleError,
+    OperationalError,
+    StatementError,
+)
+
+from glovecal_models.errors import BadInput
+from glovecal_service.store.errors import StorageFull, StoreDamaged, StoreUnavailable
+
+BUSY_TIMEOUT_MS = 5000
+
+
+class Database:
+    """Opens transactions; translates the drivers' errors into those of the store."""
+
+    def __init__(self, url: str) -> None:
+        """Raises BadInput if the URL is not one of SQLite or PostgreSQL (through psycopg 3)."""
+        self.engine = _engine(url)
+        self.is_sqlite = self.engine.dialect.name == "sqlite"
+        self._writing = self.engine.execution_options(glovecal_begin="BEGIN IMMEDIATE")
+
+    @property
+    def file(self) -> Path | None:
+        """The SQLite file, None for a server or a database in memory."""
+        name = self.engine.url.database
+        return Path(name) if self.is_sqlite and name and name != ":memory:" else None
+
+    @contextmanager
+    def read(self) -> Iterator[Connection]:
+        """A transaction that sees one state of the database and changes nothing."""
+        with self._translated(), self.engine.begin() as connection:
+            yield connection
+
+    @contextmanager
+    def write(self) -> Iterator[Connection]:
+        """A transaction that is kept whole or not at all."""
+        with self._translated(), self._writing.begin() as connection:
+            yield connection
+
+    def close(self) -> None:
+        self.engine.dispose()
+
+    @contextmanager
+    def _translated(self) -> Iterator[None]:
+        try:
+            yield
+        except DatabaseError as error:
+            raise _meaning(error, self) from error
+        except InterfaceError as error:
+            raise StoreUnavailable(f"the database {self.name} cannot be used: {error.orig}") from error
+        except StatementError as error:
+            if isinstance(error.orig, ValueError | TypeError | UnicodeError):
+                raise BadInput(f"a value cannot be stored: {error.orig}") from error
+            raise
+
+    @property
+    def name(self) -> str:
+        """The URL without its password, for messages."""
+        return self.engine.url.render_as_string(hide_password=True)
+
+
+def _engine(url: str) -> Engine:
+    try:
+        parsed = make_url(url)
+        if parsed.drivername in ("postgresql", "postgres"):
+            parsed = parsed.set(drivername="postgresql+psycopg")
+        if parsed.drivername not in ("sqlite", "sqlite+pysqlite", "postgresql+psycopg"):
+            raise ArgumentError(f"driver {parsed.drivername!r} is not supported")
+        engine = create_engine(parsed, pool_pre_ping=True, json_serializer=_json, max_overflow=40)
+    except (ArgumentError, NoSuchModuleError, ModuleNotFoundError) as error:
+        raise BadInput(
+            f"GLOVECAL_DATABASE: {error}; use sqlite:///FILE or postgresql+psycopg://USER@HOST/DATABASE"
+        ) from error
+    if engine.dialect.name == "sqlite":
+        event.listen(engine, "connect", _configure_sqlite)
+        event.listen(engine, "begin", _begin_sqlite)
+    return engine
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, allow_nan=False, separators=(",", ":"))
+
+
+def _configure_sqlite(connection: sqlite3.Connection, _record: object) -> None:
+    connection.isolation_level = None
+    cursor = connection.cursor()
+    cursor.execute(f"PRAGMA busy_timeout = {BUSY_TIMEOUT_MS}")
+    cursor.execute("PRAGMA journal_mode = WAL")
+    cursor.execute("PRAGMA synchronous = FULL")
+    cursor.execute("PRAGMA foreign_keys = ON")
+    cursor.close()
+
+
+def _begin_sqlite(connection: Connection) -> None:
+    connection.exec_driver_sql(connection.get_execution_options().get("glovecal_begin", "BEGIN"))
+
+
+def _meaning(error: DatabaseError, database: Database) -> Exception:
+    name = database.name
+    text = str(error.orig)
+    if "disk is full" in text or getattr(error.orig, "sqlstate", None) == "53100":
+        return StorageFull(f"no room left for the database {name}; nothing was changed: free some disk space")
+    if "malformed" in text or "not a database" in text:
+        return StoreDamaged(f"the database {name} is damaged ({text}); restore a backup of it")
+    if isinstance(error, OperationalError):
+        return StoreUnavailable(f"the database {name} does not answer now: {text.strip()}")
+    return error

@@ -1,0 +1,149 @@
+"""Gloves seen on the network, and who wears them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import Connection, Row, insert, select, update
+
+from glovecal_models.errors import BadInput
+from glovecal_models.names import check_identifier
+from glovecal_service.store import revision, tables
+from glovecal_service.store.clock import now
+from glovecal_service.store.database import Database
+from glovecal_service.store.errors import NotFound
+from glovecal_service.store.records import GloveRecord
+from glovecal_service.store.subjects import require_subject
+from glovecal_service.store.texts import check_text
+
+_WEARER = ("layout", "subject", "wearing", "hand")
+
+
+class Gloves:
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def seen(self, glove: str, meta: Mapping[str, Any]) -> GloveRecord:
+        """Note the meta message of a glove's capture daemon (the wire contract's ``meta`` JSON).
+
+        The later word on who wears the glove counts: a wearer chosen with ``assign`` stays through the run
+        of the daemon in which it was chosen; the subject in the meta of a later run replaces it. The subject
+        may be one the store does not know yet. Raises BadInput for a meta that cannot be one.
+        """
+        said = _said(check_identifier(glove, "glove"), meta)
+        with self._database.write() as connection:
+            earlier = _find(connection, glove)
+            if earlier is None:
+                values = {**said, "name": glove, "first_seen_at": said["last_seen_at"]}
+                connection.execute(insert(tables.gloves).values(**values))
+                revision.grow(connection)
+            else:
+                _keep_chosen_wearer(said, earlier)
+                _change(connection, glove, said)
+                if any(said[name] != getattr(earlier, name) for name in _WEARER):
+                    revision.grow(connection)
+            return _record(_require(connection, glove))
+
+    def get(self, name: str) -> GloveRecord:
+        """Raises NotFound."""
+        with self._database.read() as connection:
+            return _record(_require(connection, name))
+
+    def list(self) -> list[GloveRecord]:
+        """All gloves by name."""
+        with self._database.read() as connection:
+            rows = connection.execute(select(tables.gloves).order_by(tables.gloves.c.name))
+            return [_record(row) for row in rows]
+
+    def assign(self, glove: str, subject: str | None, wearing: str | None = None) -> GloveRecord:
+        """Say who wears the glove from now on; None for nobody. The glove need not have been seen yet.
+
+        Raises BadInput for bad names, NotFound for an unknown subject.
+        """
+        check_identifier(glove, "glove")
+        if wearing is not None:
+            check_text(wearing, f"wearing of glove {glove!r}")
+        with self._database.write() as connection:
+            if subject is not None:
+                require_subject(connection, subject)
+            earlier, at = _find(connection, glove), now()
+            if earlier is None:
+                connection.execute(insert(tables.gloves).values(**_unseen(glove, at)))
+            chosen = {
+                "subject": subject,
+                "wearing": wearing,
+                "assigned_at": at,
+                "assigned_run_id": earlier.run_id if earlier else None,
+            }
+            _change(connection, glove, chosen)
+            revision.grow(connection)
+            return _record(_require(connection, glove))
+
+
+def _said(glove: str, meta: Mapping[str, Any]) -> dict[str, Any]:
+    layout, subject, wearing = meta.get("layout"), meta.get("subject"), meta.get("wearing")
+    run_id = meta.get("run_id")
+    for what, value in (("layout", layout), ("subject", subject)):
+        if value is not None:
+            check_identifier(_text(value, what, glove), f"{what} of glove {glove!r}")
+    if wearing is not None:
+        check_text(wearing, f"wearing of glove {glove!r}")
+    return {
+        "layout": layout,
+        "subject": subject,
+        "wearing": wearing,
+        "hand": _text(meta.get("hand") or "unknown", "hand", glove)[:16],
+        "simulated": bool(meta.get("simulated", False)),
+        "meta": dict(meta),
+        "run_id": None if run_id is None else _text(run_id, "run_id", glove)[:32],
+        "last_seen_at": now(),
+    }
+
+
+def _text(value: Any, what: str, glove: str) -> str:
+    if not isinstance(value, str):
+        raise BadInput(f"meta of glove {glove!r}: {what} must be text, not {value!r}")
+    return check_text(value, f"meta of glove {glove!r}: {what}")
+
+
+def _keep_chosen_wearer(said: dict[str, Any], earlier: Row) -> None:
+    same_run = said["run_id"] == earlier.assigned_run_id
+    chosen = earlier.assigned_at is not None and (same_run or said["subject"] is None)
+    if chosen:
+        said["subject"] = earlier.subject
+        said["wearing"] = earlier.wearing if earlier.wearing is not None else said["wearing"]
+    else:
+        said["assigned_at"] = said["assigned_run_id"] = None
+
+
+def _unseen(glove: str, at: datetime) -> dict[str, Any]:
+    return {
+        "name": glove,
+        "hand": "unknown",
+        "simulated": False,
+        "meta": {},
+        "first_seen_at": at,
+        "last_seen_at": at,
+    }
+
+
+def _change(connection: Connection, glove: str, values: Mapping[str, Any]) -> None:
+    connection.execute(update(tables.gloves).where(tables.gloves.c.name == glove).values(**values))
+
+
+def _find(connection: Connection, glove: str) -> Row | None:
+    return connection.execute(select(tables.gloves).where(tables.gloves.c.name == glove)).one_or_none()
+
+
+def _require(connection: Connection, glove: str) -> Row:
+    row = _find(connection, glove)
+    if row is None:
+        raise NotFound(f"no glove {glove!r} was ever seen")
+    return row
+
+
+def _record(row: Row) -> GloveRecord:
+    hidden = ("run_id", "assigned_run_id")
+    return GloveRecord(**{name: value for name, value in row._mapping.items() if name not in hidden})

@@ -1,0 +1,252 @@
+"""Jobs: long work as database rows. The rows are the only memory; whoever runs a job can be killed.
+
+A runner claims a job by compare-and-set, which raises its attempt number and starts a lease. Everything it
+writes afterwards carries the attempt number and is refused once another attempt has begun. A lease that
+runs out puts the job back into the queue; after three attempts it has failed.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import Connection, Row, insert, select, update
+
+from glovecal_models.names import check_identifier
+from glovecal_service.store import tables
+from glovecal_service.store.clock import new_id, now
+from glovecal_service.store.database import Database
+from glovecal_service.store.errors import Conflict, NotFound
+from glovecal_service.store.records import FINISHED_JOB_STATES, JobEvent, JobRecord
+
+LEASE_S = 30.0
+MOST_ATTEMPTS = 3
+LONGEST_SENTENCE = 2000
+_HIDDEN = ("lease_until",)
+
+
+class Jobs:
+    def __init__(self, database: Database, clock: Callable[[], float] = time.time) -> None:
+        self._database = database
+        self._clock = clock
+
+    def create(self, kind: str, payload: Mapping[str, Any], *, subject: str | None = None) -> JobRecord:
+        """Put a job into the queue. Raises BadInput (kind, or a payload that is not JSON)."""
+        id, at = new_id(), now()
+        values = {
+            "id": id,
+            "kind": check_identifier(kind, "kind of job"),
+            "subject": subject,
+            "payload": dict(payload),
+            "state": "queued",
+            "attempt": 0,
+            "cancel_requested": False,
+            "fraction": 0.0,
+            "sentence": "waiting for its turn",
+            "detail": {},
+            "created_at": at,
+            "updated_at": at,
+        }
+        with self._database.write() as connection:
+            connection.execute(insert(tables.jobs).values(**values))
+            return _noted(connection, id)
+
+    def claim(self, owner: str) -> JobRecord | None:
+        """Take the oldest queued job, None if there is none. Jobs whose lease ran out are queued first."""
+        table = tables.jobs
+        with self._database.read() as connection:
+            waiting = (table.c.state == "queued") | (
+                (table.c.state == "running") & (table.c.lease_until < self._clock())
+            )
+            if connection.execute(select(table.c.id).where(waiting).limit(1)).first() is None:
+                return None
+        with self._database.write() as connection:
+            self._requeue(connection, table.c.lease_until < self._clock())
+            oldest = select(table.c.id).where(table.c.state == "queued")
+            oldest = (
+                oldest.order_by(table.c.created_at, table.c.id).limit(1).with_for_update(skip_locked=True)
+            )
+            id = connection.scalar(oldest)
+            if id is None:
+                return None
+            at = now()
+            statement = update(table).where((table.c.id == id) & (table.c.state == "queued"))
+            statement = statement.values(
+                state="running",
+                attempt=table.c.attempt + 1,
+                owner=owner,
+                lease_until=self._clock() + LEASE_S,
+                sentence="starting",
+                started_at=at,
+                updated_at=at,
+            )
+            return _noted(connection, id) if connection.execute(statement).rowcount else None
+
+    def heartbeat(self, id: str, attempt: int) -> JobRecord:
+        """Extend the lease; the record says whether to cancel. Raises Conflict if the attempt is over."""
+        with self._database.write() as connection:
+            self._write(connection, id, attempt, {"lease_until": self._clock() + LEASE_S})
+            return _require(connection, id)
+
+    def progress(
+        self,
+        id: str,
+        attempt: int,
+        fraction: float,
+        sentence: str,
+        detail: Mapping[str, Any] | None = None,
+    ) -> JobRecord:
+        """Say how far the job is (0..1) and what happened. Raises Conflict if the attempt is over."""
+        values: dict[str, Any] = {
+            "fraction": min(max(float(fraction), 0.0), 1.0),
+            "sentence": sentence[:LONGEST_SENTENCE],
+            "lease_until": self._clock() + LEASE_S,
+            "detail": dict(detail or {}),
+        }
+        with self._database.write() as connection:
+            self._write(connection, id, attempt, values)
+            return _noted(connection, id)
+
+    def finish(self, id: str, attempt: int, result: Mapping[str, Any]) -> JobRecord:
+        """The job is done. Raises Conflict if the attempt is over."""
+        return self._end(id, attempt, "done", "done", result=dict(result), fraction=1.0)
+
+    def fail(self, id: str, attempt: int, error: str) -> JobRecord:
+        """The job cannot be done; ``error`` is a sentence for the user. Raises Conflict."""
+        return self._end(id, attempt, "failed", error, error=error[:LONGEST_SENTENCE])
+
+    def cancelled(self, id: str, attempt: int) -> JobRecord:
+        """The job was stopped as requested. Raises Conflict if the attempt is over."""
+        return self._end(id, attempt, "cancelled", "cancelled")
+
+    def release(self, id: str, attempt: int) -> JobRecord:
+        """Give an unfinished job back, as a service does that stops; the attempt does not count."""
+        values = {"state": "queued", "owner": None, "sentence": "waiting for the service to start again"}
+        with self._database.write() as connection:
+            self._write(connection, id, attempt, {**values, "lease_until": None, "attempt": attempt - 1})
+            return _noted(connection, id)
+
+    def request_cancel(self, id: str) -> JobRecord:
+        """Ask for the end of a job: a queued one is cancelled at once, a running one by its runner.
+
+        A finished job stays as it is. Raises NotFound.
+        """
+        table, at = tables.jobs, now()
+        with self._database.write() as connection:
+            queued = update(table).where((table.c.id == id) & (table.c.state == "queued"))
+            queued = queued.values(
+                state="cancelled", sentence="cancelled", cancel_requested=True, finished_at=at, updated_at=at
+            )
+            if connection.execute(queued).rowcount:
+                return _noted(connection, id)
+            running = update(table).where((table.c.id == id) & (table.c.state == "running"))
+            connection.execute(running.values(cancel_requested=True, updated_at=at))
+            return _require(connection, id)
+
+    def requeue_of(self, owner: str) -> int:
+        """Put the running jobs of an owner that is known to be dead back; how many there were."""
+        with self._database.write() as connection:
+            return self._requeue(connection, tables.jobs.c.owner == owner)
+
+    def owners(self) -> set[str]:
+        """Owners of the running jobs."""
+        statement = select(tables.jobs.c.owner).where(tables.jobs.c.state == "running").distinct()
+        with self._database.read() as connection:
+            return {owner for owner in connection.scalars(statement) if owner is not None}
+
+    def get(self, id: str) -> JobRecord:
+        """Raises NotFound."""
+        with self._database.read() as connection:
+            return _require(connection, id)
+
+    def events(self, id: str, after: int = 0) -> list[JobEvent]:
+        """What happened in a job after the event with that number. Raises NotFound."""
+        table = tables.job_events
+        statement = select(table).where((table.c.job == id) & (table.c.id > after)).order_by(table.c.id)
+        with self._database.read() as connection:
+            _require(connection, id)
+            return [JobEvent(**row._mapping) for row in connection.execute(statement)]
+
+    def list(self, *, subject: str | None = None, only_unfinished: bool = False) -> list[JobRecord]:
+        """Jobs, newest first."""
+        table = tables.jobs
+        statement = select(table).order_by(table.c.created_at.desc(), table.c.id)
+        if subject is not None:
+            statement = statement.where(table.c.subject == subject)
+        if only_unfinished:
+            statement = statement.where(table.c.state.not_in(FINISHED_JOB_STATES))
+        with self._database.read() as connection:
+            return [_record(row) for row in connection.execute(statement)]
+
+    def _end(self, id: str, attempt: int, state: str, sentence: str, **values: Any) -> JobRecord:
+        at: datetime = now()
+        ended = {
+            "state": state,
+            "sentence": sentence[:LONGEST_SENTENCE],
+            "finished_at": at,
+            "lease_until": None,
+        }
+        with self._database.write() as connection:
+            self._write(connection, id, attempt, {**ended, **values})
+            return _noted(connection, id)
+
+    def _write(self, connection: Connection, id: str, attempt: int, values: Mapping[str, Any]) -> None:
+        table = tables.jobs
+        mine = (table.c.id == id) & (table.c.attempt == attempt) & (table.c.state == "running")
+        if not connection.execute(update(table).where(mine).values(**values, updated_at=now())).rowcount:
+            record = _require(connection, id)
+            raise Conflict(
+                f"attempt {attempt} of job {id} is over: it is {record.state} in attempt {record.attempt}"
+            )
+
+    def _requeue(self, connection: Connection, condition: Any) -> int:
+        table = tables.jobs
+        lost = select(table).where((table.c.state == "running") & condition).with_for_update(skip_locked=True)
+        rows = connection.execute(lost).all()
+        for row in rows:
+            mine = (table.c.id == row.id) & (table.c.attempt == row.attempt) & (table.c.state == "running")
+            connection.execute(update(table).where(mine).values(**_after_loss(row), updated_at=now()))
+            _noted(connection, row.id)
+        return len(rows)
+
+
+def _after_loss(row: Row) -> dict[str, Any]:
+    """What becomes of a running job whose runner died."""
+    if row.cancel_requested:
+        return {"state": "cancelled", "sentence": "cancelled", "finished_at": now(), "lease_until": None}
+    if row.attempt >= MOST_ATTEMPTS:
+        sentence = f"given up: the process that ran it died in each of {row.attempt} attempts"
+        return {
+            "state": "failed",
+            "sentence": sentence,
+            "error": sentence,
+            "finished_at": now(),
+            "lease_until": None,
+        }
+    return {
+        "state": "queued",
+        "owner": None,
+        "lease_until": None,
+        "sentence": "waiting again: the process that ran it died",
+    }
+
+
+def _noted(connection: Connection, id: str) -> JobRecord:
+    """The job's record, with its present step kept as an event."""
+    record = _require(connection, id)
+    step = {name: getattr(record, name) for name in ("attempt", "state", "fraction", "sentence", "detail")}
+    connection.execute(insert(tables.job_events).values(job=id, created_at=record.updated_at, **step))
+    return record
+
+
+def _require(connection: Connection, id: str) -> JobRecord:
+    row = connection.execute(select(tables.jobs).where(tables.jobs.c.id == id)).one_or_none()
+    if row is None:
+        raise NotFound(f"there is no job {id!r}")
+    return _record(row)
+
+
+def _record(row: Row) -> JobRecord:
+    return JobRecord(**{name: value for name, value in row._mapping.items() if name not in _HIDDEN})

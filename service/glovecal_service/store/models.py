@@ -1,0 +1,214 @@
+"""Calibration models and which of them is active: immutable artifacts, an append-only list of activations."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from sqlalchemy import Connection, Row, insert, select
+
+from glovecal_models.errors import BadInput
+from glovecal_models.names import check_identifier
+from glovecal_service.store import revision, tables
+from glovecal_service.store.artifacts import Artifacts
+from glovecal_service.store.clock import now
+from glovecal_service.store.database import Database
+from glovecal_service.store.errors import Conflict, NotFound
+from glovecal_service.store.records import Activation, ModelRecord
+from glovecal_service.store.row_hash import check_row, row_hash
+from glovecal_service.store.subjects import require_subject
+
+SHORTEST_PREFIX = 6
+_PREFIX = re.compile(r"[0-9a-f]{6,64}\Z")
+
+
+class Models:
+    def __init__(self, database: Database, artifacts: Artifacts) -> None:
+        self._database = database
+        self._artifacts = artifacts
+
+    def add(
+        self,
+        artifact: bytes,
+        *,
+        subject: str,
+        layout: str,
+        method: str,
+        parent: str | None,
+        facts: Mapping[str, Any],
+    ) -> ModelRecord:
+        """Keep a model; its id is the sha256 of its artifact. The very same again gives the record there is.
+
+        ``facts["takes"]`` lists the ids of the takes it was trained on (texts, or objects with ``id``).
+        Raises NotFound (subject or parent), Conflict (same bytes under another subject), StorageFull.
+        """
+        record = ModelRecord(
+            id=self._artifacts.put(artifact),
+            subject=subject,
+            layout=check_identifier(layout, "layout"),
+            method=check_identifier(method, "method"),
+            parent=parent,
+            facts=dict(facts),
+            created_at=now(),
+        )
+        takes = _take_ids(facts.get("takes", ()))
+        with self._database.write() as connection:
+            require_subject(connection, subject)
+            if parent is not None:
+                _one(connection, parent)
+            if earlier := _find(connection, record.id):
+                if (earlier.subject, earlier.layout) != (subject, layout):
+                    raise Conflict(
+                        f"model {record.id[:12]} belongs to subject {earlier.subject!r} with layout"
+                        f" {earlier.layout!r} already"
+                    )
+                return earlier
+            values = dict(record.__dict__)
+            values["row_sha256"] = row_hash("models", values)
+            connection.execute(insert(tables.models).values(**values))
+            if takes:
+                rows = [{"model": record.id, "take": take} for take in takes]
+                connection.execute(insert(tables.model_takes), rows)
+        return record
+
+    def get(self, id: str) -> ModelRecord:
+        """By id or a prefix of at least 6 digits that only one model has. Raises NotFound, Conflict."""
+        with self._database.read() as connection:
+            return _one(connection, id)
+
+    def list(self, subject: str | None = None, layout: str | None = None) -> list[ModelRecord]:
+        """Models in the order they were added."""
+        statement = select(tables.models).order_by(tables.models.c.created_at, tables.models.c.id)
+        if subject is not None:
+            statement = statement.where(tables.models.c.subject == subject)
+        if layout is not None:
+            statement = statement.where(tables.models.c.layout == layout)
+        with self._database.read() as connection:
+            return [_record(row) for row in connection.execute(statement)]
+
+    def lineage(self, id: str) -> list[ModelRecord]:
+        """The model, its parent, the parent's parent ... Raises NotFound."""
+        with self._database.read() as connection:
+            line = [_one(connection, id)]
+            while parent := line[-1].parent:
+                line.append(_one(connection, parent))
+            return line
+
+    def load_bytes(self, id: str) -> bytes:
+        """The artifact, verified. Raises NotFound, Conflict, DamagedArtifact."""
+        return self._artifacts.get(self.get(id).id)
+
+    def activate(self, id: str) -> Activation:
+        """Let the model speak for its subject and layout from now on.
+
+        The artifact is verified first; if that fails, whatever was active stays so. Raises NotFound,
+        Conflict, DamagedArtifact.
+        """
+        model = self.get(id)
+        self._artifacts.get(model.id)
+        with self._database.write() as connection:
+            revision.grow(connection)
+            earlier = _current(connection, model.subject, model.layout)
+            if earlier is not None and earlier.model == model.id:
+                return earlier
+            previous = None if earlier is None else earlier.id
+            return _append(connection, model, "activate", previous)
+
+    def rollback(self, subject: str, layout: str) -> Activation:
+        """Return to the model that was active before; again, to the one before that.
+
+        Raises Conflict when nothing earlier was active, DamagedArtifact if the earlier one is damaged.
+        """
+        with self._database.write() as connection:
+            revision.grow(connection)
+            current = _current(connection, subject, layout)
+            if current is None or current.previous is None:
+                raise Conflict(f"nothing earlier was active for subject {subject!r} with layout {layout!r}")
+            target = _activation(connection, current.previous)
+            self._artifacts.get(target.model)
+            return _append(connection, _one(connection, target.model), "rollback", target.previous)
+
+    def active(self, subject: str, layout: str) -> ModelRecord | None:
+        """The model that speaks for the subject with that layout, None if none does."""
+        with self._database.read() as connection:
+            current = _current(connection, subject, layout)
+            return None if current is None else _one(connection, current.model)
+
+    def activations(self, subject: str, layout: str) -> list[Activation]:
+        """What was active since when, oldest first."""
+        table = tables.activations
+        statement = select(table).where((table.c.subject == subject) & (table.c.layout == layout))
+        with self._database.read() as connection:
+            rows = connection.execute(statement.order_by(table.c.id)).all()
+        return [_checked_activation(row) for row in rows]
+
+
+def _find(connection: Connection, id: str) -> ModelRecord | None:
+    row = connection.execute(select(tables.models).where(tables.models.c.id == id)).one_or_none()
+    return None if row is None else _record(row)
+
+
+def _one(connection: Connection, id: str) -> ModelRecord:
+    if not _PREFIX.match(id):
+        raise NotFound(
+            f"{id[:80]!r} is no model id: give at least {SHORTEST_PREFIX} of its hexadecimal digits"
+        )
+    matching = tables.models.c.id.startswith(id)
+    rows = connection.execute(select(tables.models).where(matching).limit(2)).all()
+    if not rows:
+        raise NotFound(f"there is no model {id!r}")
+    if len(rows) > 1:
+        raise Conflict(f"more than one model starts with {id!r}; give more digits")
+    return _record(rows[0])
+
+
+def _record(row: Row) -> ModelRecord:
+    values = dict(row._mapping)
+    check_row("models", values, f"model {values['id'][:12]}")
+    del values["row_sha256"]
+    return ModelRecord(**values)
+
+
+def _current(connection: Connection, subject: str, layout: str) -> Activation | None:
+    table = tables.activations
+    mine = (table.c.subject == subject) & (table.c.layout == layout)
+    row = connection.execute(select(table).where(mine).order_by(table.c.id.desc()).limit(1)).first()
+    return None if row is None else _checked_activation(row)
+
+
+def _activation(connection: Connection, id: int) -> Activation:
+    row = connection.execute(select(tables.activations).where(tables.activations.c.id == id)).one_or_none()
+    if row is None:
+        raise NotFound(f"activation {id} is missing from the database")
+    return _checked_activation(row)
+
+
+def _append(connection: Connection, model: ModelRecord, kind: str, previous: int | None) -> Activation:
+    values = {
+        "subject": model.subject,
+        "layout": model.layout,
+        "model": model.id,
+        "kind": kind,
+        "previous": previous,
+        "created_at": now(),
+    }
+    statement = insert(tables.activations).values(**values, row_sha256=row_hash("activations", values))
+    id = connection.execute(statement.returning(tables.activations.c.id)).scalar_one()
+    return Activation(id=id, **values)
+
+
+def _checked_activation(row: Row) -> Activation:
+    values = dict(row._mapping)
+    id = values.pop("id")
+    check_row("activations", values, f"activation {id}")
+    del values["row_sha256"]
+    return Activation(id=id, **values)
+
+
+def _take_ids(takes: Iterable[Any]) -> list[str]:
+    ids = [take["id"] if isinstance(take, Mapping) else take for take in takes]
+    for id in ids:
+        if not isinstance(id, str):
+            raise BadInput(f'facts["takes"] must list the ids of takes, not {id!r}')
+    return sorted(set(ids))

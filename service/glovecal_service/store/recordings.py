@@ -1,0 +1,127 @@
+"""Recordings that somebody asked for; the real-time process carries them out and reports here."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sqlalchemy import Connection, Row, insert, select, update
+
+from glovecal_models.errors import BadInput
+from glovecal_models.names import check_identifier
+from glovecal_service.store import revision, tables
+from glovecal_service.store.clock import new_id, now
+from glovecal_service.store.database import Database
+from glovecal_service.store.errors import Conflict, NotFound
+from glovecal_service.store.records import OPEN_RECORDING_STATES, RecordingRecord, RecordingState
+from glovecal_service.store.subjects import require_subject
+from glovecal_service.store.texts import check_text
+
+_ORDER: dict[str, int] = {"requested": 0, "recording": 1, "stopping": 2, "done": 3, "failed": 3}
+
+
+class Recordings:
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def request(
+        self, glove: str, *, name: str, subject: str | None = None, wearing: str | None = None
+    ) -> RecordingRecord:
+        """Ask for a recording; subject and wearing default to the glove's at this moment.
+
+        Raises BadInput (names), NotFound (glove never seen, unknown subject), Conflict if the glove is
+        being recorded already.
+        """
+        check_identifier(glove, "glove")
+        check_text(name, "name of the recording")
+        if wearing is not None:
+            check_text(wearing, f"wearing of recording {name!r}")
+        at, id = now(), new_id()
+        with self._database.write() as connection:
+            revision.grow(connection)
+            worn = connection.execute(
+                select(tables.gloves).where(tables.gloves.c.name == glove)
+            ).one_or_none()
+            if worn is None:
+                raise NotFound(f"no glove {glove!r} was ever seen")
+            if open_one := _open_recording(connection, glove):
+                raise Conflict(f"glove {glove!r} is being recorded already ({open_one.name}, {open_one.id})")
+            if subject is not None:
+                require_subject(connection, subject)
+            values = {
+                "id": id,
+                "glove": glove,
+                "name": name,
+                "subject": subject if subject is not None else worn.subject,
+                "wearing": wearing if wearing is not None else worn.wearing,
+                "state": "requested",
+                "facts": {},
+                "requested_at": at,
+                "updated_at": at,
+            }
+            connection.execute(insert(tables.recordings).values(**values))
+            return _require(connection, id)
+
+    def stop(self, id: str) -> RecordingRecord:
+        """Ask for the end of a recording; asking again, or after its end, changes nothing."""
+        with self._database.write() as connection:
+            revision.grow(connection)
+            return _move(connection, id, "stopping", {})
+
+    def update(self, id: str, *, state: RecordingState | None = None, **facts: Any) -> RecordingRecord:
+        """Report what became of it: facts are merged, the state only moves forward.
+
+        So ``update(id, state="recording")`` of a recording that a user stopped meanwhile leaves it at
+        ``stopping``: look at the record that comes back. Raises NotFound, BadInput.
+        """
+        if state is not None and state not in _ORDER:
+            raise BadInput(f"{state!r} is no state of a recording; there are {', '.join(_ORDER)}")
+        with self._database.write() as connection:
+            if state is not None:
+                revision.grow(connection)
+            return _move(connection, id, state, facts)
+
+    def get(self, id: str) -> RecordingRecord:
+        """Raises NotFound."""
+        with self._database.read() as connection:
+            return _require(connection, id)
+
+    def list(self, glove: str | None = None, *, only_open: bool = False) -> list[RecordingRecord]:
+        """Recordings, newest first."""
+        table = tables.recordings
+        statement = select(table).order_by(table.c.requested_at.desc(), table.c.id)
+        if glove is not None:
+            statement = statement.where(table.c.glove == glove)
+        if only_open:
+            statement = statement.where(table.c.state.in_(OPEN_RECORDING_STATES))
+        with self._database.read() as connection:
+            return [_record(row) for row in connection.execute(statement)]
+
+
+def _move(connection: Connection, id: str, state: str | None, facts: dict[str, Any]) -> RecordingRecord:
+    statement = select(tables.recordings).where(tables.recordings.c.id == id).with_for_update()
+    row = connection.execute(statement).one_or_none()
+    if row is None:
+        raise NotFound(f"there is no recording {id!r}")
+    values: dict[str, Any] = {"facts": {**row.facts, **facts}, "updated_at": now()}
+    if state is not None and _ORDER[state] > _ORDER[row.state]:
+        values["state"] = state
+    connection.execute(update(tables.recordings).where(tables.recordings.c.id == id).values(**values))
+    return _require(connection, id)
+
+
+def _open_recording(connection: Connection, glove: str) -> RecordingRecord | None:
+    table = tables.recordings
+    open_ones = (table.c.glove == glove) & table.c.state.in_(OPEN_RECORDING_STATES)
+    row = connection.execute(select(table).where(open_ones).limit(1)).first()
+    return None if row is None else _record(row)
+
+
+def _require(connection: Connection, id: str) -> RecordingRecord:
+    row = connection.execute(select(tables.recordings).where(tables.recordings.c.id == id)).one_or_none()
+    if row is None:
+        raise NotFound(f"there is no recording {id!r}")
+    return _record(row)
+
+
+def _record(row: Row) -> RecordingRecord:
+    return RecordingRecord(**row._mapping)

@@ -1,0 +1,178 @@
+"""What the store hands out: plain frozen records, never database rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any, Literal
+
+RecordingState = Literal["requested", "recording", "stopping", "done", "failed"]
+JobState = Literal["queued", "running", "done", "failed", "cancelled"]
+
+FINISHED_JOB_STATES: tuple[JobState, ...] = ("done", "failed", "cancelled")
+OPEN_RECORDING_STATES: tuple[RecordingState, ...] = ("requested", "recording", "stopping")
+
+
+@dataclass(frozen=True)
+class SubjectRecord:
+    """A person: owns hand dimensions, takes and calibration models."""
+
+    name: str
+    title: str
+    dimensions: dict[str, float]
+    """Hand dimensions in millimetres by name; empty if nobody measured them."""
+    created_at: datetime
+
+
+@dataclass(frozen=True)
+class LayoutRecord:
+    """A layout in the store, or one that is built in (``built_in``, never stored)."""
+
+    name: str
+    document: dict[str, Any]
+    """``glovecal_models.layout.Layout.to_document()``."""
+    built_in: bool
+    created_at: datetime | None = None
+
+
+@dataclass(frozen=True)
+class GloveRecord:
+    """A glove that was seen on the network, and who wears it."""
+
+    name: str
+    layout: str | None
+    subject: str | None
+    wearing: str | None
+    hand: str
+    simulated: bool
+    meta: dict[str, Any]
+    """The newest meta message of its capture daemon; empty before the first."""
+    first_seen_at: datetime
+    last_seen_at: datetime
+    assigned_at: datetime | None = None
+    """When a user last chose the wearer; None if only the capture daemon said who it is."""
+
+
+@dataclass(frozen=True)
+class TakeRecord:
+    """A stored take: its arrays are in the artifact, its description here."""
+
+    id: str
+    name: str
+    subject: str
+    layout: str
+    wearing: str
+    source: str
+    """``import``, ``recording`` ... : where the frames came from."""
+    artifact: str
+    """sha256 of the safetensors file that holds the arrays."""
+    original_sha256: str | None
+    """sha256 of the file the user gave, None for a recording."""
+    sensors: tuple[str, ...]
+    rotations: tuple[str, ...]
+    """Rotations with a reference; empty if nothing was measured."""
+    context: tuple[str, ...]
+    frames: int
+    reference_rows: int
+    duration_s: float
+    simulated: bool
+    recording: str | None
+    accounting: dict[str, Any] | None
+    facts: dict[str, Any] = field(default_factory=dict)
+    """``history``: artifacts of earlier references, newest last."""
+    created_at: datetime | None = None
+
+    @property
+    def has_reference(self) -> bool:
+        return self.reference_rows > 0 and bool(self.rotations)
+
+
+@dataclass(frozen=True)
+class ModelRecord:
+    """A calibration model: immutable; ``id`` is the sha256 of its artifact."""
+
+    id: str
+    subject: str
+    layout: str
+    method: str
+    parent: str | None
+    facts: dict[str, Any]
+    """``takes`` (ids), errors, seconds ...: whatever the trainer had to say."""
+    created_at: datetime
+
+
+@dataclass(frozen=True)
+class Activation:
+    """From ``created_at`` on, frames of ``subject`` with ``layout`` are predicted by ``model``."""
+
+    id: int
+    subject: str
+    layout: str
+    model: str
+    kind: Literal["activate", "rollback"]
+    previous: int | None
+    """The activation that a rollback would return to, None if there is none."""
+    created_at: datetime
+
+
+@dataclass(frozen=True)
+class RecordingRecord:
+    """A recording somebody asked for; the real-time process carries it out."""
+
+    id: str
+    glove: str
+    name: str
+    subject: str | None
+    wearing: str | None
+    state: RecordingState
+    facts: dict[str, Any]
+    """``first_sequence``, ``last_sequence``, ``sent``, ``recorded``, ``repaired``, ``missing``, ``take``"""
+    requested_at: datetime
+    updated_at: datetime
+
+    @property
+    def is_open(self) -> bool:
+        return self.state in OPEN_RECORDING_STATES
+
+
+@dataclass(frozen=True)
+class JobRecord:
+    """Long work: a database row is its only memory."""
+
+    id: str
+    kind: str
+    subject: str | None
+    payload: dict[str, Any]
+    state: JobState
+    attempt: int
+    """How often the job was claimed; writes of an older attempt are refused."""
+    owner: str | None
+    cancel_requested: bool
+    fraction: float
+    sentence: str
+    detail: dict[str, Any]
+    result: dict[str, Any] | None
+    error: str | None
+    created_at: datetime
+    started_at: datetime | None
+    finished_at: datetime | None
+    updated_at: datetime
+
+    @property
+    def is_finished(self) -> bool:
+        return self.state in FINISHED_JOB_STATES
+
+
+@dataclass(frozen=True)
+class JobEvent:
+    """One step of a job's progress, kept for whoever listens later."""
+
+    id: int
+    """Grows within the store; ask for events after the last one seen."""
+    job: str
+    attempt: int
+    state: JobState
+    fraction: float
+    sentence: str
+    detail: dict[str, Any]
+    created_at: datetime

@@ -1,0 +1,75 @@
+"""The store: everything that outlives a process, one attribute per noun."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from types import TracebackType
+
+from glovecal_service.settings import Settings
+from glovecal_service.store.artifacts import Artifacts
+from glovecal_service.store.blobs import FolderBlobs, ObjectBlobs, full_disk_named
+from glovecal_service.store.database import Database
+from glovecal_service.store.gloves import Gloves
+from glovecal_service.store.jobs import Jobs
+from glovecal_service.store.layouts import Layouts
+from glovecal_service.store.models import Models
+from glovecal_service.store.recordings import Recordings
+from glovecal_service.store.revision import Revision
+from glovecal_service.store.schema import upgrade
+from glovecal_service.store.subjects import Subjects
+from glovecal_service.store.takes import Takes
+
+
+class Store:
+    """Safe to use from several threads; several processes may open the same one."""
+
+    def __init__(self, database: Database, artifacts: Artifacts, clock: Callable[[], float]) -> None:
+        self.database = database
+        self.artifacts = artifacts
+        self.subjects = Subjects(database)
+        self.layouts = Layouts(database)
+        self.gloves = Gloves(database)
+        self.takes = Takes(database, artifacts)
+        self.models = Models(database, artifacts)
+        self.recordings = Recordings(database)
+        self.jobs = Jobs(database, clock)
+        self.revision = Revision(database)
+
+    @classmethod
+    def open(cls, settings: Settings, *, clock: Callable[[], float] = time.time) -> Store:
+        """Create the folders, upgrade the schema, sweep what killed processes left.
+
+        ``clock`` gives seconds since 1970 and is what leases run on. Raises StorageFull, StoreUnavailable,
+        StoreDamaged, NewerSchema, BadInput (settings).
+        """
+        with full_disk_named(settings.data):
+            for folder in (
+                settings.data,
+                settings.uploads_folder,
+                settings.recordings_folder,
+                settings.fits_folder,
+            ):
+                folder.mkdir(parents=True, exist_ok=True)
+        blobs = (
+            ObjectBlobs(settings.artifacts) if settings.artifacts else FolderBlobs(settings.artifacts_folder)
+        )
+        database = Database(settings.database_url)
+        try:
+            upgrade(database)
+        except BaseException:
+            database.close()
+            raise
+        return cls(database, Artifacts(blobs), clock)
+
+    def close(self) -> None:
+        """Give the connections back; the store can still be used afterwards and opens new ones."""
+        self.database.close()
+
+    def __enter__(self) -> Store:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,84 @@
+"""Subjects: the people whose hands are calibrated."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from sqlalchemy import Connection, Row, delete, func, insert, select, update
+from sqlalchemy.exc import IntegrityError
+
+from glovecal_models.errors import BadInput
+from glovecal_models.names import check_channel_name, check_identifier
+from glovecal_service.store import revision, tables
+from glovecal_service.store.clock import now
+from glovecal_service.store.database import Database
+from glovecal_service.store.errors import Conflict, NotFound
+from glovecal_service.store.records import SubjectRecord
+from glovecal_service.store.texts import check_text
+
+
+class Subjects:
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def create(
+        self, name: str, *, title: str = "", dimensions: Mapping[str, float] | None = None
+    ) -> SubjectRecord:
+        """Add a person. Raises BadInput for a bad name or dimension, Conflict if the name is taken."""
+        record = SubjectRecord(
+            check_identifier(name, "subject"),
+            check_text(title, f"title of subject {name!r}", empty=True),
+            _dimensions(name, dimensions or {}),
+            now(),
+        )
+        try:
+            with self._database.write() as connection:
+                connection.execute(insert(tables.subjects).values(**record.__dict__))
+        except IntegrityError as error:
+            raise Conflict(f"there is already a subject {name!r}") from error
+        return record
+
+    def get(self, name: str) -> SubjectRecord:
+        """Raises NotFound."""
+        with self._database.read() as connection:
+            return require_subject(connection, name)
+
+    def list(self) -> list[SubjectRecord]:
+        """All subjects by name."""
+        with self._database.read() as connection:
+            rows = connection.execute(select(tables.subjects).order_by(tables.subjects.c.name))
+            return [_record(row) for row in rows]
+
+    def remove(self, name: str) -> None:
+        """Forget a person. Raises NotFound, or Conflict while takes or models of theirs exist."""
+        with self._database.write() as connection:
+            require_subject(connection, name)
+            for table in (tables.takes, tables.models):
+                owned = select(func.count()).where(table.c.subject == name).select_from(table)
+                if count := connection.scalar(owned):
+                    raise Conflict(f"subject {name!r} still owns {count} {table.name}; remove those first")
+            worn = update(tables.gloves).where(tables.gloves.c.subject == name)
+            connection.execute(worn.values(subject=None, wearing=None))
+            connection.execute(delete(tables.subjects).where(tables.subjects.c.name == name))
+            revision.grow(connection)
+
+
+def require_subject(connection: Connection, name: str) -> SubjectRecord:
+    """The subject, or NotFound."""
+    row = connection.execute(select(tables.subjects).where(tables.subjects.c.name == name)).one_or_none()
+    if row is None:
+        raise NotFound(f"there is no subject {name!r}")
+    return _record(row)
+
+
+def _record(row: Row) -> SubjectRecord:
+    return SubjectRecord(**row._mapping)
+
+
+def _dimensions(subject: str, dimensions: Mapping[str, float]) -> dict[str, float]:
+    for name, value in dimensions.items():
+        check_channel_name(name, f"dimension of subject {subject!r}")
+        if not isinstance(value, int | float) or not math.isfinite(value) or value <= 0:
+            raise BadInput(f"dimension {name} of subject {subject!r} is {value!r}; give millimetres above 0")
+    return {name: float(value) for name, value in dimensions.items()}

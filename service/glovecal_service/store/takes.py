@@ -1,0 +1,159 @@
+"""Takes: frames with their reference, kept under the subject who wore the glove."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from sqlalchemy import Connection, Row, delete, insert, select, update
+from sqlalchemy.exc import IntegrityError
+
+from glovecal_models.errors import BadInput
+from glovecal_models.names import check_identifier
+from glovecal_models.takes.take import Take
+from glovecal_service.store import tables
+from glovecal_service.store.artifacts import Artifacts, check_sha256
+from glovecal_service.store.clock import new_id, now
+from glovecal_service.store.database import Database
+from glovecal_service.store.errors import Conflict, NotFound
+from glovecal_service.store.records import TakeRecord
+from glovecal_service.store.subjects import require_subject
+from glovecal_service.store.take_file import dump_take, frames_hash, load_take
+from glovecal_service.store.texts import check_text
+
+
+class Takes:
+    def __init__(self, database: Database, artifacts: Artifacts) -> None:
+        self._database = database
+        self._artifacts = artifacts
+
+    def add(
+        self,
+        take: Take,
+        *,
+        subject: str,
+        layout: str,
+        source: str,
+        original_sha256: str | None = None,
+        accounting: Mapping[str, Any] | None = None,
+        recording: str | None = None,
+    ) -> TakeRecord:
+        """Keep a take. The arrays are on disk before the row exists, so a row never points at nothing.
+
+        Raises BadInput (bad names, no frames), NotFound (unknown subject), Conflict if the subject has the
+        very same frames already (they would be trained and tested on at once), StorageFull.
+        """
+        check_text(take.name, "name of the take")
+        check_text(take.wearing, f"wearing of take {take.name!r}", empty=True)
+        check_identifier(layout, "layout")
+        if len(take.time_s) == 0:
+            raise BadInput(f"take {take.name!r} holds no frames")
+        if original_sha256 is not None:
+            check_sha256(original_sha256)
+        with self._database.read() as connection:
+            require_subject(connection, subject)
+        record = TakeRecord(
+            id=new_id(),
+            subject=subject,
+            layout=layout,
+            source=check_identifier(source, "source of the take"),
+            original_sha256=original_sha256,
+            recording=recording,
+            accounting=None if accounting is None else dict(accounting),
+            created_at=now(),
+            **self._content(take),
+        )
+        try:
+            with self._database.write() as connection:
+                require_subject(connection, subject)
+                values = {**record.__dict__, "frames_sha256": frames_hash(take)}
+                connection.execute(insert(tables.takes).values(**values))
+        except IntegrityError as error:
+            raise Conflict(
+                f"subject {subject!r} already has a take with exactly the frames of {take.name!r}"
+            ) from error
+        return record
+
+    def get(self, id: str) -> TakeRecord:
+        """Raises NotFound."""
+        with self._database.read() as connection:
+            return _require(connection, id)
+
+    def list(self, subject: str | None = None, layout: str | None = None) -> list[TakeRecord]:
+        """Takes in the order they were added."""
+        statement = select(tables.takes).order_by(tables.takes.c.created_at, tables.takes.c.id)
+        if subject is not None:
+            statement = statement.where(tables.takes.c.subject == subject)
+        if layout is not None:
+            statement = statement.where(tables.takes.c.layout == layout)
+        with self._database.read() as connection:
+            return [_record(row) for row in connection.execute(statement)]
+
+    def load(self, id: str) -> Take:
+        """The take's arrays, verified. Raises NotFound, DamagedArtifact."""
+        return load_take(self._artifacts.get(self.get(id).artifact))
+
+    def attach_reference(
+        self, id: str, time_s: np.ndarray, rotations: Sequence[str], reference: np.ndarray
+    ) -> TakeRecord:
+        """Give a take its reference angles, (R,) seconds and (R, len(rotations)) degrees.
+
+        The id stays; the artifact that was there is listed in ``facts["history"]``. Raises NotFound,
+        BadInput, StorageFull, Conflict if the take was changed meanwhile.
+        """
+        earlier = self.get(id)
+        take = load_take(self._artifacts.get(earlier.artifact))
+        take = dataclasses.replace(
+            take, reference_time_s=time_s, rotations=tuple(rotations), reference=reference
+        )
+        content = self._content(take)
+        history = [
+            *earlier.facts.get("history", []),
+            {"artifact": earlier.artifact, "until": now().isoformat()},
+        ]
+        values = {**content, "facts": {**earlier.facts, "history": history}}
+        same = (tables.takes.c.id == id) & (tables.takes.c.artifact == earlier.artifact)
+        with self._database.write() as connection:
+            if not connection.execute(update(tables.takes).where(same).values(**values)).rowcount:
+                raise Conflict(f"take {id} was changed or removed meanwhile; look at it again")
+            return _require(connection, id)
+
+    def remove(self, id: str) -> None:
+        """Forget a take (its artifact stays). Raises NotFound, Conflict if a model was trained on it."""
+        with self._database.write() as connection:
+            record = _require(connection, id)
+            trained = select(tables.model_takes.c.model).where(tables.model_takes.c.take == id)
+            if model := connection.scalar(trained.limit(1)):
+                raise Conflict(f"model {model[:12]} was trained on take {id} ({record.name}), so it stays")
+            connection.execute(delete(tables.takes).where(tables.takes.c.id == id))
+
+    def _content(self, take: Take) -> dict[str, Any]:
+        measured = bool(len(take.reference_time_s)) and np.isfinite(take.reference).any(axis=0)
+        return {
+            "artifact": self._artifacts.put(dump_take(take)),
+            "name": take.name,
+            "wearing": take.wearing,
+            "sensors": take.sensors,
+            "rotations": tuple(np.array(take.rotations, dtype=object)[measured]) if take.rotations else (),
+            "context": tuple(take.context),
+            "frames": len(take.time_s),
+            "reference_rows": len(take.reference_time_s),
+            "duration_s": take.duration_s,
+            "simulated": take.simulated,
+        }
+
+
+def _require(connection: Connection, id: str) -> TakeRecord:
+    row = connection.execute(select(tables.takes).where(tables.takes.c.id == id)).one_or_none()
+    if row is None:
+        raise NotFound(f"there is no take {id!r}")
+    return _record(row)
+
+
+def _record(row: Row) -> TakeRecord:
+    values = {name: value for name, value in row._mapping.items() if name != "frames_sha256"}
+    for name in ("sensors", "rotations", "context"):
+        values[name] = tuple(values[name])
+    return TakeRecord(**values)
