@@ -175,7 +175,7 @@ def test_damaged_parquet_is_refused(tmp_path):
 def test_any_bytes_are_read_or_refused_but_never_crash(tmp_path_factory, content):
     path = tmp_path_factory.mktemp("wild") / "take.csv"
     path.write_bytes(content)
-    refused = None
+    refused, takes = None, []
     try:
         takes = read_takes(path)
     except BadTakeTable as error:

@@ -19,7 +19,7 @@ from glovecal_models.takes.raw_table import (
     what_is_right,
 )
 
-_ROWS_AT_ONCE = 4096
+_ROWS_AT_ONCE = 128  # small enough to stay in the cache; 4096 took a third longer
 _FOREIGN_STARTS = {
     b"\xff\xfe": "UTF-16 text; save it as UTF-8",
     b"\xfe\xff": "UTF-16 text; save it as UTF-8",
