@@ -6,7 +6,8 @@
     ├── DeviceError         a capture device cannot do what was asked
     │   ├── UnknownDevice   no device of that name is installed
     │   ├── BadOption       a device was given an option it cannot use
-    │   └── DeviceLost      the device was there and is gone (unplugged); open it again
+    │   ├── DeviceLost      the device was there and is gone (unplugged); open it again
+    │   └── DeviceFinished  the device has no more to give (the end of a replayed file)
     ├── DamagedLog          a recording cannot be read at all (a damaged tail is repaired instead)
     ├── CaptureRefused      capture must not start (another publisher has the glove)
     ├── NoAnswer            nobody answered a query; the sentence says what was asked
@@ -44,6 +45,10 @@ class BadOption(DeviceError, ValueError):
 
 class DeviceLost(DeviceError):
     """The device was there and is gone, as when its cable is pulled; close and open to bring it back."""
+
+
+class DeviceFinished(DeviceError):
+    """The device has no more to give, as at the end of a replayed file; capture stops cleanly."""
 
 
 class DamagedLog(ClientError):

@@ -14,7 +14,7 @@ from typing import Any
 
 import zenoh
 
-from glovecal_client.errors import NoAnswer
+from glovecal_client.errors import BadName, NoAnswer
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 MAX_PUT_BYTES = 65536
@@ -79,6 +79,12 @@ def open_client(
 def _connect(
     endpoints: Sequence[str], wait_s: float | None, cancelled: Callable[[], bool] | None
 ) -> zenoh.Session:
+    try:
+        client_config(endpoints)
+    except zenoh.ZError as error:
+        raise BadName(
+            f"endpoint {', '.join(endpoints)!r} is not like {DEFAULT_ENDPOINT!r}: {error}"
+        ) from error
     started = time.monotonic()
     while True:
         try:
@@ -86,9 +92,7 @@ def _connect(
         except zenoh.ZError as error:
             late = wait_s is not None and time.monotonic() - started >= wait_s
             if late or (cancelled is not None and cancelled()):
-                raise NoAnswer(
-                    f"no router at {', '.join(endpoints)}; is the service running? ({error})"
-                ) from error
+                raise NoAnswer(f"no router at {', '.join(endpoints)}; is the service running?") from error
             time.sleep(0.05)
 
 

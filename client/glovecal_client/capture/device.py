@@ -63,7 +63,7 @@ class Device(Protocol):
         ...
 
     def read(self, timeout_s: float) -> Reading | None:
-        """The next reading, or None if there was none in time. Raises DeviceLost when it is gone."""
+        """The next reading, or None if there was none in time. Raises DeviceLost, DeviceFinished."""
         ...
 
 

@@ -1,0 +1,116 @@
+"""``glovecal-capture``: record and publish a glove. Needs nothing but the client."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings, CaptureSummary
+from glovecal_client.capture.device import build_device, device_names
+from glovecal_client.errors import BadOption, ClientError
+from glovecal_client.keys import GloveKeys
+from glovecal_client.names import check_identifier
+from glovecal_client.session import DEFAULT_ENDPOINT
+
+
+def run_capture(
+    device: str,
+    glove: str,
+    *,
+    options: Mapping[str, str] | None = None,
+    site: str = "lab",
+    subject: str | None = None,
+    wearing: str | None = None,
+    endpoints: Sequence[str] = (DEFAULT_ENDPOINT,),
+    data: Path | str = "glovecal-data",
+    stop: threading.Event | None = None,
+    report: Callable[[str], None] | None = None,
+) -> CaptureSummary:
+    """Capture until ``stop`` is set or the device has no more to give.
+
+    ``device`` is ``NAME`` or ``NAME:ARGUMENT``; ``report`` gets sentences as things happen. Raises BadName,
+    UnknownDevice, BadOption, DeviceError (a device that cannot work at all) and CaptureRefused (another
+    publisher, no place to record).
+    """
+    for name, what in ((subject, "subject"), (wearing, "wearing")):
+        if name is not None:
+            check_identifier(name, what)
+    settings = CaptureSettings(GloveKeys(site, glove), subject, wearing, tuple(endpoints), Path(data))
+    daemon = CaptureDaemon(build_device(device, options), settings, report or (lambda sentence: None))
+    return daemon.run(stop or threading.Event())
+
+
+def parse_options(pairs: Sequence[str]) -> dict[str, str]:
+    """``["speed=2"]`` as ``{"speed": "2"}``. Raises BadOption."""
+    options: dict[str, str] = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not equals or not key:
+            raise BadOption(f"option {pair!r} is not KEY=VALUE")
+        if key in options:
+            raise BadOption(f"option {key!r} is given twice")
+        options[key] = value
+    return options
+
+
+@contextmanager
+def stopped_by_signals(stop: threading.Event) -> Iterator[None]:
+    """SIGINT and SIGTERM set ``stop``; only from the main thread."""
+    signals = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, lambda *_: stop.set()) for number in signals]
+    try:
+        yield
+    finally:
+        for number, handler in zip(signals, before, strict=True):
+            signal.signal(number, handler)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The script's entry point; 0 when stopped cleanly, 1 with a sentence when it could not capture."""
+    asked = _parser().parse_args(arguments)
+    stop = threading.Event()
+    try:
+        with stopped_by_signals(stop):
+            summary = run_capture(
+                asked.device,
+                asked.glove,
+                options=parse_options(asked.option),
+                site=asked.site,
+                subject=asked.subject,
+                wearing=asked.wearing,
+                endpoints=asked.connect or [os.environ.get("GLOVECAL_ZENOH", DEFAULT_ENDPOINT)],
+                data=asked.data,
+                stop=stop,
+                report=lambda sentence: print(sentence, file=sys.stderr, flush=True),
+            )
+    except ClientError as error:
+        print(f"glovecal-capture: {error}", file=sys.stderr)
+        return 1
+    print(summary)
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="glovecal-capture", description="Record and publish a data glove.")
+    installed = ", ".join(device_names())
+    parser.add_argument("--device", required=True, help=f"NAME or NAME:ARGUMENT; installed: {installed}")
+    parser.add_argument("--option", action="append", default=[], metavar="KEY=VALUE", help="for the device")
+    parser.add_argument("--glove", required=True, help="name of this glove on the wire, such as right-hand")
+    parser.add_argument("--site", default=os.environ.get("GLOVECAL_SITE", "lab"))
+    parser.add_argument("--subject", help="who wears it")
+    parser.add_argument("--wearing", help="name of this donning")
+    parser.add_argument(
+        "--connect", action="append", metavar="ENDPOINT", help=f"the service's router, {DEFAULT_ENDPOINT}"
+    )
+    parser.add_argument("--data", default=os.environ.get("GLOVECAL_DATA", "glovecal-data"), type=Path)
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

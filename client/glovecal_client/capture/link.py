@@ -1,0 +1,173 @@
+"""The daemon's side of the wire: connects when the router is there, publishes, answers queries.
+
+Recording never waits for it: while there is no router, ``publish`` does nothing and the log has the frames.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+import zenoh
+
+from glovecal_client.capture.log_queries import LogQueries
+from glovecal_client.capture.other_publisher import describe_publisher, other_publisher
+from glovecal_client.errors import CaptureRefused, ClientError, NoAnswer
+from glovecal_client.keys import JSON_ENCODING, GloveKeys
+from glovecal_client.queries import json_object
+from glovecal_client.session import open_client
+from glovecal_client.wire.frame import FRAME_ENCODING
+
+_RETRY_S = 1.0
+
+
+@dataclass(frozen=True)
+class LinkSources:
+    """Where the link gets its answers from; called from zenoh's threads."""
+
+    status: Callable[[], str]
+    meta: Callable[[], str]
+    log: LogQueries
+
+
+class CaptureLink:
+    """One zenoh session with everything a glove publishes."""
+
+    def __init__(
+        self,
+        keys: GloveKeys,
+        endpoints: tuple[str, ...],
+        run: tuple[int, int],
+        sources: LinkSources,
+        report: Callable[[str], None],
+    ) -> None:
+        self.refusal: str | None = None
+        """Why this capture must give way to another publisher, once that is found."""
+        self._keys = keys
+        self._endpoints = endpoints
+        self._run = run
+        self._sources = sources
+        self._report = report
+        self._stop = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._open = ExitStack()
+        self._frames: zenoh.Publisher | None = None
+        self._documents: dict[str, zenoh.Publisher] = {}
+
+    @property
+    def connected(self) -> bool:
+        """Whether frames go out."""
+        return self._frames is not None
+
+    def start(self) -> None:
+        """Try once now; without a router go on trying in a thread. Raises CaptureRefused."""
+        try:
+            self._connect(wait_s=0.0)
+        except NoAnswer as error:
+            self._report(f"recording without publishing: {error}")
+            self._thread = threading.Thread(target=self._keep_trying, name="capture link", daemon=True)
+            self._thread.start()
+
+    def _keep_trying(self) -> None:
+        while not self._stop.is_set():
+            try:
+                self._connect(wait_s=None)
+                return
+            except CaptureRefused as error:
+                self.refusal = str(error)
+                return
+            except (ClientError, zenoh.ZError) as error:
+                self._report(f"recording without publishing: {error}")
+                self._stop.wait(_RETRY_S)
+
+    def _connect(self, wait_s: float | None) -> None:
+        with ExitStack() as opened:
+            session = opened.enter_context(
+                open_client(self._endpoints, wait_s=wait_s, cancelled=self._stop.is_set)
+            )
+            other = other_publisher(session, self._keys, self._stop.is_set)
+            if other is not None:
+                raise CaptureRefused(other)
+            self._declare(session, opened)
+            self._open = opened.pop_all()
+        self._report(f"publishing to {self._keys.raw}")
+
+    def _declare(self, session: zenoh.Session, opened: ExitStack) -> None:
+        keys = self._keys
+        opened.enter_context(session.liveliness().declare_token(keys.alive))
+        watch = zenoh.handlers.Callback(self._hear_status, indirect=True)
+        opened.enter_context(
+            session.declare_subscriber(keys.status, watch, allowed_origin=zenoh.Locality.REMOTE)
+        )
+        answers = {keys.status: self._answer_status, keys.meta: self._answer_meta, keys.log: self._answer_log}
+        for key, answer in answers.items():
+            opened.enter_context(session.declare_queryable(key, answer))
+        for key in (keys.status, keys.meta):
+            self._documents[key] = session.declare_publisher(key, encoding=JSON_ENCODING)
+        self._frames = session.declare_publisher(
+            keys.raw,
+            encoding=FRAME_ENCODING,
+            congestion_control=zenoh.CongestionControl.DROP,
+            priority=zenoh.Priority.INTERACTIVE_HIGH,
+            express=True,
+        )
+        self.publish_meta()
+
+    def publish(self, message: bytes) -> None:
+        """Send one frame, or nothing while there is no router. Never blocks, never raises for the wire."""
+        if self._frames is not None:
+            self._frames.put(message)
+
+    def publish_status(self) -> None:
+        """Send the status of this moment."""
+        self._publish_document(self._keys.status, self._sources.status)
+
+    def publish_meta(self) -> None:
+        """Send the meta of this moment."""
+        self._publish_document(self._keys.meta, self._sources.meta)
+
+    def _publish_document(self, key: str, text: Callable[[], str]) -> None:
+        publisher = self._documents.get(key)
+        if publisher is not None:
+            publisher.put(text())
+
+    def close(self) -> None:
+        """Stop trying, close the session. What was put before is still sent."""
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join()
+        self._frames = None
+        self._documents = {}
+        self._open.close()
+
+    def _answer_status(self, query: zenoh.Query) -> None:
+        with query:
+            query.reply(self._keys.status, self._sources.status(), encoding=JSON_ENCODING)
+
+    def _answer_meta(self, query: zenoh.Query) -> None:
+        with query:
+            query.reply(self._keys.meta, self._sources.meta(), encoding=JSON_ENCODING)
+
+    def _answer_log(self, query: zenoh.Query) -> None:
+        with query:
+            try:
+                found = self._sources.log.answer(str(query.parameters))
+            except (ClientError, OSError) as error:
+                query.reply_err(str(error), encoding="text/plain")
+            else:
+                query.reply(self._keys.log, found)
+
+    def _hear_status(self, sample: zenoh.Sample) -> None:
+        """Two captures that started while the router was away meet here; the later one gives way."""
+        other = json_object(sample.payload.to_bytes())
+        if other is None or other.get("state") == "stopped":
+            return
+        try:
+            run_id, started = int(str(other["run_id"]), 16), int(other["started_wall_ns"])
+        except (KeyError, ValueError, TypeError):
+            return
+        mine = self._run
+        if run_id != mine[1] and (started, run_id) < mine:
+            self.refusal = describe_publisher(self._keys, other)

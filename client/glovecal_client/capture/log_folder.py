@@ -1,0 +1,77 @@
+"""The capture logs of one glove: ``DATA/capture/<site>/<glove>/<start>-<run>.glvlog``, one file a run."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from glovecal_client.errors import CaptureRefused, DamagedLog
+from glovecal_client.frame_log import FrameLog
+from glovecal_client.keys import GloveKeys
+from glovecal_client.log_records import cut_damaged_tail
+
+SUFFIX = ".glvlog"
+
+
+class LogFolder:
+    """The folder, held by one daemon at a time (the lock goes with the process, also on kill -9)."""
+
+    def __init__(self, data: Path, keys: GloveKeys) -> None:
+        """Create the folder if needed and lock it. Raises CaptureRefused."""
+        self.path = data / "capture" / keys.site / keys.glove
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            self._lock = (self.path / "lock").open("ab")
+        except OSError as error:
+            raise CaptureRefused(
+                f"capture of glove {keys.glove!r}: cannot write in {self.path}: {error}"
+            ) from error
+        try:
+            _lock(self._lock)
+        except OSError as error:
+            self._lock.close()
+            raise CaptureRefused(
+                f"capture of glove {keys.glove!r}: another capture on this computer is writing to {self.path}"
+            ) from error
+
+    def close(self) -> None:
+        """Let go of the folder."""
+        self._lock.close()
+
+    def repair(self, report: Callable[[str], None]) -> None:
+        """Cut damaged tails off the logs of earlier runs and tell each to ``report``."""
+        for path in sorted(self.path.glob(f"*{SUFFIX}")):
+            try:
+                cut = cut_damaged_tail(path)
+            except (DamagedLog, OSError) as error:
+                report(f"earlier recording left as it is: {error}")
+            else:
+                if cut:
+                    report(f"earlier recording {path.name}: {cut} damaged bytes moved to {path.name}.cut")
+
+    def create(self, run_id: int, meta: Mapping[str, Any]) -> FrameLog:
+        """The log of a new run. Raises CaptureRefused if it cannot be written."""
+        start = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
+        path = self.path / f"{start}-{run_id:016x}{SUFFIX}"
+        try:
+            return FrameLog.create(path, meta)
+        except OSError as error:
+            raise CaptureRefused(f"capture does not start without its recording: {path}: {error}") from error
+
+    def find(self, run_id: int) -> Path | None:
+        """The log of a run, None if there is none."""
+        return next(iter(self.path.glob(f"*-{run_id:016x}{SUFFIX}")), None)
+
+
+def _lock(file: BinaryIO) -> None:
+    if sys.platform == "win32":
+        import msvcrt
+
+        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+    else:
+        import fcntl
+
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

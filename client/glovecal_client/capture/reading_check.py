@@ -1,0 +1,68 @@
+"""Which readings of a device are fit to become frames."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from glovecal_client.capture.device import Device, Reading
+
+_MAX_AHEAD_NS = 1_000_000_000
+
+
+class ReadingCheck:
+    """Refuses readings that are not what the device said it produces, and tells why."""
+
+    def __init__(self, device: Device) -> None:
+        self._sensors = tuple(device.sensors)
+        self._context = tuple(device.context)
+        self._counts: tuple[float, float] | None = getattr(device, "counts", None)
+        self._last_ns: int | None = None
+
+    def is_duplicate(self, reading: Reading) -> bool:
+        """Whether it was taken at the same nanosecond as the one before: the same reading given twice."""
+        return self._last_ns is not None and reading.monotonic_ns == self._last_ns
+
+    def fault(self, reading: Reading) -> str | None:
+        """A sentence saying what is wrong, None if nothing is; the next must then be later than this."""
+        fault = self._values_fault(reading) or self._time_fault(reading)
+        if fault is None:
+            self._last_ns = reading.monotonic_ns
+        return fault
+
+    def _values_fault(self, reading: Reading) -> str | None:
+        readings, context = np.asarray(reading.readings), np.asarray(reading.context)
+        if readings.shape != (len(self._sensors),):
+            return f"{_size(readings)} sensor values instead of {len(self._sensors)}"
+        if context.shape != (len(self._context),):
+            return f"{_size(context)} context values instead of {len(self._context)}"
+        if np.isinf(context).any():
+            return f"context {self._context[int(np.argmax(np.isinf(context)))]} is infinite"
+        bad = ~np.isfinite(readings)
+        if bad.any():
+            column = int(np.argmax(bad))
+            return f"sensor {self._sensors[column]} reads {readings[column]}"
+        return self._counts_fault(readings)
+
+    def _counts_fault(self, readings: np.ndarray) -> str | None:
+        if self._counts is None:
+            return None
+        low, high = self._counts
+        outside = (readings < low) | (readings > high)
+        if not outside.any():
+            return None
+        column = int(np.argmax(outside))
+        return f"sensor {self._sensors[column]} reads {readings[column]:g}, outside {low:g} to {high:g}"
+
+    def _time_fault(self, reading: Reading) -> str | None:
+        if self._last_ns is not None and reading.monotonic_ns < self._last_ns:
+            return f"its time is {(self._last_ns - reading.monotonic_ns) / 1e6:g} ms before the one before it"
+        ahead_ns = reading.monotonic_ns - time.monotonic_ns()
+        if ahead_ns > _MAX_AHEAD_NS:
+            return f"its time is {ahead_ns / 1e9:g} s in the future"
+        return None
+
+
+def _size(values: np.ndarray) -> str:
+    return str(len(values)) if values.ndim == 1 else f"an array of shape {values.shape} with"

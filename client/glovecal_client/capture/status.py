@@ -1,0 +1,74 @@
+"""What the capture daemon says about itself, on change and once a second."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+CaptureState = Literal["opening", "streaming", "lost", "stopped"]
+_SILENT_NS = 2_000_000_000
+
+
+@dataclass
+class CaptureStatus:
+    """Counters of one run. Written by the capture thread, read by zenoh's threads through ``document``."""
+
+    run_id: int
+    started_wall_ns: int
+    state: CaptureState = "opening"
+    sentence: str = "opening the device"
+    frames: int = 0
+    bad_frames: int = 0
+    duplicates: int = 0
+    reconnects: int = 0
+    disk_problem: str | None = None
+    frames_not_logged: int = 0
+    _times: deque[int] = field(default_factory=lambda: deque(maxlen=241))
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def change(self, state: CaptureState, sentence: str) -> bool:
+        """Take on a new state; True if it is one."""
+        changed = (state, sentence) != (self.state, self.sentence)
+        self.state, self.sentence = state, sentence
+        return changed
+
+    def frame_sent(self, now_ns: int) -> None:
+        """Count one frame that was given a sequence number."""
+        with self._lock:
+            self.frames += 1
+            self._times.append(now_ns)
+
+    def document(self) -> dict[str, Any]:
+        """The status as JSON-able data; ``sequence`` is the last one given, null before the first."""
+        now_ns = time.monotonic_ns()
+        with self._lock:
+            age = round((now_ns - self._times[-1]) / 1e9, 3) if self._times else None
+            return {
+                "state": self.state,
+                "sequence": self.frames - 1 if self.frames else None,
+                "frames": self.frames,
+                "rate_hz": self._measured_rate(now_ns),
+                "bad_frames": self.bad_frames,
+                "duplicates": self.duplicates,
+                "last_frame_age_s": age,
+                "reconnects": self.reconnects,
+                "disk": "full" if self.disk_problem else "ok",
+                "frames_not_logged": self.frames_not_logged,
+                "sentence": self.disk_problem or self.sentence,
+                "run_id": f"{self.run_id:016x}",
+                "started_wall_ns": self.started_wall_ns,
+            }
+
+    def _measured_rate(self, now_ns: int) -> float:
+        times = self._times
+        if len(times) < 2 or now_ns - times[-1] > _SILENT_NS or times[-1] == times[0]:
+            return 0.0
+        return round((len(times) - 1) * 1e9 / (times[-1] - times[0]), 2)
+
+    def text(self) -> str:
+        """The document as JSON."""
+        return json.dumps(self.document(), allow_nan=False)

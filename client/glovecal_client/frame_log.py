@@ -1,0 +1,152 @@
+"""An append-only log of frames that survives kill -9, power cuts and a full disk.
+
+Appending is one unbuffered write, so the record is with the operating system before the frame is published;
+``BackgroundSync`` brings it to the disk once a second. A record that could not be written whole is cut off
+again at once and kept in memory, in order, until there is room.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections import deque
+from collections.abc import Mapping
+from io import FileIO
+from pathlib import Path
+from typing import Any
+
+from glovecal_client.log_records import cut_damaged_tail, good_end, header_bytes, record_bytes
+
+MAX_WAITING = 7200
+"""Records kept in memory while the disk is full: one minute at 120 Hz."""
+
+
+class FrameLog:
+    """One log file open for appending. ``append`` is for one thread; ``sync`` may run in another."""
+
+    def __init__(self, path: Path, file: FileIO, meta: dict[str, Any], records: int, end: int) -> None:
+        self.path = path
+        self.meta = meta
+        self.records = records
+        """Records in the file."""
+        self.good_bytes = end
+        """Where the last whole record ends."""
+        self.lost_records = 0
+        """Records given up because the disk stayed full for too long."""
+        self._file = file
+        self._waiting: deque[bytes] = deque()
+        self._append_problem: str | None = None
+        self._sync_problem: str | None = None
+        self._synced_bytes = end
+
+    @classmethod
+    def create(cls, path: Path | str, meta: Mapping[str, Any]) -> FrameLog:
+        """A new log. Raises FileExistsError, OSError (no folder, disk full), ValueError (meta is no JSON)."""
+        path = Path(path)
+        head = header_bytes(meta)
+        file = FileIO(path, "xb")
+        try:
+            if file.write(head) != len(head):
+                raise OSError(f"{path}: no room for the header")
+            os.fsync(file.fileno())
+        except OSError:
+            file.close()
+            path.unlink()
+            raise
+        return cls(path, file, dict(meta), 0, len(head))
+
+    @classmethod
+    def resume(cls, path: Path | str) -> FrameLog:
+        """An existing log, cut back to its last good record. Raises DamagedLog, OSError."""
+        path = Path(path)
+        cut_damaged_tail(path)
+        meta, records, end = good_end(path)
+        file = FileIO(path, "r+b")
+        file.seek(end)
+        return cls(path, file, meta, records, end)
+
+    @property
+    def waiting(self) -> int:
+        """Records in memory that the disk did not take yet."""
+        return len(self._waiting)
+
+    @property
+    def problem(self) -> str | None:
+        """Why records do not reach the disk, None if they do."""
+        return self._append_problem or self._sync_problem
+
+    def append(self, payload: bytes) -> bool:
+        """Write one record; False if it has to wait in memory. Raises ValueError for a bad payload."""
+        self._waiting.append(record_bytes(payload))
+        written = self._write_waiting()
+        while len(self._waiting) > MAX_WAITING:
+            self._waiting.popleft()
+            self.lost_records += 1
+        return written
+
+    def _write_waiting(self) -> bool:
+        try:
+            while self._waiting:
+                self._write(self._waiting[0])
+                self._waiting.popleft()
+        except OSError as error:
+            self._append_problem = f"{self.path}: {error.strerror or error}"
+            return False
+        self._append_problem = None
+        return True
+
+    def _write(self, record: bytes) -> None:
+        if self._file.tell() != self.good_bytes:
+            self._cut_back()
+        written = self._file.write(record)
+        if written != len(record):
+            self._cut_back()
+            raise OSError(f"no room: {written} of {len(record)} bytes written")
+        self.good_bytes += len(record)
+        self.records += 1
+
+    def _cut_back(self) -> None:
+        self._file.truncate(self.good_bytes)
+        self._file.seek(self.good_bytes)
+
+    def sync(self) -> None:
+        """Bring what was written to the disk; a failure shows in ``problem``."""
+        end = self.good_bytes
+        if end == self._synced_bytes and self._sync_problem is None:
+            return
+        try:
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            self._sync_problem = f"{self.path}: {error.strerror or error}"
+        else:
+            self._sync_problem = None
+            self._synced_bytes = end
+
+    def close(self) -> None:
+        """Write what is waiting, sync and close; harmless when already closed."""
+        if not self._file.closed:
+            self._write_waiting()
+            self.lost_records += len(self._waiting)
+            self._waiting.clear()
+            self.sync()
+            self._file.close()
+
+
+class BackgroundSync:
+    """Syncs a log once a second in a thread of its own; close it before the log."""
+
+    def __init__(self, log: FrameLog, period_s: float = 1.0) -> None:
+        self._log = log
+        self._period_s = period_s
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="log sync", daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._stop.wait(self._period_s):
+            self._log.sync()
+
+    def close(self) -> None:
+        """Stop the thread."""
+        self._stop.set()
+        self._thread.join()

@@ -1,0 +1,168 @@
+"""Poses of one glove for an animation tool: always the newest, never a queue, and honest about silence."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from types import TracebackType
+from typing import Any
+
+import zenoh
+
+from glovecal_client.errors import NoAnswer, WireError
+from glovecal_client.keys import GloveKeys
+from glovecal_client.pose_order import PoseCounts, PoseOrder
+from glovecal_client.queries import ask_json, json_object
+from glovecal_client.wire.pose import Pose, decode_pose
+
+STALE_AFTER_S = 0.5
+
+
+class PoseSubscriber:
+    """Subscribes to one glove's poses, latest wins: a slow reader misses poses, it never gets old ones.
+
+    Use it in one of three ways: ``latest`` (a tool with a draw loop), ``wait`` or iteration (a loop of one's
+    own), or ``on_pose`` (called in a thread of the subscriber's own, so it may take its time). Close it, or use
+    it in a ``with`` block, before the session is closed.
+    """
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        site: str,
+        glove: str,
+        *,
+        on_pose: Callable[[Pose], None] | None = None,
+        stale_after_s: float = STALE_AFTER_S,
+    ) -> None:
+        """Raises BadName for a site or glove that cannot be."""
+        self._session = session
+        self._keys = GloveKeys(site, glove)
+        self._stale_after_s = stale_after_s
+        self._changed = threading.Condition()
+        self._order = PoseOrder()
+        self._latest: Pose | None = None
+        self._latest_at = 0.0
+        self._fresh = False
+        self._meta: dict[str, Any] | None = None
+        self._closed = False
+        hear_pose = zenoh.handlers.Callback(self._hear_pose, indirect=False)
+        hear_meta = zenoh.handlers.Callback(self._hear_meta, indirect=False)
+        self._subscribers = [
+            session.declare_subscriber(self._keys.pose_meta, hear_meta),
+            session.declare_subscriber(self._keys.pose, hear_pose),
+        ]
+        self._caller: threading.Thread | None = None
+        if on_pose is not None:
+            self._caller = threading.Thread(target=self._call, args=(on_pose,), name="poses", daemon=True)
+            self._caller.start()
+
+    @property
+    def latest(self) -> Pose | None:
+        """The newest pose, None before the first. Look at ``stale`` before using it."""
+        with self._changed:
+            return self._latest
+
+    @property
+    def stale(self) -> bool:
+        """Nothing came for half a second (or ever), or the service says that the glove is silent."""
+        with self._changed:
+            pose = self._latest
+            return pose is None or pose.stale or time.monotonic() - self._latest_at > self._stale_after_s
+
+    @property
+    def counts(self) -> PoseCounts:
+        """What came and what did not."""
+        with self._changed:
+            return self._order.counts()
+
+    def wait(self, timeout_s: float) -> Pose | None:
+        """The newest pose not yet given by ``wait`` or iteration, None if there was none in time."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._fresh or self._closed, timeout_s)
+            if not self._fresh:
+                return None
+            self._fresh = False
+            return self._latest
+
+    def __iter__(self) -> Iterator[Pose]:
+        """Newest poses as they come, until the subscriber is closed."""
+        while not self._closed:
+            pose = self.wait(self._stale_after_s)
+            if pose is not None:
+                yield pose
+
+    def rotations(self, pose: Pose, *, timeout_s: float = 2.0) -> tuple[str, ...]:
+        """Names of the pose's rotations, in order. Asks the service if the names known are of another model.
+
+        Raises NoAnswer while nobody says what the rotations of this pose's model are.
+        """
+        names = _names(self._meta, pose)
+        if names is None:
+            self._meta = ask_json(self._session, self._keys.pose_meta, timeout_s=timeout_s)
+            names = _names(self._meta, pose)
+        if names is None:
+            raise NoAnswer(
+                f"{self._keys.pose_meta}: the names given are for model {self._meta.get('model')!r}, "
+                f"the pose is of {pose.model_sha256!r} with {len(pose.degrees)} rotations"
+            )
+        return names
+
+    def angles(self, pose: Pose) -> dict[str, float]:
+        """The pose's rotations by name, in degrees; empty when uncalibrated. Raises NoAnswer as ``rotations``."""
+        if not len(pose.degrees):
+            return {}
+        return dict(zip(self.rotations(pose), pose.degrees.tolist(), strict=True))
+
+    def close(self) -> None:
+        """Stop listening; waiting readers get None. Not to be called from ``on_pose``."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+        for subscriber in self._subscribers:
+            subscriber.undeclare()
+        self._subscribers = []
+        if self._caller is not None:
+            self._caller.join()
+            self._caller = None
+
+    def __enter__(self) -> PoseSubscriber:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _hear_pose(self, sample: zenoh.Sample) -> None:
+        """On zenoh's own thread: take the message in and return at once."""
+        message = sample.payload.to_bytes()
+        try:
+            pose = decode_pose(message)
+        except WireError:
+            with self._changed:
+                self._order.note_damage()
+            return
+        with self._changed:
+            if self._order.accept(pose):
+                self._latest, self._latest_at, self._fresh = pose, time.monotonic(), True
+                self._changed.notify_all()
+
+    def _hear_meta(self, sample: zenoh.Sample) -> None:
+        meta = json_object(sample.payload.to_bytes())
+        if meta is not None:
+            self._meta = meta
+
+    def _call(self, on_pose: Callable[[Pose], None]) -> None:
+        for pose in self:
+            on_pose(pose)
+
+
+def _names(meta: dict[str, Any] | None, pose: Pose) -> tuple[str, ...] | None:
+    """The rotation names in ``meta`` if they are those of the pose's model."""
+    if meta is None or meta.get("model") != pose.model_sha256:
+        return None
+    names = meta.get("rotations")
+    fits = isinstance(names, list) and len(names) == len(pose.degrees)
+    return tuple(str(name) for name in names) if fits and names is not None else None
