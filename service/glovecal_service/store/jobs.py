@@ -2,7 +2,7 @@
 
 A runner claims a job by compare-and-set, which raises its attempt number and starts a lease. Everything it
 writes afterwards carries the attempt number and is refused once another attempt has begun. A lease that
-runs out puts the job back into the queue; after three attempts it has failed.
+runs out puts the job back into the queue; after three such losses it has failed.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import FINISHED_JOB_STATES, JobEvent, JobRecord
 
 LEASE_S = 30.0
-MOST_ATTEMPTS = 3
+MOST_LOSSES = 3
 LONGEST_SENTENCE = 2000
-_HIDDEN = ("lease_until",)
+_HIDDEN = ("lease_until", "losses")
 
 
 class Jobs:
@@ -42,6 +42,7 @@ class Jobs:
             "payload": dict(payload),
             "state": "queued",
             "attempt": 0,
+            "losses": 0,
             "cancel_requested": False,
             "fraction": 0.0,
             "sentence": "waiting for its turn",
@@ -122,10 +123,10 @@ class Jobs:
         return self._end(id, attempt, "cancelled", "cancelled")
 
     def release(self, id: str, attempt: int) -> JobRecord:
-        """Give an unfinished job back, as a service does that stops; the attempt does not count."""
+        """Give an unfinished job back, as a service does that stops; that is no loss."""
         values = {"state": "queued", "owner": None, "sentence": "waiting for the service to start again"}
         with self._database.write() as connection:
-            self._write(connection, id, attempt, {**values, "lease_until": None, "attempt": attempt - 1})
+            self._write(connection, id, attempt, {**values, "lease_until": None})
             return _noted(connection, id)
 
     def request_cancel(self, id: str) -> JobRecord:
@@ -216,10 +217,12 @@ def _after_loss(row: Row) -> dict[str, Any]:
     """What becomes of a running job whose runner died."""
     if row.cancel_requested:
         return {"state": "cancelled", "sentence": "cancelled", "finished_at": now(), "lease_until": None}
-    if row.attempt >= MOST_ATTEMPTS:
-        sentence = f"given up: the process that ran it died in each of {row.attempt} attempts"
+    losses = row.losses + 1
+    if losses >= MOST_LOSSES:
+        sentence = f"given up: the process that ran it died {losses} times"
         return {
             "state": "failed",
+            "losses": losses,
             "sentence": sentence,
             "error": sentence,
             "finished_at": now(),
@@ -227,6 +230,7 @@ def _after_loss(row: Row) -> dict[str, Any]:
         }
     return {
         "state": "queued",
+        "losses": losses,
         "owner": None,
         "lease_until": None,
         "sentence": "waiting again: the process that ran it died",

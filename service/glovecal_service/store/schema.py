@@ -75,6 +75,6 @@ def _refuse_newer(known: ScriptDirectory, present: str | None, database: Databas
         return
     raise NewerSchema(
         f"the database {database.name} has schema {present!r}, which this version of Glovecal does not know"
-        f" (its newest is {known.get_current_head()!r}); install the newer Glovecal that wrote it, or restore a"
-        " backup"
+        f" (its newest is {known.get_current_head()!r}); install the newer Glovecal that wrote it, or restore"
+        " a backup"
     )

@@ -170,6 +170,7 @@ jobs = Table(
     Column("payload", JSON, nullable=False),
     Column("state", String(16), nullable=False),
     Column("attempt", Integer, nullable=False),
+    Column("losses", Integer, nullable=False),
     Column("owner", Text),
     Column("lease_until", Float),
     Column("cancel_requested", Boolean, nullable=False),

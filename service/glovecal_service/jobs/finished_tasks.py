@@ -1,0 +1,68 @@
+"""Results of finished tasks on disk, by task key: what was computed once is not computed again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+from contextlib import suppress
+from pathlib import Path
+
+from safetensors import SafetensorError
+from safetensors.numpy import load as load_arrays
+from safetensors.numpy import save as save_arrays
+
+from glovecal_models.errors import BadInput
+from glovecal_service.jobs.job_kind import TaskResult
+from glovecal_service.store.blobs import write_durably
+
+KEPT_BYTES = 2_000_000_000
+_KEY = re.compile(r"[0-9a-f]{16,128}\Z")
+
+
+class FinishedTasks:
+    """Files ``<key>.<sha256 of the content>.safetensors``; a file that does not match its name is ignored."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def get(self, key: str) -> TaskResult | None:
+        """The result of that key, None if there is none or it is damaged."""
+        for path in self.folder.glob(f"{_check(key)}.*.safetensors"):
+            with suppress(OSError, SafetensorError, KeyError, ValueError):
+                content = path.read_bytes()
+                if hashlib.sha256(content).hexdigest() == path.name.split(".")[1]:
+                    os.utime(path)
+                    return _load(content)
+            path.unlink(missing_ok=True)
+        return None
+
+    def put(self, key: str, result: TaskResult) -> None:
+        """Keep a result. Raises StorageFull."""
+        content = save_arrays(result.arrays, {"facts": json.dumps(result.facts, allow_nan=False)})
+        digest = hashlib.sha256(content).hexdigest()
+        write_durably(self.folder / f"{_check(key)}.{digest}.safetensors", content)
+
+    def prune(self, kept_bytes: int = KEPT_BYTES) -> None:
+        """Delete the results that were not used for longest until the rest fits."""
+        used = []
+        for path in self.folder.glob("*.safetensors"):
+            with suppress(FileNotFoundError):
+                used.append((path.stat().st_mtime, path.stat().st_size, path))
+        total = 0
+        for _, size, path in sorted(used, reverse=True):
+            total += size
+            if total > kept_bytes:
+                path.unlink(missing_ok=True)
+
+
+def _check(key: str) -> str:
+    if not _KEY.match(key):
+        raise BadInput(f"{key!r} is no task key: 16 to 128 hexadecimal digits")
+    return key
+
+
+def _load(content: bytes) -> TaskResult:
+    header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])
+    return TaskResult(load_arrays(content), json.loads(header["__metadata__"]["facts"]))

@@ -1,0 +1,66 @@
+"""What a kind of job is: a plan of independent tasks, and what to do with their results.
+
+A new kind is one module with a ``JobKind`` and one line in ``registry.py``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from glovecal_service.store import Store
+from glovecal_service.store.records import JobRecord
+
+Cancelled = Callable[[], bool]
+Report = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class TaskResult:
+    """What a task computed, in the form a file can hold."""
+
+    arrays: dict[str, np.ndarray]
+    facts: dict[str, Any]
+    """JSON-able."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One unit of work for one worker process."""
+
+    key: str
+    """Names the result: data, settings and software version hashed. A finished key is never run again."""
+    label: str
+    """For messages: ``I_PIP`` or ``I_PIP, fold 2``."""
+    function: Callable[[Any, Cancelled], TaskResult]
+    """A function of a module (workers import it); polls the second argument and raises Cancelled."""
+    payload: Any
+    """Its first argument: plain dataclasses, numbers, texts and arrays."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """Where a job stands after a task."""
+
+    sentence: str
+    detail: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class JobPlan:
+    tasks: Sequence[Task]
+    step: Callable[[int, Mapping[int, TaskResult]], Step]
+    """Given the number of the task that just finished and all results so far."""
+    finish: Callable[[Sequence[TaskResult]], dict[str, Any]]
+    """Given the results in the order of ``tasks``; its answer is the job's result. May run more than once."""
+    in_this_process: bool = False
+    """Tasks so short that starting workers for them would take longer than they do."""
+
+
+class JobKind(Protocol):
+    def plan(self, store: Store, job: JobRecord) -> JobPlan:
+        """Lay out the work. Raises BadInput, NotFound ... with a sentence for the user."""
+        ...

@@ -1,0 +1,213 @@
+"""One claimed job, from its plan to its last write. All writes carry the attempt number."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import structlog
+from distributed import Future
+
+from glovecal_models.errors import Cancelled, GlovecalError
+from glovecal_service.jobs.finished_tasks import FinishedTasks
+from glovecal_service.jobs.job_kind import JobKind, JobPlan, TaskResult
+from glovecal_service.jobs.task_run import TaskOutcome, run_task
+from glovecal_service.jobs.workers import Workers, WorkersLost, finished, outcome
+from glovecal_service.store import Store
+from glovecal_service.store.errors import Conflict, StoreUnavailable
+from glovecal_service.store.records import JobRecord
+
+log = structlog.get_logger(__name__)
+
+WATCH_S = 0.2
+HEARTBEAT_S = 5.0
+STRAGGLERS_S = 1.0
+"""After a cancel the row is written this late at most, whether or not the last fit has noticed."""
+WORKER_RESTARTS = 3
+RETRY_WRITES_FOR_S = 60.0
+
+
+class JobRun:
+    """Runs in a thread of its own; a second thread keeps the lease and watches for the cancel request."""
+
+    def __init__(self, store: Store, job: JobRecord, kind: JobKind, workers: Workers, folder: Path) -> None:
+        self._store = store
+        self._job = job
+        self._kind = kind
+        self._workers = workers
+        self._finished = FinishedTasks(folder)
+        self._cancel_file = folder / f"cancel-{job.id}-{job.attempt}"
+        self._ended = threading.Event()
+        self._stopped = threading.Event()
+        self._released = False
+        self._cancel_requested = False
+
+    def stop(self) -> None:
+        """The service stops: leave the job to the next start."""
+        self._released = True
+        self._cancel()
+
+    def run(self) -> None:
+        """Never raises; whatever happens is written to the job's row or to the log."""
+        watch = threading.Thread(target=self._watch, name=f"watch-{self._job.id}", daemon=True)
+        watch.start()
+        try:
+            self._written(self._end())
+        except Conflict as error:
+            log.warning("job was taken over", job=self._job.id, reason=str(error))
+        except GlovecalError as error:
+            log.error("job could not be ended", job=self._job.id, reason=str(error))
+        finally:
+            self._ended.set()
+            watch.join()
+            self._cancel_file.unlink(missing_ok=True)
+
+    def _end(self) -> Callable[[], object]:
+        """Do the work; the write that ends it."""
+        jobs, id, attempt = self._store.jobs, self._job.id, self._job.attempt
+        try:
+            result = self._result()
+            return lambda: jobs.finish(id, attempt, result)
+        except Cancelled:
+            if self._released and not self._cancel_requested:
+                return lambda: jobs.release(id, attempt)
+            return lambda: jobs.cancelled(id, attempt)
+        except Conflict as error:
+            if self._is_over():
+                raise
+            message = str(error)
+        except GlovecalError as error:
+            message = str(error)
+        except Exception as error:
+            log.exception("job failed", job=id, kind=self._job.kind)
+            message = f"an error in Glovecal itself: {type(error).__name__}: {error}"
+        return lambda: jobs.fail(id, attempt, message)
+
+    def _result(self) -> dict:
+        plan = self._kind.plan(self._store, self._job)
+        results = self._known(plan)
+        if plan.in_this_process:
+            self._fit_here(plan, results)
+        else:
+            self._fit_in_workers(plan, results)
+        self._raise_if_stopped()
+        self._progress(1.0, "putting the result together", {})
+        return plan.finish([results[number] for number in range(len(plan.tasks))])
+
+    def _known(self, plan: JobPlan) -> dict[int, TaskResult]:
+        """Results that an earlier attempt or an earlier job left."""
+        found = {number: self._finished.get(task.key) for number, task in enumerate(plan.tasks)}
+        results = {number: result for number, result in found.items() if result is not None}
+        already = f", {len(results)} of them known already" if results else ""
+        self._progress(
+            len(results) / max(1, len(plan.tasks)),
+            f"{len(plan.tasks)} fits to do{already}",
+            {"tasks": len(plan.tasks), "known": len(results)},
+        )
+        return results
+
+    def _fit_here(self, plan: JobPlan, results: dict[int, TaskResult]) -> None:
+        for number, task in enumerate(plan.tasks):
+            self._raise_if_stopped()
+            if number not in results:
+                self._take(plan, number, run_task(task, self._finished.folder, self._cancel_file), results)
+
+    def _fit_in_workers(self, plan: JobPlan, results: dict[int, TaskResult]) -> None:
+        for restart in range(WORKER_RESTARTS + 1):
+            try:
+                self._hand_out(plan, results)
+                return
+            except WorkersLost as error:
+                if restart == WORKER_RESTARTS:
+                    raise
+                log.warning("training processes lost, starting again", job=self._job.id, reason=str(error))
+                self._workers.reset()
+
+    def _hand_out(self, plan: JobPlan, results: dict[int, TaskResult]) -> None:
+        """Keep every worker busy with one task and one waiting; futures are dropped as they finish."""
+        waiting = [number for number in range(len(plan.tasks)) if number not in results]
+        running: dict[Future, int] = {}
+        try:
+            while waiting or running:
+                self._raise_if_stopped()
+                while waiting and len(running) < 2 * self._workers.count:
+                    number = waiting.pop(0)
+                    task = plan.tasks[number]
+                    future = self._workers.submit(task, self._finished.folder, self._cancel_file)
+                    running[future] = number
+                for future in finished(list(running), WATCH_S):
+                    number = running.pop(future)
+                    self._take(plan, number, outcome(future, plan.tasks[number]), results)
+        finally:
+            self._leave(list(running))
+
+    def _leave(self, running: list[Future]) -> None:
+        """An error or a cancel: the fits in flight are told to stop, and given a moment to do so."""
+        if not running:
+            return
+        self._cancel()
+        until = time.monotonic() + STRAGGLERS_S
+        while running and (left := until - time.monotonic()) > 0:
+            try:
+                done = finished(running, left)
+            except WorkersLost:
+                return
+            running = [future for future in running if future not in done]
+
+    def _take(self, plan: JobPlan, number: int, outcome: TaskOutcome, results: dict[int, TaskResult]) -> None:
+        if outcome.cancelled:
+            raise Cancelled("the fit was stopped")
+        if outcome.error is not None:
+            raise GlovecalError(outcome.error)
+        result = self._finished.get(outcome.key)
+        if result is None:
+            raise WorkersLost(f"the result of {plan.tasks[number].label} is not in {self._finished.folder}")
+        results[number] = result
+        step = plan.step(number, results)
+        self._progress(len(results) / len(plan.tasks), step.sentence, step.detail)
+
+    def _progress(self, fraction: float, sentence: str, detail: dict) -> None:
+        jobs, id, attempt = self._store.jobs, self._job.id, self._job.attempt
+        self._written(lambda: jobs.progress(id, attempt, fraction, sentence, detail))
+
+    def _written(self, write: Callable[[], object]) -> None:
+        """Repeat a write while the database is away; the lease outlives a short restart."""
+        until = time.monotonic() + RETRY_WRITES_FOR_S
+        while True:
+            try:
+                write()
+                return
+            except StoreUnavailable:
+                if time.monotonic() > until:
+                    raise
+                time.sleep(WATCH_S)
+
+    def _watch(self) -> None:
+        beat = time.monotonic()
+        while not self._ended.wait(WATCH_S):
+            try:
+                if time.monotonic() - beat >= HEARTBEAT_S:
+                    beat = time.monotonic()
+                    self._store.jobs.heartbeat(self._job.id, self._job.attempt)
+                if self._store.jobs.get(self._job.id).cancel_requested:
+                    self._cancel_requested = True
+                    self._cancel()
+            except StoreUnavailable as error:
+                log.warning("job cannot be watched now", job=self._job.id, reason=str(error))
+            except GlovecalError:
+                self._cancel()  # the attempt is over: somebody else runs the job
+
+    def _is_over(self) -> bool:
+        record = self._store.jobs.get(self._job.id)
+        return record.state != "running" or record.attempt != self._job.attempt
+
+    def _cancel(self) -> None:
+        self._stopped.set()
+        if not self._ended.is_set():
+            self._cancel_file.touch()
+
+    def _raise_if_stopped(self) -> None:
+        if self._stopped.is_set():
+            raise Cancelled("the job was stopped")

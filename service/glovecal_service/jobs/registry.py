@@ -1,0 +1,8 @@
+"""All kinds of jobs, by the name in the job's row."""
+
+from __future__ import annotations
+
+from glovecal_service.jobs.job_kind import JobKind
+from glovecal_service.jobs.train import TrainJob
+
+KINDS: dict[str, JobKind] = {"train": TrainJob()}

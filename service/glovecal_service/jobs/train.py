@@ -1,0 +1,171 @@
+"""Job kind ``train``: takes of one subject in, a stored (and, if wished, active) calibration model out."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+from glovecal_models.calibration.artifact import dump
+from glovecal_models.calibration.fit_task import FitResult, FitTask
+from glovecal_models.calibration.fit_task import run_task as run_fit
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.training import assemble
+from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
+from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.errors import BadInput, NotTrainable
+from glovecal_service.jobs.job_kind import JobPlan, Step, Task, TaskResult
+from glovecal_service.store import Store
+from glovecal_service.store.records import JobRecord, TakeRecord
+
+_OWN_KEYS = {"subject", "layout", "takes", "activate", "parent"}
+_SETTINGS = {field.name for field in fields(TrainingSettings)}
+
+
+class TrainJob:
+    """Payload: ``subject``, ``layout``, ``takes`` (ids, or None for all with a reference), ``activate``,
+    ``parent`` (model id or None), and any of ``TrainingSettings``.
+
+    Result: ``model``, ``held_out_rmse_deg``, ``per_rotation`` (held-out degrees, None for a rule),
+    ``sentences``, ``active``.
+    """
+
+    def plan(self, store: Store, job: JobRecord) -> JobPlan:
+        """Raises BadInput (payload), NotFound (subject, layout, takes, parent), NotTrainable."""
+        payload = job.payload
+        subject, layout_name = _text(payload, "subject"), _text(payload, "layout")
+        settings = _settings(payload)
+        store.subjects.get(subject)
+        layout = store.layouts.get(layout_name)
+        parent = payload.get("parent")
+        parent = None if parent is None else store.models.get(parent).id
+        records = _takes(store, payload.get("takes"), subject, layout_name)
+        plan = plan_training([store.takes.load(record.id) for record in records], layout, subject, settings)
+
+        def finish(results: Sequence[TaskResult]) -> dict[str, Any]:
+            hashes = [record.artifact for record in records]
+            fits = [_fit_result(result) for result in results]
+            model = assemble(plan, fits, take_hashes=hashes, parent=parent)
+            facts = _facts(model, plan, records)
+            return _keep(store, model, layout_name, facts, activate=bool(payload.get("activate", False)))
+
+        return JobPlan(
+            tasks=[Task(task.key, _label(task), fit, task) for task in plan.tasks],
+            step=_stepper(plan),
+            finish=finish,
+            in_this_process=settings.method == "linear",
+        )
+
+
+def fit(task: FitTask, cancelled: Callable[[], bool]) -> TaskResult:
+    """One fit, run in a worker. Raises Cancelled, NotTrainable."""
+    result = run_fit(task, cancelled=cancelled)
+    facts = {
+        "rotation": result.rotation,
+        "fold": result.fold,
+        "settings": result.settings,
+        "held_out_squared_error": result.held_out_squared_error,
+        "held_out_count": result.held_out_count,
+    }
+    return TaskResult(result.arrays, facts)
+
+
+def _fit_result(result: TaskResult) -> FitResult:
+    return FitResult(arrays=result.arrays, **result.facts)
+
+
+def _stepper(plan: TrainingPlan) -> Callable[[int, Mapping[int, TaskResult]], Step]:
+    """Says after each fit how far its rotation is, and its held-out error once all its folds are done."""
+    planned = Counter(task.rotation for task in plan.tasks)
+
+    def step(number: int, results: Mapping[int, TaskResult]) -> Step:
+        rotation = plan.tasks[number].rotation
+        done = Counter(plan.tasks[other].rotation for other in results)
+        complete = [name for name in planned if done[name] == planned[name]]
+        of_all = f"{len(complete)} of {len(planned)} rotations"
+        detail: dict[str, Any] = {
+            "rotation": rotation,
+            "rotations_done": len(complete),
+            "rotations": len(planned),
+        }
+        if rotation not in complete:
+            return Step(f"{rotation}: {done[rotation]} of {planned[rotation]} fits done", detail)
+        own = [result.facts for result in results.values() if result.facts["rotation"] == rotation]
+        count = sum(facts["held_out_count"] for facts in own)
+        if not count:
+            return Step(f"{rotation} fitted; {of_all}", detail)
+        error = (sum(facts["held_out_squared_error"] for facts in own) / count) ** 0.5
+        detail["held_out_rmse_deg"] = error
+        return Step(f"{rotation} fitted, {error:.2f} degrees on held-out takes; {of_all}", detail)
+
+    return step
+
+
+def _takes(store: Store, ids: Sequence[str] | None, subject: str, layout: str) -> list[TakeRecord]:
+    if ids is None:
+        records = [take for take in store.takes.list(subject, layout) if take.has_reference]
+        if not records:
+            raise NotTrainable(
+                f"subject {subject!r} has no take with reference angles for layout {layout!r}; import one,"
+                " or attach a reference to a recorded take"
+            )
+        return records
+    if not isinstance(ids, list) or not ids or not all(isinstance(id, str) for id in ids):
+        raise BadInput(f"takes must be a list of take ids or null, not {ids!r}")
+    records = [store.takes.get(id) for id in dict.fromkeys(ids)]
+    for record in records:
+        if record.subject != subject:
+            raise BadInput(f"take {record.id} is of subject {record.subject!r}, not of {subject!r}")
+    return records
+
+
+def _settings(payload: Mapping[str, Any]) -> TrainingSettings:
+    unknown = set(payload) - _OWN_KEYS - _SETTINGS
+    if unknown:
+        known = ", ".join(sorted(_OWN_KEYS | _SETTINGS))
+        raise BadInput(f"training does not know {sorted(unknown)[0]!r}; it knows {known}")
+    chosen = {name: payload[name] for name in _SETTINGS if payload.get(name) is not None}
+    for name, value in chosen.items():
+        if name != "method" and (not isinstance(value, int) or isinstance(value, bool) or value < 0):
+            raise BadInput(f"{name} must be a whole number, not {value!r}")
+    return TrainingSettings(**chosen)
+
+
+def _facts(model: CalibrationModel, plan: TrainingPlan, records: Sequence[TakeRecord]) -> dict[str, Any]:
+    return {
+        "takes": [{"id": record.id, "name": record.name, "artifact": record.artifact} for record in records],
+        "held_out_rmse_deg": model.error_estimate.get("rmse_deg"),
+        "held_out_how": model.error_estimate.get("how"),
+        "per_rotation": {item.rotation: item.held_out_rmse_deg for item in model.rotations},
+        "sentences": list(plan.sentences),
+        "simulated": model.simulated,
+    }
+
+
+def _keep(
+    store: Store, model: CalibrationModel, layout: str, facts: dict[str, Any], *, activate: bool
+) -> dict[str, Any]:
+    record = store.models.add(
+        dump(model),
+        subject=model.subject,
+        layout=layout,
+        method=model.method,
+        parent=model.parent,
+        facts=facts,
+    )
+    if activate:
+        store.models.activate(record.id)
+    said = {name: facts[name] for name in ("held_out_rmse_deg", "per_rotation", "sentences")}
+    return {"model": record.id, **said, "active": activate}
+
+
+def _text(payload: Mapping[str, Any], name: str) -> str:
+    value = payload.get(name)
+    if not isinstance(value, str):
+        raise BadInput(f"training needs {name!r} as text, not {value!r}")
+    return value
+
+
+def _label(task: FitTask) -> str:
+    return task.rotation if task.fold is None else f"{task.rotation}, fold {task.fold + 1}"

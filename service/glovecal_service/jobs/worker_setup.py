@@ -1,0 +1,18 @@
+"""What a worker process does before its first task: step back behind the live stream, pin BLAS."""
+
+from __future__ import annotations
+
+import os
+
+from distributed import Worker
+
+from glovecal_models.threads import pin_blas_to_one_thread
+
+NICENESS = 10
+
+
+def dask_setup(worker: Worker) -> None:
+    """Called by Dask in each worker (``preload``)."""
+    if hasattr(os, "nice"):
+        os.nice(NICENESS - os.nice(0))
+    pin_blas_to_one_thread()
