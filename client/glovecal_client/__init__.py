@@ -1,7 +1,7 @@
 """Glovecal on the wire: frames and poses over zenoh, capture of gloves, fetching of missed frames.
 
-What stands here is the public interface; ``glovecal_client.capture`` holds the devices and the daemon, the REST
-client is in a module of its own and needs the extra ``[rest]``.
+What stands here is the public interface. ``glovecal_client.capture`` holds the devices and the daemon; the
+REST client is in a module of its own and needs the extra ``[rest]``.
 """
 
 from glovecal_client.errors import (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -17,14 +18,15 @@ from glovecal_client.queries import ask_json, json_object
 from glovecal_client.wire.pose import Pose, decode_pose
 
 STALE_AFTER_S = 0.5
+_LOG = logging.getLogger(__name__)
 
 
 class PoseSubscriber:
     """Subscribes to one glove's poses, latest wins: a slow reader misses poses, it never gets old ones.
 
     Use it in one of three ways: ``latest`` (a tool with a draw loop), ``wait`` or iteration (a loop of one's
-    own), or ``on_pose`` (called in a thread of the subscriber's own, so it may take its time). Close it, or use
-    it in a ``with`` block, before the session is closed.
+    own), or ``on_pose`` (called in a thread of the subscriber's own, so it may take its time; what it raises
+    is logged and the next pose is given). Close it, or use a ``with`` block, before closing the session.
     """
 
     def __init__(
@@ -100,17 +102,17 @@ class PoseSubscriber:
         """
         names = _names(self._meta, pose)
         if names is None:
-            self._meta = ask_json(self._session, self._keys.pose_meta, timeout_s=timeout_s)
-            names = _names(self._meta, pose)
-        if names is None:
-            raise NoAnswer(
-                f"{self._keys.pose_meta}: the names given are for model {self._meta.get('model')!r}, "
-                f"the pose is of {pose.model_sha256!r} with {len(pose.degrees)} rotations"
-            )
+            meta = self._meta = ask_json(self._session, self._keys.pose_meta, timeout_s=timeout_s)
+            names = _names(meta, pose)
+            if names is None:
+                raise NoAnswer(
+                    f"{self._keys.pose_meta}: the names given are for model {meta.get('model')!r}, "
+                    f"the pose is of {pose.model_sha256!r} with {len(pose.degrees)} rotations"
+                )
         return names
 
     def angles(self, pose: Pose) -> dict[str, float]:
-        """The pose's rotations by name, in degrees; empty when uncalibrated. Raises NoAnswer as ``rotations``."""
+        """Rotations by name, in degrees; empty when uncalibrated. Raises NoAnswer as ``rotations``."""
         if not len(pose.degrees):
             return {}
         return dict(zip(self.rotations(pose), pose.degrees.tolist(), strict=True))
@@ -156,7 +158,10 @@ class PoseSubscriber:
 
     def _call(self, on_pose: Callable[[Pose], None]) -> None:
         for pose in self:
-            on_pose(pose)
+            try:
+                on_pose(pose)
+            except Exception:
+                _LOG.exception("%s: on_pose failed for frame %d", self._keys.pose, pose.sequence)
 
 
 def _names(meta: dict[str, Any] | None, pose: Pose) -> tuple[str, ...] | None:
