@@ -1,0 +1,212 @@
+"""The REST client: everything the ``glovecal`` command asks of the service, and what scripts need.
+
+httpx does the HTTP (streamed uploads, pluggable transports: the same client speaks to an application inside
+its own process). It is an extra, ``pip install 'glovecal-client[rest]'``, imported when first needed.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote, urlsplit
+
+from glovecal_client.errors import BadName, ClientError, ServiceError
+
+if TYPE_CHECKING:
+    import httpx
+
+FINISHED = ("done", "failed", "cancelled")
+CSV, PARQUET = "text/csv", "application/vnd.apache.parquet"
+
+
+class NoService(ServiceError):
+    """Nobody answered at the service's address."""
+
+    exit_code = 3
+
+
+class Refused(ServiceError):
+    """The service refused; ``problem`` is its whole problem document (RFC 9457)."""
+
+    def __init__(self, status: int, title: str, detail: str, problem: Mapping[str, Any]) -> None:
+        super().__init__(status, title, detail)
+        self.problem = dict(problem)
+
+    def __str__(self) -> str:
+        return self.detail or self.title
+
+
+class RestClient:
+    """A session with one service. Paths are below ``/v1``: ``client.get("/takes", {"subject": "anna"})``.
+
+    Answers are the service's JSON as plain data. Every refusal is a ``Refused`` and no answer a
+    ``NoService``, both ``ServiceError``. Not to be shared between threads.
+    """
+
+    def __init__(
+        self,
+        url: str = "http://127.0.0.1:8600",
+        *,
+        transport: httpx.BaseTransport | None = None,
+        patience_s: float = 300.0,
+    ) -> None:
+        """``transport`` replaces the network; ``patience_s`` bounds the wait for one answer."""
+        parts = urlsplit(url)
+        if parts.scheme not in ("http", "https") or not parts.netloc:
+            raise BadName(f"{url!r} is not the address of a service; write it like http://127.0.0.1:8600")
+        httpx = _import_httpx()
+        self.url = url.rstrip("/")
+        self._http = httpx.Client(
+            base_url=f"{self.url}/v1",
+            transport=transport,
+            timeout=httpx.Timeout(patience_s, connect=5.0),
+            trust_env=False,
+        )
+
+    def __enter__(self) -> RestClient:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self._http.close()
+
+    def get(self, path: str, query: Mapping[str, Any] | None = None) -> Any:
+        return self._json("GET", path, params=query)
+
+    def post(self, path: str, body: Any = None) -> Any:
+        return self._json("POST", path, json=body)
+
+    def put(self, path: str, body: Any) -> Any:
+        return self._json("PUT", path, json=body)
+
+    def delete(self, path: str) -> None:
+        self._send("DELETE", path)
+
+    def download(self, path: str, query: Mapping[str, Any] | None = None) -> bytes:
+        """The bytes of an export."""
+        return self._send("GET", path, params=query).content
+
+    def add_layout(self, file: Path) -> str:
+        """Store the layout in a TOML file and return its name; a file without one gives its own name."""
+        content = file.read_bytes()
+        name = layout_name(content, file)
+        headers = {"Content-Type": "application/toml"}
+        return self._json("PUT", f"/gloves/{quote(name, safe='')}", content=content, headers=headers)["name"]
+
+    def upload_takes(
+        self,
+        file: Path,
+        *,
+        subject: str,
+        layout: str | None = None,
+        reference: Path | None = None,
+        **options: str,
+    ) -> dict[str, Any]:
+        """Import a take table, streamed from disk, with its reference table if that is a second file.
+
+        ``options`` are ``name``, ``wearing``, ``equal_times``. The answer holds ``takes``, ``imported``,
+        ``existing`` (ids), ``layout`` and ``warnings``.
+        """
+        query: dict[str, str] = {"subject": subject, "filename": file.name, **options}
+        if layout is not None:
+            query["layout"] = layout
+        if reference is not None:
+            query["reference_upload"] = self._send_file("POST", "/uploads", reference)["sha256"]
+            query["reference_filename"] = reference.name
+        return self._send_file("POST", "/takes", file, query)
+
+    def attach_reference(self, take: str, file: Path, *, clock: str = "take") -> dict[str, Any]:
+        """Give a take the reference angles of a table; ``clock`` is ``take`` or ``wall`` (Unix seconds)."""
+        query = {"clock": clock, "filename": file.name}
+        return self._send_file("PUT", f"/takes/{quote(take, safe='')}/reference", file, query)
+
+    def wait_for_job(
+        self,
+        job: str,
+        *,
+        progress: Callable[[dict[str, Any]], None] | None = None,
+        poll_s: float = 0.2,
+        patience_s: float | None = None,
+    ) -> dict[str, Any]:
+        """The finished job; ``progress`` gets it at every look. Raises ServiceError unless it is done."""
+        until = None if patience_s is None else time.monotonic() + patience_s
+        while True:
+            document = self.get(f"/jobs/{quote(job, safe='')}")
+            if progress is not None:
+                progress(document)
+            if document["state"] in FINISHED:
+                break
+            if until is not None and time.monotonic() > until:
+                raise ServiceError(408, "Job takes too long", f"job {job} is still {document['state']}")
+            time.sleep(poll_s)
+        if document["state"] != "done":
+            raise ServiceError(409, f"Job {document['state']}", document["error"] or document["sentence"])
+        return document
+
+    def _send_file(
+        self, method: str, path: str, file: Path, query: Mapping[str, str] | None = None
+    ) -> dict[str, Any]:
+        kind = PARQUET if file.suffix.lower() == ".parquet" else CSV
+        with file.open("rb") as stream:
+            return self._json(method, path, params=query, content=stream, headers={"Content-Type": kind})
+
+    def _json(self, method: str, path: str, **request: Any) -> Any:
+        response = self._send(method, path, **request)
+        return response.json() if response.content else None
+
+    def _send(self, method: str, path: str, **request: Any) -> httpx.Response:
+        httpx = _import_httpx()
+        try:
+            response = self._http.request(method, path, **request)
+        except (httpx.ConnectError, httpx.ConnectTimeout) as error:
+            raise NoService(
+                503,
+                "No service",
+                f"nobody answers at {self.url}; start it with `glovecal serve`, or unset GLOVECAL_URL to "
+                "work on the local folder",
+            ) from error
+        except httpx.TimeoutException as error:
+            raise NoService(504, "No answer", f"{self.url} did not answer {method} {path} in time") from error
+        except httpx.TransportError as error:
+            sentence = f"the connection to {self.url} broke: {error}"
+            raise NoService(502, "Connection broken", sentence) from error
+        if response.status_code >= 400:
+            raise _refusal(response)
+        return response
+
+
+def layout_name(content: bytes, file: Path) -> str:
+    """The ``name`` in a layout file, else the file's own name. Raises BadName if it cannot be one."""
+    for line in content.decode("utf-8", "replace").splitlines():
+        if line.lstrip().startswith("["):
+            break
+        key, equals, value = line.partition("=")
+        if equals and key.strip() == "name":
+            return value.split("#")[0].strip().strip("\"'")
+    return file.stem.lower()
+
+
+def _refusal(response: httpx.Response) -> ServiceError:
+    try:
+        problem = response.json()
+        title, detail = str(problem["title"]), str(problem["detail"])
+    except (ValueError, KeyError, TypeError):
+        return ServiceError(response.status_code, response.reason_phrase or "Refused", response.text[:300])
+    return Refused(response.status_code, title, detail, problem)
+
+
+def _import_httpx() -> Any:
+    try:
+        import httpx
+    except ModuleNotFoundError as error:
+        raise ClientError(
+            "the REST client needs httpx: pip install 'glovecal-client[rest]' (or httpx)"
+        ) from error
+    return httpx

@@ -1,0 +1,104 @@
+"""The REST application."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from importlib.metadata import version
+
+from fastapi import APIRouter, FastAPI
+from starlette.concurrency import run_in_threadpool
+
+from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_service.jobs.dispatcher import Dispatcher
+from glovecal_service.rest import (
+    gloves,
+    health,
+    jobs,
+    metrics_page,
+    models,
+    recordings,
+    subjects,
+    takes,
+    training,
+    uploads,
+)
+from glovecal_service.rest.answers import install_openapi
+from glovecal_service.rest.body_guard import BodyGuard
+from glovecal_service.rest.dependencies import Parts
+from glovecal_service.rest.error_handlers import install_error_handlers
+from glovecal_service.rest.metrics import Metrics
+from glovecal_service.rest.observation import Observation
+from glovecal_service.rest.predictors import Predictors
+from glovecal_service.rest.request_guard import RequestGuard, is_loopback
+from glovecal_service.rest.upload_folder import UploadFolder
+from glovecal_service.settings import Settings
+from glovecal_service.store.store import Store
+
+JSON_LIMIT_BYTES = 8_000_000
+"""Enough for 20,000 frames of 18 sensors to predict."""
+BODY_PATIENCE_S = 30.0
+ROUTERS = (subjects, gloves, takes, uploads, recordings, training, models, jobs, health, metrics_page)
+
+
+def create_app(
+    settings: Settings, store: Store | None = None, *, body_patience_s: float = BODY_PATIENCE_S
+) -> FastAPI:
+    """The application; its lifespan opens the store (unless given) and runs the job dispatcher.
+
+    No logins: whoever reaches the port may do everything, so it is bound to loopback by default, and
+    ``RequestGuard`` keeps pages of other sites out.
+    """
+    metrics = Metrics()
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        pin_blas_to_one_thread()
+        opened = store or await run_in_threadpool(Store.open, settings)
+        uploads_folder = UploadFolder(settings.uploads_folder)
+        await run_in_threadpool(uploads_folder.sweep)
+        app.state.parts = Parts(settings, opened, uploads_folder, metrics, Predictors(opened))
+        dispatcher = Dispatcher(opened, settings)
+        dispatcher.start()
+        try:
+            yield
+        finally:
+            await run_in_threadpool(dispatcher.stop)
+            if store is None:
+                opened.close()
+
+    app = FastAPI(
+        title="Glovecal",
+        version=version("glovecal-service"),
+        description="Joint rotations you can trust, from data gloves.",
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+        openapi_url="/v1/openapi.json",
+        redirect_slashes=False,
+    )
+    under_v1 = APIRouter(prefix="/v1")
+    for noun in ROUTERS:
+        under_v1.include_router(noun.router)
+    app.include_router(under_v1)
+    install_error_handlers(app)
+    install_openapi(app, gloves.LayoutBody)
+    _guard(app, settings, metrics, body_patience_s)
+    return app
+
+
+def _guard(app: FastAPI, settings: Settings, metrics: Metrics, body_patience_s: float) -> None:
+    """The last added is the outermost: every refusal below is seen, counted and given an id."""
+
+    def limit(path: str) -> int:
+        return settings.upload_limit_bytes if _takes_files(path) else JSON_LIMIT_BYTES
+
+    app.add_middleware(BodyGuard, limit=limit, patience_s=body_patience_s)
+    app.add_middleware(RequestGuard, loopback_only=is_loopback(settings.host))
+    app.add_middleware(Observation, metrics=metrics)
+
+
+def _takes_files(path: str) -> bool:
+    return path in ("/v1/takes", "/v1/uploads") or (
+        path.startswith("/v1/takes/") and path.endswith("/reference")
+    )

@@ -1,0 +1,27 @@
+"""``metrics``: numbers for Prometheus."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from fastapi import APIRouter, Response
+from prometheus_client import CONTENT_TYPE_LATEST
+
+from glovecal_service.rest.answers import problems
+from glovecal_service.rest.dependencies import PartsNeeded
+
+router = APIRouter(tags=["health"])
+
+
+@router.get(
+    "/metrics",
+    response_class=Response,
+    summary="Numbers for Prometheus",
+    responses=problems()
+    | {200: {"description": "Text format.", "content": {"text/plain": {"schema": {"type": "string"}}}}},
+)
+def metrics(parts: PartsNeeded) -> Response:
+    counts = Counter(job.state for job in parts.store.jobs.list(only_unfinished=True))
+    for state in ("queued", "running"):
+        parts.metrics.jobs.labels(state).set(counts[state])
+    return Response(parts.metrics.text(), media_type=CONTENT_TYPE_LATEST)

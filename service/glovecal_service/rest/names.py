@@ -1,0 +1,46 @@
+"""The names and ids a request may hold, as types: what does not match never reaches the store."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import Path, Query
+from pydantic import Field, FiniteFloat, StringConstraints
+
+ID = r"^[0-9a-f]{12}$"
+IDENTIFIER = r"^[a-z0-9][a-z0-9_-]{0,63}$"
+CHANNEL = r"^[A-Za-z][A-Za-z0-9_]{0,63}$"
+ONE_LINE = r"^[^\x00-\x1f\x7f]*$"
+SHA256 = r"^[0-9a-f]{64}$"
+SHA256_PREFIX = r"^[0-9a-f]{6,64}$"
+
+MEANING = {
+    IDENTIFIER: "use a-z, 0-9, _ and -, at most 64, not starting with _ or -",
+    CHANNEL: "use a letter, then letters, digits and _, at most 64",
+    SHA256: "give 64 digits of 0-9 and a-f",
+    SHA256_PREFIX: "give 6 to 64 digits of 0-9 and a-f",
+    ONE_LINE: "give one line of text without control characters",
+    ID: "give the 12 digits of 0-9 and a-f that it got when it was made",
+}
+"""What would be right, for each pattern."""
+
+Identifier = Annotated[str, StringConstraints(pattern=IDENTIFIER)]
+"""Subjects, gloves, layouts, wearings, recordings: as in ``glovecal_models.names``."""
+Channel = Annotated[str, StringConstraints(pattern=CHANNEL)]
+ModelReference = Annotated[str, StringConstraints(pattern=SHA256_PREFIX)]
+"""A model's id (sha256 of its artifact) or a prefix of at least 6 digits."""
+Sha256 = Annotated[str, StringConstraints(pattern=SHA256)]
+WearingName = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=ONE_LINE)]
+Title = Annotated[str, StringConstraints(max_length=200, pattern=ONE_LINE)]
+"""Free text for people: one line, no control characters."""
+
+NameInPath = Annotated[str, Path(pattern=IDENTIFIER, description="a-z, 0-9, _ and -, at most 64.")]
+ModelInPath = Annotated[
+    str, Path(pattern=SHA256_PREFIX, description="A model's id, or at least its first 6 digits.")
+]
+IdInPath = Annotated[str, Path(pattern=ID, description="As given when it was made.")]
+SubjectFilter = Annotated[str | None, Query(pattern=IDENTIFIER, description="Only this subject's.")]
+LayoutFilter = Annotated[str | None, Query(pattern=IDENTIFIER, description="Only of this layout.")]
+Id = Annotated[str, StringConstraints(pattern=ID)]
+"""Of takes, recordings and jobs."""
+Millimetres = Annotated[FiniteFloat, Field(gt=0, lt=1000)]

@@ -1,0 +1,70 @@
+"""``recordings``: takes in the making; the real-time process carries them out."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Response
+from pydantic import BaseModel, Field
+
+from glovecal_service.rest.answers import change_problems, problems
+from glovecal_service.rest.dependencies import StoreNeeded
+from glovecal_service.rest.names import IDENTIFIER, Identifier, IdInPath, WearingName
+from glovecal_service.rest.strict_body import StrictBody
+from glovecal_service.store.records import RecordingRecord, RecordingState
+
+router = APIRouter(prefix="/recordings", tags=["recordings"])
+
+
+class NewRecording(StrictBody):
+    glove: Identifier
+    name: WearingName = Field(description="What the take will be called.")
+    subject: Identifier | None = Field(None, description="None: who wears the glove now.")
+    wearing: WearingName | None = None
+
+
+class Recording(BaseModel):
+    id: str
+    glove: str
+    name: str
+    subject: str | None
+    wearing: str | None
+    state: RecordingState
+    facts: dict[str, Any] = Field(description="`sent`, `recorded`, `repaired`, `missing`, `take` ...")
+    requested_at: datetime
+    updated_at: datetime
+
+
+@router.post(
+    "",
+    status_code=201,
+    response_model=Recording,
+    summary="Start recording a glove",
+    responses=change_problems(409),
+)
+def start_recording(body: NewRecording, store: StoreNeeded, response: Response) -> RecordingRecord:
+    """404 when the glove was never seen, 409 while it is being recorded."""
+    record = store.recordings.request(body.glove, name=body.name, subject=body.subject, wearing=body.wearing)
+    response.headers["Location"] = f"/v1/recordings/{record.id}"
+    return record
+
+
+@router.get("", response_model=list[Recording], summary="Recordings, newest first", responses=problems())
+def list_recordings(
+    store: StoreNeeded,
+    glove: Annotated[str | None, Query(pattern=IDENTIFIER)] = None,
+    only_open: bool = False,
+) -> list[RecordingRecord]:
+    return store.recordings.list(glove, only_open=only_open)
+
+
+@router.get("/{id}", response_model=Recording, summary="One recording", responses=problems())
+def get_recording(id: IdInPath, store: StoreNeeded) -> RecordingRecord:
+    return store.recordings.get(id)
+
+
+@router.post("/{id}/stop", response_model=Recording, summary="Stop a recording", responses=change_problems())
+def stop_recording(id: IdInPath, store: StoreNeeded) -> RecordingRecord:
+    """Asking again changes nothing. The take is there once `state` is `done`."""
+    return store.recordings.stop(id)

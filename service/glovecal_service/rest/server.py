@@ -1,0 +1,75 @@
+"""Uvicorn as Glovecal runs it: bounded connections, a deadline for headers, a bounded shutdown."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import uvicorn
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+HEADER_DEADLINE_S = 10.0
+"""A connection that has not sent complete headers by then is closed (slow-header attacks)."""
+MOST_CONNECTIONS = 512
+
+
+class PatientH11Protocol(H11Protocol):
+    """Uvicorn's HTTP/1.1 protocol, which by itself waits for headers for ever."""
+
+    header_deadline_s = HEADER_DEADLINE_S
+    _deadline: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        if len(self.connections) > MOST_CONNECTIONS:
+            transport.abort()
+            return
+        self._deadline = self.loop.call_later(self.header_deadline_s, self._give_up)
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        if self._waits_for_headers():
+            if self._deadline is None:
+                self._deadline = self.loop.call_later(self.header_deadline_s, self._give_up)
+        else:
+            self._forget_deadline()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._forget_deadline()
+        super().connection_lost(exc)
+
+    def _waits_for_headers(self) -> bool:
+        return self.cycle is None or self.cycle.response_complete
+
+    def _give_up(self) -> None:
+        self._deadline = None
+        if self._waits_for_headers() and not self.transport.is_closing():
+            self.transport.abort()
+
+    def _forget_deadline(self) -> None:
+        if self._deadline is not None:
+            self._deadline.cancel()
+            self._deadline = None
+
+
+def server_config(app: Any, host: str, port: int) -> uvicorn.Config:
+    """The configuration to start ``uvicorn.Server`` with, for ``app`` from ``create_app``.
+
+    Server-sent events stay open for ever by design, hence the bound on the graceful shutdown. Logs go
+    through ``logging`` as the process has set it up; the access log is the application's own.
+    """
+    return uvicorn.Config(
+        app,
+        host=host,
+        port=port,
+        http=PatientH11Protocol,
+        ws="none",
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        date_header=True,
+        proxy_headers=False,
+        timeout_keep_alive=15,
+        timeout_graceful_shutdown=3,
+        lifespan="on",
+    )

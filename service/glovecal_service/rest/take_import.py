@@ -1,0 +1,137 @@
+"""Importing a take table: all takes of the file, or none."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from glovecal_models.calibration.samples import require_layout
+from glovecal_models.errors import BadInput
+from glovecal_models.layout import Layout
+from glovecal_models.takes.reference_check import reference_warnings
+from glovecal_models.takes.take import Take
+from glovecal_service.store.errors import Conflict, NotFound, StoreError
+from glovecal_service.store.records import TakeRecord
+from glovecal_service.store.store import Store
+
+
+@dataclass(frozen=True)
+class Import:
+    """What became of a file."""
+
+    layout: str
+    takes: list[TakeRecord]
+    """All takes of the file, in its order."""
+    existing: set[str]
+    """Ids of those that this very file had brought before: sending a file twice is harmless."""
+    warnings: list[str]
+
+    @property
+    def imported(self) -> list[str]:
+        return [record.id for record in self.takes if record.id not in self.existing]
+
+
+def import_takes(
+    store: Store, read: Callable[[], list[Take]], *, original_sha256: str, subject: str, layout: str | None
+) -> Import:
+    """Keep all takes that ``read`` finds. Without ``layout`` the file's columns make one.
+
+    A file that another subject has already is refused: one recording is of one hand. Raises BadInput
+    (BadTakeTable, LayoutMismatch), NotFound, Conflict, StorageFull; then nothing was imported.
+    """
+    store.subjects.get(subject)
+    known = None if layout is None else store.layouts.get(layout)
+    _require_no_other_owner(store, original_sha256, subject)
+    takes = read()
+    if not takes:
+        raise BadInput("the file holds no takes: there is no row below the header")
+    chosen = known or _layout_of_columns(store, takes)
+    for take in takes:
+        _require_fits(take, chosen)
+    stored = {
+        record.name: record
+        for record in store.takes.list(subject=subject, layout=chosen.name)
+        if record.original_sha256 == original_sha256
+    }
+    existing = {take.name: _same(take, stored[take.name]) for take in takes if take.name in stored}
+    new = [take for take in takes if take.name not in stored]
+    added = _add_all(store, new, subject=subject, layout=chosen.name, original_sha256=original_sha256)
+    by_name = existing | {record.name: record for record in added}
+    warnings = [sentence for take in takes for sentence in reference_warnings(take)]
+    return Import(
+        chosen.name,
+        [by_name[take.name] for take in takes],
+        {record.id for record in existing.values()},
+        warnings,
+    )
+
+
+def _require_no_other_owner(store: Store, original_sha256: str, subject: str) -> None:
+    for record in store.takes.list():
+        if record.original_sha256 == original_sha256 and record.subject != subject:
+            raise Conflict(
+                f"this file was imported for subject {record.subject!r} already (take {record.id}, "
+                f"{record.name!r}); a recording is of one hand"
+            )
+
+
+def _require_fits(take: Take, layout: Layout) -> None:
+    require_layout(take, layout)
+    unknown = [name for name in take.rotations if name not in layout.rotations]
+    if unknown and len(unknown) == len(take.rotations):
+        raise BadInput(
+            f"take {take.name!r} measured {', '.join(unknown)}, none of which layout {layout.name!r} has; "
+            f"its rotations are {', '.join(layout.rotations)}"
+        )
+
+
+def _same(take: Take, record: TakeRecord) -> TakeRecord:
+    if len(take.reference_time_s) != record.reference_rows:
+        raise Conflict(
+            f"take {take.name!r} of this file is here already ({record.id}) with another reference; "
+            f"attach the new one with PUT /v1/takes/{record.id}/reference"
+        )
+    return record
+
+
+def _add_all(
+    store: Store, takes: list[Take], *, subject: str, layout: str, original_sha256: str
+) -> list[TakeRecord]:
+    added: list[TakeRecord] = []
+    try:
+        for take in takes:
+            record = store.takes.add(
+                take, subject=subject, layout=layout, source="import", original_sha256=original_sha256
+            )
+            added.append(record)
+    except BaseException:
+        for record in added:
+            _take_back(store, record)
+        raise
+    return added
+
+
+def _take_back(store: Store, record: TakeRecord) -> None:
+    try:
+        store.takes.remove(record.id)
+    except StoreError as error:
+        raise Conflict(
+            f"take {record.id} ({record.name!r}) of a file that could not be imported stays: {error}"
+        ) from error
+
+
+def _layout_of_columns(store: Store, takes: list[Take]) -> Layout:
+    """The layout of these sensors: each rotation from the sensor of its name, else from all of them.
+
+    Its name is made of the sensors, so that files of one glove share it.
+    """
+    sensors = takes[0].sensors
+    rotations = list(dict.fromkeys(name for take in takes for name in take.rotations))
+    name = f"auto-{hashlib.sha256(' '.join(sensors).encode()).hexdigest()[:8]}"
+    try:
+        return store.layouts.get(name)
+    except NotFound:
+        layout = Layout.from_columns(name, sensors, rotations)
+        store.layouts.put(layout)
+        return layout

@@ -1,0 +1,83 @@
+"""``models/train``: a calibration model from takes, as a job."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Response
+from pydantic import Field
+
+from glovecal_models.errors import LayoutMismatch, NotTrainable
+from glovecal_service.rest.answers import change_problems
+from glovecal_service.rest.dependencies import StoreNeeded
+from glovecal_service.rest.jobs import Job
+from glovecal_service.rest.names import Id, Identifier, ModelReference
+from glovecal_service.rest.strict_body import StrictBody
+from glovecal_service.store.errors import Conflict
+from glovecal_service.store.records import JobRecord, TakeRecord
+from glovecal_service.store.store import Store
+
+router = APIRouter(prefix="/models", tags=["models"])
+
+MOST_TAKES = 1000
+MOST_UNFINISHED_JOBS = 100
+
+
+class Training(StrictBody):
+    subject: Identifier
+    layout: Identifier
+    method: Literal["linear", "lmc_gpr", "spgp"] = "lmc_gpr"
+    takes: Annotated[list[Id], Field(min_length=1, max_length=MOST_TAKES)] | None = Field(
+        None, description="None: all takes of the subject and layout that have a reference."
+    )
+    activate: bool = Field(True, description="Predict live with the model once it is trained.")
+    pseudo_inputs: Annotated[int, Field(ge=2, le=1000)] = Field(100, description="SPGP only.")
+    parent: ModelReference | None = None
+    samples: Annotated[int, Field(ge=10, le=5000)] = Field(2000, description="At most, for one rotation.")
+    folds: Annotated[int, Field(ge=0, le=20)] = Field(3, description="Held-out folds; 0: no error estimate.")
+    iterations: Annotated[int, Field(ge=1, le=2000)] = Field(200, description="SPGP only.")
+    seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = 0
+
+
+@router.post(
+    "/train",
+    status_code=202,
+    response_model=Job,
+    summary="Train a calibration model",
+    responses=change_problems(409),
+)
+def train(body: Training, store: StoreNeeded, response: Response) -> JobRecord:
+    """Answers at once with the job; what cannot be trained is refused here, before anything is fitted."""
+    store.subjects.get(body.subject)
+    store.layouts.get(body.layout)
+    takes = _chosen_takes(store, body)
+    if len(store.jobs.list(only_unfinished=True)) >= MOST_UNFINISHED_JOBS:
+        raise Conflict(f"{MOST_UNFINISHED_JOBS} jobs are waiting already; cancel some or wait")
+    payload: dict[str, Any] = body.model_dump() | {"takes": [take.id for take in takes]}
+    if body.parent is not None:
+        payload["parent"] = store.models.get(body.parent).id
+    record = store.jobs.create("train", payload, subject=body.subject)
+    response.headers["Location"] = f"/v1/jobs/{record.id}"
+    return record
+
+
+def _chosen_takes(store: Store, body: Training) -> list[TakeRecord]:
+    if body.takes is None:
+        takes = [t for t in store.takes.list(subject=body.subject, layout=body.layout) if t.has_reference]
+    else:
+        takes = [store.takes.get(id) for id in dict.fromkeys(body.takes)]
+    for take in takes:
+        if take.subject != body.subject:
+            raise Conflict(
+                f"take {take.id} ({take.name!r}) is of subject {take.subject!r}, not {body.subject!r}"
+            )
+        if take.layout != body.layout:
+            raise LayoutMismatch(
+                f"take {take.id} ({take.name!r}) has layout {take.layout!r}, not {body.layout!r}"
+            )
+    if not any(take.has_reference for take in takes):
+        raise NotTrainable(
+            f"no take of subject {body.subject!r} with layout {body.layout!r} has reference angles; "
+            "import some with r.ROTATION columns, or attach a reference to a recording"
+        )
+    return takes

@@ -1,0 +1,125 @@
+"""Uploads: the bytes as they came, kept under their sha256 before anyone tries to read them."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import secrets
+import shutil
+import tempfile
+import time
+from collections.abc import AsyncIterator, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from starlette.concurrency import run_in_threadpool
+
+from glovecal_service.store.blobs import full_disk_named
+
+TEMPORARY = ".partial"
+WRITE_AT_ONCE = 2**20
+ABANDONED_AFTER_S = 3600.0
+"""A temporary file this old belongs to a process that was killed; younger ones may be another's."""
+
+
+@dataclass(frozen=True)
+class Upload:
+    """A file that was received whole."""
+
+    path: Path
+    sha256: str
+    size: int
+    is_new: bool
+    """False when the same bytes were here before."""
+
+
+class UploadFolder:
+    """``uploads/`` in the data folder. Only complete files carry a sha256 name."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def sweep(self) -> int:
+        """Remove what a killed process left half received; call before the first upload."""
+        swept = 0
+        for leftover in self.folder.glob(f"*{TEMPORARY}"):
+            with suppress(OSError):
+                if time.time() - leftover.stat().st_mtime > ABANDONED_AFTER_S:
+                    shutil.rmtree(leftover) if leftover.is_dir() else leftover.unlink()
+                    swept += 1
+        return swept
+
+    async def receive(self, chunks: AsyncIterator[bytes]) -> Upload:
+        """Write ``chunks`` to a temporary file, force it to disk and give it its sha256 as name.
+
+        Raises StorageFull, and whatever ``chunks`` raises; either way nothing
+        is left behind. Memory used is ``WRITE_AT_ONCE`` and one chunk, whatever the size.
+        """
+        temporary = self.folder / f"{secrets.token_hex(16)}{TEMPORARY}"
+        try:
+            with full_disk_named(self.folder):
+                digest, size = await _write(temporary, chunks)
+                return await run_in_threadpool(self._keep, temporary, digest, size)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+    def find(self, sha256: str) -> Path | None:
+        """The upload of that name, or None. ``sha256`` must be 64 hex digits already."""
+        path = self.folder / sha256
+        return path if path.is_file() else None
+
+    @contextmanager
+    def under_names(self, *files: tuple[str, Path]) -> Iterator[list[Path]]:
+        """The uploads under the names their users gave them, for as long as they are being read.
+
+        Readers name the file in their errors. Each of ``files`` is a checked file name and an upload.
+        """
+        with tempfile.TemporaryDirectory(dir=self.folder, suffix=TEMPORARY) as folder:
+            named = []
+            for number, (name, upload) in enumerate(files):
+                place = Path(folder) / str(number)
+                place.mkdir()
+                os.link(upload, place / name)
+                named.append(place / name)
+            yield named
+
+    def _keep(self, temporary: Path, digest: str, size: int) -> Upload:
+        path = self.folder / digest
+        if path.is_file() and path.stat().st_size == size:
+            return Upload(path, digest, size, is_new=False)
+        os.replace(temporary, path)
+        _sync_folder(self.folder)
+        return Upload(path, digest, size, is_new=True)
+
+
+async def _write(path: Path, chunks: AsyncIterator[bytes]) -> tuple[str, int]:
+    digest, size, waiting = hashlib.sha256(), 0, bytearray()
+    with path.open("xb") as file:
+
+        def write() -> None:
+            digest.update(waiting)
+            file.write(waiting)
+
+        def finish() -> None:
+            write()
+            file.flush()
+            os.fsync(file.fileno())
+
+        async for chunk in chunks:
+            waiting += chunk
+            size += len(chunk)
+            if len(waiting) >= WRITE_AT_ONCE:
+                await run_in_threadpool(write)
+                waiting.clear()
+        await run_in_threadpool(finish)
+    return digest.hexdigest(), size
+
+
+def _sync_folder(folder: Path) -> None:
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
