@@ -1,0 +1,105 @@
+"""One glove on its way through the service: frames that wait, the gate, the counts, the last pose."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any, NamedTuple
+
+from glovecal_client.keys import GloveKeys
+from glovecal_client.wire.frame import Frame
+from glovecal_client.wire.pose import Pose
+from glovecal_service.realtime.frame_gate import FrameGate
+from glovecal_service.realtime.refusal import RefusalCount, Refused
+
+WAITING_LIMIT = 64
+
+
+class Waiting(NamedTuple):
+    """A message not yet looked into."""
+
+    message: bytes
+    received_ns: int
+
+
+class GloveLane:
+    """Belongs to the predicting thread; others read its counts only.
+
+    Every message received ends as exactly one of predicted, skipped or refused, or is still waiting.
+    """
+
+    def __init__(self, keys: GloveKeys) -> None:
+        self.keys = keys
+        self.glove = keys.glove
+        self.gate = FrameGate()
+        self.refusals = RefusalCount(keys.glove)
+        self.received = 0
+        self.predicted = 0
+        self.skipped = 0
+        self.skipped_in_run = 0
+        self.last_received_ns = 0
+        self.last_pose: Pose | None = None
+        self.last_pose_received_ns = 0
+        self.stale_published_ns = 0
+        self.model_id: str | None = None
+        self._waiting: deque[Waiting] = deque()
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def add(self, message: bytes, received_ns: int) -> None:
+        """Let a message wait; the oldest goes when too many do."""
+        self.received += 1
+        self.last_received_ns = received_ns
+        if len(self._waiting) >= WAITING_LIMIT:
+            self._waiting.popleft()
+            self.skip(1)
+        self._waiting.append(Waiting(message, received_ns))
+
+    def add_skipped(self, count: int) -> None:
+        """Count messages that were received but thrown away before they got here."""
+        self.received += count
+        self.skip(count)
+
+    def skip(self, count: int) -> None:
+        self.skipped += count
+        self.skipped_in_run += count
+
+    def newest(self, limit: int, oldest_ns: int) -> list[Waiting]:
+        """Take the newest ``limit`` messages received since ``oldest_ns``, in order; skip all others."""
+        late = 0
+        while self._waiting and (len(self._waiting) > limit or self._waiting[0].received_ns < oldest_ns):
+            self._waiting.popleft()
+            late += 1
+        if late:
+            self.skip(late)
+        taken = list(self._waiting)
+        self._waiting.clear()
+        return taken
+
+    def open(self, waiting: Waiting) -> Frame | None:
+        """The frame of a message, or None when it was refused, which is counted."""
+        runs = self.gate.runs
+        try:
+            frame = self.gate.pass_frame(waiting.message, waiting.received_ns)
+        except Refused as refused:
+            self.refusals.add(refused)
+            return None
+        if self.gate.runs != runs:
+            self.skipped_in_run = 0
+        return frame
+
+    def status(self) -> dict[str, Any]:
+        """Counts for the status document."""
+        run_id = self.gate.run_id
+        return {
+            "received": self.received,
+            "predicted": self.predicted,
+            "skipped": self.skipped,
+            "refused": self.refusals.by_reason(),
+            "waiting": len(self),
+            "last_refusal": self.refusals.last_sentence,
+            "run_id": None if run_id is None else f"{run_id:016x}",
+            "runs": self.gate.runs,
+            "sequence": self.gate.sequence,
+            "model": self.model_id,
+        }

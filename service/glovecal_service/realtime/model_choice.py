@@ -1,0 +1,90 @@
+"""Which model a glove is to be served with: the active one of its wearer and layout, if it is undamaged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from glovecal_models.calibration.artifact import load
+from glovecal_models.errors import DamagedArtifact
+from glovecal_service.realtime.pose_meta import Serving
+from glovecal_service.realtime.served_model import ServedModel
+from glovecal_service.store.errors import NotFound
+from glovecal_service.store.store import Store
+
+
+def choose(
+    store: Store, glove: str, meta: Mapping[str, Any] | None, prepared: Mapping[str, ServedModel]
+) -> Serving:
+    """How ``glove`` is to be served now; ``prepared`` holds models that are in use already, by id.
+
+    A damaged or missing artifact is named in the sentence, and the model that was active before it is
+    taken. Raises StoreError when the database does not answer.
+    """
+    try:
+        record = store.gloves.get(glove)
+    except NotFound:
+        return Serving(sentence=f"glove {glove} has not said yet which layout it has")
+    subject, layout = record.subject, record.layout
+    if layout is None:
+        return Serving(subject, layout, sentence=f"glove {glove} has not said yet which layout it has")
+    if subject is None:
+        return Serving(subject, layout, sentence=f"nobody wears glove {glove}; assign a subject to it")
+    chain = _activations(store, subject, layout)
+    if not chain:
+        sentence = f"subject {subject} has no active model for layout {layout}; train and activate one"
+        return Serving(subject, layout, sentence=sentence)
+    return _first_that_loads(store, chain, Serving(subject, layout), meta, prepared)
+
+
+def _activations(store: Store, subject: str, layout: str) -> list[str]:
+    """Model ids: the active one, then what rolling back would lead to."""
+    active = store.models.active(subject, layout)
+    if active is None:
+        return []
+    by_id = {item.id: item for item in store.models.activations(subject, layout)}
+    current, chain = by_id[max(by_id)], [active.id]
+    while current.previous is not None and current.previous in by_id:
+        current = by_id[current.previous]
+        if current.model not in chain:
+            chain.append(current.model)
+    return chain
+
+
+def _first_that_loads(
+    store: Store,
+    chain: list[str],
+    serving: Serving,
+    meta: Mapping[str, Any] | None,
+    prepared: Mapping[str, ServedModel],
+) -> Serving:
+    problems = []
+    for model_id in chain:
+        try:
+            model = prepared.get(model_id) or _prepare(store, model_id)
+        except (DamagedArtifact, NotFound) as error:
+            problems.append(f"model {model_id[:12]} cannot be served: {error}")
+            continue
+        misfit = _misfit(model, meta)
+        if misfit:
+            return Serving(serving.subject, serving.layout, None, "; ".join([*problems, misfit]))
+        if problems:
+            problems.append(f"model {model_id[:12]}, active before it, is served")
+        return Serving(serving.subject, serving.layout, model, "; ".join(problems))
+    return Serving(serving.subject, serving.layout, None, "; ".join(problems))
+
+
+def _prepare(store: Store, model_id: str) -> ServedModel:
+    return ServedModel.prepare(model_id, load(store.models.load_bytes(model_id), expected_id=model_id))
+
+
+def _misfit(model: ServedModel, meta: Mapping[str, Any] | None) -> str:
+    """Why the model cannot read this glove, "" if it can (or the glove did not say what it sends)."""
+    sensors = None if meta is None else meta.get("sensors")
+    if not isinstance(sensors, list) or tuple(sensors) == model.sensors:
+        return ""
+    return (
+        f"the glove sends {len(sensors)} sensors ({', '.join(map(str, sensors[:4]))} ...), but model "
+        f"{model.model_id[:12]} reads the {len(model.sensors)} of layout {model.layout}: "
+        f"{', '.join(model.sensors)}"
+    )

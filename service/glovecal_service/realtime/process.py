@@ -1,0 +1,117 @@
+"""The real-time process: zenoh router, prediction and model choice. It needs no other process of ours."""
+
+from __future__ import annotations
+
+import gc
+import logging
+import secrets
+import sys
+from collections.abc import Callable
+from threading import Event, Thread
+
+import zenoh
+
+from glovecal_client.keys import all_gloves, service_alive_key
+from glovecal_client.session import open_router
+from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_service.realtime.arrivals import Arrivals
+from glovecal_service.realtime.glove_metas import GloveMetas
+from glovecal_service.realtime.model_watcher import ModelWatcher
+from glovecal_service.realtime.pose_loop import PoseLoop
+from glovecal_service.realtime.pose_meta import PoseMetas
+from glovecal_service.realtime.pose_publishers import PosePublishers
+from glovecal_service.realtime.served_model import ServedModels
+from glovecal_service.realtime.service_status import ServiceStatus
+from glovecal_service.settings import Settings
+from glovecal_service.store.store import Store
+
+GIL_SWITCH_S = 0.0005
+"""Longest time another thread of this process keeps a frame waiting (Python's default is ten times that)."""
+
+_log = logging.getLogger("glovecal.realtime")
+
+
+class RealTimeFailed(Exception):
+    """A thread of the real-time process died; the process must be started again."""
+
+
+def run_real_time(settings: Settings, stopped: Event, started: Callable[[], None] | None = None) -> None:
+    """Serve until ``stopped``. Raises zenoh.ZError if the endpoint cannot be used, RealTimeFailed."""
+    pin_blas_to_one_thread()
+    sys.setswitchinterval(GIL_SWITCH_S)
+    instance = f"realtime-{secrets.token_hex(4)}"
+    with open_router([settings.zenoh]) as session:
+        token = session.liveliness().declare_token(service_alive_key(settings.site, instance))
+        _serve(session, settings, instance, stopped, started)
+        token.undeclare()
+
+
+def _serve(
+    session: zenoh.Session,
+    settings: Settings,
+    instance: str,
+    stopped: Event,
+    started: Callable[[], None] | None,
+) -> None:
+    models = ServedModels()
+    arrivals = Arrivals(session, all_gloves(settings.site, "raw"))
+    loop = PoseLoop(arrivals, models, PosePublishers(session, settings.site).publish)
+    pose_metas = PoseMetas(session, settings.site)
+    watcher = ModelWatcher(
+        lambda: Store.open(settings),
+        GloveMetas(session, settings.site),
+        lambda: loop.lanes,
+        models,
+        pose_metas,
+    )
+    status = ServiceStatus(
+        session,
+        settings.site,
+        instance,
+        lambda: loop.lanes,
+        pose_metas,
+        lambda: watcher.database_problem,
+        settings.data,
+    )
+    _settle_garbage()
+    failures: list[str] = []
+    threads = [
+        _thread(name, work, stopped, failures)
+        for name, work in (("poses", loop.run), ("models", watcher.run), ("status", status.run))
+    ]
+    if started is not None:
+        started()
+    stopped.wait()
+    arrivals.close()
+    for thread in threads:
+        thread.join(5.0)
+    if failures:
+        raise RealTimeFailed("; ".join(failures))
+
+
+def _thread(name: str, work: Callable[[Event], None], stopped: Event, failures: list[str]) -> Thread:
+    """A thread whose death ends the process: a service that looks alive but serves nothing is worse."""
+
+    def guarded() -> None:
+        try:
+            work(stopped)
+        except Exception as error:
+            if not stopped.is_set():
+                _log.exception("the thread %s died", name)
+                failures.append(f"the thread {name} died: {error}")
+        finally:
+            stopped.set()
+
+    thread = Thread(target=guarded, name=name, daemon=True)
+    thread.start()
+    return thread
+
+
+def _settle_garbage() -> None:
+    """What is there now stays: never look through it again, and collect only when the pose loop says so.
+
+    The path of a frame makes no reference cycles, so nothing piles up between the collections.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.disable()

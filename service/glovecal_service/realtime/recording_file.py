@@ -1,0 +1,134 @@
+"""One recording's file and its books: which frames of which run are in it, and which are not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from glovecal_client.errors import WireError
+from glovecal_client.frame_log import FrameLog
+from glovecal_client.log_records import Recording
+from glovecal_client.wire.frame import Frame, decode_frame
+from glovecal_service.realtime.sequence_ranges import SequenceRanges
+
+SUFFIX = ".glog"
+
+
+@dataclass
+class RunBooks:
+    """The frames of one start of the capture daemon."""
+
+    run_id: int
+    first: int
+    """Where the recording begins in this run; 0 for a run that began while it was going on."""
+    recorded: SequenceRanges = field(default_factory=SequenceRanges)
+    repaired: int = 0
+    """Of the recorded frames, those fetched from the capture log."""
+    last: int = -1
+    """The last frame that belongs to the recording, as far as is known."""
+
+    def missing(self) -> list[tuple[int, int]]:
+        return self.recorded.missing(self.first, self.last)
+
+    @property
+    def sent(self) -> int:
+        return max(0, self.last - self.first + 1)
+
+    def document(self) -> dict[str, Any]:
+        """``sent`` equals ``recorded`` plus the frames in ``missing``."""
+        return {
+            "run_id": f"{self.run_id:016x}",
+            "first_sequence": self.first,
+            "last_sequence": self.last,
+            "sent": self.sent,
+            "recorded": len(self.recorded),
+            "repaired": self.repaired,
+            "missing": [list(gap) for gap in self.missing()],
+        }
+
+
+class RecordingFile:
+    """A frame log in ``recordings/``; every frame is written once, in the order it came."""
+
+    def __init__(self, log: FrameLog) -> None:
+        self._log = log
+        self.runs: dict[int, RunBooks] = {}
+        """In the order they were first met."""
+        self.last_wall_ns = 0
+
+    @classmethod
+    def create(cls, path: Path, meta: Mapping[str, Any]) -> RecordingFile:
+        """A new file. Raises FileExistsError, OSError."""
+        return cls(FrameLog.create(path, meta))
+
+    @classmethod
+    def resume(cls, path: Path) -> RecordingFile:
+        """A file that was left when its process was killed, cut back to its last whole record.
+
+        Raises DamagedLog, OSError.
+        """
+        file = cls(FrameLog.resume(path))
+        for frame in Recording.open(path).frames():
+            file._enter(frame)
+        return file
+
+    @property
+    def path(self) -> Path:
+        return self._log.path
+
+    @property
+    def meta(self) -> dict[str, Any]:
+        return self._log.meta
+
+    @property
+    def problem(self) -> str | None:
+        """Why frames do not reach the disk, None if they do."""
+        return self._log.problem
+
+    def add(self, frame: Frame, message: bytes) -> bool:
+        """Write a frame, or False if it is in already. While the disk is full frames wait in memory."""
+        if not self._enter(frame):
+            return False
+        self._log.append(message)
+        return True
+
+    def open_run(self, run_id: int) -> RunBooks:
+        """The books of a run; one that was not met before belongs to the recording from its start."""
+        return self.runs.setdefault(run_id, RunBooks(run_id, 0))
+
+    def _enter(self, frame: Frame) -> bool:
+        books = self.runs.get(frame.run_id)
+        if books is None:
+            first = 0 if self.runs else frame.sequence
+            books = self.runs[frame.run_id] = RunBooks(frame.run_id, first)
+        if frame.sequence < books.first or not books.recorded.add(frame.sequence):
+            return False
+        books.last = max(books.last, frame.sequence)
+        books.repaired += frame.repaired
+        self.last_wall_ns = max(self.last_wall_ns, frame.wall_ns)
+        return True
+
+    def sync(self) -> None:
+        self._log.sync()
+
+    def close(self) -> None:
+        """Write what waits, sync, close. Frames the full disk did not take are missing from then on."""
+        self._log.close()
+        if self._log.lost_records:
+            self._count_again()
+
+    def _count_again(self) -> None:
+        for books in self.runs.values():
+            books.recorded, books.repaired = SequenceRanges(), 0
+        for frame in Recording.open(self.path).frames():
+            self._enter(frame)
+
+
+def decoded(message: bytes) -> Frame | None:
+    """The frame in ``message``; None for a damaged one, which then counts as not received."""
+    try:
+        return decode_frame(message)
+    except WireError:
+        return None

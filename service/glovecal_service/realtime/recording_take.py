@@ -1,0 +1,87 @@
+"""A finished recording file as a take."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from glovecal_client.log_records import Recording
+from glovecal_client.wire.frame import Frame
+from glovecal_models.errors import BadInput
+from glovecal_models.takes.take import Take
+
+
+@dataclass(frozen=True)
+class RecordedTake:
+    """The take, and what has to be known about its time."""
+
+    take: Take
+    clock: dict[str, Any]
+    """``wall_minus_time_s``: add it to ``time_s`` for seconds since 1970; ``left_out``: frames not taken."""
+
+
+def read_take(path: Path, *, name: str, wearing: str) -> RecordedTake:
+    """The frames of all runs in order; ``time_s`` is the capture computer's monotonic clock in seconds.
+
+    Frames whose time does not increase, or with another number of sensors, are left out and counted.
+    Raises BadInput if nothing usable remains, DamagedLog, OSError.
+    """
+    recording = Recording.open(path)
+    frames = _in_order(list(recording.frames()))
+    meta = recording.meta.get("capture") or {}
+    sensors = tuple(str(sensor) for sensor in meta.get("sensors") or ())
+    if not sensors:
+        raise BadInput(f"recording {path.name}: capture did not say which sensors its frames hold")
+    usable = [frame for frame in frames if len(frame.readings) == len(sensors)]
+    if not usable:
+        raise BadInput(f"recording {path.name}: none of its {len(frames)} frames has {len(sensors)} sensors")
+    time_s = _time_s(usable)
+    kept = _increasing(time_s)
+    taken = [frame for frame, keep in zip(usable, kept, strict=True) if keep]
+    take = Take(
+        name=name,
+        wearing=wearing,
+        sensors=sensors,
+        time_s=time_s[kept],
+        readings=np.array([frame.readings for frame in taken], dtype=np.float64),
+        context=_context(taken, [str(item) for item in meta.get("context") or ()]),
+        simulated=any(frame.simulated for frame in taken),
+    )
+    offset = taken[0].wall_ns / 1e9 - float(take.time_s[0])
+    return RecordedTake(take, {"wall_minus_time_s": offset, "left_out": len(frames) - len(taken)})
+
+
+def _in_order(frames: Sequence[Frame]) -> list[Frame]:
+    """By run, in the order the runs were met, and by sequence number: repaired frames were written late."""
+    order = {run_id: place for place, run_id in enumerate(dict.fromkeys(frame.run_id for frame in frames))}
+    return sorted(frames, key=lambda frame: (order[frame.run_id], frame.sequence))
+
+
+def _time_s(frames: Sequence[Frame]) -> np.ndarray:
+    """Monotonic seconds; a run after a restart of the computer is put in place by the wall clock."""
+    time_s = np.array([frame.monotonic_ns for frame in frames]) / 1e9
+    for at in range(1, len(frames)):
+        before, after = frames[at - 1], frames[at]
+        if after.run_id != before.run_id and time_s[at] <= time_s[at - 1]:
+            step = max(1e-3, (after.wall_ns - before.wall_ns) / 1e9)
+            time_s[at:] += time_s[at - 1] + step - time_s[at]
+    return time_s
+
+
+def _increasing(time_s: np.ndarray) -> np.ndarray:
+    """Where the time is later than at every kept frame before."""
+    latest = np.maximum.accumulate(time_s)
+    return np.concatenate([[True], time_s[1:] > latest[:-1]])
+
+
+def _context(frames: Sequence[Frame], names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Columns of the frames that carry all context values; columns never measured are dropped."""
+    rows = [
+        frame.context if len(frame.context) == len(names) else np.full(len(names), np.nan) for frame in frames
+    ]
+    values = np.array(rows, dtype=np.float64).reshape(len(frames), len(names))
+    return {name: values[:, at] for at, name in enumerate(names) if np.isfinite(values[:, at]).any()}

@@ -1,0 +1,92 @@
+"""The calibration model a glove is served with, ready for prediction, and the table of who has which."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from glovecal_models.calibration.predictor import GloveAngles, GlovePredictor
+
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_service.realtime.pace import Pace
+from glovecal_service.realtime.refusal import Refusal, Refused
+
+
+@dataclass(frozen=True, eq=False)
+class ServedModel:
+    """A model with everything computed that prediction needs. Gloves of one subject and layout share one."""
+
+    model_id: str
+    """sha256, 64 hexadecimal digits."""
+    subject: str
+    layout: str
+    method: str
+    simulated: bool
+    """The model was trained on simulated takes."""
+    sensors: tuple[str, ...]
+    rotations: tuple[str, ...]
+    counts: tuple[float, float] | None
+    predictor: GlovePredictor
+    pace: Pace = field(default_factory=Pace)
+    """Belongs to the thread that predicts."""
+
+    @classmethod
+    def prepare(cls, model_id: str, model: CalibrationModel) -> ServedModel:
+        """Build the predictor and run it once, so that the first frame finds it warm."""
+        predictor = GlovePredictor(model)
+        low, high = model.layout.counts or (0.0, 1.0)
+        predictor.predict(np.full((1, len(model.layout.sensors)), 0.5 * (low + high)))
+        return cls(
+            model_id=model_id,
+            subject=model.subject,
+            layout=model.layout.name,
+            method=model.method,
+            simulated=model.simulated,
+            sensors=model.layout.sensors,
+            rotations=tuple(predictor.rotations),
+            counts=model.layout.counts,
+            predictor=predictor,
+        )
+
+    def check(self, readings: np.ndarray) -> None:
+        """Raise Refused for readings (S,) that are not this layout's."""
+        if len(readings) != len(self.sensors):
+            raise Refused(
+                Refusal.SENSOR_COUNT,
+                f"{len(readings)} readings, but layout {self.layout} has {len(self.sensors)} sensors",
+            )
+        if self.counts is not None:
+            low, high = self.counts
+            if readings.min() < low or readings.max() > high:
+                column = int(np.argmax((readings < low) | (readings > high)))
+                raise Refused(
+                    Refusal.OUT_OF_RANGE,
+                    f"{self.sensors[column]} reads {readings[column]:g}; "
+                    f"layout {self.layout} sends {low:g} to {high:g}",
+                )
+
+    def predict(self, readings: Sequence[np.ndarray]) -> GloveAngles:
+        """Angles of several frames at once, each (S,)."""
+        return self.predictor.predict(np.stack(readings).astype(np.float64))
+
+
+class ServedModels:
+    """Which model each glove has. Written by the model watcher, read between frames; a swap is one store."""
+
+    def __init__(self) -> None:
+        self._models: dict[str, ServedModel] = {}
+
+    def of(self, glove: str) -> ServedModel | None:
+        return self._models.get(glove)
+
+    def put(self, glove: str, model: ServedModel | None) -> None:
+        """Serve ``glove`` with ``model`` from its next frame on; None makes it uncalibrated."""
+        if model is None:
+            self._models.pop(glove, None)
+        else:
+            self._models[glove] = model
+
+    def in_use(self) -> dict[str, ServedModel]:
+        """The prepared models by model id."""
+        return {model.model_id: model for model in list(self._models.values())}

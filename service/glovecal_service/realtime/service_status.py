@@ -1,0 +1,84 @@
+"""The real-time process' own account, as JSON on ``glovecal/<site>/service/<instance>/status``."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+import zenoh
+
+from glovecal_client.keys import JSON_ENCODING, service_alive_key
+from glovecal_service.realtime.glove_lane import GloveLane
+from glovecal_service.realtime.pose_meta import PoseMetas
+
+PERIOD_S = 1.0
+ALIVE_FILE = "realtime.alive"
+"""In the data folder, touched once a second: for those who look at files rather than at zenoh."""
+
+
+def service_status_key(site: str, instance: str) -> str:
+    """Beside the process' liveliness token."""
+    return service_alive_key(site, instance).removesuffix("alive") + "status"
+
+
+class ServiceStatus:
+    """Published once a second and answered to queries: every frame's fate by glove, and what is wrong."""
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        site: str,
+        instance: str,
+        lanes: Callable[[], list[GloveLane]],
+        pose_metas: PoseMetas,
+        problem: Callable[[], str],
+        data: Path,
+    ) -> None:
+        self._key = service_status_key(site, instance)
+        self._instance = instance
+        self._lanes = lanes
+        self._pose_metas = pose_metas
+        self._problem = problem
+        self._alive_file = data / ALIVE_FILE
+        self._started_wall_ns = time.time_ns()
+        self._publisher = session.declare_publisher(self._key, encoding=JSON_ENCODING)
+        self._queryable = session.declare_queryable(self._key, self._answer)
+
+    def run(self, stopped: Event) -> None:
+        """Publish until ``stopped``."""
+        while not stopped.wait(PERIOD_S):
+            self._publisher.put(json.dumps(self.document()))
+            with suppress(OSError):
+                self._alive_file.touch()
+
+    def document(self) -> dict[str, Any]:
+        """``database`` is "" while the store answers, else why it does not."""
+        metas = self._pose_metas.documents()
+        lanes = {lane.glove: lane.status() for lane in self._lanes()}
+        gloves = {
+            glove: {
+                **lanes.get(glove, {}),
+                **{
+                    name: metas.get(glove, {}).get(name)
+                    for name in ("state", "subject", "layout", "sentence")
+                },
+            }
+            for glove in sorted(lanes.keys() | metas.keys())
+        }
+        return {
+            "instance": self._instance,
+            "process": os.getpid(),
+            "started_wall_ns": self._started_wall_ns,
+            "database": self._problem(),
+            "gloves": gloves,
+        }
+
+    def _answer(self, query: zenoh.Query) -> None:
+        with query:
+            query.reply(self._key, json.dumps(self.document()), encoding=JSON_ENCODING)
