@@ -1,0 +1,187 @@
+"""Live prediction of a whole glove: all rotations of a calibration model from raw readings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from glovecal_models.calibration.fused_processes import FusedProcesses, grouped_by_nodes, is_fusible
+from glovecal_models.calibration.model import CalibrationModel, RotationModel
+from glovecal_models.errors import BadInput
+from glovecal_models.regression.process_regressor import ProcessRegressor
+from glovecal_models.regression.rule_regressor import RuleRegressor
+
+EXTRAPOLATING, TOO_UNCERTAIN, BY_RULE = 1, 2, 4
+RANGE_MARGIN = 0.05
+"""An input this share of its training range outside that range is extrapolating."""
+FLOATS_AT_ONCE = 2_000_000
+"""Long recordings are predicted in blocks with work arrays of about this size."""
+
+
+@dataclass(frozen=True)
+class GloveAngles:
+    """Rotations of N frames, in the order of ``GlovePredictor.rotations``."""
+
+    mean: np.ndarray
+    """Degrees, shape (N, R)."""
+    sd: np.ndarray
+    """Standard deviation of a measurement of the rotation: its own uncertainty plus noise, shape (N, R)."""
+    flags: np.ndarray
+    """uint8, shape (N, R): 1 extrapolating, 2 too uncertain to use, 4 by rule."""
+
+
+class GlovePredictor:
+    """Predicts one frame or many with a calibration model.
+
+    Keeps work arrays between calls, so each thread needs a predictor of its own.
+    """
+
+    def __init__(self, model: CalibrationModel) -> None:
+        self.rotations = model.rotation_names
+        self._sensors = model.layout.sensors
+        measured = [
+            index
+            for index, item in enumerate(model.rotations)
+            if not isinstance(item.regressor, RuleRegressor)
+        ]
+        self._groups, self._others = _split(model, measured)
+        self._rules = _ordered_rules(model)
+        items = model.rotations
+        self._noise = np.array([[item.regressor.noise_variance] for item in items])
+        limits = [[item.uncertain_above_deg**2] for item in items]
+        self._largest_variance = np.array(limits)
+        self._range = _Range([(index, items[index]) for index in measured], model)
+        frame = sum(group.floats_per_frame for _, group in self._groups)
+        self._block = int(np.clip(FLOATS_AT_ONCE // max(frame, 1), 1, 256))
+
+    def predict(self, readings: np.ndarray) -> GloveAngles:
+        """Angles from ``readings`` (N, S), raw counts in the layout's sensor order.
+
+        Raises BadInput on a wrong shape and on readings that are not finite.
+        """
+        readings = np.asarray(readings, dtype=float)
+        if readings.ndim != 2 or readings.shape[1] != len(self._sensors):
+            raise BadInput(f"readings have shape {readings.shape}, expected (N, {len(self._sensors)})")
+        if not np.isfinite(readings).all():
+            frame, sensor = np.argwhere(~np.isfinite(readings))[0]
+            value = readings[frame, sensor]
+            raise BadInput(f"sensor {self._sensors[sensor]} reads {value} in frame {frame}; leave it out")
+        count = len(readings)
+        if count <= self._block:
+            return self._predict_block(readings)
+        blocks = [
+            self._predict_block(readings[start : start + self._block])
+            for start in range(0, count, self._block)
+        ]
+        return GloveAngles(
+            np.concatenate([block.mean for block in blocks]),
+            np.concatenate([block.sd for block in blocks]),
+            np.concatenate([block.flags for block in blocks]),
+        )
+
+    def _predict_block(self, readings: np.ndarray) -> GloveAngles:
+        columns = readings.T
+        mean = np.empty((len(self.rotations), len(readings)))
+        variance = np.empty_like(mean)
+        for rows, group in self._groups:
+            mean[rows], variance[rows] = group.predict(columns)
+        for row, predict in self._others:
+            mean[row], variance[row] = predict(readings)
+        flags = self._range.flags(columns, len(mean))
+        np.bitwise_or(flags, TOO_UNCERTAIN, out=flags, where=variance > self._largest_variance)
+        variance += self._noise
+        for row, sources, weights in self._rules:
+            mean[row] = weights @ mean[sources]
+            variance[row] = (weights * weights) @ variance[sources]
+            flags[row] = np.bitwise_or.reduce(flags[sources], axis=0) | BY_RULE
+        return GloveAngles(mean.T, np.sqrt(variance).T, flags.T)
+
+
+class _Range:
+    """Which inputs are outside what was trained on."""
+
+    def __init__(self, items: list[tuple[int, RotationModel]], model: CalibrationModel) -> None:
+        selections = [_selection(item, model) for _, item in items]
+        sensors = len(model.layout.sensors)
+        self._select = np.concatenate([s.T for s in selections]) if items else np.zeros((0, sensors))
+        low = np.concatenate([item.input_low for _, item in items]) if items else np.empty(0)
+        high = np.concatenate([item.input_high for _, item in items]) if items else np.empty(0)
+        margin = RANGE_MARGIN * (high - low)
+        self._low, self._high = (low - margin)[:, None], (high + margin)[:, None]
+        self._rows = np.array([index for index, _ in items], dtype=np.intp)
+        self._starts = np.cumsum([0, *[s.shape[1] for s in selections]])[:-1]
+
+    def flags(self, columns: np.ndarray, rotations: int) -> np.ndarray:
+        """uint8 (R, N): EXTRAPOLATING or 0."""
+        flags = np.zeros((rotations, columns.shape[1]), dtype=np.uint8)
+        if not len(self._rows) or not columns.shape[1]:
+            return flags
+        inputs = self._select @ columns
+        outside = (inputs < self._low) | (inputs > self._high)
+        flags[self._rows] = np.logical_or.reduceat(outside, self._starts, axis=0)
+        return flags
+
+
+_Predict = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+def _split(
+    model: CalibrationModel, measured: list[int]
+) -> tuple[list[tuple[np.ndarray, FusedProcesses]], list[tuple[int, _Predict]]]:
+    """Fused groups with their rows, and the rows that are predicted one by one."""
+    processes: list[tuple[int, ProcessRegressor]] = []
+    others: list[tuple[int, _Predict]] = []
+    for index in measured:
+        regressor = model.rotations[index].regressor
+        if isinstance(regressor, ProcessRegressor) and is_fusible(regressor):
+            processes.append((index, regressor))
+        else:
+            others.append((index, _one_by_one(model.rotations[index], model)))
+    by_index = dict(processes)
+    groups = []
+    for rows in grouped_by_nodes(processes):
+        selections = [_selection(model.rotations[row], model) for row in rows]
+        groups.append((np.array(rows), FusedProcesses([by_index[row] for row in rows], selections)))
+    return groups, others
+
+
+def _one_by_one(item: RotationModel, model: CalibrationModel) -> _Predict:
+    correspondence, regressor, sensors = item.correspondence, item.regressor, model.layout.sensors
+
+    def predict(readings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        prediction = regressor.predict(correspondence.input_columns(readings, sensors))
+        return prediction.mean, prediction.variance
+
+    return predict
+
+
+def _selection(item: RotationModel, model: CalibrationModel) -> np.ndarray:
+    """Matrix (S, D) with inputs = readings @ matrix: every correspondence is linear in the sensors."""
+    return item.correspondence.input_columns(np.eye(len(model.layout.sensors)), model.layout.sensors)
+
+
+def _ordered_rules(model: CalibrationModel) -> list[tuple[int, np.ndarray, np.ndarray]]:
+    """(row, rows of its sources, weights) of every rule, sources before those that need them."""
+    names = list(model.rotation_names)
+    waiting = {
+        index: item.regressor
+        for index, item in enumerate(model.rotations)
+        if isinstance(item.regressor, RuleRegressor)
+    }
+    ordered: list[tuple[int, np.ndarray, np.ndarray]] = []
+    while waiting:
+        ready = [
+            index
+            for index, rule in waiting.items()
+            if not any(names.index(name) in waiting for name in rule.rotations)
+        ]
+        if not ready:
+            stuck = ", ".join(names[index] for index in waiting)
+            raise BadInput(f"the rules for {stuck} depend on each other in a circle")
+        for index in ready:
+            rule = waiting.pop(index)
+            sources = np.array([names.index(name) for name in rule.rotations], dtype=np.intp)
+            ordered.append((index, sources, np.asarray(rule.weights, dtype=float)))
+    return ordered

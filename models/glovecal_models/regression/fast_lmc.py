@@ -1,0 +1,230 @@
+"""LMC-GPR of Wang & Neff (2013), section 6.1, at its maximum-likelihood optimum in well under a second.
+
+The paper's covariance is k_LARD + k_seARD with a linear mean. When the mean's coefficients maximise the
+likelihood, so do beta_d = 0: the generalised least-squares residual does not change when X B X' (B the
+diagonal of beta, not negative) is added to K, because that residual is orthogonal to X in the metric of
+K^-1 already, while log|K + X B X'| can only grow. So the trained model is a plane plus k_seARD, which is
+what ``fit_lmc_gpr`` searches, with plane and scale in closed form, and D + 1 parameters left.
+
+Steps: merge equal inputs; several starts on few nodes (``multi_start``); refine the best to 1e-4 nats, by
+exact evaluations where nodes do not suffice; bracket the exact NLML (``certificate``); keep as many nodes as
+the served mean and standard deviation need (``served_nodes``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from glovecal_models.covariance.squared_exponential_ard import SquaredExponentialArd
+from glovecal_models.errors import Cancelled
+from glovecal_models.regression.certificate import Certificate, NystromFit, certify
+from glovecal_models.regression.exact_profiled_likelihood import ExactProfiledLikelihood
+from glovecal_models.regression.merged_samples import MergedSamples
+from glovecal_models.regression.multi_start import (
+    FEW,
+    MOST_NODES,
+    Candidate,
+    best_start,
+    descend,
+    search_exactly,
+)
+from glovecal_models.regression.pivoted_cholesky import PivotedCholesky, pivoted_cholesky
+from glovecal_models.regression.process_regressor import ProcessRegressor
+from glovecal_models.regression.profiled_likelihood import Profile
+from glovecal_models.regression.served_nodes import NodeChooser, Reference, ServedNodes
+from glovecal_models.regression.standardise import Standardised, standardise
+from glovecal_models.regression.training_check import check_samples
+
+MOST_EXACT = 4000
+"""Distinct inputs up to which an N x N matrix is formed; 128 MB each at this size."""
+LARGEST_FACTOR = 1.2e7
+"""Entries of a low-rank factor: 96 MB."""
+MEAN_ERROR_DEG, SD_ERROR_DEG = 5e-4, 1e-3
+"""How closely served nodes follow the exact process at training inputs."""
+SHORT_LENGTHSCALE = 0.5
+"""Standard deviations of an input. Shorter ones that also need many nodes hint at a missing input."""
+
+
+@dataclass(frozen=True)
+class _Trained:
+    """Hyperparameters at the optimum and what is known of their likelihood."""
+
+    parameters: np.ndarray
+    profile: Profile
+    certificate: Certificate | None
+    factor: PivotedCholesky
+    reference: Reference | None
+    """The exact process at the training inputs, where it was evaluated."""
+
+
+def fit_lmc_gpr(
+    inputs: np.ndarray,
+    target: np.ndarray,
+    *,
+    seed: int = 0,
+    cancelled: Callable[[], bool] | None = None,
+    report: Callable[[str, float], None] | None = None,
+) -> ProcessRegressor:
+    """Train on ``inputs`` (N, D), raw counts, and ``target`` (N,), degrees; same seed, same result.
+
+    ``evidence`` tells: ``nlml`` (standardised units; + N log target_scale_deg in degrees) and the bracket
+    ``nlml_lower``..``nlml_upper`` of the exact value, ``starts``, ``evaluations``, ``exact_evaluation``,
+    ``served_mean_error_deg`` and ``served_sd_error_deg``, ``missing_input_suspected``.
+    Raises NotTrainable on unusable samples, Cancelled when ``cancelled`` answers True.
+    """
+    inputs, target = check_samples(inputs, target)
+    standard = standardise(inputs, target)
+    samples = MergedSamples.of(standard.x, standard.y)
+    generator = np.random.default_rng(seed)
+    say = report or (lambda sentence, fraction: None)
+    say("searching from several starts", 0.0)
+    rough, account = _rough(samples, standard, generator, cancelled)
+    _stop_if(cancelled)
+    say("refining the best optimum", 0.4)
+    refined = _refine(samples, standard, rough, generator, cancelled)
+    _stop_if(cancelled)
+    say("bounding the likelihood and choosing nodes", 0.8)
+    trained = _examine(samples, refined)
+    scale_deg = standard.target_scale
+    served = _served(samples, trained, scale_deg)
+    evidence = _evidence(samples, trained, refined, served, scale_deg)
+    evidence["starts"] = account
+    say("trained", 1.0)
+    return _regressor(samples, standard, trained, served, evidence)
+
+
+def _rough(
+    samples: MergedSamples,
+    standard: Standardised,
+    generator: np.random.Generator,
+    cancelled: Callable[[], bool] | None,
+) -> tuple[Candidate, list[dict[str, object]]]:
+    """Try all starts; on a random 3000 of the samples when there are many more."""
+    x, y = standard.x, standard.y
+    if len(samples.inputs) > MOST_EXACT:
+        rows = generator.choice(len(y), 3000, replace=False)
+        x, y = x[rows], y[rows]
+        samples = MergedSamples.of(x, y)
+    return best_start(samples, x, y, generator, cancelled)
+
+
+def _refine(
+    samples: MergedSamples,
+    standard: Standardised,
+    rough: Candidate,
+    generator: np.random.Generator,
+    cancelled: Callable[[], bool] | None,
+) -> Candidate:
+    """The optimum to 1e-4 nats on nodes, to 1e-3 by exact evaluations, or from 3000 of very many samples."""
+    distinct = len(samples.inputs)
+    if distinct <= FEW:
+        return search_exactly(samples, rough.parameters, tolerance=1e-6, cancelled=cancelled) or rough
+    nodes = min(MOST_NODES, distinct // 2)
+    refined = descend(samples, rough.parameters, fine=True, most_nodes=nodes, cancelled=cancelled)
+    if refined is not None:
+        return refined
+    if distinct > MOST_EXACT:
+        rows = generator.choice(len(standard.y), 3000, replace=False)
+        samples = MergedSamples.of(standard.x[rows], standard.y[rows])
+    return search_exactly(samples, rough.parameters, tolerance=1e-3, cancelled=cancelled) or rough
+
+
+def _examine(samples: MergedSamples, refined: Candidate) -> _Trained:
+    """Profile, certificate and nodes at the optimum; exactly where that is affordable or needed."""
+    parameters, distinct = refined.parameters, len(samples.inputs)
+    rho = float(np.exp(parameters[-1]))
+    points = samples.inputs * np.exp(-parameters[:-1])
+    exact = distinct <= FEW or (not refined.low_rank and distinct <= MOST_EXACT)
+    tolerance = 1e-12 if exact else float(np.clip(0.05 * rho / samples.total**2, 1e-13, 1e-8))
+    most = int(min(600 if exact else 800, distinct, LARGEST_FACTOR / distinct))
+    factor = pivoted_cholesky(points, tolerance, most)
+    if not exact:
+        fit = NystromFit(samples, factor.rows, rho)
+        best = fit.profile()
+        trace = float(samples.root_count**2 @ factor.residual)
+        certificate = certify(fit, trace, best.plane, best.scale)
+        if certificate.width <= 0.05 or distinct > MOST_EXACT:
+            return _Trained(parameters, best, certificate, factor, None)
+    process = ExactProfiledLikelihood(samples).training_process(parameters)
+    if process is None:
+        raise ArithmeticError(f"covariance is not positive definite at {parameters.tolist()}")
+    reference = Reference(process.mean, process.variance, process.weights)
+    nlml = process.profile.nlml
+    known = Certificate(nlml, nlml, "exact evaluation")
+    return _Trained(parameters, process.profile, known, factor, reference)
+
+
+def _served(samples: MergedSamples, trained: _Trained, scale_deg: float) -> ServedNodes:
+    """Nodes within ``MEAN_ERROR_DEG`` of the exact process, or all that were offered."""
+    rho = float(np.exp(trained.parameters[-1]))
+    best, factor = trained.profile, trained.factor
+    fit = NystromFit(samples, factor.rows, rho)
+    chooser = NodeChooser(fit, factor.rows, factor.pivots, best.residual, best.scale)
+    reference = trained.reference or chooser.reference()
+    acceptable = MEAN_ERROR_DEG / scale_deg
+    size = chooser.choose(reference, acceptable, SD_ERROR_DEG / scale_deg, len(factor.pivots))
+    return chooser.serve(size, reference, acceptable)
+
+
+def _regressor(
+    samples: MergedSamples,
+    standard: Standardised,
+    trained: _Trained,
+    served: ServedNodes,
+    evidence: dict[str, Any],
+) -> ProcessRegressor:
+    """Everything in degrees."""
+    scale_deg, best = standard.target_scale, trained.profile
+    plane = samples.to_plane @ best.plane * scale_deg
+    signal = best.scale * scale_deg**2
+    return ProcessRegressor(
+        method="lmc_gpr",
+        input_shift=standard.input_shift,
+        input_scale=standard.input_scale,
+        slope=plane[:-1],
+        intercept=float(plane[-1] + standard.target_shift),
+        covariance=SquaredExponentialArd(),
+        theta=np.append(np.log(signal), -2.0 * trained.parameters[:-1]),
+        nodes=samples.inputs[served.pivots],
+        weights=served.weights * (scale_deg / signal),
+        variance_root=served.variance_root / np.sqrt(signal),
+        noise_variance=float(np.exp(trained.parameters[-1])) * signal,
+        jitter=0.0,
+        evidence=evidence,
+    )
+
+
+def _evidence(
+    samples: MergedSamples, trained: _Trained, refined: Candidate, served: ServedNodes, scale_deg: float
+) -> dict[str, Any]:
+    lengthscales = np.exp(trained.parameters[:-1])
+    certificate = trained.certificate
+    many = not refined.low_rank and len(samples.inputs) > FEW
+    collapsed = float(lengthscales.min()) < (SHORT_LENGTHSCALE if many else 0.2 * SHORT_LENGTHSCALE)
+    facts: dict[str, Any] = {
+        "samples": samples.total,
+        "distinct_inputs": len(samples.inputs),
+        "nlml": trained.profile.nlml,
+        "target_scale_deg": scale_deg,
+        "lengthscales": lengthscales.tolist(),
+        "evaluations": refined.evaluations,
+        "exact_evaluation": trained.reference is not None,
+        "served_nodes": len(served.pivots),
+        "variance_nodes": int(np.count_nonzero(served.variance_root.any(axis=1))),
+        "served_mean_error_deg": served.mean_error * scale_deg,
+        "served_sd_error_deg": served.sd_error * scale_deg,
+        "missing_input_suspected": collapsed,
+    }
+    if certificate is not None:
+        facts["nlml_lower"], facts["nlml_upper"] = float(certificate.lower), float(certificate.upper)
+        facts["certificate"] = certificate.how
+    return facts
+
+
+def _stop_if(cancelled: Callable[[], bool] | None) -> None:
+    if cancelled is not None and cancelled():
+        raise Cancelled("training was cancelled")

@@ -1,0 +1,200 @@
+"""From several starts to the best optimum of the profiled likelihood, as cheaply as each start allows.
+
+The likelihood of a cross-coupled joint has several optima, some with short lengthscales, so one start is
+not enough. Long lengthscales are searched on few nodes (``LowRankLikelihood``), whose number does not depend
+on N. Short ones in several dimensions need too many nodes; a random subset of the samples shows where they
+lead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from glovecal_models.regression.exact_profiled_likelihood import ExactProfiledLikelihood
+from glovecal_models.regression.low_rank_likelihood import LowRankLikelihood
+from glovecal_models.regression.merged_samples import MergedSamples
+from glovecal_models.regression.newton_search import SearchResult, newton_search
+
+LONGEST_LENGTHSCALE, LARGEST_LOG_RHO, SMALLEST_LOG_RHO, SHORTEST_LENGTHSCALE = 60.0, 12.0, -18.0, 0.02
+SUBSET = 320
+"""Samples on which short lengthscales are tried first."""
+FEW = 260
+"""With no more distinct inputs than this, exact evaluations are cheap enough for every start."""
+MOST_NODES = 420
+"""Beyond this rank an exact evaluation is not much dearer than a low-rank one."""
+REBUILDS = 8
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An optimum reached from a start; NLML of the likelihood it was searched with."""
+
+    parameters: np.ndarray
+    nlml: float
+    evaluations: int
+    low_rank: bool
+    """Searched on nodes for all samples, as against exactly or on a subset."""
+
+
+def lower_bounds(dimensions: int) -> np.ndarray:
+    return np.append(np.full(dimensions, np.log(SHORTEST_LENGTHSCALE)), SMALLEST_LOG_RHO)
+
+
+def upper_bounds(dimensions: int) -> np.ndarray:
+    return np.append(np.full(dimensions, np.log(LONGEST_LENGTHSCALE)), LARGEST_LOG_RHO)
+
+
+def long_starts(dimensions: int) -> Iterator[np.ndarray]:
+    """Smooth functions, all inputs alike or one more relevant than the others."""
+    yield np.append(np.full(dimensions, np.log(3.0)), np.log(0.1))
+    if dimensions == 1:
+        yield np.log([1.0, 0.01])
+        yield np.log([0.3, 0.3])
+        yield np.log([0.1, 1.0])
+        return
+    for short in range(min(dimensions, 4)):
+        lengthscales = np.full(dimensions, 4.0)
+        lengthscales[short] = 1.0
+        yield np.append(np.log(lengthscales), np.log(0.3))
+
+
+def short_start(dimensions: int) -> np.ndarray:
+    return np.append(np.full(dimensions, np.log(0.4)), np.log(0.3))
+
+
+def descend(
+    samples: MergedSamples,
+    start: np.ndarray,
+    *,
+    fine: bool,
+    most_nodes: int = MOST_NODES,
+    cancelled: Callable[[], bool] | None = None,
+) -> Candidate | None:
+    """Search on nodes, choosing them anew whenever lengthscales or noise leave the range they serve.
+
+    None when more than ``most_nodes`` would be needed. ``fine`` makes the result good to 1e-4 nats,
+    else to some hundredths.
+    """
+    dimensions = len(start) - 1
+    point, evaluations, reach, nlml = start, 0, 0.8 if fine else 0.6, np.inf
+    for _ in range(REBUILDS):
+        lower = np.append(point[:-1] + np.log(reach), point[-1] - (1.5 if fine else 3.0))
+        lower = np.maximum(lower, lower_bounds(dimensions))
+        tolerance = (1e-6 if fine else 1e-3) * float(np.exp(lower[-1]))
+        likelihood = LowRankLikelihood.at(
+            samples, np.exp(lower[:-1]), float(np.clip(tolerance, 1e-12, 1e-4)), most_nodes
+        )
+        if likelihood is None:
+            return None
+        found = newton_search(
+            likelihood.evaluate,
+            point,
+            lower,
+            upper_bounds(dimensions),
+            tolerance=1e-5 if fine else 1e-2,
+            evaluations=60 if fine else 40,
+            cancelled=cancelled,
+        )
+        if found is None:
+            return None
+        evaluations += found.evaluations
+        held = (found.parameters < lower + 0.02) & (lower > lower_bounds(dimensions))
+        point, nlml = found.parameters, found.nlml
+        if not held.any():
+            break
+        reach = 0.8 if fine else 0.5
+    return Candidate(point, nlml, evaluations, low_rank=True)
+
+
+def search_exactly(
+    samples: MergedSamples,
+    start: np.ndarray,
+    *,
+    tolerance: float,
+    cancelled: Callable[[], bool] | None = None,
+) -> Candidate | None:
+    """Search the exact likelihood of ``samples``."""
+    found = newton_search(
+        ExactProfiledLikelihood(samples).evaluate,
+        start,
+        lower_bounds(len(start) - 1),
+        upper_bounds(len(start) - 1),
+        tolerance=tolerance,
+        evaluations=60,
+        cancelled=cancelled,
+    )
+    return _candidate(found)
+
+
+def best_start(
+    samples: MergedSamples,
+    x: np.ndarray,
+    y: np.ndarray,
+    generator: np.random.Generator,
+    cancelled: Callable[[], bool] | None = None,
+) -> tuple[Candidate, list[dict[str, object]]]:
+    """The best optimum over all starts, roughly located, and a JSON-able account of every start.
+
+    ``x`` (N, D) and ``y`` (N,) are the standardised samples behind ``samples``.
+    """
+    dimensions = x.shape[1]
+    found: list[Candidate] = []
+    account: list[dict[str, object]] = []
+    few = len(samples.inputs) <= FEW
+    for start in long_starts(dimensions):
+        candidate = descend(samples, start, fine=False, most_nodes=240, cancelled=cancelled)
+        _note(account, start, candidate)
+        if candidate is not None:
+            found.append(candidate)
+    if not (few and found and dimensions == 1):
+        short = _from_subset(samples, x, y, found, generator, cancelled)
+        _note(account, short_start(dimensions), short)
+        if short is not None:
+            found.append(short)
+    if not found:
+        found.append(Candidate(short_start(dimensions), np.inf, 0, low_rank=False))
+    return min(found, key=lambda candidate: candidate.nlml), account
+
+
+def _from_subset(
+    samples: MergedSamples,
+    x: np.ndarray,
+    y: np.ndarray,
+    rivals: list[Candidate],
+    generator: np.random.Generator,
+    cancelled: Callable[[], bool] | None,
+) -> Candidate | None:
+    """The short-lengthscale optimum of a subset, if it beats the best rival on that same subset.
+
+    Its NLML is then put below the rival's, because the search goes on from it with all samples.
+    """
+    size = min(SUBSET, len(y))
+    rows = generator.choice(len(y), size, replace=False) if size < len(y) else np.arange(size)
+    subset = samples if size == len(y) else MergedSamples.of(x[rows], y[rows])
+    short = search_exactly(subset, short_start(x.shape[1]), tolerance=0.05, cancelled=cancelled)
+    if short is None or not rivals:
+        return short
+    best = min(rivals, key=lambda candidate: candidate.nlml)
+    there = ExactProfiledLikelihood(subset).evaluate(best.parameters)
+    if there is not None and there.nlml <= short.nlml + 1.0:
+        return None
+    return replace(short, nlml=best.nlml - 1.0)
+
+
+def _candidate(found: SearchResult | None) -> Candidate | None:
+    if found is None:
+        return None
+    return Candidate(found.parameters, found.nlml, found.evaluations, low_rank=False)
+
+
+def _note(account: list[dict[str, object]], start: np.ndarray, candidate: Candidate | None) -> None:
+    entry: dict[str, object] = {"lengthscales": np.round(np.exp(start[:-1]), 3).tolist()}
+    if candidate is None:
+        entry["outcome"] = "left"
+    else:
+        entry["nlml"] = round(candidate.nlml, 4)
+        entry["evaluations"] = candidate.evaluations
+    account.append(entry)

@@ -1,0 +1,120 @@
+"""A trained process on few nodes: what is stored, and what predicts at 120 frames a second.
+
+Nodes are pivots of a pivoted Cholesky factorisation, not moved (Foster et al. 2009; the DTC or projected
+process mean of Quinonero-Candela & Rasmussen 2005). With K ~ L L', Lp the pivots' own triangle and
+G = L' S^2 L, C = Lp^-T (I - rho (G + rho I)^-1) Lp^-1: no difference of nearly equal inverses is ever taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from glovecal_models.regression.certificate import NystromFit
+from glovecal_models.regression.lapack_routines import potrf, potrs, trtrs
+
+SIZES = (4, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 56, 64, 72, 80, 90, 100, 115, 130, 150, 175, 200)
+SIZES_WHEN_NEEDED = (250, 300, 350, 400, 450, 500, 550, 600, 700)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The process to be followed at the distinct training inputs, standardised units."""
+
+    mean: np.ndarray
+    """Mean without the plane, shape (m,)."""
+    variance: np.ndarray
+    """Shape (m,)."""
+    weights: np.ndarray | None = None
+    """Weights (m,) of all training inputs that give ``mean``, where known."""
+
+
+@dataclass(frozen=True)
+class ServedNodes:
+    """Nodes for unit signal variance, and how far they are from the reference."""
+
+    pivots: np.ndarray
+    """Which distinct inputs are nodes, shape (M,)."""
+    weights: np.ndarray
+    """(M,), in units of the target."""
+    variance_root: np.ndarray
+    """(M, r), for unit signal variance."""
+    mean_error: float
+    """Largest difference of the mean from the reference at a training input."""
+    sd_error: float
+
+
+class NodeChooser:
+    """Predictions at the training inputs from the first M pivots, for any M."""
+
+    def __init__(
+        self, fit: NystromFit, rows: np.ndarray, pivots: np.ndarray, residual: np.ndarray, scale: float
+    ) -> None:
+        """``residual`` (p + 1,): the columns' combination that is target minus plane; ``scale``: s^2."""
+        self._fit, self._rows, self._pivots, self._scale = fit, rows, pivots, scale
+        self._pulled = fit.projected @ residual
+
+    def mean(self, size: int) -> np.ndarray:
+        return self._rows[:size].T @ self._solve(size)
+
+    def variance(self, size: int) -> np.ndarray:
+        rows = self._rows[:size]
+        half = trtrs(self._factor(size), rows, lower=1)[0]
+        explained = np.einsum("ij,ij->j", rows, rows)
+        left = self._fit.rho * np.einsum("ij,ij->j", half, half)
+        return self._scale * np.maximum(1.0 - explained + left, 0.0)
+
+    def reference(self) -> Reference:
+        """All pivots: with a factorisation fine enough this is the exact process."""
+        return Reference(self.mean(len(self._rows)), self.variance(len(self._rows)))
+
+    def choose(self, reference: Reference, mean_error: float, sd_error: float, most: int) -> int:
+        """The smallest offered size within both errors of the reference, else the largest up to ``most``."""
+        most = min(most, len(self._rows))
+        sizes = [size for size in (*SIZES, *SIZES_WHEN_NEEDED) if size < most] + [most]
+        low, high = 0, len(sizes) - 1
+        while low < high:
+            middle = (low + high) // 2
+            if self._close(sizes[middle], reference, mean_error, sd_error):
+                high = middle
+            else:
+                low = middle + 1
+        return sizes[low]
+
+    def serve(self, size: int, reference: Reference, acceptable: float) -> ServedNodes:
+        """Weights and variance root of the first ``size`` nodes.
+
+        Where these do not give the mean to ``acceptable``, all training inputs become nodes for the mean
+        (cost M per frame); the variance, whose cost is M r, stays with the first ``size``.
+        """
+        pivots = self._pivots[:size]
+        corner = np.tril(self._rows[:size, pivots].T)
+        weights = trtrs(corner, self._solve(size), lower=1, trans=1)[0]
+        values, vectors = np.linalg.eigh(self._fit.gram[:size, :size])
+        share = np.maximum(values, 0.0) / (np.maximum(values, 0.0) + self._fit.rho)
+        kept = share > 1e-10
+        root = trtrs(corner, vectors[:, kept] * np.sqrt(share[kept]), lower=1, trans=1)[0]
+        mean_error = float(np.abs(self.mean(size) - reference.mean).max())
+        if mean_error > acceptable and reference.weights is not None:
+            rest = np.setdiff1d(np.arange(len(reference.weights)), pivots)
+            pivots = np.concatenate([pivots, rest])
+            weights = reference.weights[pivots]
+            root = np.vstack([root, np.zeros((len(rest), root.shape[1]))])
+            mean_error = 0.0
+        sd_error = float(np.abs(np.sqrt(self.variance(size)) - np.sqrt(reference.variance)).max())
+        return ServedNodes(pivots, weights, root, mean_error, sd_error)
+
+    def _close(self, size: int, reference: Reference, mean_error: float, sd_error: float) -> bool:
+        if np.abs(self.mean(size) - reference.mean).max() > mean_error:
+            return False
+        difference = np.sqrt(self.variance(size)) - np.sqrt(reference.variance)
+        return bool(np.abs(difference).max() <= sd_error)
+
+    def _factor(self, size: int) -> np.ndarray:
+        inner = self._fit.gram[:size, :size].copy()
+        inner.ravel()[:: size + 1] += self._fit.rho
+        return potrf(inner.T, lower=1, overwrite_a=1, clean=0)[0]
+
+    def _solve(self, size: int) -> np.ndarray:
+        return potrs(self._factor(size), self._pulled[:size], lower=1)[0]
