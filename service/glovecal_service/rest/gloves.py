@@ -15,7 +15,7 @@ from glovecal_models.errors import BadLayout
 from glovecal_models.layout import Layout
 from glovecal_service.rest.answers import change_problems, problems
 from glovecal_service.rest.dependencies import StoreNeeded
-from glovecal_service.rest.names import Channel, Identifier, NameInPath, Title, WearingName
+from glovecal_service.rest.names import ONE_LINE, Channel, Identifier, NameInPath, Title, WearingName
 from glovecal_service.rest.problem import Problem
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.errors import NotFound
@@ -25,7 +25,7 @@ router = APIRouter(prefix="/gloves", tags=["gloves"])
 
 MOST_CHANNELS = 512
 Channels = Annotated[list[Channel], Field(max_length=MOST_CHANNELS)]
-Expression = Annotated[str, StringConstraints(max_length=2000)]
+Expression = Annotated[str, StringConstraints(max_length=2000, pattern=ONE_LINE)]
 
 
 class LayoutBody(StrictBody):

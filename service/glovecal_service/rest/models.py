@@ -14,7 +14,7 @@ from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.errors import LayoutMismatch
 from glovecal_service.rest.answers import change_problems, problems
 from glovecal_service.rest.dependencies import PartsNeeded, StoreNeeded
-from glovecal_service.rest.names import Id, Identifier, LayoutFilter, ModelInPath, SubjectFilter
+from glovecal_service.rest.names import Channel, Id, Identifier, LayoutFilter, ModelInPath, SubjectFilter
 from glovecal_service.rest.plain import plain
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.records import Activation, ModelRecord
@@ -78,7 +78,7 @@ class Readings(StrictBody):
         list[Annotated[list[FiniteFloat], Field(max_length=MOST_SENSORS)]],
         Field(min_length=1, max_length=MOST_FRAMES, description="Frames of raw readings."),
     ]
-    sensors: Annotated[list[str], Field(max_length=MOST_SENSORS)] | None = Field(
+    sensors: Annotated[list[Channel], Field(max_length=MOST_SENSORS)] | None = Field(
         None, description="Order of the readings; None: that of the model's layout."
     )
 
