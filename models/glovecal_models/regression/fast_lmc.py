@@ -27,9 +27,10 @@ from glovecal_models.regression.merged_samples import MergedSamples
 from glovecal_models.regression.multi_start import (
     FEW,
     MOST_NODES,
+    SAME_OPTIMUM,
     Candidate,
-    best_start,
     descend,
+    screen,
     search_exactly,
 )
 from glovecal_models.regression.pivoted_cholesky import PivotedCholesky, pivoted_cholesky
@@ -82,10 +83,10 @@ def fit_lmc_gpr(
     generator = np.random.default_rng(seed)
     say = report or (lambda sentence, fraction: None)
     say("searching from several starts", 0.0)
-    rough, account = _rough(samples, standard, generator, cancelled)
+    found, account = screen(standard.x, standard.y, generator, cancelled)
     _stop_if(cancelled)
     say("refining the best optimum", 0.4)
-    refined = _refine(samples, standard, rough, generator, cancelled)
+    refined = _refine_best(samples, standard, found, generator, cancelled)
     _stop_if(cancelled)
     say("bounding the likelihood and choosing nodes", 0.8)
     trained = _examine(samples, refined)
@@ -97,19 +98,24 @@ def fit_lmc_gpr(
     return _regressor(samples, standard, trained, served, evidence)
 
 
-def _rough(
+def _refine_best(
     samples: MergedSamples,
     standard: Standardised,
+    found: list[Candidate],
     generator: np.random.Generator,
     cancelled: Callable[[], bool] | None,
-) -> tuple[Candidate, list[dict[str, object]]]:
-    """Try all starts; on a random 3000 of the samples when there are many more."""
-    x, y = standard.x, standard.y
-    if len(samples.inputs) > MOST_EXACT:
-        rows = generator.choice(len(y), 3000, replace=False)
-        x, y = x[rows], y[rows]
-        samples = MergedSamples.of(x, y)
-    return best_start(samples, x, y, generator, cancelled)
+) -> Candidate:
+    """Refine the most promising optimum; others too while that is cheap, which exact searches are not."""
+    best = _refine(samples, standard, found[0], generator, cancelled)
+    for candidate in found[1:3]:
+        _stop_if(cancelled)
+        if np.abs(candidate.parameters - best.parameters).max() < SAME_OPTIMUM:
+            continue
+        nodes = min(MOST_NODES, len(samples.inputs))
+        rival = descend(samples, candidate.parameters, fine=True, most_nodes=nodes, cancelled=cancelled)
+        if rival is not None and rival.nlml < best.nlml - 1e-3:
+            best = rival
+    return best
 
 
 def _refine(

@@ -12,4 +12,4 @@ from scipy.linalg import get_blas_funcs, get_lapack_funcs
 gesdd, posv, potrf, potri, potrs, trtrs = get_lapack_funcs(
     ("gesdd", "posv", "potrf", "potri", "potrs", "trtrs"), dtype=np.float64
 )
-symm, trmm = get_blas_funcs(("symm", "trmm"), dtype=np.float64)
+symm, trmm, trsm = get_blas_funcs(("symm", "trmm", "trsm"), dtype=np.float64)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.regression.lapack_routines import potrf, trmm, trtrs
+from glovecal_models.regression.lapack_routines import potrf, trmm, trsm, trtrs
 from glovecal_models.regression.merged_samples import MergedSamples
 from glovecal_models.regression.pivoted_cholesky import PivotedCholesky, pivoted_cholesky
 from glovecal_models.regression.profiled_likelihood import (
@@ -38,12 +38,9 @@ class LowRankLikelihood:
         self.nodes = samples.inputs[factor.pivots]
         self.rank = factor.rank
         self._total = samples.total
-        weights = trtrs(factor.corner().T, factor.rows, lower=0)[0].T
-        triangle = _triangle(np.column_stack([weights * samples.root_count[:, None], samples.columns]))
-        r = self.rank
-        self._corner = np.asfortranarray(triangle[:r, :r])
-        self._columns = triangle[:r, r:]
-        self._outside = triangle[r:, r:].T @ triangle[r:, r:]
+        weights = trsm(1.0, factor.corner(), factor.rows.T, side=1, lower=1)
+        weights *= samples.root_count[:, None]
+        self._corner, self._columns, self._outside = _split_by_span(weights, samples.columns)
         self._outside[-1, -1] += samples.scatter
 
     @classmethod
@@ -90,12 +87,20 @@ class LowRankLikelihood:
         return derivatives(best, inside, traces, np.column_stack([moved, by_noise]))
 
 
-def _triangle(tall: np.ndarray) -> np.ndarray:
-    """R of tall = Q R, (c, c). By Cholesky of the Gram matrix where that is safe: three times faster."""
-    gram = tall.T @ tall
-    factor, info = potrf(gram, lower=0, clean=1)
-    if info == 0 and factor.diagonal().min() > 1e-5 * factor.diagonal().max():
-        return factor
-    r = np.asarray(np.linalg.qr(tall, mode="r"))
-    missing = tall.shape[1] - len(r)
-    return np.vstack([r, np.zeros((missing, tall.shape[1]))]) if missing > 0 else r
+def _split_by_span(weights: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """With weights = Q R: R (r, r), Q' columns (r, c), and the Gram matrix (c, c) of what Q leaves of them.
+
+    By Cholesky of the Gram matrix where the weights are well conditioned, as they nearly always are: three
+    times faster than Householder's QR.
+    """
+    gram = weights.T @ weights
+    corner, info = potrf(gram.T, lower=0, clean=1, overwrite_a=1)
+    diagonal = corner.diagonal()
+    if info == 0 and diagonal.min() > 1e-6 * diagonal.max():
+        inside = trtrs(corner, weights.T @ columns, lower=0, trans=1)[0]
+        left = columns.T @ columns - inside.T @ inside
+        return corner, inside, left
+    q, r = np.linalg.qr(weights)
+    inside = q.T @ columns
+    left = columns - q @ inside
+    return np.asfortranarray(r), inside, left.T @ left

@@ -19,8 +19,13 @@ from glovecal_models.regression.merged_samples import MergedSamples
 from glovecal_models.regression.newton_search import SearchResult, newton_search
 
 LONGEST_LENGTHSCALE, LARGEST_LOG_RHO, SMALLEST_LOG_RHO, SHORTEST_LENGTHSCALE = 60.0, 12.0, -18.0, 0.02
-SUBSET = 320
-"""Samples on which short lengthscales are tried first."""
+SCREENED = 800
+"""Samples on which starts are compared; the best go on with all."""
+SCREENING_NODES = 200
+SUBSET = 240
+"""Samples on which short lengthscales are tried first, exactly."""
+SAME_OPTIMUM, HOPELESS = 0.5, 5.0
+"""Largest difference of log parameters, and nats of the screening, by which optima are told apart."""
 FEW = 260
 """With no more distinct inputs than this, exact evaluations are cheap enough for every start."""
 MOST_NODES = 420
@@ -129,59 +134,67 @@ def search_exactly(
     return _candidate(found)
 
 
-def best_start(
-    samples: MergedSamples,
+def screen(
     x: np.ndarray,
     y: np.ndarray,
     generator: np.random.Generator,
     cancelled: Callable[[], bool] | None = None,
-) -> tuple[Candidate, list[dict[str, object]]]:
-    """The best optimum over all starts, roughly located, and a JSON-able account of every start.
+) -> tuple[list[Candidate], list[dict[str, object]]]:
+    """Distinct optima over all starts, best first, roughly located; and a JSON-able account of every start.
 
-    ``x`` (N, D) and ``y`` (N,) are the standardised samples behind ``samples``.
+    ``x`` (N, D), ``y`` (N,): standardised samples, of which a random ``SCREENED`` are used.
     """
     dimensions = x.shape[1]
+    samples = _some(x, y, SCREENED, generator)
     found: list[Candidate] = []
     account: list[dict[str, object]] = []
-    few = len(samples.inputs) <= FEW
     for start in long_starts(dimensions):
-        candidate = descend(samples, start, fine=False, most_nodes=240, cancelled=cancelled)
+        nodes = min(SCREENING_NODES, len(samples.inputs))
+        candidate = descend(samples, start, fine=False, most_nodes=nodes, cancelled=cancelled)
         _note(account, start, candidate)
         if candidate is not None:
             found.append(candidate)
-    if not (few and found and dimensions == 1):
-        short = _from_subset(samples, x, y, found, generator, cancelled)
+    found.sort(key=lambda candidate: candidate.nlml)
+    if dimensions > 1 or not found:
+        subset = _some(x, y, SUBSET, generator)
+        short = _short_optimum(subset, found, cancelled)
         _note(account, short_start(dimensions), short)
         if short is not None:
-            found.append(short)
+            found.insert(0, short)
     if not found:
         found.append(Candidate(short_start(dimensions), np.inf, 0, low_rank=False))
-    return min(found, key=lambda candidate: candidate.nlml), account
+    return _distinct(found), account
 
 
-def _from_subset(
-    samples: MergedSamples,
-    x: np.ndarray,
-    y: np.ndarray,
-    rivals: list[Candidate],
-    generator: np.random.Generator,
-    cancelled: Callable[[], bool] | None,
+def _some(x: np.ndarray, y: np.ndarray, most: int, generator: np.random.Generator) -> MergedSamples:
+    if len(y) > most:
+        rows = generator.choice(len(y), most, replace=False)
+        x, y = x[rows], y[rows]
+    return MergedSamples.of(x, y)
+
+
+def _short_optimum(
+    subset: MergedSamples, rivals: list[Candidate], cancelled: Callable[[], bool] | None
 ) -> Candidate | None:
-    """The short-lengthscale optimum of a subset, if it beats the best rival on that same subset.
-
-    Its NLML is then put below the rival's, because the search goes on from it with all samples.
-    """
-    size = min(SUBSET, len(y))
-    rows = generator.choice(len(y), size, replace=False) if size < len(y) else np.arange(size)
-    subset = samples if size == len(y) else MergedSamples.of(x[rows], y[rows])
-    short = search_exactly(subset, short_start(x.shape[1]), tolerance=0.05, cancelled=cancelled)
+    """The optimum reached from short lengthscales, if it beats the best rival on ``subset``."""
+    start = short_start(subset.inputs.shape[1])
+    short = search_exactly(subset, start, tolerance=0.05, cancelled=cancelled)
     if short is None or not rivals:
         return short
-    best = min(rivals, key=lambda candidate: candidate.nlml)
-    there = ExactProfiledLikelihood(subset).evaluate(best.parameters)
+    there = ExactProfiledLikelihood(subset).evaluate(rivals[0].parameters)
     if there is not None and there.nlml <= short.nlml + 1.0:
         return None
-    return replace(short, nlml=best.nlml - 1.0)
+    return replace(short, nlml=rivals[0].nlml)
+
+
+def _distinct(found: list[Candidate]) -> list[Candidate]:
+    """Leave out optima that are another's, and those far worse than the best."""
+    kept: list[Candidate] = []
+    for candidate in found:
+        near = any(np.abs(candidate.parameters - other.parameters).max() < SAME_OPTIMUM for other in kept)
+        if not near and candidate.nlml < found[0].nlml + HOPELESS:
+            kept.append(candidate)
+    return kept
 
 
 def _candidate(found: SearchResult | None) -> Candidate | None:
