@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import traceback
 from collections.abc import Mapping
 
 import structlog
@@ -84,7 +85,7 @@ class Dispatcher:
                 log.warning("no job can be claimed now", reason=str(error))
                 self._stopping.wait(1.0)
             except Exception:
-                log.exception("no job can be claimed now")
+                log.error("no job can be claimed now", trace=traceback.format_exc())
                 self._stopping.wait(1.0)
 
     def _begin(self, job: JobRecord) -> None:

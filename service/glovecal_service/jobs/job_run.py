@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+import traceback
 from collections.abc import Callable
 from pathlib import Path
 
@@ -81,7 +82,7 @@ class JobRun:
         except GlovecalError as error:
             message = str(error)
         except Exception as error:
-            log.exception("job failed", job=id, kind=self._job.kind)
+            log.error("job failed", job=id, kind=self._job.kind, trace=traceback.format_exc())
             message = f"an error in Glovecal itself: {type(error).__name__}: {error}"
         return lambda: jobs.fail(id, attempt, message)
 
@@ -129,6 +130,8 @@ class JobRun:
         """Keep every worker busy with one task and one waiting; futures are dropped as they finish."""
         waiting = [number for number in range(len(plan.tasks)) if number not in results]
         running: dict[Future, int] = {}
+        if waiting and not self._workers.started:
+            self._progress(len(results) / len(plan.tasks), "starting the training processes", {})
         try:
             while waiting or running:
                 self._raise_if_stopped()
@@ -150,10 +153,7 @@ class JobRun:
         self._cancel()
         until = time.monotonic() + STRAGGLERS_S
         while running and (left := until - time.monotonic()) > 0:
-            try:
-                done = finished(running, left)
-            except WorkersLost:
-                return
+            done = finished(running, left)
             running = [future for future in running if future not in done]
 
     def _take(self, plan: JobPlan, number: int, outcome: TaskOutcome, results: dict[int, TaskResult]) -> None:

@@ -10,12 +10,13 @@ from __future__ import annotations
 import logging
 import os
 import threading
+import time
 from concurrent.futures import CancelledError
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 from dask.config import set as configure
-from distributed import Client, Future, KilledWorker, LocalCluster, wait
+from distributed import Client, Future, KilledWorker, LocalCluster
 
 from glovecal_models.errors import GlovecalError
 from glovecal_service.jobs.job_kind import Task
@@ -23,6 +24,7 @@ from glovecal_service.jobs.task_run import TaskOutcome, run_task
 from glovecal_service.settings import Settings
 
 START_TIMEOUT_S = 60
+LOOK_S = 0.01
 _CONFIG = {
     "distributed.admin.large-graph-warning-threshold": "1GB",
     "distributed.scheduler.allowed-failures": 2,
@@ -110,13 +112,14 @@ class Workers:
 
 
 def finished(futures: list[Future], timeout_s: float) -> list[Future]:
-    """Those that are finished, after waiting ``timeout_s`` for at least one."""
-    try:
-        return list(cast(Any, wait(futures, timeout=timeout_s, return_when="FIRST_COMPLETED")).done)
-    except TimeoutError:
-        return []
-    except CancelledError as error:
-        raise WorkersLost("the scheduler of the training processes was lost") from error
+    """Those that are finished, after waiting ``timeout_s`` at most for the first.
+
+    Looks instead of calling Dask's ``wait``, which wants one client for the whole process.
+    """
+    until = time.monotonic() + timeout_s
+    while not (done := [future for future in futures if future.done()]) and time.monotonic() < until:
+        time.sleep(LOOK_S)
+    return done
 
 
 def outcome(future: Future, task: Task) -> TaskOutcome:

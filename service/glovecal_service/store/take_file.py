@@ -37,9 +37,9 @@ def dump_take(take: Take) -> bytes:
         "poses": None,
     }
     if take.poses is not None:
-        names, numbers = np.unique(np.array(take.poses, dtype=str), return_inverse=True)
-        description["poses"] = [str(name) for name in names]
-        arrays["poses"] = numbers.astype(np.int32)
+        numbers = {pose: number for number, pose in enumerate(dict.fromkeys(take.poses))}
+        description["poses"] = list(numbers)
+        arrays["poses"] = np.array([numbers[pose] for pose in take.poses], np.int32)
     contiguous = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
     return save_arrays(contiguous, {"glovecal.take": json.dumps(description)})
 

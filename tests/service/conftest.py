@@ -1,0 +1,57 @@
+"""Stores to test with: SQLite always, PostgreSQL where it is installed."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from postgres_server import PostgresServer, find_programs
+
+from glovecal_service.settings import Settings
+from glovecal_service.store import Store
+
+
+@pytest.fixture(scope="session")
+def postgres() -> Iterator[PostgresServer]:
+    """A running PostgreSQL; without one the test is skipped, or fails if everything is required."""
+    programs = find_programs()
+    if programs is None:
+        sentence = "PostgreSQL's initdb and pg_ctl are not installed (Debian: apt-get install postgresql)"
+        if os.environ.get("GLOVECAL_REQUIRE_EVERYTHING") == "1":
+            pytest.fail(sentence)
+        pytest.skip(sentence)
+    server = PostgresServer(programs)
+    yield server
+    server.remove()
+
+
+@pytest.fixture
+def sqlite_settings(tmp_path: Path) -> Settings:
+    return Settings(data=tmp_path / "data", database=None, artifacts=None, scheduler=None, workers=2)
+
+
+@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.needs_postgres)])
+def store_settings(request: pytest.FixtureRequest, sqlite_settings: Settings) -> Settings:
+    """Settings of an empty store on each of the two databases."""
+    if request.param == "sqlite":
+        return sqlite_settings
+    server = request.getfixturevalue("postgres")
+    return sqlite_settings.model_copy(update={"database": server.new_database()})
+
+
+@pytest.fixture
+def store(store_settings: Settings) -> Iterator[Store]:
+    with Store.open(store_settings) as store:
+        yield store
+
+
+@pytest.fixture
+def sqlite_store(sqlite_settings: Settings) -> Iterator[Store]:
+    with Store.open(sqlite_settings) as store:
+        yield store

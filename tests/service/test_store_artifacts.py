@@ -1,0 +1,94 @@
+"""Artifacts: every changed byte is noticed, every write is whole or absent."""
+
+import hashlib
+import os
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from glovecal_models.errors import BadInput, DamagedArtifact
+from glovecal_service.store.artifacts import Artifacts
+from glovecal_service.store.blobs import ABANDONED_AFTER_S, TEMPORARY, FolderBlobs, ObjectBlobs
+from glovecal_service.store.errors import NotFound
+
+
+@pytest.fixture(params=["folder", "object store"])
+def artifacts(request, tmp_path):
+    """The folder we write ourselves, and the same through obstore (its own folder store and URL)."""
+    if request.param == "folder":
+        return Artifacts(FolderBlobs(tmp_path))
+    return Artifacts(ObjectBlobs(tmp_path.as_uri()))
+
+
+def test_what_is_read_is_what_was_written(artifacts):
+    for content in (b"", b"x", os.urandom(100_000)):
+        name = artifacts.put(content)
+        assert name == hashlib.sha256(content).hexdigest()
+        assert artifacts.exists(name)
+        assert artifacts.get(name) == content
+        assert artifacts.put(content) == name
+
+
+def test_a_missing_artifact_is_named(artifacts):
+    assert not artifacts.exists("0" * 64)
+    with pytest.raises(NotFound, match="0" * 64):
+        artifacts.get("0" * 64)
+
+
+def test_every_flipped_bit_and_every_truncation_is_refused_by_name(tmp_path):
+    artifacts = Artifacts(FolderBlobs(tmp_path))
+    content = bytes(range(256)) + b"a small model"
+    name = artifacts.put(content)
+    path = tmp_path / name
+    broken = [content[:length] for length in range(len(content))] + [content + b"\0"]
+    for place in range(len(content)):
+        for bit in range(8):
+            changed = bytearray(content)
+            changed[place] ^= 1 << bit
+            broken.append(bytes(changed))
+    for wrong in broken:
+        path.write_bytes(wrong)
+        with pytest.raises(DamagedArtifact, match=name):
+            artifacts.get(name)
+    assert artifacts.put(content) == name
+    assert artifacts.get(name) == content
+
+
+@settings(max_examples=200, deadline=None)
+@given(name=st.text(max_size=80) | st.sampled_from(["../" + "0" * 61, "0" * 63 + "\n", "A" * 64, "0" * 65]))
+def test_no_other_name_reaches_a_path(name):
+    class Untouched:
+        place = "nowhere"
+
+        def read(self, name):
+            pytest.fail(f"a path was made of {name!r}")
+
+        write = exists = read
+
+    artifacts = Artifacts(Untouched())
+    for call in (artifacts.get, artifacts.exists):
+        with pytest.raises(BadInput):
+            call(name)
+
+
+def test_nothing_but_whole_artifacts_is_left_in_the_folder(tmp_path):
+    artifacts = Artifacts(FolderBlobs(tmp_path))
+    name = artifacts.put(b"whole")
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_leftovers_of_killed_writers_are_swept(tmp_path):
+    old, fresh = tmp_path / f"{TEMPORARY}old", tmp_path / f"{TEMPORARY}fresh"
+    for path in (old, fresh):
+        path.write_bytes(b"half")
+    long_ago = os.stat(old).st_mtime - ABANDONED_AFTER_S - 10
+    os.utime(old, (long_ago, long_ago))
+    FolderBlobs(tmp_path)
+    assert not old.exists()
+    assert fresh.exists(), "another process may be writing it"
+
+
+def test_an_unusable_object_store_is_named():
+    with pytest.raises(BadInput, match="GLOVECAL_ARTIFACTS"):
+        ObjectBlobs("gopher://nowhere")

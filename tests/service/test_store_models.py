@@ -1,0 +1,163 @@
+"""Models: immutable, verified at each load, activated and rolled back in one step."""
+
+import threading
+
+import pytest
+from sqlalchemy import text
+
+from glovecal_models.errors import BadInput, DamagedArtifact
+from glovecal_service.store.errors import Conflict, NotFound, StoreDamaged
+
+
+@pytest.fixture
+def anna(store):
+    store.subjects.create("anna")
+    return store
+
+
+def add(store, content: bytes, parent=None, subject="anna", layout="cyberglove18", **facts):
+    return store.models.add(
+        content, subject=subject, layout=layout, method="linear", parent=parent, facts=facts
+    )
+
+
+def test_a_model_comes_back_and_is_found_by_prefix(anna):
+    record = add(anna, b"one", held_out_rmse_deg=1.25, per_rotation={"I_PIP": None})
+    assert anna.models.get(record.id) == record
+    assert anna.models.get(record.id[:6]) == record
+    assert anna.models.load_bytes(record.id[:6]) == b"one"
+    assert anna.models.list("anna", "cyberglove18") == [record]
+    assert anna.models.list("anna", "lucidglove") == []
+    for wrong in (record.id[:5], record.id.upper(), "f" * 64, "../" + record.id, "", "%" * 6, "______"):
+        with pytest.raises(NotFound):
+            anna.models.get(wrong)
+
+
+def test_the_same_model_again_is_the_same_record(anna):
+    record = add(anna, b"one", seconds=1)
+    assert add(anna, b"one", seconds=2) == record
+    anna.subjects.create("ben")
+    with pytest.raises(Conflict, match="belongs to subject 'anna'"):
+        add(anna, b"one", subject="ben")
+
+
+def test_lineage_runs_from_child_to_first(anna):
+    first = add(anna, b"one")
+    second = add(anna, b"two", parent=first.id)
+    third = add(anna, b"three", parent=second.id)
+    assert anna.models.lineage(third.id[:12]) == [third, second, first]
+    with pytest.raises(NotFound):
+        add(anna, b"four", parent="0" * 64)
+
+
+def test_activation_and_rollback_walk_back_one_by_one(anna):
+    models = [add(anna, content) for content in (b"one", b"two", b"three")]
+    assert anna.models.active("anna", "cyberglove18") is None
+    for model in models:
+        anna.models.activate(model.id)
+        assert anna.models.active("anna", "cyberglove18") == model
+    assert anna.models.rollback("anna", "cyberglove18").model == models[1].id
+    assert anna.models.rollback("anna", "cyberglove18").model == models[0].id
+    with pytest.raises(Conflict, match="nothing earlier"):
+        anna.models.rollback("anna", "cyberglove18")
+    assert anna.models.active("anna", "cyberglove18") == models[0]
+    anna.models.activate(models[2].id)
+    assert anna.models.rollback("anna", "cyberglove18").model == models[0].id
+    kinds = [item.kind for item in anna.models.activations("anna", "cyberglove18")]
+    assert kinds == ["activate"] * 3 + ["rollback"] * 2 + ["activate", "rollback"]
+
+
+def test_activating_the_active_model_adds_nothing(anna):
+    model = add(anna, b"one")
+    assert anna.models.activate(model.id) == anna.models.activate(model.id)
+    assert len(anna.models.activations("anna", "cyberglove18")) == 1
+
+
+def test_layouts_of_one_subject_do_not_disturb_each_other(anna):
+    one, two = add(anna, b"one"), add(anna, b"two", layout="lucidglove")
+    anna.models.activate(one.id)
+    anna.models.activate(two.id)
+    assert anna.models.active("anna", "cyberglove18") == one
+    assert anna.models.active("anna", "lucidglove") == two
+    with pytest.raises(Conflict):
+        anna.models.rollback("anna", "lucidglove")
+
+
+def test_a_damaged_or_missing_artifact_is_not_activated(anna, store_settings):
+    good, damaged, missing = add(anna, b"good"), add(anna, b"damaged"), add(anna, b"missing")
+    anna.models.activate(good.id)
+    (store_settings.artifacts_folder / damaged.id).write_bytes(b"changed")
+    (store_settings.artifacts_folder / missing.id).unlink()
+    with pytest.raises(DamagedArtifact, match=damaged.id):
+        anna.models.activate(damaged.id)
+    with pytest.raises(NotFound, match=missing.id):
+        anna.models.activate(missing.id)
+    assert anna.models.active("anna", "cyberglove18") == good
+
+
+def test_a_rollback_to_a_damaged_model_keeps_the_present_one(anna, store_settings):
+    first, second = add(anna, b"one"), add(anna, b"two")
+    anna.models.activate(first.id)
+    anna.models.activate(second.id)
+    (store_settings.artifacts_folder / first.id).write_bytes(b"x")
+    with pytest.raises(DamagedArtifact):
+        anna.models.rollback("anna", "cyberglove18")
+    assert anna.models.active("anna", "cyberglove18") == second
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "UPDATE models SET subject = 'ben'",
+        "UPDATE models SET method = 'spgp'",
+        """UPDATE models SET facts = '{"held_out_rmse_deg": 0.1}'""",
+        "UPDATE activations SET model = (SELECT max(id) FROM models)",
+        "UPDATE activations SET subject = 'ben'",
+        "UPDATE activations SET previous = 1",
+    ],
+)
+def test_a_changed_row_is_found(anna, change):
+    anna.subjects.create("ben")
+    ids = sorted(add(anna, content, held_out_rmse_deg=3.0).id for content in (b"one", b"two"))
+    anna.models.activate(ids[0])
+    with anna.database.write() as connection:
+        connection.execute(text(change))
+    subject = "ben" if "activations SET subject" in change else "anna"
+    with pytest.raises(StoreDamaged, match="changed after it was written"):
+        anna.models.active(subject, "cyberglove18")
+
+
+def test_the_revision_grows_with_what_the_live_stream_must_know(anna):
+    def grows(action) -> bool:
+        before = anna.revision()
+        action()
+        return anna.revision() > before
+
+    one, two = add(anna, b"one"), add(anna, b"two")
+    assert grows(lambda: anna.models.activate(one.id))
+    assert grows(lambda: anna.models.activate(two.id))
+    assert grows(lambda: anna.models.rollback("anna", "cyberglove18"))
+    assert grows(lambda: anna.gloves.assign("left", "anna", "morning"))
+    assert grows(lambda: anna.recordings.request("left", name="first"))
+    assert not grows(lambda: anna.subjects.list())
+    assert not grows(lambda: add(anna, b"three"))
+
+
+def test_every_activation_of_many_threads_is_kept_in_one_order(anna):
+    models = [add(anna, str(number).encode()) for number in range(12)]
+    threads = [threading.Thread(target=anna.models.activate, args=(model.id,)) for model in models]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    history = anna.models.activations("anna", "cyberglove18")
+    assert sorted(item.model for item in history) == sorted(model.id for model in models)
+    assert [item.previous for item in history] == [None] + [item.id for item in history[:-1]]
+    assert anna.models.active("anna", "cyberglove18").id == history[-1].model
+
+
+def test_facts_that_are_not_json_are_refused(anna):
+    for fact in (float("nan"), float("inf"), object()):
+        with pytest.raises((BadInput, ValueError, TypeError)):
+            add(anna, b"model", wrong=fact)
+    assert anna.models.list() == []
