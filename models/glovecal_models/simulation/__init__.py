@@ -1,0 +1,1 @@
+"""A simulated hand in a simulated glove: motion, sensors and takes whose truth is known."""

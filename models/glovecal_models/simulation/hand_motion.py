@@ -1,0 +1,135 @@
+"""How a simulated hand moves: between postures, to and fro, and never quite still.
+
+Hands move from posture to posture on smooth bell-shaped speeds (minimum jerk: Flash & Hogan 1985), fingers
+starting a little apart; held, they wander slowly and tremble at 7 to 11 Hz. All motions are functions of
+time, so that any frame can be asked for by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
+from glovecal_models.simulation.simulated_hand import DRIVEN
+
+WANDER_DEG = 0.4
+TREMOR_DEG = 0.12
+"""Amplitudes of each of the two slow and three fast waves of a hand that tries to be still."""
+
+
+class HandMotion(Protocol):
+    """The driven rotations over time."""
+
+    @property
+    def duration_s(self) -> float: ...
+
+    def driven(self, time_s: np.ndarray) -> np.ndarray:
+        """Angles, shape (N, len(DRIVEN)), degrees, at ``time_s`` (N,), 0 at the motion's start."""
+        ...
+
+    def poses(self, time_s: np.ndarray) -> tuple[str, ...]:
+        """The name of the pose held at each time, "" in between."""
+        ...
+
+
+def minimum_jerk(share: np.ndarray) -> np.ndarray:
+    """Progress 0..1 of a minimum-jerk movement after ``share`` of its time (held at the ends)."""
+    x = np.clip(share, 0.0, 1.0)
+    return x**3 * (10 - 15 * x + 6 * x * x)
+
+
+def posture_vector(posture: Mapping[str, float]) -> np.ndarray:
+    """Angles in the order of DRIVEN."""
+    return np.array([posture[name] for name in DRIVEN])
+
+
+def within_range(driven: np.ndarray) -> np.ndarray:
+    """Angles held within each joint's active range."""
+    low, high = np.array([ACTIVE_RANGE_DEG[name] for name in DRIVEN]).T
+    return np.clip(driven, low, high)
+
+
+class PostureSequence:
+    """Postures one after another, each held for a while."""
+
+    def __init__(
+        self,
+        postures: np.ndarray,
+        names: Sequence[str],
+        *,
+        hold_s: Sequence[float],
+        move_s: Sequence[float],
+        random: np.random.Generator,
+    ) -> None:
+        """``postures`` (K, len(DRIVEN)); ``hold_s`` has K entries, ``move_s`` K-1."""
+        self._postures = postures
+        self._names = tuple(names)
+        self._arrive = np.concatenate([[0.0], np.cumsum(np.array(hold_s[:-1]) + np.array(move_s))])
+        self._leave = self._arrive + np.array(hold_s)
+        self._move = np.append(np.array(move_s), 1.0)
+        self._late = random.uniform(0.0, 0.2, (len(postures), len(DRIVEN)))
+
+    @property
+    def duration_s(self) -> float:
+        return float(self._leave[-1])
+
+    def driven(self, time_s: np.ndarray) -> np.ndarray:
+        at = self._index(time_s)
+        after = np.minimum(at + 1, len(self._postures) - 1)
+        share = ((time_s - self._leave[at]) / self._move[at])[:, None]
+        progress = minimum_jerk((share - self._late[at]) / (1 - self._late[at]))
+        return self._postures[at] + progress * (self._postures[after] - self._postures[at])
+
+    def poses(self, time_s: np.ndarray) -> tuple[str, ...]:
+        at = self._index(time_s)
+        held = time_s <= self._leave[at]
+        return tuple(self._names[i] if still else "" for i, still in zip(at, held, strict=True))
+
+    def _index(self, time_s: np.ndarray) -> np.ndarray:
+        return np.clip(np.searchsorted(self._arrive, time_s, side="right") - 1, 0, len(self._arrive) - 1)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """From a start posture into swings of several joints at different speeds, and back."""
+
+    start: np.ndarray
+    """Posture at both ends, shape (len(DRIVEN),), degrees."""
+    low: np.ndarray
+    high: np.ndarray
+    """Each joint swings between these; equal where it is held, for instance by a widget."""
+    speed_hz: np.ndarray
+    phase: np.ndarray
+    duration_s: float
+    blend_s: float = 0.4
+
+    def driven(self, time_s: np.ndarray) -> np.ndarray:
+        angle = 2 * np.pi * self.speed_hz * time_s[:, None] + self.phase
+        swing = self.low + (self.high - self.low) * (1 - np.cos(angle)) / 2
+        share = np.minimum(time_s, self.duration_s - time_s) / self.blend_s
+        return self.start + minimum_jerk(share)[:, None] * (swing - self.start)
+
+    def poses(self, time_s: np.ndarray) -> tuple[str, ...]:
+        return ("",) * len(time_s)
+
+
+class Unrest:
+    """Slow wander and tremor of each joint, added to any motion."""
+
+    def __init__(self, random: np.random.Generator, held: Sequence[str] = ()) -> None:
+        """``held`` joints are clamped by a widget and do not move at all."""
+        shape = (5, len(DRIVEN))
+        slow = np.arange(5)[:, None] < 2
+        self._speed_hz = np.where(slow, random.uniform(0.1, 0.5, shape), random.uniform(7.0, 11.0, shape))
+        free = np.array([name not in held for name in DRIVEN])
+        self._size = np.where(slow, WANDER_DEG, TREMOR_DEG) * random.uniform(0.5, 1.5, shape) * free
+        self._phase = random.uniform(0, 2 * np.pi, shape)
+
+    def driven(self, time_s: np.ndarray) -> np.ndarray:
+        """Shape (N, len(DRIVEN)), degrees."""
+        waves = np.sin(2 * np.pi * self._speed_hz * time_s[:, None, None] + self._phase)
+        return (self._size * waves).sum(axis=1)

@@ -1,0 +1,62 @@
+"""A simulated person's hand: which rotations follow from which.
+
+A hand is driven in the 17 rotations of ``DRIVEN``. The last finger joints follow the ones before them and
+the thumb's virtual joint follows the two at its base, by the rules of Wang & Neff 2013, section 3.3
+(DIP = 2/3 PIP, T_VIR = a T_TMC + b TI_ABD), but every person deviates a little, and not in a straight line.
+The palm arch rises as thumb and outer fingers close.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
+from glovecal_models.simulation.stretch import bent_share
+
+ROTATIONS: tuple[str, ...] = tuple(ACTIVE_RANGE_DEG)
+"""All rotations of the simulated hand, in the order of the CyberGlove layouts."""
+FINGERS = ("I", "M", "R", "P")
+RULED: tuple[str, ...] = ("T_VIR", "I_DIP", "M_DIP", "R_DIP", "P_DIP", "PALM_ARCH")
+DRIVEN: tuple[str, ...] = tuple(name for name in ROTATIONS if name not in RULED)
+
+DIP_SLOPE_SD = 0.04
+DIP_CURVE_SD_DEG = 2.5
+DIP_KNUCKLE_SD_DEG = 1.0
+"""How much a bent knuckle pulls the last joint along: no glove without DIP sensors can see it."""
+VIRTUAL_SHARE_SD = 0.05
+VIRTUAL_CURVE_SD_DEG = 2.0
+_PALM_PARTS = {"T_TMC": 6.0, "TI_ABD": -2.0, "R_MCP": 4.0, "P_MCP": 9.0}
+
+
+class SimulatedHand:
+    """The rules of one person, fixed by ``seed``."""
+
+    def __init__(self, seed: int) -> None:
+        random = np.random.default_rng([seed, 1])
+        self._dip_slope = 2 / 3 + DIP_SLOPE_SD * random.standard_normal(4)
+        self._dip_curve = DIP_CURVE_SD_DEG * random.standard_normal(4)
+        self._dip_knuckle = DIP_KNUCKLE_SD_DEG * random.standard_normal(4)
+        self._virtual_share = 0.5 + VIRTUAL_SHARE_SD * random.standard_normal(2)
+        self._virtual_curve = VIRTUAL_CURVE_SD_DEG * random.standard_normal()
+
+    def complete(self, driven: Mapping[str, np.ndarray]) -> np.ndarray:
+        """All rotations, shape (N, len(ROTATIONS)) degrees, from the driven ones, each shape (N,)."""
+        angles = {name: np.asarray(driven[name], float) for name in DRIVEN}
+        for index, finger in enumerate(FINGERS):
+            angles[f"{finger}_DIP"] = self._last_joint(
+                index, angles[f"{finger}_PIP"], angles[f"{finger}_MCP"]
+            )
+        turn, spread = angles["T_TMC"], angles["TI_ABD"]
+        share = self._virtual_share
+        curve = self._virtual_curve * np.sin(np.pi * bent_share("T_TMC", turn))
+        angles["T_VIR"] = share[0] * turn + share[1] * spread + curve
+        closing = sum(size * bent_share(name, angles[name]) for name, size in _PALM_PARTS.items())
+        angles["PALM_ARCH"] = np.maximum(4.0 + closing, 0.0)
+        return np.column_stack([angles[name] for name in ROTATIONS])
+
+    def _last_joint(self, finger: int, middle: np.ndarray, knuckle: np.ndarray) -> np.ndarray:
+        curve = self._dip_curve[finger] * np.sin(np.pi * bent_share("I_PIP", middle))
+        pulled = self._dip_knuckle[finger] * (bent_share("I_MCP", knuckle) - 0.5)
+        return self._dip_slope[finger] * middle + curve + pulled
