@@ -145,7 +145,7 @@ class PoseLoop:
             for lane, frame, _ in opened:
                 lane.refusals.add(_not_predictable(frame, model, str(error)))
             return
-        usable = np.isfinite(angles.mean).all(axis=1) & np.isfinite(angles.sd).all(axis=1)
+        usable: list[bool] = np.min(np.isfinite(angles.mean + angles.sd), axis=1).tolist()
         any_flags = np.bitwise_or.reduce(angles.flags, axis=1).tolist()
         mean, sd = angles.mean.astype(np.float32), angles.sd.astype(np.float32)
         for row, (lane, frame, received_ns) in enumerate(opened):
