@@ -1,0 +1,23 @@
+"""Lets the tests of this folder import its test support (the emulated gloves) by name."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from cyberglove_emulator import CyberGloveEmulator
+
+
+@pytest.fixture
+def emulate(tmp_path: Path) -> Iterator[Callable[..., CyberGloveEmulator]]:
+    """Start emulated CyberGloves: ``emulate(box, persona=..., name=...)``; they end with the test."""
+    with ExitStack() as running:
+
+        def start(*arguments, name: str = "glove", **options) -> CyberGloveEmulator:
+            return running.enter_context(CyberGloveEmulator(tmp_path / name, *arguments, **options))
+
+        yield start
