@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 
@@ -124,19 +123,19 @@ def _pull(neighbour: str, standard: float, largest: float) -> Pull:
         size = float((s + m) / (s * s + m * m))
         return size, (size * s - 1) ** 2 + (size * m - 1) ** 2
 
-    power = minimize_scalar(lambda p: best_size(p)[1], bounds=POWERS, method="bounded")["x"]
-    return Pull(neighbour, best_size(power)[0], float(power))
+    power = min(np.linspace(*POWERS, 301).tolist(), key=lambda p: best_size(p)[1])
+    return Pull(neighbour, best_size(power)[0], power)
 
 
 def _with_product_term(alone: Stretch) -> Stretch:
     """Add the product term that comes nearest to both deviations when two neighbours move freely at once."""
     standard, largest = TOGETHER[alone.sensor]
-    first, second = np.meshgrid(_SWEEP[::4], _SWEEP[::4])
+    first, second = np.meshgrid(_SWEEP[::8], _SWEEP[::8])
     bent = {alone.pulls[0].neighbour: first, alone.pulls[1].neighbour: second}
 
     def misfit(together: float) -> float:
         s, m = deviations(Stretch(alone.sensor, alone.pulls, together).share(bent))
         return (100 * s / standard - 1) ** 2 + (100 * m / largest - 1) ** 2
 
-    together = float(minimize_scalar(misfit, bounds=(-3.0, 3.0), method="bounded")["x"])
+    together = min(np.linspace(-3.0, 3.0, 301).tolist(), key=misfit)
     return Stretch(alone.sensor, alone.pulls, together)

@@ -32,7 +32,7 @@ TYPICAL_COUNTS: dict[str, tuple[float, float]] = {
     "P_PIP": (62.0, 1.3),
     "P_DIP": (60.0, 0.8),
     "RP_ABD": (218.0, -1.8),
-    "PALM_ARCH": (60.0, 1.2),
+    "PALM_ARCH": (60.0, 1.0),
     "W_FLEX": (125.0, 0.9),
     "W_ABD": (120.0, 1.8),
 }
