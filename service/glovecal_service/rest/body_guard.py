@@ -155,4 +155,4 @@ async def _throw_away(receive: Receive) -> None:
 
 
 def _size(count: int) -> str:
-    return f"{count / 2**20:g} MB" if count >= 2**20 else f"{count / 2**10:g} kB"
+    return f"{count / 1e6:g} MB" if count >= 1e6 else f"{count / 1e3:g} kB"

@@ -11,9 +11,13 @@ from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 from glovecal_models.takes.reference_check import reference_warnings
 from glovecal_models.takes.take import Take
-from glovecal_service.store.errors import Conflict, NotFound, StoreError
+from glovecal_service.store.errors import Conflict, StoreError
 from glovecal_service.store.records import TakeRecord
 from glovecal_service.store.store import Store
+
+
+MADE_OF_COLUMNS = "auto-"
+"""Begins the names of layouts that an import made."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,7 @@ def _require_no_other_owner(store: Store, original_sha256: str, subject: str) ->
 
 
 def _require_fits(take: Take, layout: Layout) -> None:
+    """Further rotations are kept, but a take none of whose rotations the layout has is a mistake."""
     require_layout(take, layout)
     unknown = [name for name in take.rotations if name not in layout.rotations]
     if unknown and len(unknown) == len(take.rotations):
@@ -122,16 +127,24 @@ def _take_back(store: Store, record: TakeRecord) -> None:
 
 
 def _layout_of_columns(store: Store, takes: list[Take]) -> Layout:
-    """The layout of these sensors: each rotation from the sensor of its name, else from all of them.
+    """The layout of a file that nobody named one for, by its columns.
 
-    Its name is made of the sensors, so that files of one glove share it.
+    One that is there already (built in, or made of another file's columns) when it has the same sensors
+    and all the rotations; else a new one: each rotation from the sensor of its name, else from all.
     """
     sensors = takes[0].sensors
     rotations = list(dict.fromkeys(name for take in takes for name in take.rotations))
-    name = f"auto-{hashlib.sha256(' '.join(sensors).encode()).hexdigest()[:8]}"
-    try:
-        return store.layouts.get(name)
-    except NotFound:
-        layout = Layout.from_columns(name, sensors, rotations)
-        store.layouts.put(layout)
-        return layout
+    for record in store.layouts.list():
+        if record.built_in or record.name.startswith(MADE_OF_COLUMNS):
+            layout = Layout.from_document(record.document)
+            if set(layout.sensors) == set(sensors) and set(rotations) <= set(layout.rotations):
+                return layout
+    if not rotations:
+        raise BadInput(
+            f"the file has no r.ROTATION columns and no known layout has the sensors {', '.join(sensors)}: "
+            "name a layout, so that its rotations are known"
+        )
+    digest = hashlib.sha256(" ".join([*sensors, "", *rotations]).encode()).hexdigest()
+    layout = Layout.from_columns(MADE_OF_COLUMNS + digest[:8], sensors, rotations)
+    store.layouts.put(layout)
+    return layout

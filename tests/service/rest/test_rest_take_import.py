@@ -1,0 +1,301 @@
+"""Import of take tables: kept before it is read, all or nothing, errors that name the cell."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from glovecal_client.rest import Refused, RestClient
+from glovecal_models.errors import BadInput
+from glovecal_models.takes.table import read_takes, write_takes
+from glovecal_models.takes.take import Take
+from glovecal_service.settings import Settings
+from glovecal_service.store.blobs import FolderBlobs
+from glovecal_service.store.errors import StorageFull
+
+Write = Callable[..., Path]
+
+
+@pytest.fixture(autouse=True)
+def anna(client: RestClient) -> None:
+    client.post("/subjects", {"name": "anna"})
+
+
+def test_the_file_is_kept_and_comes_back_as_it_was(
+    client: RestClient, settings: Settings, write_table: Write, tmp_path: Path
+) -> None:
+    file = write_table()
+    answer = client.upload_takes(file, subject="anna", wearing="morning")
+    assert [take["name"] for take in answer["takes"]] == ["a", "b"]
+    assert answer["imported"] == [take["id"] for take in answer["takes"]]
+    assert answer["takes"][0]["wearing"] == "morning"
+    sha256 = hashlib.sha256(file.read_bytes()).hexdigest()
+    assert answer["original_sha256"] == sha256
+    assert (settings.uploads_folder / sha256).read_bytes() == file.read_bytes()
+    assert [path.name for path in settings.uploads_folder.iterdir()] == [sha256]
+    for file_format in ("csv", "parquet"):
+        exported = tmp_path / f"back.{file_format}"
+        query = {"format": file_format}
+        exported.write_bytes(client.download(f"/takes/{answer['imported'][1]}/export", query))
+        [back] = read_takes(exported)
+        original = read_takes(file)[1]
+        np.testing.assert_array_equal(back.readings, original.readings)
+        np.testing.assert_array_equal(back.reference, original.reference)
+        assert (back.name, back.wearing) == ("b", "morning")
+
+
+def test_the_same_file_again_changes_nothing(client: RestClient, write_table: Write) -> None:
+    file = write_table()
+    first = client.upload_takes(file, subject="anna")
+    again = client.upload_takes(file, subject="anna")
+    assert again["imported"] == []
+    assert again["existing"] == sorted(first["imported"])
+    client.delete(f"/takes/{first['imported'][0]}")
+    third = client.upload_takes(file, subject="anna")
+    assert len(third["imported"]) == 1
+    assert third["existing"] == [first["imported"][1]]
+    assert len(client.get("/takes")) == 2
+
+
+def test_a_recording_is_of_one_hand(client: RestClient, write_table: Write) -> None:
+    client.post("/subjects", {"name": "ben"})
+    file = write_table()
+    take = client.upload_takes(file, subject="anna")["imported"][0]
+    with pytest.raises(Refused, match=take) as refused:
+        client.upload_takes(file, subject="ben")
+    assert refused.value.status == 409
+    assert client.get("/takes", {"subject": "ben"}) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "column", "says"),
+    [
+        ("0.05,b", "0.05x,b", 127, "time_s", "0.05x"),
+        ("0.05,b", "0.03,b", 127, "time_s", "increase"),
+        ("0.05,b,", "0.05,b,nan", 127, None, ""),
+        ("s.I_PIP", "s.I PIP", 1, "s.I PIP", "channel name"),
+        ("s.I_PIP", "s.I_MCP", 1, "s.I_MCP", "twice"),
+        ("time_s", "time", 1, None, "time_s"),
+    ],
+)
+def test_errors_name_file_line_and_column(
+    client: RestClient, write_table: Write, old: str, new: str, line: int, column: str | None, says: str
+) -> None:
+    file = write_table("Mittwoch früh.csv")
+    text = file.read_text()
+    assert old in text
+    before, _, after = text.rpartition(old) if line > 1 else text.partition(old)
+    file.write_text(before + new + after)
+    with pytest.raises(Refused) as refused:
+        client.upload_takes(file, subject="anna")
+    problem = refused.value.problem
+    assert problem["status"] == 422
+    assert problem["type"] == "urn:glovecal:problem:bad-take-table"
+    assert problem["file"] == "Mittwoch früh.csv"
+    assert problem["line"] == line
+    if column is not None:
+        assert problem["column"] == column
+    assert says in problem["detail"]
+    assert client.get("/takes") == []
+
+
+FRAMES = "time_s,take,s.A\n0,x,1\n1,x,2\n0,y,1\n1,y,2\n"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"\n",
+        b"time_s,s.A\n",
+        b"\xff\xfe\x00",
+        b"PK\x03\x04 a spreadsheet",
+        b"\x1f\x8b gzip",
+        b"PAR1 but not really PAR1",
+        b"\x80\x04\x95pickle",
+        b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'shape': (1099511627776,)}",
+        b"time_s,s.A\n0,1e400\n",
+        b"time_s,s.A\n0,NaN\n",
+        b"time_s,s.A\nNaN,1\n",
+        b"time_s,s.A\n0,1\n0,2\n",
+        b'time_s,s.A\n0,"1\n',
+        b"time_s,s.A\n0,1,2\n",
+        b"time_s,s.A\x00\n0,1\n",
+        b"time_s," + b",".join(b"s.S%d" % n for n in range(1100)) + b"\n",
+        b"time_s,s.A,r.A\n0,1,inf\n",
+        b"time_s,take,s.A\n0,,1\n",
+        b"time_s,take,s.A\n0," + b"x" * 300 + b",1\n",
+        FRAMES.encode(),  # two takes with exactly the same frames
+    ],
+)
+def test_what_is_no_take_table_leaves_no_take(client: RestClient, tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / "bad.csv"
+    file.write_bytes(content)
+    with pytest.raises(Refused) as refused:
+        client.upload_takes(file, subject="anna")
+    assert refused.value.status in (409, 422), refused.value.problem
+    assert client.get("/takes") == []
+
+
+def test_a_parquet_bomb_is_refused_by_its_cells(client: RestClient, tmp_path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    column = pa.DictionaryArray.from_arrays(pa.array(np.zeros(13_000_000, np.int32)), pa.array([1.0]))
+    file = tmp_path / "bomb.parquet"
+    pq.write_table(pa.table({"time_s": column, "s.A": column, "s.B": column, "s.C": column}), file)
+    assert file.stat().st_size < 1_000_000
+    with pytest.raises(Refused, match="cells") as refused:
+        client.upload_takes(file, subject="anna")
+    assert refused.value.status == 422
+
+
+def test_half_a_file_is_taken_back_when_the_disk_fills(
+    client: RestClient, write_table: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write, calls = FolderBlobs.write, []
+
+    def fills_up(self: FolderBlobs, name: str, content: bytes) -> None:
+        calls.append(name)
+        if len(calls) == 3:
+            raise StorageFull("no room left; nothing was changed: free some disk space")
+        write(self, name, content)
+
+    monkeypatch.setattr(FolderBlobs, "write", fills_up)
+    file = write_table(takes=("a", "b", "c"))
+    with pytest.raises(Refused, match="no room") as refused:
+        client.upload_takes(file, subject="anna")
+    assert refused.value.status == 507
+    assert client.get("/takes") == []
+    monkeypatch.undo()
+    assert len(client.upload_takes(file, subject="anna")["imported"]) == 3
+
+
+def test_a_full_disk_while_uploading(
+    client: RestClient, settings: Settings, write_table: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_space(descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    file = write_table()
+    monkeypatch.setattr("os.fsync", no_space)
+    with pytest.raises(Refused) as refused:
+        client.upload_takes(file, subject="anna")
+    assert refused.value.status == 507
+    monkeypatch.undo()
+    assert list(settings.uploads_folder.iterdir()) == []
+    assert client.upload_takes(file, subject="anna")["imported"]
+
+
+def two_tables(tmp_path: Path) -> tuple[Path, Path]:
+    time = np.arange(200) / 100
+    own = np.arange(0, 2, 1 / 30) + 0.001
+    take = Take(
+        "walk", "first", ("A",), time, np.sin(time)[:, None] * 100, ("A",), own, np.cos(own)[:, None] * 30
+    )
+    frames, reference = write_takes([take], tmp_path / "walk.csv")
+    return frames, reference
+
+
+def test_two_tables_with_clocks_of_their_own(client: RestClient, tmp_path: Path) -> None:
+    frames, reference = two_tables(tmp_path)
+    answer = client.upload_takes(frames, reference=reference, subject="anna")
+    [take] = answer["takes"]
+    assert take["rotations"] == ["A"]
+    assert take["reference_rows"] == 60
+    with pytest.raises(Refused, match="clock of its own") as refused:
+        client.download(f"/takes/{take['id']}/export")
+    assert refused.value.status == 409
+    assert client.download(f"/takes/{take['id']}/export", {"part": "frames"}) == frames.read_bytes()
+    assert client.download(f"/takes/{take['id']}/export", {"part": "reference"}) == reference.read_bytes()
+    with pytest.raises(Refused, match="another reference"):
+        client.upload_takes(frames, subject="anna")
+
+
+def test_a_reference_that_is_missing_or_wrong_imports_nothing(client: RestClient, tmp_path: Path) -> None:
+    frames, reference = two_tables(tmp_path)
+    reference.write_text(reference.read_text().replace("walk", "run"))
+    with pytest.raises(Refused) as refused:
+        client.upload_takes(frames, reference=reference, subject="anna")
+    assert refused.value.problem["file"] == "walk.reference.csv"
+    with pytest.raises(Refused, match="no upload"):
+        client.upload_takes(frames, subject="anna", reference_upload="0" * 64)
+    assert client.get("/takes") == []
+
+
+def test_attach_a_reference_later(client: RestClient, tmp_path: Path) -> None:
+    frames, reference = two_tables(tmp_path)
+    with pytest.raises(Refused, match="name a layout"):
+        client.upload_takes(frames, subject="anna")
+    layout = tmp_path / "one.toml"
+    layout.write_text('sensors = ["A"]\n')
+    [take] = client.upload_takes(frames, subject="anna", layout=client.add_layout(layout))["takes"]
+    assert (take["rotations"], take["layout"]) == ([], "one")
+    changed = client.attach_reference(take["id"], reference)
+    assert (changed["id"], changed["rotations"], changed["reference_rows"]) == (take["id"], ["A"], 60)
+    assert changed["facts"]["history"][0]["artifact"] == take["artifact"]
+    with pytest.raises(Refused, match="when it was recorded") as refused:
+        client.attach_reference(take["id"], reference, clock="wall")
+    assert refused.value.status == 409
+    with pytest.raises(Refused) as refused:
+        client.attach_reference("0123456789ab", reference)
+    assert refused.value.status == 404
+    frames.write_text("time_s,s.A\n0,1\n")
+    with pytest.raises(Refused, match="no reference|belong to the frames"):
+        client.attach_reference(take["id"], frames)
+
+
+def test_layouts(client: RestClient, write_table: Write, tmp_path: Path) -> None:
+    file = write_table()
+    with pytest.raises(Refused, match="needs; its sensors are I_MCP, I_PIP"):
+        client.upload_takes(file, subject="anna", layout="cyberglove18")
+    with pytest.raises(Refused, match="no layout") as refused:
+        client.upload_takes(file, subject="anna", layout="unknown")
+    assert refused.value.status == 404
+    layout = tmp_path / "finger.toml"
+    layout.write_text('name = "finger"\nsensors = ["I_MCP", "I_PIP"]\n[rotations]\nI_MCP = ["I_MCP", "I_PIP"]\n')
+    assert client.add_layout(layout) == "finger"
+    answer = client.upload_takes(file, subject="anna", layout="finger")
+    assert answer["layout"] == "finger"
+    made = client.upload_takes(write_table("other.csv", seed=3), subject="anna")["layout"]
+    assert client.upload_takes(write_table("third.csv", seed=4), subject="anna")["layout"] == made
+    unmeasured = write_table("fourth.csv", seed=5, reference=False)
+    assert client.upload_takes(unmeasured, subject="anna")["layout"] == made
+    names = [item["name"] for item in client.get("/gloves")["layouts"]]
+    assert names == ["cyberglove18", "cyberglove22", "lucidglove", made, "finger"]
+
+
+def test_a_reference_that_never_moves_is_said(client: RestClient, tmp_path: Path) -> None:
+    file = tmp_path / "still.csv"
+    file.write_text("time_s,s.A,r.A\n" + "".join(f"{n},{n % 7},10\n" for n in range(50)))
+    answer = client.upload_takes(file, subject="anna")
+    assert any("never moves" in sentence for sentence in answer["warnings"])
+
+
+def test_stray_temporary_files_do_not_hinder(
+    client: RestClient, settings: Settings, write_table: Write
+) -> None:
+    (settings.uploads_folder / "0123.partial").write_bytes(b"half")
+    assert client.upload_takes(write_table(), subject="anna")["imported"]
+
+
+def test_import_for_nobody(client: RestClient, write_table: Write) -> None:
+    with pytest.raises(Refused, match="no subject") as refused:
+        client.upload_takes(write_table(), subject="nobody")
+    assert refused.value.status == 404
+
+
+def test_refusals_are_what_the_model_says(client: RestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: Any, **__: Any) -> None:
+        raise BadInput("the reason \ud800 with a lone surrogate")
+
+    monkeypatch.setattr("glovecal_service.store.subjects.Subjects.list", refuse)
+    with pytest.raises(Refused, match="the reason") as refused:
+        client.get("/subjects")
+    assert refused.value.status == 422
