@@ -8,9 +8,10 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
+
 from glovecal_client.capture.device import Reading
 from glovecal_client.errors import DeviceFinished, DeviceLost
 
@@ -21,7 +22,7 @@ def values_of(number: int, sensors: int = 4) -> np.ndarray:
 
 
 class SignalGenerator:
-    """Gives numbered readings at a rate; ``instead`` replaces the next ones, ``unplugged`` makes it vanish."""
+    """Gives numbered readings; ``instead`` replaces the next ones, ``unplugged`` makes it vanish."""
 
     name = "signal-generator"
     layout = "four-sensors"
@@ -33,7 +34,7 @@ class SignalGenerator:
     def __init__(self, rate_hz: float = 200.0, frames: int | None = None) -> None:
         self.rate_hz = rate_hz
         self.unplugged = threading.Event()
-        self.instead: deque[Reading | BaseException] = deque()
+        self.instead: deque[Callable[[], Reading] | BaseException] = deque()
         self.opened = 0
         self.given = 0
         self._frames = frames
@@ -63,7 +64,7 @@ class SignalGenerator:
             item = self.instead.popleft()
             if isinstance(item, BaseException):
                 raise item
-            return item
+            return item()
         reading = self.reading(self.given)
         self.given += 1
         return reading

@@ -42,12 +42,35 @@ class Device(Protocol):
     raw value its hardware can send, and ``hand``, one of ``left``, ``right``, ``unknown``.
     """
 
-    name: str
-    layout: str
-    sensors: tuple[str, ...]
-    context: tuple[str, ...]
-    simulated: bool
-    rate_hz: float
+    @property
+    def name(self) -> str:
+        """What to call it in sentences and in the meta."""
+        ...
+
+    @property
+    def layout(self) -> str:
+        """Name of the layout whose sensors it has."""
+        ...
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the values of a reading, in order."""
+        ...
+
+    @property
+    def context(self) -> tuple[str, ...]:
+        """Names of the context values of a reading, in order."""
+        ...
+
+    @property
+    def simulated(self) -> bool:
+        """Whether its readings are made up."""
+        ...
+
+    @property
+    def rate_hz(self) -> float:
+        """Nominal readings a second."""
+        ...
 
     @classmethod
     def from_options(cls, argument: str | None, options: Mapping[str, str]) -> Device:
