@@ -44,8 +44,10 @@ class Covariance(ABC):
         """A sensible theta to start training from, for standardised x (N, D) and y (N,)."""
 
     @abstractmethod
-    def with_pullback(self, theta: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, Pullback]:
-        """The matrix k(a, b) (A, B), C-ordered, and its pullback.
+    def with_pullback(
+        self, theta: np.ndarray, a: np.ndarray, b: np.ndarray, out: np.ndarray | None = None
+    ) -> tuple[np.ndarray, Pullback]:
+        """The matrix k(a, b) (A, B), C-ordered, in ``out`` if given, and its pullback.
 
         The pullback may still need the returned matrix: copy it before overwriting it.
         For a matrix k(a, a) with symmetric weights the gradient by a is twice the pullback's.
@@ -126,14 +128,16 @@ class Sum(Covariance):
             thetas.append(term.initial(x, y) + 1.5 * repetition)
         return np.concatenate(thetas)
 
-    def with_pullback(self, theta: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, Pullback]:
-        values: np.ndarray | None = None
+    def with_pullback(
+        self, theta: np.ndarray, a: np.ndarray, b: np.ndarray, out: np.ndarray | None = None
+    ) -> tuple[np.ndarray, Pullback]:
+        values = np.empty((len(a), len(b))) if out is None else out
+        values[:] = 0.0
         pullbacks: list[Pullback] = []
         for term, part in zip(self._terms, self._split(theta, a.shape[1]), strict=True):
             matrix, pullback = term.with_pullback(part, a, b)
-            values = matrix if values is None else values + matrix
+            values += matrix
             pullbacks.append(pullback)
-        assert values is not None
         return values, lambda weights: _collect(pullback(weights) for pullback in pullbacks)
 
     def diagonal(self, theta: np.ndarray, a: np.ndarray) -> np.ndarray:

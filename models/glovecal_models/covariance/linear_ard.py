@@ -25,14 +25,16 @@ class LinearArd(Covariance):
         share = 0.5 * float(y.var()) / (x.shape[1] * np.maximum(x.var(axis=0), 1e-12))
         return np.log(np.maximum(share, 1e-12))
 
-    def with_pullback(self, theta: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, Pullback]:
+    def with_pullback(
+        self, theta: np.ndarray, a: np.ndarray, b: np.ndarray, out: np.ndarray | None = None
+    ) -> tuple[np.ndarray, Pullback]:
         beta = np.exp(theta)
 
         def pullback(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             by_a = (weights @ b) * beta
             return (by_a * a).sum(axis=0), by_a
 
-        return (a * beta) @ b.T, pullback
+        return np.matmul(a * beta, b.T, out=out), pullback
 
     def diagonal(self, theta: np.ndarray, a: np.ndarray) -> np.ndarray:
         return (a * a) @ np.exp(theta)

@@ -37,7 +37,9 @@ class Polynomial(Covariance):
         typical = float((x * x).sum(axis=1).mean()) + 1.0
         return np.array([np.log(max(0.5 * float(y.var()), 1e-12)) - self.degree * np.log(typical), 0.0])
 
-    def with_pullback(self, theta: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, Pullback]:
+    def with_pullback(
+        self, theta: np.ndarray, a: np.ndarray, b: np.ndarray, out: np.ndarray | None = None
+    ) -> tuple[np.ndarray, Pullback]:
         variance, offset = np.exp(theta)
         base = a @ b.T + offset
         lower_power = variance * base ** (self.degree - 1)
@@ -47,7 +49,7 @@ class Polynomial(Covariance):
             total = float(np.vdot(slopes, base))
             return np.array([total, self.degree * offset * slopes.sum()]), self.degree * (slopes @ b)
 
-        return lower_power * base, pullback
+        return np.multiply(lower_power, base, out=out), pullback
 
     def diagonal(self, theta: np.ndarray, a: np.ndarray) -> np.ndarray:
         variance, offset = np.exp(theta)

@@ -24,12 +24,14 @@ class SquaredExponential(Covariance):
         spread = max(float(x.var(axis=0).sum()), 1e-12)
         return np.log([max(0.5 * float(y.var()), 1e-12), 1.0 / spread])
 
-    def with_pullback(self, theta: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, Pullback]:
+    def with_pullback(
+        self, theta: np.ndarray, a: np.ndarray, b: np.ndarray, out: np.ndarray | None = None
+    ) -> tuple[np.ndarray, Pullback]:
         relevance = np.full(a.shape[1], np.exp(theta[1]))
-        values = squared_exponential(theta[0], np.sqrt(relevance), a, b)
+        values = squared_exponential(theta[0], np.sqrt(relevance), a, b, out)
 
         def pullback(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            total, by_relevance, by_a = weighted_differences(weights * values, relevance, a, b)
+            total, by_relevance, by_a = weighted_differences(weights, values, relevance, a, b)
             return np.array([total, by_relevance.sum()]), by_a
 
         return values, pullback

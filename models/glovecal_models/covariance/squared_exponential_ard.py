@@ -28,11 +28,13 @@ class SquaredExponentialArd(Covariance):
         relevance = 1.0 / (dimensions * np.maximum(x.var(axis=0), 1e-12))
         return np.concatenate([[np.log(max(0.5 * float(y.var()), 1e-12))], np.log(relevance)])
 
-    def with_pullback(self, theta: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, Pullback]:
-        values = squared_exponential(theta[0], np.exp(0.5 * theta[1:]), a, b)
+    def with_pullback(
+        self, theta: np.ndarray, a: np.ndarray, b: np.ndarray, out: np.ndarray | None = None
+    ) -> tuple[np.ndarray, Pullback]:
+        values = squared_exponential(theta[0], np.exp(0.5 * theta[1:]), a, b, out)
 
         def pullback(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            total, by_relevance, by_a = weighted_differences(weights * values, np.exp(theta[1:]), a, b)
+            total, by_relevance, by_a = weighted_differences(weights, values, np.exp(theta[1:]), a, b)
             return np.concatenate([[total], by_relevance]), by_a
 
         return values, pullback

@@ -31,7 +31,6 @@ JITTER = 1e-8
 LOG_NOISE_BOUNDS = (np.log(1e-6), np.log(10.0))
 """Range of the noise variance, in units of the target's variance."""
 
-_SAMPLES_FOR_STARTS = 400
 _LOG_2PI = float(np.log(2 * np.pi))
 _potrf, _potri = get_lapack_funcs(("potrf", "potri"), dtype=np.float64)
 (_ger,) = get_blas_funcs(("ger",), dtype=np.float64)
@@ -62,6 +61,14 @@ class ExactLikelihood:
         weights = _likelihood_weights(lower, alpha)
         by_theta, _ = pullback(weights)
         return value, np.concatenate([by_theta, [noise * float(np.trace(weights))]])
+
+    def value(self, parameters: np.ndarray) -> float:
+        """The value alone, a third of the work; raises LinAlgError."""
+        lower = self.cholesky(self.covariance(parameters[:-1], self.x, self.x), float(np.exp(parameters[-1])))
+        _, residual = self.fit_mean(lower)
+        white = solve_triangular(lower, residual, lower=True, check_finite=False)
+        log_determinant = 2 * float(np.log(np.diagonal(lower)).sum())
+        return 0.5 * (float(white @ white) + log_determinant + len(self.y) * _LOG_2PI)
 
     def cholesky(self, values: np.ndarray, noise: float) -> np.ndarray:
         """Lower root of values + (noise + jitter) I, column-major, zeros above; values stay unchanged."""
@@ -94,6 +101,38 @@ def _likelihood_weights(lower: np.ndarray, alpha: np.ndarray) -> np.ndarray:
     return _ger(-0.5, alpha, alpha, a=inverse, overwrite_a=1).T
 
 
+def search_bounds(covariance: Covariance, dimensions: int) -> list[tuple[float, float]]:
+    """Of [theta, log noise variance], in working units."""
+    return [*covariance.bounds(dimensions), LOG_NOISE_BOUNDS]
+
+
+def search_few(
+    x: np.ndarray,
+    y: np.ndarray,
+    mean: Mean,
+    covariance: Covariance,
+    *,
+    starts: int,
+    generator: np.random.Generator,
+    samples: int = 400,
+    iterations: int = 200,
+    cancelled: Callable[[], bool] | None = None,
+    on_evaluation: Callable[[int], None] | None = None,
+) -> Optimum:
+    """The best [theta, log noise variance] of several searches on at most ``samples`` random samples."""
+    first = np.concatenate([covariance.initial(x, y), [np.log(0.05)]])
+    others = [first + generator.normal(scale=1.2, size=len(first)) for _ in range(starts - 1)]
+    chosen = generator.permutation(len(y))[:samples]
+    return minimise(
+        ExactLikelihood(x[chosen], y[chosen], mean, covariance),
+        [first, *others],
+        search_bounds(covariance, x.shape[1]),
+        iterations=iterations,
+        cancelled=cancelled,
+        on_evaluation=on_evaluation,
+    )
+
+
 def fit_exact(
     inputs: np.ndarray,
     target: np.ndarray,
@@ -110,21 +149,17 @@ def fit_exact(
     """Train on raw inputs (N, D), counts, and target (N,), degrees.
 
     ``starts`` searches run on at most 400 of the samples, the best goes on with all. Raises NotTrainable
-    for samples that cannot carry a model, Cancelled when ``cancelled`` says so.
+    for samples that cannot carry a model, Cancelled when ``cancelled`` says so. ``evidence`` holds the
+    NLML in standardised units (add N log target_scale_deg for degrees), and what each start reached.
     """
     working = standardise(*check_samples(inputs, target, sensor_names))
-    generator = np.random.default_rng(seed)
-    bounds = [*covariance.bounds(working.x.shape[1]), LOG_NOISE_BOUNDS]
-    first = np.concatenate([covariance.initial(working.x, working.y), [np.log(0.05)]])
-    others = [first + generator.normal(scale=1.2, size=len(first)) for _ in range(starts - 1)]
-
-    chosen = generator.permutation(len(working.y))[:_SAMPLES_FOR_STARTS]
-    few = ExactLikelihood(working.x[chosen], working.y[chosen], mean, covariance)
-    search = minimise(
-        few,
-        [first, *others],
-        bounds,
-        iterations=iterations,
+    search = search_few(
+        working.x,
+        working.y,
+        mean,
+        covariance,
+        starts=starts,
+        generator=np.random.default_rng(seed),
         cancelled=cancelled,
         on_evaluation=counted_progress(report, f"searching from {starts} starts", 0.0, 0.2),
     )
@@ -132,7 +167,7 @@ def fit_exact(
     optimum = minimise(
         likelihood,
         [search.parameters],
-        bounds,
+        search_bounds(covariance, working.x.shape[1]),
         iterations=iterations,
         cancelled=cancelled,
         on_evaluation=counted_progress(report, f"fitting {len(target)} samples", 0.2, 1.0),
@@ -166,8 +201,8 @@ def _regressor(
         evidence={
             "trainer": "exact",
             "samples": samples,
-            "nlml": optimum.value + samples * float(np.log(scale)),
-            "nlml_standardised": optimum.value,
+            "nlml": optimum.value,
+            "target_scale_deg": scale,
             "evaluations": optimum.evaluations,
             "search_evaluations": search.evaluations,
             "start_values": search.start_values,

@@ -49,6 +49,15 @@ def profile_coefficients(whitened_basis: np.ndarray, whitened_target: np.ndarray
     """
     if whitened_basis.shape[1] == 0:
         return np.empty(0)
-    solution = lstsq(whitened_basis, whitened_target, cond=1e-10, check_finite=False)
+    return _least_squares(whitened_basis, whitened_target, cutoff=1e-10)
+
+
+def profile_coefficients_from_products(products: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """The same from the normal equations: basis^T C^-1 basis (C, C) and basis^T C^-1 target (C,)."""
+    return _least_squares(products, right, cutoff=1e-12) if len(right) else np.empty(0)
+
+
+def _least_squares(matrix: np.ndarray, right: np.ndarray, cutoff: float) -> np.ndarray:
+    solution = lstsq(matrix, right, cond=cutoff, check_finite=False)
     assert solution is not None
     return solution[0]

@@ -1,0 +1,207 @@
+"""SPGP: a sparse process whose pseudo-inputs and hyperparameters are trained together.
+
+Snelson & Ghahramani (2006), as in Wang & Neff (2013), section 6.2, equations 15 to 19, with a linear mean
+(whose coefficients are solved for at every step) and, unlike equation 19, that mean in the prediction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh, solve_triangular
+
+from glovecal_models.covariance.base import Covariance
+from glovecal_models.covariance.squared_exponential_ard import SquaredExponentialArd
+from glovecal_models.errors import BadInput
+from glovecal_models.regression.exact import LOG_NOISE_BOUNDS, search_few
+from glovecal_models.regression.fast_lmc import fit_lmc_gpr
+from glovecal_models.regression.fitc import FitcLikelihood
+from glovecal_models.regression.mean import LinearMean, Mean
+from glovecal_models.regression.noise_guard import LEAST_NOISE, Verdict, judge
+from glovecal_models.regression.optimise import Optimum, counted_progress, minimise
+from glovecal_models.regression.process_regressor import ProcessRegressor
+from glovecal_models.regression.pseudo_inputs import choose_pseudo_inputs
+from glovecal_models.regression.standardise import Standardised, standardise
+from glovecal_models.regression.training_check import check_samples
+
+_SAMPLES_FOR_START = 300
+_START_SHARE = 0.2
+_REACH = 1.0
+"""How far beyond the samples a pseudo-input may move, in input deviations."""
+
+
+def fit_spgp(
+    inputs: np.ndarray,
+    target: np.ndarray,
+    *,
+    pseudo_inputs: int = 100,
+    iterations: int = 200,
+    mean: Mean | None = None,
+    covariance: Covariance | None = None,
+    start: ProcessRegressor | None = None,
+    seed: int = 0,
+    sensor_names: Sequence[str] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+    report: Callable[[str, float], None] | None = None,
+) -> ProcessRegressor:
+    """Train on raw inputs (N, D), counts, and target (N,), degrees.
+
+    The search starts at the hyperparameters of ``start``, a process trained on the same samples, with
+    pseudo-inputs chosen for these. Without one it is ``fit_lmc_gpr`` of the same samples, or, where mean
+    or covariance are given, an exact process of at most 300 of them. The noise may not fall below half
+    the start's, and hyperparameters that the exact likelihood refuses are replaced by the start's
+    (``noise_guard``); ``evidence`` says which happened, its NLML values are in standardised units. The
+    mean is linear and the covariance squared exponential with one relevance per sensor unless given.
+    Raises NotTrainable, Cancelled, and BadInput when ``start`` has another covariance or sensor count.
+    """
+    inputs, target = check_samples(inputs, target, sensor_names)
+    if pseudo_inputs < 1:
+        raise BadInput(f"pseudo_inputs is {pseudo_inputs}, expected at least 1")
+    if start is None and mean is None and covariance is None:
+        first_part = report and (lambda sentence, fraction: report(sentence, _START_SHARE * fraction))
+        start = fit_lmc_gpr(inputs, target, seed=seed, cancelled=cancelled, report=first_part)
+    if start is not None and covariance is not None and covariance.settings() != start.covariance.settings():
+        raise BadInput(f"the start has covariance {start.covariance!r}, not {covariance!r}")
+    if start is not None and len(start.input_shift) != inputs.shape[1]:
+        raise BadInput(f"the start has {len(start.input_shift)} sensors, the samples have {inputs.shape[1]}")
+    mean = LinearMean() if mean is None else mean
+    generator = np.random.default_rng(seed)
+    working = standardise(inputs, target)
+    if start is None:
+        covariance = SquaredExponentialArd() if covariance is None else covariance
+        theta, noise = _search_start(working, mean, covariance, generator, cancelled)
+    else:
+        covariance = start.covariance
+        working = _in_units_of(start, working)
+        theta = covariance.scaled(start.theta, working.target_scale**-2)
+        noise = start.noise_variance / working.target_scale**2
+    noise = float(np.clip(noise, *np.exp(LOG_NOISE_BOUNDS)))
+    likelihood, first = _first(working, mean, covariance, theta, noise, pseudo_inputs, generator)
+    on_evaluation = counted_progress(
+        report, f"moving pseudo-inputs of {len(target)} samples", _START_SHARE, 1.0
+    )
+    optimum = minimise(
+        likelihood,
+        [first],
+        _bounds(covariance, noise, working.x, len(first)),
+        iterations=iterations,
+        cancelled=cancelled,
+        on_evaluation=on_evaluation,
+    )
+    verdict = judge(likelihood, optimum.parameters, first, generator)
+    if report is not None:
+        report(verdict.sentence(), 1.0)
+    evidence = _evidence(working, likelihood, first, optimum, verdict)
+    return _regressor(working, likelihood, optimum.parameters if verdict.accepted else first, evidence)
+
+
+def _search_start(
+    working: Standardised,
+    mean: Mean,
+    covariance: Covariance,
+    generator: np.random.Generator,
+    cancelled: Callable[[], bool] | None,
+) -> tuple[np.ndarray, float]:
+    """Theta and noise variance of an exact process of some samples."""
+    search = search_few(
+        working.x,
+        working.y,
+        mean,
+        covariance,
+        starts=3,
+        samples=_SAMPLES_FOR_START,
+        iterations=60,
+        generator=generator,
+        cancelled=cancelled,
+    )
+    return search.parameters[:-1], float(np.exp(search.parameters[-1]))
+
+
+def _in_units_of(start: ProcessRegressor, working: Standardised) -> Standardised:
+    """The samples in the start's units of input, in which its theta holds."""
+    inputs = working.input_shift + working.input_scale * working.x
+    x = (inputs - start.input_shift) / start.input_scale
+    return replace(working, x=x, input_shift=start.input_shift, input_scale=start.input_scale)
+
+
+def _first(
+    working: Standardised,
+    mean: Mean,
+    covariance: Covariance,
+    theta: np.ndarray,
+    noise: float,
+    pseudo_inputs: int,
+    generator: np.random.Generator,
+) -> tuple[FitcLikelihood, np.ndarray]:
+    """The likelihood, and its parameters where the search starts."""
+    likelihood = FitcLikelihood(working.x, working.y, mean, covariance)
+    z = choose_pseudo_inputs(covariance, theta, working.x, pseudo_inputs, generator)
+    return likelihood, likelihood.pack(theta, noise, z)
+
+
+def _bounds(
+    covariance: Covariance, noise: float, x: np.ndarray, parameters: int
+) -> list[tuple[float, float]]:
+    """Hyperparameters as in exact training but with the noise guarded; pseudo-inputs near the samples."""
+    hyperparameters = covariance.bounds(x.shape[1])
+    lowest = max(np.log(LEAST_NOISE * noise), LOG_NOISE_BOUNDS[0])
+    reach = _REACH * x.std(axis=0)
+    box = list(zip((x.min(axis=0) - reach).tolist(), (x.max(axis=0) + reach).tolist(), strict=True))
+    count = (parameters - len(hyperparameters) - 1) // x.shape[1]
+    return [*hyperparameters, (lowest, LOG_NOISE_BOUNDS[1]), *(box * count)]
+
+
+def _evidence(
+    working: Standardised, likelihood: FitcLikelihood, first: np.ndarray, optimum: Optimum, verdict: Verdict
+) -> dict[str, Any]:
+    variance = working.target_scale**2
+    _, noise_start, z = likelihood.unpack(first)
+    _, noise_trained, _ = likelihood.unpack(optimum.parameters)
+    return {
+        "trainer": "spgp",
+        "samples": len(working.y),
+        "pseudo_inputs": len(z),
+        "evaluations": optimum.evaluations,
+        "fitc_nlml_trained": optimum.value,
+        "target_scale_deg": working.target_scale,
+        "noise_variance_start": noise_start * variance,
+        "noise_variance_trained": noise_trained * variance,
+        "guard": {
+            "accepted": verdict.accepted,
+            "loss_per_sample": verdict.loss_per_sample,
+            "samples": verdict.samples,
+            "sentence": verdict.sentence(),
+        },
+    }
+
+
+def _regressor(
+    working: Standardised, likelihood: FitcLikelihood, parameters: np.ndarray, evidence: dict[str, Any]
+) -> ProcessRegressor:
+    """The trained process in degrees: weights Q^-1 Kmn Lambda^-1 (y - mean), root of Kmm^-1 - Q^-1."""
+    theta, noise, z = likelihood.unpack(parameters)
+    state = likelihood.state(theta, noise, z)
+    slope, intercept = likelihood.mean.plane(state.coefficients, working.x.shape[1])
+    scale = working.target_scale
+    eigenvalues, vectors = eigh(state.inner)
+    explained = vectors * np.sqrt(np.maximum(1.0 - 1.0 / np.maximum(eigenvalues, 1.0), 0.0))
+    both = np.column_stack([explained, state.projected])
+    both = solve_triangular(state.root.T, both, lower=False)
+    return ProcessRegressor(
+        method="spgp",
+        input_shift=working.input_shift,
+        input_scale=working.input_scale,
+        slope=scale * slope,
+        intercept=working.target_shift + scale * intercept,
+        covariance=likelihood.covariance,
+        theta=likelihood.covariance.scaled(theta, scale**2),
+        nodes=z.copy(),
+        weights=both[:, -1] / scale,
+        variance_root=both[:, :-1] / scale,
+        noise_variance=noise * scale**2,
+        jitter=likelihood.jitter * scale**2,
+        evidence=evidence | {"fitc_nlml": state.value},
+    )
