@@ -67,5 +67,7 @@ def test_a_linear_calibration_reads_the_measuring_sensor_at_the_key_poses():
     assert linear_correspondence(correspondence).sensors == ("IM_ABD",)
     given_samples = samples([1, 2, 3, 4], [0, 5, 10, 15], poses=["flat", "", "fist", ""])
     assert linear_samples(given_samples).target.tolist() == [0, 10]
+    hardly_moving = samples([1, 2, 3, 4], [0, 80, 1, 160], poses=["flat", "", "fist", ""])
+    assert len(linear_samples(hardly_moving)) == 4
     without_poses = samples([1, 2, 3, 4], [0, 5, 10, 15])
     assert len(linear_samples(without_poses)) == 4

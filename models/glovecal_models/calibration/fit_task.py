@@ -16,9 +16,11 @@ from typing import Any
 import numpy as np
 
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
+from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
 from glovecal_models.regression.linear_regressor import fit_linear
 from glovecal_models.regression.regressor import Regressor
+from glovecal_models.regression.rescaling import rescale_readings
 from glovecal_models.regression.spgp import fit_spgp
 
 
@@ -74,8 +76,11 @@ def run_task(
 
 def _fit(task: FitTask, cancelled: Callable[[], bool] | None, report: Report | None) -> Regressor:
     settings = task.settings
+    if settings.method == "raw":
+        span = ACTIVE_RANGE_DEG.get(task.rotation) or (float(task.target.min()), float(task.target.max()))
+        return rescale_readings(task.inputs, task.target, span, sensor_names=task.sensors)
     if settings.method == "linear":
-        return fit_linear(task.inputs, task.target)
+        return fit_linear(task.inputs, task.target, sensor_names=task.sensors, cancelled=cancelled)
     start = fit_lmc_gpr(task.inputs, task.target, seed=settings.seed, cancelled=cancelled, report=report)
     if settings.method == "lmc_gpr":
         return start

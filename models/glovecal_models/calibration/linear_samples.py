@@ -2,7 +2,8 @@
 
 The commonly used baseline of Wang & Neff 2013, section 7.1: every sensor by itself, a line through the key
 poses of section 5.1.1. Where a layout has no sensor of a rotation's name (an ankle sleeve), all sensors of
-its correspondence are used, and where no key poses were recorded, all samples.
+its correspondence are used; where no key poses were recorded, or a rotation hardly moves in them (the
+wrist), all samples are: a line through noise would be no fair baseline.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from glovecal_models.calibration.samples import Samples
 from glovecal_models.layout import Correspondence
 
 KEY_POSES = ("flat", "spread", "fist", "overbend")
+LEAST_SHARE_OF_RANGE = 0.25
+"""Key poses must span this share of a rotation's recorded range to carry its line."""
 
 
 def linear_correspondence(correspondence: Correspondence) -> Correspondence:
@@ -23,10 +26,10 @@ def linear_correspondence(correspondence: Correspondence) -> Correspondence:
 
 
 def linear_samples(samples: Samples) -> Samples:
-    """The samples at key poses, when at least two different ones were recorded; else all."""
+    """The samples at key poses, when these move the rotation enough; else all."""
     at_key_pose = np.isin(samples.poses.astype(str), KEY_POSES)
-    if len(np.unique(samples.poses[at_key_pose].astype(str))) < 2:
+    if not at_key_pose.any():
         return samples
     chosen = samples.select(np.flatnonzero(at_key_pose))
-    moves = np.ptp(chosen.inputs, axis=0).min() > 0 and np.ptp(chosen.target) > 0
-    return chosen if moves else samples
+    spans = np.ptp(chosen.target) >= LEAST_SHARE_OF_RANGE * np.ptp(samples.target)
+    return chosen if spans and np.ptp(chosen.inputs, axis=0).min() > 0 else samples

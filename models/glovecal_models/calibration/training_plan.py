@@ -55,7 +55,7 @@ def plan_training(
     ranges: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     unmeasured: list[Correspondence] = []
     for correspondence in layout.correspondences:
-        if settings.method == "linear":
+        if settings.method in ("raw", "linear"):
             correspondence = linear_correspondence(correspondence)
         samples = gather_samples(takes, correspondence)
         if len(samples) == 0:

@@ -8,8 +8,9 @@ from typing import Literal
 
 from glovecal_models.calibration.representative import DEFAULT_SAMPLES
 
-Method = Literal["linear", "lmc_gpr", "spgp"]
-METHODS: tuple[Method, ...] = ("linear", "lmc_gpr", "spgp")
+Method = Literal["raw", "linear", "lmc_gpr", "spgp"]
+METHODS: tuple[Method, ...] = ("raw", "linear", "lmc_gpr", "spgp")
+"""``raw`` is no calibration at all, the scale that the others are read against."""
 Report = Callable[[str, float], None]
 """Called with a sentence and the fraction done, 0 to 1."""
 

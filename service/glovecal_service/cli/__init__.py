@@ -1,0 +1,1 @@
+"""The ``glovecal`` command: one file per verb or noun, all speaking REST."""
