@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 from pydantic import Field, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
@@ -26,12 +27,12 @@ class Settings(BaseSettings):
     site: str = "lab"
     """Second part of every zenoh key."""
     host: str = "127.0.0.1"
-    port: int = Field(8600, ge=0, le=65535)
-    workers: int = Field(2, ge=1, le=256)
+    port: Annotated[int, Field(ge=0, le=65535)] = 8600
+    workers: Annotated[int, Field(ge=1, le=256)] = 2
     """Training processes, one thread each."""
     scheduler: str | None = None
     """Address of a Dask scheduler whose workers share ``data``; None: workers of our own, started lazily."""
-    upload_limit_mb: int = Field(256, ge=1)
+    upload_limit_mb: Annotated[int, Field(ge=1)] = 256
 
     @field_validator("site")
     @classmethod

@@ -11,8 +11,11 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from jobs_counting import CountingJob
 from postgres_server import PostgresServer, find_programs
 
+from glovecal_service.jobs.dispatcher import Dispatcher
+from glovecal_service.jobs.registry import KINDS
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 
@@ -55,3 +58,12 @@ def store(store_settings: Settings) -> Iterator[Store]:
 def sqlite_store(sqlite_settings: Settings) -> Iterator[Store]:
     with Store.open(sqlite_settings) as store:
         yield store
+
+
+@pytest.fixture(scope="session")
+def dispatched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Store, Dispatcher]]:
+    """A store whose jobs are run, by one pair of worker processes for all tests."""
+    settings = Settings(data=tmp_path_factory.mktemp("dispatched"), database=None, artifacts=None, workers=2)
+    kinds = {**KINDS, "count": CountingJob()}
+    with Store.open(settings) as store, Dispatcher(store, settings, kinds) as dispatcher:
+        yield store, dispatcher

@@ -61,10 +61,14 @@ def test_no_other_name_reaches_a_path(name):
     class Untouched:
         place = "nowhere"
 
-        def read(self, name):
+        def read(self, name: str) -> bytes | None:
             pytest.fail(f"a path was made of {name!r}")
 
-        write = exists = read
+        def exists(self, name: str) -> bool:
+            pytest.fail(f"a path was made of {name!r}")
+
+        def write(self, name: str, content: bytes) -> None:
+            pytest.fail(f"a path was made of {name!r}")
 
     artifacts = Artifacts(Untouched())
     for call in (artifacts.get, artifacts.exists):

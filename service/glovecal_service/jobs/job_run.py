@@ -143,13 +143,14 @@ class JobRun:
                 for future in finished(list(running), WATCH_S):
                     number = running.pop(future)
                     self._take(plan, number, outcome(future, plan.tasks[number]), results)
-        finally:
+        except WorkersLost:
+            raise
+        except BaseException:
             self._leave(list(running))
+            raise
 
     def _leave(self, running: list[Future]) -> None:
         """An error or a cancel: the fits in flight are told to stop, and given a moment to do so."""
-        if not running:
-            return
         self._cancel()
         until = time.monotonic() + STRAGGLERS_S
         while running and (left := until - time.monotonic()) > 0:

@@ -7,6 +7,7 @@ trusted with nothing but running: the database remembers jobs, the fits folder r
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 import threading
@@ -17,6 +18,7 @@ from typing import cast
 
 from dask.config import set as configure
 from distributed import Client, Future, KilledWorker, LocalCluster
+from distributed.client import ClosedClientError
 
 from glovecal_models.errors import GlovecalError
 from glovecal_service.jobs.job_kind import Task
@@ -25,6 +27,7 @@ from glovecal_service.settings import Settings
 
 START_TIMEOUT_S = 60
 LOOK_S = 0.01
+CANCELLED = (asyncio.CancelledError, CancelledError)
 _CONFIG = {
     "distributed.admin.large-graph-warning-threshold": "1GB",
     "distributed.scheduler.allowed-failures": 2,
@@ -54,6 +57,12 @@ class Workers:
         return self._client is not None
 
     @property
+    def address(self) -> str | None:
+        """Of the scheduler, None before it is started."""
+        client = self._client
+        return None if client is None or client.scheduler is None else str(client.scheduler.address)
+
+    @property
     def count(self) -> int:
         """How many tasks run at once."""
         client = self._client
@@ -65,7 +74,7 @@ class Workers:
         """Hand a task out. Raises WorkersLost."""
         try:
             return self._started().submit(run_task, task, folder, cancel_file, pure=False)
-        except (OSError, TimeoutError, RuntimeError) as error:
+        except (OSError, TimeoutError, RuntimeError, ClosedClientError) as error:
             raise WorkersLost(f"the training processes cannot be reached: {error}") from error
 
     def reset(self) -> None:
@@ -126,7 +135,7 @@ def outcome(future: Future, task: Task) -> TaskOutcome:
     """What became of a finished future. Raises WorkersLost, TaskKilledWorkers."""
     try:
         return future.result()
-    except CancelledError as error:
+    except (*CANCELLED, OSError, ClosedClientError) as error:
         raise WorkersLost("the scheduler of the training processes was lost") from error
     except KilledWorker as error:
         raise TaskKilledWorkers(

@@ -1,0 +1,137 @@
+"""The dispatcher with real worker processes: results, memory of results, cancel, crashes, restarts."""
+
+import os
+import signal
+
+import pytest
+from jobs_counting import CountingJob, noted
+from jobs_waiting import result_of, wait_for, wait_for_job
+
+from glovecal_service.jobs.dispatcher import Dispatcher
+from glovecal_service.jobs.owner import Owner
+
+
+@pytest.fixture
+def ledger(tmp_path):
+    return tmp_path / "ledger"
+
+
+def create(store, ledger, numbers, seconds=0.0, **more):
+    payload = {"numbers": numbers, "seconds": seconds, "ledger": str(ledger), **more}
+    return store.jobs.create("count", payload)
+
+
+def test_a_job_runs_in_polite_worker_processes(dispatched, ledger):
+    store, dispatcher = dispatched
+    result = result_of(store, create(store, ledger, [3, 4, 5, 6]).id)
+    assert result["sums"] == [6, 10, 15, 21]
+    for facts in result["facts"]:
+        assert facts["niceness"] == 10
+        assert facts["blas_threads"] == 1
+        assert facts["pid"] in dispatcher.workers.pids()
+        assert facts["pid"] != os.getpid()
+
+
+def test_progress_is_told_task_by_task_and_kept(dispatched, ledger):
+    store, _ = dispatched
+    job = wait_for_job(store, create(store, ledger, [3, 4, 5]).id)
+    events = store.jobs.events(job.id)
+    fractions = [event.fraction for event in events]
+    assert fractions == sorted(fractions)
+    assert {f"sum to {number} done" for number in (3, 4, 5)} <= {event.sentence for event in events}
+    assert [event.state for event in (events[0], events[1], events[-1])] == ["queued", "running", "done"]
+    assert store.jobs.events(job.id, after=events[-2].id) == events[-1:]
+
+
+def test_the_scheduler_listens_on_this_computer_only(dispatched, ledger):
+    store, dispatcher = dispatched
+    wait_for_job(store, create(store, ledger, [1]).id)
+    assert dispatcher.workers.address.startswith("tcp://127.0.0.1:")
+
+
+def test_what_was_computed_once_is_not_computed_again(dispatched, ledger):
+    store, _ = dispatched
+    assert result_of(store, create(store, ledger, [1, 2, 3]).id)["sums"] == [1, 3, 6]
+    assert result_of(store, create(store, ledger, [3, 2, 7]).id)["sums"] == [6, 3, 28]
+    assert sorted(noted(ledger, "done")) == [1, 2, 3, 7]
+
+
+def test_cancelling_stops_the_fits_in_flight(dispatched, ledger):
+    store, _ = dispatched
+    job = create(store, ledger, [1, 2, 3, 4, 5, 6], seconds=60)
+    wait_for(lambda: len(noted(ledger, "begin")) >= 2)
+    store.jobs.request_cancel(job.id)
+    job = wait_for_job(store, job.id)
+    assert (job.state, job.sentence, job.result) == ("cancelled", "cancelled", None)
+    assert result_of(store, create(store, ledger, [10]).id)["sums"] == [55]
+    assert noted(ledger, "done") == [10]
+
+
+def test_a_queued_job_is_cancelled_at_once(sqlite_store):
+    job = sqlite_store.jobs.create("count", {})
+    assert sqlite_store.jobs.request_cancel(job.id).state == "cancelled"
+    assert sqlite_store.jobs.claim("anybody") is None
+
+
+def test_a_killed_worker_is_replaced_and_its_fit_repeated(dispatched, ledger):
+    store, _ = dispatched
+    job = create(store, ledger, [1, 2, 3], seconds=0.3)
+    wait_for(lambda: noted(ledger, "begin"))
+    victim = int(ledger.read_text().splitlines()[0].split()[2])
+    os.kill(victim, signal.SIGKILL)
+    result = result_of(store, job.id)
+    assert result["sums"] == [1, 3, 6]
+    assert victim not in {facts["pid"] for facts in result["facts"]}
+
+
+def test_a_fit_that_kills_every_worker_fails_with_a_reason(dispatched, ledger):
+    store, _ = dispatched
+    job = wait_for_job(store, create(store, ledger, [4], ending="die").id)
+    assert job.state == "failed"
+    assert job.error == "sum to 4: every process that worked on it died (killed, or out of memory)"
+    assert wait_for_job(store, create(store, ledger, [5]).id).state == "done"
+
+
+def test_a_refusal_is_passed_on_and_a_mistake_is_called_one(dispatched, ledger):
+    store, _ = dispatched
+    refused = wait_for_job(store, create(store, ledger, [1], ending="refuse").id)
+    assert (refused.state, refused.error) == ("failed", "sum to 1: the samples are all alike")
+    broken = wait_for_job(store, create(store, ledger, [2], ending="break").id)
+    assert broken.error == "an error in Glovecal itself: ZeroDivisionError: a mistake in the program"
+    unknown = wait_for_job(store, store.jobs.create("knit", {}).id)
+    assert unknown.error == "no job of kind 'knit'; there are count, train"
+
+
+def test_stopping_leaves_the_job_for_the_next_start(sqlite_store, sqlite_settings, ledger):
+    with Dispatcher(sqlite_store, sqlite_settings, {"count": CountingJob()}):
+        job = create(sqlite_store, ledger, [1, 2, 3], seconds=0.2, here=True)
+        wait_for(lambda: noted(ledger, "done"))
+    assert sqlite_store.jobs.get(job.id).state == "queued"
+    done = noted(ledger, "done")
+    with Dispatcher(sqlite_store, sqlite_settings, {"count": CountingJob()}):
+        assert result_of(sqlite_store, job.id)["sums"] == [1, 3, 6]
+    assert noted(ledger, "done")[: len(done)] == done
+    assert sorted(noted(ledger, "done")) == [1, 2, 3]
+    assert not list((sqlite_settings.data / "owners").iterdir())
+    assert not list(sqlite_settings.fits_folder.glob("cancel-*"))
+
+
+def test_a_predecessor_that_lives_keeps_its_jobs(sqlite_store, sqlite_settings):
+    folder = sqlite_settings.data / "owners"
+    living, successor = Owner(folder), Owner(folder)
+    job = sqlite_store.jobs.create("count", {})
+    sqlite_store.jobs.claim(living.name)
+    assert successor.take_back_from_dead(sqlite_store) == 0
+    living._file.close()  # pyright: ignore[reportOptionalMemberAccess]  # what the operating system does when the process dies
+    assert successor.take_back_from_dead(sqlite_store) == 1
+    assert sqlite_store.jobs.get(job.id).state == "queued"
+    successor.close()
+
+
+def test_the_scheduler_can_be_lost_in_the_middle_of_a_job(dispatched, ledger):
+    store, dispatcher = dispatched
+    job = create(store, ledger, [1, 2, 3, 4], seconds=0.3)
+    wait_for(lambda: noted(ledger, "done"))
+    dispatcher.workers._cluster.close()
+    assert result_of(store, job.id)["sums"] == [1, 3, 6, 10]
+    assert len(noted(ledger, "done")) <= 6, "only the two fits in flight may be repeated"
