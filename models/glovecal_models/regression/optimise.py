@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import OptimizeResult, minimize
 
 from glovecal_models.errors import Cancelled
 
@@ -33,16 +33,17 @@ def minimise(
     bounds: Sequence[tuple[float, float]],
     *,
     iterations: int = 200,
+    least_gain: float = 1e-6,
     cancelled: Callable[[], bool] | None = None,
     on_evaluation: Callable[[int], None] | None = None,
 ) -> Optimum:
-    """L-BFGS-B from every start; at most ``iterations`` iterations each.
+    """L-BFGS-B from every start: ``iterations`` iterations, fewer once one gains less than ``least_gain``.
 
     ``cancelled`` is asked before every evaluation (raises Cancelled); ``on_evaluation`` gets the number
     of evaluations so far, over all starts. Raises LinAlgError if no start could be evaluated at all.
     """
     count = 0
-    best_value, best_parameters = np.inf, np.empty(0)
+    best_value, best_parameters, last_value = np.inf, np.empty(0), np.inf
 
     def evaluate(parameters: np.ndarray) -> tuple[float, np.ndarray]:
         nonlocal count, best_value, best_parameters
@@ -61,12 +62,25 @@ def minimise(
             best_value, best_parameters = value, parameters.copy()
         return value, gradient
 
+    def stop_when_gains_are_small(intermediate_result: OptimizeResult) -> None:
+        nonlocal last_value
+        gain, last_value = last_value - float(intermediate_result.fun), float(intermediate_result.fun)
+        if gain < least_gain:
+            raise StopIteration
+
     lower, upper = np.array(bounds, dtype=float).T
     ends = []
     for start in starts:
-        options = {"maxiter": iterations, "maxcor": 20, "ftol": 1e-10, "gtol": 1e-4}
-        inside = np.clip(start, lower, upper)
-        outcome = minimize(evaluate, inside, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
+        last_value = np.inf
+        outcome = minimize(
+            evaluate,
+            np.clip(start, lower, upper),
+            jac=True,
+            method="L-BFGS-B",
+            bounds=bounds,
+            callback=stop_when_gains_are_small,
+            options={"maxiter": iterations, "maxcor": 20, "ftol": 0.0, "gtol": 1e-5},
+        )
         ends.append(float(outcome.fun))
     if not np.isfinite(best_value):
         raise np.linalg.LinAlgError("the objective could not be evaluated at any start")

@@ -39,6 +39,7 @@ def fit_spgp(
     *,
     pseudo_inputs: int = 100,
     iterations: int = 200,
+    least_gain: float = 1e-4,
     mean: Mean | None = None,
     covariance: Covariance | None = None,
     start: ProcessRegressor | None = None,
@@ -49,12 +50,14 @@ def fit_spgp(
 ) -> ProcessRegressor:
     """Train on raw inputs (N, D), counts, and target (N,), degrees.
 
-    The search starts at the hyperparameters of ``start``, a process trained on the same samples, with
-    pseudo-inputs chosen for these. Without one it is ``fit_lmc_gpr`` of the same samples, or, where mean
-    or covariance are given, an exact process of at most 300 of them. The noise may not fall below half
-    the start's, and hyperparameters that the exact likelihood refuses are replaced by the start's
-    (``noise_guard``); ``evidence`` says which happened, its NLML values are in standardised units. The
-    mean is linear and the covariance squared exponential with one relevance per sensor unless given.
+    The search takes at most ``iterations`` iterations and ends earlier when one gains less than
+    ``least_gain`` nats. It starts at the hyperparameters of ``start``, a process trained on the same
+    samples, with pseudo-inputs chosen for these. Without one the start is ``fit_lmc_gpr`` of the same
+    samples, or, where mean or covariance are given, an exact process of at most 300 of them. The noise
+    may not fall below half the start's, and hyperparameters that the exact likelihood refuses are
+    replaced by the start's (``noise_guard``); ``evidence`` says which happened, its NLML values are in
+    standardised units. The mean is linear and the covariance squared exponential with one relevance per
+    sensor unless given.
     Raises NotTrainable, Cancelled, and BadInput when ``start`` has another covariance or sensor count.
     """
     inputs, target = check_samples(inputs, target, sensor_names)
@@ -88,6 +91,7 @@ def fit_spgp(
         [first],
         _bounds(covariance, noise, working.x, len(first)),
         iterations=iterations,
+        least_gain=least_gain,
         cancelled=cancelled,
         on_evaluation=on_evaluation,
     )
