@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from importlib.metadata import version
 
-from fastapi import APIRouter, FastAPI
+from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
 
 from glovecal_models.threads import pin_blas_to_one_thread
@@ -28,7 +28,7 @@ from glovecal_service.rest.body_guard import BodyGuard
 from glovecal_service.rest.dependencies import Parts
 from glovecal_service.rest.error_handlers import install_error_handlers
 from glovecal_service.rest.metrics import Metrics
-from glovecal_service.rest.observation import Observation
+from glovecal_service.rest.observation import PREFIX, Observation
 from glovecal_service.rest.predictors import Predictors
 from glovecal_service.rest.request_guard import RequestGuard, is_loopback
 from glovecal_service.rest.upload_folder import UploadFolder
@@ -74,13 +74,11 @@ def create_app(
         lifespan=lifespan,
         docs_url=None,
         redoc_url=None,
-        openapi_url="/v1/openapi.json",
+        openapi_url=f"{PREFIX}/openapi.json",
         redirect_slashes=False,
     )
-    under_v1 = APIRouter(prefix="/v1")
     for noun in ROUTERS:
-        under_v1.include_router(noun.router)
-    app.include_router(under_v1)
+        app.include_router(noun.router, prefix=PREFIX)
     install_error_handlers(app)
     install_openapi(app, gloves.LayoutBody)
     _guard(app, settings, metrics, body_patience_s)

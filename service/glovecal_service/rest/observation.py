@@ -15,6 +15,7 @@ from glovecal_service.rest.metrics import Metrics
 from glovecal_service.rest.plain import plain_text
 from glovecal_service.rest.problem import Problem
 
+PREFIX = "/v1"
 REQUEST_ID = re.compile(r"[A-Za-z0-9_-]{8,64}\Z")
 
 log: Any = structlog.wrap_logger(
@@ -102,4 +103,8 @@ def _request_id(scope: Scope) -> str:
 
 
 def _route(scope: Scope) -> str:
-    return getattr(scope.get("route"), "path", "unmatched")
+    """The route's pattern. Some versions of FastAPI leave the prefix of an included router out of it."""
+    path = getattr(scope.get("route"), "path", None)
+    if path is None:
+        return "unmatched"
+    return path if path.startswith(PREFIX) else PREFIX + path

@@ -15,7 +15,6 @@ from glovecal_service.store.errors import Conflict, StoreError
 from glovecal_service.store.records import TakeRecord
 from glovecal_service.store.store import Store
 
-
 MADE_OF_COLUMNS = "auto-"
 """Begins the names of layouts that an import made."""
 

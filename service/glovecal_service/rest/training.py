@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Response
 from pydantic import Field
 
+from glovecal_models.calibration.training_settings import Method
 from glovecal_models.errors import LayoutMismatch, NotTrainable
 from glovecal_service.rest.answers import change_problems
 from glovecal_service.rest.dependencies import StoreNeeded
@@ -26,7 +27,7 @@ MOST_UNFINISHED_JOBS = 100
 class Training(StrictBody):
     subject: Identifier
     layout: Identifier
-    method: Literal["linear", "lmc_gpr", "spgp"] = "lmc_gpr"
+    method: Method = "lmc_gpr"
     takes: Annotated[list[Id], Field(min_length=1, max_length=MOST_TAKES)] | None = Field(
         None, description="None: all takes of the subject and layout that have a reference."
     )

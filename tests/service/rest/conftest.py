@@ -33,6 +33,15 @@ def client(settings: Settings) -> Iterator[RestClient]:
 
 
 @pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RestClient]:
+    """One client for the tests of a module that change nothing; subject ``anna`` is there."""
+    settings = Settings(data=tmp_path_factory.mktemp("shared") / "data", upload_limit_mb=16)
+    with in_process_client(settings) as client:
+        client.post("/subjects", {"name": "anna"})
+        yield client
+
+
+@pytest.fixture(scope="module")
 def http(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
     """Raw HTTP to an application that the tests of one module share."""
     settings = Settings(data=tmp_path_factory.mktemp("shared") / "data", upload_limit_mb=1)
@@ -50,10 +59,12 @@ def serve() -> Iterator[Callable[..., str]]:
     """Starts real uvicorn servers on free loopback ports; gives their addresses."""
     running: list[tuple[uvicorn.Server, threading.Thread]] = []
 
-    def start(settings: Settings, **options: float) -> str:
+    def start(settings: Settings, *, body_patience_s: float = 30.0) -> str:
         listener = socket.create_server(("127.0.0.1", 0))
         port = listener.getsockname()[1]
-        server = uvicorn.Server(server_config(create_app(settings, **options), "127.0.0.1", port))
+        server = uvicorn.Server(
+            server_config(create_app(settings, body_patience_s=body_patience_s), "127.0.0.1", port)
+        )
         thread = threading.Thread(target=server.run, args=([listener],))
         thread.start()
         running.append((server, thread))

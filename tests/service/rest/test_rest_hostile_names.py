@@ -70,7 +70,9 @@ ROUTES = [
 
 
 @pytest.fixture(scope="module")
-def connection(serve: Callable[..., str], tmp_path_factory: pytest.TempPathFactory) -> Iterator[HTTPConnection]:
+def connection(
+    serve: Callable[..., str], tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[HTTPConnection]:
     """Real HTTP, by a client that sends paths as they stand (httpx would resolve ``..`` by itself)."""
     url = serve(Settings(data=tmp_path_factory.mktemp("names") / "data"))
     connection = HTTPConnection(url.removeprefix("http://"), timeout=10)
@@ -92,7 +94,8 @@ def test_no_route_takes_the_name(connection: HTTPConnection, name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "target", [b"/v1/subjects/\xff\xfe", b"/v1/subjects/a\x00b", b"/v1/../v1/subjects", b"//v1//subjects", b"*"]
+    "target",
+    [b"/v1/subjects/\xff\xfe", b"/v1/subjects/a\x00b", b"/v1/../v1/subjects", b"//v1//subjects", b"*"],
 )
 def test_raw_bytes_in_the_request_line(connection: HTTPConnection, target: bytes) -> None:
     with socket.create_connection((connection.host, connection.port), timeout=10) as raw:

@@ -22,9 +22,10 @@ from glovecal_service.store.errors import StorageFull
 Write = Callable[..., Path]
 
 
-@pytest.fixture(autouse=True)
-def anna(client: RestClient) -> None:
+@pytest.fixture
+def client(client: RestClient) -> RestClient:
     client.post("/subjects", {"name": "anna"})
+    return client
 
 
 def test_the_file_is_kept_and_comes_back_as_it_was(
@@ -85,7 +86,7 @@ def test_a_recording_is_of_one_hand(client: RestClient, write_table: Write) -> N
     ],
 )
 def test_errors_name_file_line_and_column(
-    client: RestClient, write_table: Write, old: str, new: str, line: int, column: str | None, says: str
+    shared: RestClient, write_table: Write, old: str, new: str, line: int, column: str | None, says: str
 ) -> None:
     file = write_table("Mittwoch früh.csv")
     text = file.read_text()
@@ -93,7 +94,7 @@ def test_errors_name_file_line_and_column(
     before, _, after = text.rpartition(old) if line > 1 else text.partition(old)
     file.write_text(before + new + after)
     with pytest.raises(Refused) as refused:
-        client.upload_takes(file, subject="anna")
+        shared.upload_takes(file, subject="anna")
     problem = refused.value.problem
     assert problem["status"] == 422
     assert problem["type"] == "urn:glovecal:problem:bad-take-table"
@@ -102,7 +103,7 @@ def test_errors_name_file_line_and_column(
     if column is not None:
         assert problem["column"] == column
     assert says in problem["detail"]
-    assert client.get("/takes") == []
+    assert shared.get("/takes") == []
 
 
 FRAMES = "time_s,take,s.A\n0,x,1\n1,x,2\n0,y,1\n1,y,2\n"
@@ -134,16 +135,16 @@ FRAMES = "time_s,take,s.A\n0,x,1\n1,x,2\n0,y,1\n1,y,2\n"
         FRAMES.encode(),  # two takes with exactly the same frames
     ],
 )
-def test_what_is_no_take_table_leaves_no_take(client: RestClient, tmp_path: Path, content: bytes) -> None:
+def test_what_is_no_take_table_leaves_no_take(shared: RestClient, tmp_path: Path, content: bytes) -> None:
     file = tmp_path / "bad.csv"
     file.write_bytes(content)
     with pytest.raises(Refused) as refused:
-        client.upload_takes(file, subject="anna")
+        shared.upload_takes(file, subject="anna")
     assert refused.value.status in (409, 422), refused.value.problem
-    assert client.get("/takes") == []
+    assert shared.get("/takes") == []
 
 
-def test_a_parquet_bomb_is_refused_by_its_cells(client: RestClient, tmp_path: Path) -> None:
+def test_a_parquet_bomb_is_refused_by_its_cells(shared: RestClient, tmp_path: Path) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -152,7 +153,7 @@ def test_a_parquet_bomb_is_refused_by_its_cells(client: RestClient, tmp_path: Pa
     pq.write_table(pa.table({"time_s": column, "s.A": column, "s.B": column, "s.C": column}), file)
     assert file.stat().st_size < 1_000_000
     with pytest.raises(Refused, match="cells") as refused:
-        client.upload_takes(file, subject="anna")
+        shared.upload_takes(file, subject="anna")
     assert refused.value.status == 422
 
 
@@ -218,15 +219,15 @@ def test_two_tables_with_clocks_of_their_own(client: RestClient, tmp_path: Path)
         client.upload_takes(frames, subject="anna")
 
 
-def test_a_reference_that_is_missing_or_wrong_imports_nothing(client: RestClient, tmp_path: Path) -> None:
+def test_a_reference_that_is_missing_or_wrong_imports_nothing(shared: RestClient, tmp_path: Path) -> None:
     frames, reference = two_tables(tmp_path)
     reference.write_text(reference.read_text().replace("walk", "run"))
     with pytest.raises(Refused) as refused:
-        client.upload_takes(frames, reference=reference, subject="anna")
+        shared.upload_takes(frames, reference=reference, subject="anna")
     assert refused.value.problem["file"] == "walk.reference.csv"
     with pytest.raises(Refused, match="no upload"):
-        client.upload_takes(frames, subject="anna", reference_upload="0" * 64)
-    assert client.get("/takes") == []
+        shared.upload_takes(frames, subject="anna", reference_upload="0" * 64)
+    assert shared.get("/takes") == []
 
 
 def test_attach_a_reference_later(client: RestClient, tmp_path: Path) -> None:
@@ -247,7 +248,7 @@ def test_attach_a_reference_later(client: RestClient, tmp_path: Path) -> None:
         client.attach_reference("0123456789ab", reference)
     assert refused.value.status == 404
     frames.write_text("time_s,s.A\n0,1\n")
-    with pytest.raises(Refused, match="no reference|belong to the frames"):
+    with pytest.raises(Refused, match="belong to the frames"):
         client.attach_reference(take["id"], frames)
 
 
@@ -259,7 +260,9 @@ def test_layouts(client: RestClient, write_table: Write, tmp_path: Path) -> None
         client.upload_takes(file, subject="anna", layout="unknown")
     assert refused.value.status == 404
     layout = tmp_path / "finger.toml"
-    layout.write_text('name = "finger"\nsensors = ["I_MCP", "I_PIP"]\n[rotations]\nI_MCP = ["I_MCP", "I_PIP"]\n')
+    layout.write_text(
+        'name = "finger"\nsensors = ["I_MCP", "I_PIP"]\n[rotations]\nI_MCP = ["I_MCP", "I_PIP"]\n'
+    )
     assert client.add_layout(layout) == "finger"
     answer = client.upload_takes(file, subject="anna", layout="finger")
     assert answer["layout"] == "finger"
@@ -285,17 +288,17 @@ def test_stray_temporary_files_do_not_hinder(
     assert client.upload_takes(write_table(), subject="anna")["imported"]
 
 
-def test_import_for_nobody(client: RestClient, write_table: Write) -> None:
+def test_import_for_nobody(shared: RestClient, write_table: Write) -> None:
     with pytest.raises(Refused, match="no subject") as refused:
-        client.upload_takes(write_table(), subject="nobody")
+        shared.upload_takes(write_table(), subject="nobody")
     assert refused.value.status == 404
 
 
-def test_refusals_are_what_the_model_says(client: RestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_refusals_are_what_the_model_says(shared: RestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: Any, **__: Any) -> None:
         raise BadInput("the reason \ud800 with a lone surrogate")
 
     monkeypatch.setattr("glovecal_service.store.subjects.Subjects.list", refuse)
     with pytest.raises(Refused, match="the reason") as refused:
-        client.get("/subjects")
+        shared.get("/subjects")
     assert refused.value.status == 422
