@@ -1,7 +1,8 @@
-"""The order of a CyberGlove's sensors, against a table written from the fact sheet and not from the driver."""
+"""The order of a CyberGlove's sensors, against a table written from the fact sheet."""
 
 import pytest
 from emulated_cyberglove_box import EmulatedBox
+
 from glovecal_client.capture.cyberglove_order import SENSORS, hardware_order, layout_index
 from glovecal_models.layout import Layout
 
@@ -49,9 +50,7 @@ def test_every_sensor_arrives_under_its_own_name(count: int) -> None:
     record = list(range(count))
     arrived = [record[place] for place in layout_index(count)]
     names = SENSORS[f"cyberglove{count}"]
-    assert {name: value for name, value in zip(names, arrived, strict=True)} == {
-        name: place for place, name in expected.items()
-    }
+    assert dict(zip(names, arrived, strict=True)) == {name: place for place, name in expected.items()}
 
 
 @pytest.mark.parametrize("count", [18, 22])

@@ -5,9 +5,10 @@ import random
 import pytest
 from cyberglove_emulator import Damage
 from emulated_cyberglove_box import EmulatedBox
-from glovecal_client.capture.cyberglove_record import RecordFormat, RecordReader, decode_ticks
 from hypothesis import given
 from hypothesis import strategies as st
+
+from glovecal_client.capture.cyberglove_record import RecordFormat, RecordReader, decode_ticks
 
 FORMATS = [
     RecordFormat(sensors, timestamp, status)

@@ -107,7 +107,7 @@ class CyberGlove:
         """Find the box, ask it who it is, set it up, start the stream.
 
         Raises DeviceLost when nothing answers, no glove is plugged into the box or the port is gone;
-        DeviceError when something else answers (within about 7 s) or the glove cannot do what was asked.
+        DeviceError when something else answers (within about 6 s) or the glove cannot do what was asked.
         """
         self.close()
         self.port = self._asked_port or find_port.only_cyberglove()

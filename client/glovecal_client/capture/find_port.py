@@ -95,11 +95,11 @@ def _probe_at(link: SerialLink, description: str, hardware_id: str, tries: list[
     """Listen, and ask only silence or a CyberGlove's stream; adds what was heard to ``tries``."""
     box = ControlBox(link)
     heard = link.drain(quiet_s=_LISTEN_S, at_most_s=2 * _LISTEN_S)
-    if heard and not _streams_records(heard):
-        tries.append(Heard(link.baud, b"", heard))
-        return None
-    if heard:
+    if _streams_records(heard):
         box.stop()
+    elif heard and (more := link.read(_LISTEN_S)):  # it goes on; else it was the rest of something
+        tries.append(Heard(link.baud, b"", heard + more))
+        return None
     sensors, came = ask_sensors(box, _ANSWER_S)
     if sensors is None:
         tries.append(Heard(link.baud, b"?S", came))
