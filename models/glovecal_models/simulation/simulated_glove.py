@@ -27,7 +27,7 @@ from glovecal_models.simulation.simulated_hand import SimulatedHand
 from glovecal_models.simulation.typical_glove import TYPICAL_COUNTS
 
 LAYOUTS = ("cyberglove18", "cyberglove22")
-ZERO_SD_COUNTS = 12.0
+ZERO_SD_COUNTS = 13.0
 GAIN_LOG_SD = 0.15
 LARGEST_BOW = 0.03
 NOISE_DEG = 0.9

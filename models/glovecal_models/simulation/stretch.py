@@ -128,14 +128,18 @@ def _pull(neighbour: str, standard: float, largest: float) -> Pull:
 
 
 def _with_product_term(alone: Stretch) -> Stretch:
-    """Add the product term that comes nearest to both deviations when two neighbours move freely at once."""
+    """Add the product term that comes nearest to both deviations when two neighbours move freely at once.
+
+    Two neighbours fully bent together may pull less than either alone, but never the other way.
+    """
     standard, largest = TOGETHER[alone.sensor]
-    first, second = np.meshgrid(_SWEEP[::8], _SWEEP[::8])
+    first, second = np.meshgrid(_SWEEP[::4], _SWEEP[::4])
     bent = {alone.pulls[0].neighbour: first, alone.pulls[1].neighbour: second}
 
     def misfit(together: float) -> float:
         s, m = deviations(Stretch(alone.sensor, alone.pulls, together).share(bent))
         return (100 * s / standard - 1) ** 2 + (100 * m / largest - 1) ** 2
 
-    together = min(np.linspace(-3.0, 3.0, 301).tolist(), key=misfit)
+    lowest = -sum(pull.size for pull in alone.pulls)
+    together = min(np.linspace(lowest, 3.0, 101).tolist(), key=misfit)
     return Stretch(alone.sensor, alone.pulls, together)
