@@ -158,6 +158,6 @@ def test_every_activation_of_many_threads_is_kept_in_one_order(anna):
 
 def test_facts_that_are_not_json_are_refused(anna):
     for fact in (float("nan"), float("inf"), object()):
-        with pytest.raises((BadInput, ValueError, TypeError)):
+        with pytest.raises(BadInput):
             add(anna, b"model", wrong=fact)
     assert anna.models.list() == []

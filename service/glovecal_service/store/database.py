@@ -9,17 +9,16 @@ schema changes would commit half-way.
 
 from __future__ import annotations
 
-import json
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from sqlalchemy import Connection, Engine, create_engine, event, make_url
 from sqlalchemy.exc import (
     ArgumentError,
     DatabaseError,
+    DataError,
     InterfaceError,
     NoSuchModuleError,
     OperationalError,
@@ -28,6 +27,7 @@ from sqlalchemy.exc import (
 
 from glovecal_models.errors import BadInput
 from glovecal_service.store.errors import StorageFull, StoreDamaged, StoreUnavailable
+from glovecal_service.store.json_text import json_text
 
 BUSY_TIMEOUT_MS = 5000
 
@@ -68,9 +68,13 @@ class Database:
             yield
         except DatabaseError as error:
             raise _meaning(error, self) from error
+        except UnicodeEncodeError as error:
+            raise BadInput(f"{error.object!r} is not text that can be stored") from error
         except InterfaceError as error:
             raise StoreUnavailable(f"the database {self.name} cannot be used: {error.orig}") from error
         except StatementError as error:
+            if isinstance(error.orig, BadInput):
+                raise error.orig from None
             if isinstance(error.orig, ValueError | TypeError | UnicodeError):
                 raise BadInput(f"a value cannot be stored: {error.orig}") from error
             raise
@@ -88,7 +92,7 @@ def _engine(url: str) -> Engine:
             parsed = parsed.set(drivername="postgresql+psycopg")
         if parsed.drivername not in ("sqlite", "sqlite+pysqlite", "postgresql+psycopg"):
             raise ArgumentError(f"driver {parsed.drivername!r} is not supported")
-        engine = create_engine(parsed, pool_pre_ping=True, json_serializer=_json, max_overflow=40)
+        engine = create_engine(parsed, pool_pre_ping=True, json_serializer=json_text, max_overflow=40)
     except (ArgumentError, NoSuchModuleError, ModuleNotFoundError) as error:
         raise BadInput(
             f"GLOVECAL_DATABASE: {error}; use sqlite:///FILE or postgresql+psycopg://USER@HOST/DATABASE"
@@ -97,10 +101,6 @@ def _engine(url: str) -> Engine:
         event.listen(engine, "connect", _configure_sqlite)
         event.listen(engine, "begin", _begin_sqlite)
     return engine
-
-
-def _json(value: Any) -> str:
-    return json.dumps(value, allow_nan=False, separators=(",", ":"))
 
 
 def _configure_sqlite(connection: sqlite3.Connection, _record: object) -> None:
@@ -122,6 +122,8 @@ def _meaning(error: DatabaseError, database: Database) -> Exception:
     text = str(error.orig)
     if "disk is full" in text or getattr(error.orig, "sqlstate", None) == "53100":
         return StorageFull(f"no room left for the database {name}; nothing was changed: free some disk space")
+    if isinstance(error, DataError):
+        return BadInput(f"a value cannot be stored: {text.strip()}")
     if "malformed" in text or "not a database" in text:
         return StoreDamaged(f"the database {name} is damaged ({text}); restore a backup of it")
     if isinstance(error, OperationalError):

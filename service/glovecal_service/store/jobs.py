@@ -102,7 +102,7 @@ class Jobs:
         """Say how far the job is (0..1) and what happened. Raises Conflict if the attempt is over."""
         values: dict[str, Any] = {
             "fraction": min(max(float(fraction), 0.0), 1.0),
-            "sentence": sentence[:LONGEST_SENTENCE],
+            "sentence": _plain(sentence),
             "lease_until": self._clock() + LEASE_S,
             "detail": dict(detail or {}),
         }
@@ -116,7 +116,7 @@ class Jobs:
 
     def fail(self, id: str, attempt: int, error: str) -> JobRecord:
         """The job cannot be done; ``error`` is a sentence for the user. Raises Conflict."""
-        return self._end(id, attempt, "failed", error, error=error[:LONGEST_SENTENCE])
+        return self._end(id, attempt, "failed", error, error=_plain(error))
 
     def cancelled(self, id: str, attempt: int) -> JobRecord:
         """The job was stopped as requested. Raises Conflict if the attempt is over."""
@@ -185,7 +185,7 @@ class Jobs:
         at: datetime = now()
         ended = {
             "state": state,
-            "sentence": sentence[:LONGEST_SENTENCE],
+            "sentence": _plain(sentence),
             "finished_at": at,
             "lease_until": None,
         }
@@ -211,6 +211,11 @@ class Jobs:
             connection.execute(update(table).where(mine).values(**_after_loss(row), updated_at=now()))
             _noted(connection, row.id)
         return len(rows)
+
+
+def _plain(sentence: str) -> str:
+    """Text that both databases can keep, whatever an exception's message holds."""
+    return sentence.encode("utf-8", "replace").decode().replace("\0", "")[:LONGEST_SENTENCE]
 
 
 def _after_loss(row: Row) -> dict[str, Any]:

@@ -7,18 +7,18 @@ decide which model speaks for a person carry a hash of their own, checked at eac
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
 from glovecal_service.store.errors import StoreDamaged
+from glovecal_service.store.json_text import json_text
 
 
 def row_hash(table: str, values: Mapping[str, Any]) -> str:
     """sha256 hex of the canonical JSON of ``values`` (column names sorted, ``row_sha256`` left out)."""
     content = {name: _plain(value) for name, value in values.items() if name != "row_sha256"}
-    text = json.dumps([table, content], sort_keys=True, allow_nan=False, separators=(",", ":"))
+    text = json_text([table, content], sort_keys=True)
     return hashlib.sha256(text.encode("ascii")).hexdigest()
 
 

@@ -79,6 +79,7 @@ def _record(row: Row) -> SubjectRecord:
 def _dimensions(subject: str, dimensions: Mapping[str, float]) -> dict[str, float]:
     for name, value in dimensions.items():
         check_channel_name(name, f"dimension of subject {subject!r}")
-        if not isinstance(value, int | float) or not math.isfinite(value) or value <= 0:
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or not math.isfinite(value) or value <= 0:
             raise BadInput(f"dimension {name} of subject {subject!r} is {value!r}; give millimetres above 0")
     return {name: float(value) for name, value in dimensions.items()}

@@ -1,0 +1,125 @@
+"""Training as a job: the same model as in one process, its error, its sentences, its refusals."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from jobs_waiting import result_of, wait_for_job
+from stored_takes import LAYOUT, make_take
+
+from glovecal_models.calibration.artifact import dump, load, model_id
+from glovecal_models.calibration.training import train
+from glovecal_models.calibration.training_settings import TrainingSettings
+
+QUICK = {"samples": 120, "folds": 2}
+
+
+@pytest.fixture(scope="module")
+def trained(dispatched):
+    """A store with a subject of three takes; its jobs are run."""
+    store, _ = dispatched
+    store.subjects.create("anna")
+    store.subjects.create("ben")
+    store.layouts.put(LAYOUT)
+    for seed in range(3):
+        store.takes.add(make_take(seed), subject="anna", layout=LAYOUT.name, source="import")
+    store.takes.add(make_take(9, measured=False), subject="anna", layout=LAYOUT.name, source="recording")
+    return store
+
+
+def create(store, **payload):
+    return store.jobs.create("train", {"subject": "anna", "layout": LAYOUT.name, **QUICK, **payload}).id
+
+
+@pytest.mark.parametrize("method", ["linear", "lmc_gpr"])
+def test_workers_train_the_model_that_one_process_trains(trained, method):
+    result = result_of(trained, create(trained, method=method, activate=True))
+    records = [take for take in trained.takes.list("anna") if take.has_reference]
+    alone = train(
+        [trained.takes.load(record.id) for record in records],
+        LAYOUT,
+        "anna",
+        TrainingSettings(method=method, samples=120, folds=2),
+        take_hashes=[record.artifact for record in records],
+    )
+    assert result["model"] == model_id(dump(alone))
+    assert result["held_out_rmse_deg"] == pytest.approx(alone.error_estimate["rmse_deg"])
+    assert result["per_rotation"]["I_DIP"] is None
+    model = trained.models.active("anna", LAYOUT.name)
+    assert (model.id, model.method) == (result["model"], method)
+    assert [take["id"] for take in model.facts["takes"]] == [record.id for record in records]
+    assert load(trained.models.load_bytes(model.id)).simulated
+
+
+def test_training_again_gives_the_same_model_at_once(trained):
+    first = result_of(trained, create(trained, method="lmc_gpr"))
+    again = create(trained, method="lmc_gpr")
+    assert result_of(trained, again)["model"] == first["model"]
+    sentences = [event.sentence for event in trained.jobs.events(again)]
+    assert "9 fits to do, 9 of them known already" in sentences
+
+
+def test_progress_tells_each_rotation_and_its_error(trained):
+    id = create(trained, method="linear", samples=100)
+    wait_for_job(trained, id)
+    fitted = [event for event in trained.jobs.events(id) if " fitted, " in event.sentence]
+    assert [event.detail["rotation"] for event in fitted] == ["I_MCP", "I_PIP", "IM_ABD"]
+    for event in fitted:
+        assert f"{event.detail['held_out_rmse_deg']:.2f} degrees on held-out takes" in event.sentence
+
+
+def test_a_child_names_its_parent(trained):
+    parent = result_of(trained, create(trained, method="linear"))["model"]
+    child = result_of(trained, create(trained, method="linear", samples=90, parent=parent[:8]))["model"]
+    assert [model.id for model in trained.models.lineage(child)] == [child, parent]
+
+
+@pytest.mark.parametrize(
+    ("payload", "sentence"),
+    [
+        ({"subject": "ben"}, "subject 'ben' has no take with reference angles for layout 'two-fingers'"),
+        ({"subject": "carl"}, "there is no subject 'carl'"),
+        ({"layout": "knitted"}, "there is no layout 'knitted'"),
+        ({"subject": None}, "training needs 'subject' as text, not None"),
+        ({"takes": ["000000000000"]}, "there is no take '000000000000'"),
+        ({"takes": []}, "takes must be a list of take ids or null, not []"),
+        ({"takes": "all"}, "takes must be a list of take ids or null, not 'all'"),
+        ({"method": "magic"}, "unknown method 'magic'"),
+        ({"samples": -1}, "samples must be a whole number, not -1"),
+        ({"pseudo_inputs": "many"}, "pseudo_inputs must be a whole number"),
+        ({"colour": "red"}, "training does not know 'colour'"),
+        ({"parent": "abcdef"}, "there is no model 'abcdef'"),
+    ],
+)
+def test_what_cannot_be_trained_fails_with_a_sentence(trained, payload, sentence):
+    job = wait_for_job(trained, create(trained, **{"method": "linear", **payload}))
+    assert job.state == "failed"
+    assert sentence in job.error
+
+
+def test_takes_that_cannot_carry_a_model_are_named(trained):
+    still = make_take(20)
+    still = dataclasses.replace(still, reference=np.full_like(still.reference, 10.0))
+    mute = trained.takes.add(
+        make_take(21, measured=False), subject="anna", layout=LAYOUT.name, source="import"
+    )
+    stiff = trained.takes.add(still, subject="ben", layout=LAYOUT.name, source="import")
+    of_ben = wait_for_job(trained, create(trained, takes=[stiff.id]))
+    assert of_ben.error == f"take {stiff.id} is of subject 'ben', not of 'anna'"
+    never_moves = wait_for_job(trained, create(trained, subject="ben", method="linear"))
+    assert never_moves.state == "failed"
+    assert "I_MCP" in never_moves.error or "constant" in never_moves.error
+    nothing = wait_for_job(trained, create(trained, takes=[mute.id], method="linear"))
+    assert "no reference angle for any rotation" in nothing.error
+    other = wait_for_job(trained, create(trained, layout="cyberglove18", takes=[mute.id], method="linear"))
+    assert "has no sensor 'T_TMC'" in other.error
+
+
+def test_a_damaged_take_is_named(trained, dispatched):
+    take = trained.takes.add(make_take(30), subject="ben", layout=LAYOUT.name, source="import")
+    path = trained.artifacts._blobs._folder / take.artifact
+    content = path.read_bytes()
+    path.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
+    job = wait_for_job(trained, create(trained, subject="ben", takes=[take.id]))
+    assert f"artifact {take.artifact}" in job.error
+    assert "is damaged" in job.error

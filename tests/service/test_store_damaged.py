@@ -1,0 +1,107 @@
+"""Full disks and damaged databases: said by name, nothing half written, reading goes on."""
+
+import os
+import shutil
+import subprocess
+from contextlib import closing
+
+import pytest
+from stored_takes import LAYOUT, make_take
+
+from glovecal_service.settings import Settings
+from glovecal_service.store import Store
+from glovecal_service.store.errors import StorageFull, StoreDamaged, StoreError
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A disk of 3 MB: a tmpfs mount, for which one must be root on Linux."""
+    folder = tmp_path / "small"
+    folder.mkdir()
+    mount = shutil.which("mount")
+    command = [mount or "mount", "-t", "tmpfs", "-o", "size=3m", "glovecal-test", str(folder)]
+    if mount is None or subprocess.run(command, capture_output=True, check=False).returncode:
+        if os.environ.get("GLOVECAL_REQUIRE_EVERYTHING") == "1":
+            pytest.fail("a small tmpfs cannot be mounted here; run as root on Linux")
+        pytest.skip("a small tmpfs cannot be mounted here; run as root on Linux")
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+def test_a_full_disk_is_said_and_survived(small_disk):
+    filler = small_disk / "filler"
+    with Store.open(Settings(data=small_disk / "data", database=None, artifacts=None)) as store:
+        store.subjects.create("anna")
+        kept = store.takes.add(make_take(0), subject="anna", layout=LAYOUT.name, source="import")
+        with pytest.raises(StorageFull, match="no room left in"):
+            store.takes.add(make_take(1, frames=40_000), subject="anna", layout=LAYOUT.name, source="import")
+        with filler.open("wb") as file, pytest.raises(OSError, match="No space"):
+            while file.write(b"\0" * 4096):
+                file.flush()
+        with pytest.raises(StorageFull):
+            for number in range(1000):
+                store.subjects.create(f"s{number}")
+        with pytest.raises(StorageFull):
+            store.models.add(b"x" * 9000, subject="anna", layout="a", method="linear", parent=None, facts={})
+        assert store.takes.list() == [kept]
+        assert len(store.takes.load(kept.id).time_s) == 300
+        files = [path.name for path in (small_disk / "data" / "artifacts").iterdir()]
+        assert files == [kept.artifact]
+        filler.unlink()
+        assert store.subjects.create("ben").name == "ben"
+        store.takes.add(make_take(2), subject="anna", layout=LAYOUT.name, source="import")
+        with store.database.read() as connection:
+            assert connection.exec_driver_sql("PRAGMA integrity_check").scalar() == "ok"
+
+
+def test_a_file_that_is_no_database_is_named(sqlite_settings):
+    Store.open(sqlite_settings).close()
+    file = sqlite_settings.data / "glovecal.sqlite3"
+    for suffix in ("-wal", "-shm"):
+        file.with_name(file.name + suffix).unlink(missing_ok=True)
+    file.write_bytes(b"not a database, but a letter" * 100)
+    with pytest.raises(StoreDamaged, match=r"glovecal\.sqlite3 is damaged .* restore a backup"):
+        Store.open(sqlite_settings)
+
+
+def test_no_overwritten_bytes_make_another_model_active(sqlite_settings):
+    """Every occurrence of the active model's id in the file is changed, one at a time."""
+    import sqlite3
+
+    with Store.open(sqlite_settings) as store:
+        store.subjects.create("anna")
+        model = store.models.add(
+            b"m",
+            subject="anna",
+            layout="glove",
+            method="linear",
+            parent=None,
+            facts={"held_out_rmse_deg": 2.5},
+        )
+        store.models.activate(model.id)
+    file = sqlite_settings.data / "glovecal.sqlite3"
+    with closing(sqlite3.connect(file)) as connection:
+        connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    whole = file.read_bytes()
+    targets = (model.id.encode(), b"2.5", b"anna", b"linear")
+    places = [place for target in targets for place in _occurrences(whole, target)]
+    assert len(places) >= 8
+    for place in places:
+        file.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        try:
+            with Store.open(sqlite_settings) as store:
+                found = store.models.active("anna", "glove")
+        except StoreError:
+            continue
+        assert found is None or found == model, f"byte {place} changed the answer"
+    file.write_bytes(whole)
+    with Store.open(sqlite_settings) as store:
+        assert store.models.active("anna", "glove") == model
+
+
+def _occurrences(content: bytes, wanted: bytes) -> list[int]:
+    found, place = [], content.find(wanted)
+    while place >= 0:
+        found.append(place)
+        place = content.find(wanted, place + 1)
+    return found

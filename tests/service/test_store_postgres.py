@@ -1,0 +1,79 @@
+"""PostgreSQL killed under writes: nothing acknowledged is lost, the store goes on by itself afterwards."""
+
+import os
+import signal
+import threading
+from pathlib import Path
+
+import pytest
+from jobs_waiting import wait_for
+from postgres_server import PostgresServer, find_programs
+
+from glovecal_models.errors import BadInput
+from glovecal_service.jobs.dispatcher import Dispatcher
+from glovecal_service.store import Store
+from glovecal_service.store.database import Database
+from glovecal_service.store.errors import StoreUnavailable
+
+pytestmark = pytest.mark.needs_postgres
+
+
+@pytest.fixture
+def own_postgres(postgres):
+    """A server of this test alone: it will be killed."""
+    programs = find_programs()
+    assert programs is not None
+    server = PostgresServer(programs)
+    yield server
+    server.remove()
+
+
+def test_nothing_acknowledged_is_lost_when_the_server_is_killed(own_postgres, sqlite_settings):
+    settings = sqlite_settings.model_copy(update={"database": own_postgres.new_database()})
+    with Store.open(settings) as store, Dispatcher(store, settings):
+        acknowledged, refused, stop = [], [], threading.Event()
+
+        def write() -> None:
+            number = 0
+            while not stop.is_set():
+                number += 1
+                try:
+                    acknowledged.append(store.subjects.create(f"s{number}").name)
+                except StoreUnavailable:
+                    refused.append(number)
+                    stop.wait(0.05)
+
+        writer = threading.Thread(target=write)
+        writer.start()
+        wait_for(lambda: len(acknowledged) >= 20)
+        postmaster = int((own_postgres.folder / "data" / "postmaster.pid").read_text().split()[0])
+        os.kill(postmaster, signal.SIGKILL)
+        wait_for(lambda: refused)
+        wait_for(lambda: not _alive(postmaster))
+        before = len(acknowledged)
+        own_postgres.start()
+        wait_for(lambda: len(acknowledged) >= before + 5)
+        stop.set()
+        writer.join()
+        assert set(acknowledged) <= {record.name for record in store.subjects.list()}
+        job = store.jobs.create("knit", {})
+        wait_for(lambda: store.jobs.get(job.id).state == "failed")
+
+
+def test_a_server_that_is_not_there_is_named_without_its_password(tmp_path):
+    database = Database(f"postgresql://anna:secret@/x?host={tmp_path}")
+    with pytest.raises(StoreUnavailable) as raised, database.read():
+        pass
+    assert "secret" not in str(raised.value)
+    database.close()
+    for url in ("mysql://x", "not a url", "sqlite+aiosqlite:///x"):
+        with pytest.raises(BadInput, match="GLOVECAL_DATABASE"):
+            Database(url)
+
+
+def _alive(pid: int) -> bool:
+    status = Path(f"/proc/{pid}/stat")
+    try:
+        return status.read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
