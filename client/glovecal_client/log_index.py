@@ -7,7 +7,7 @@ import threading
 from pathlib import Path
 
 from glovecal_client.log_records import Recording, scan_records
-from glovecal_client.wire.frame import decode_frame
+from glovecal_client.wire.frame import frame_sequence
 
 _EVERY = 64
 """One entry for so many records: 8 hours at 120 Hz need less than 1 MB."""
@@ -29,11 +29,11 @@ class LogIndex:
         """Highest sequence number in the log as of the last ``extend``."""
 
     def extend(self) -> None:
-        """Take in the records written since the last call. Raises WireError for a record that is no frame."""
+        """Take in the records written since the last call. Raises OSError."""
         with self._lock, self._recording.path.open("rb") as file:
             start = self._end
             for end, payload in scan_records(file, self._end):
-                self._add(decode_frame(payload).sequence, start)
+                self._add(frame_sequence(payload), start)
                 start = self._end = end
 
     def _add(self, sequence: int, offset: int) -> None:
@@ -55,7 +55,7 @@ class LogIndex:
         total = 0
         with self._recording.path.open("rb") as file:
             for _, payload in scan_records(file, offset):
-                sequence = decode_frame(payload).sequence
+                sequence = frame_sequence(payload)
                 total += len(payload) if sequence >= first else 0
                 if sequence > last or len(found) >= max_count or total > max_bytes:
                     break

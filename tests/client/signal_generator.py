@@ -31,13 +31,16 @@ class SignalGenerator:
     simulated = True
     counts = (0.0, 4095.0)
 
-    def __init__(self, rate_hz: float = 200.0, frames: int | None = None) -> None:
+    def __init__(
+        self, rate_hz: float = 200.0, frames: int | None = None, silent_after: int | None = None
+    ) -> None:
         self.rate_hz = rate_hz
         self.unplugged = threading.Event()
         self.instead: deque[Callable[[], Reading] | BaseException] = deque()
         self.opened = 0
         self.given = 0
         self._frames = frames
+        self._silent_after = silent_after
         self._due = 0.0
 
     @classmethod
@@ -58,6 +61,9 @@ class SignalGenerator:
             raise DeviceLost("signal generator: unplugged")
         if self._frames is not None and self.given >= self._frames:
             raise DeviceFinished("signal generator: done")
+        if self._silent_after is not None and self.given >= self._silent_after:
+            time.sleep(timeout_s)
+            return None
         self._due += 1 / self.rate_hz
         time.sleep(min(max(0.0, self._due - time.monotonic()), timeout_s))
         if self.instead:

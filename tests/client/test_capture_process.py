@@ -168,6 +168,37 @@ def test_frozen_router_does_not_hold_up_the_recording(recording: Path, tmp_path:
         router.communicate()
 
 
+def test_glove_of_a_frozen_capture_is_free_as_soon_as_that_is_dead(recording: Path, tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    with open_router([endpoint]) as router:
+        heard = Heard(router)
+        with capture_process(recording, endpoint, tmp_path / "a") as frozen:
+            eventually(lambda: heard.frames, "frames of the first")
+            frozen.send_signal(signal.SIGSTOP)
+            with capture_process(recording, endpoint, tmp_path / "b") as second:
+                eventually(lambda: logs(tmp_path / "b"), "the second has started")
+                assert {frame.run_id for frame in heard.frames} == {heard.frames[0].run_id}
+                frozen.kill()
+                eventually(lambda: heard.frames[-1].run_id != heard.frames[0].run_id, "it publishes")
+                second.terminate()
+                second.communicate(timeout=20)
+                assert second.returncode == 0
+
+
+def test_closed_terminal_does_not_end_the_recording(recording: Path, tmp_path: Path) -> None:
+    with capture_process(recording, free_endpoint(), tmp_path / "data") as process:
+        assert process.stderr is not None
+        process.stderr.readline()
+        process.stderr.close()
+        process.stderr = None
+        (log,) = eventually(lambda: logs(tmp_path / "data"), "a recording")
+        eventually(lambda: len(sequences(log)) > 300, "frames")
+        process.terminate()
+        output, _ = process.communicate(timeout=20)
+    assert process.returncode == 0
+    assert " 0 readings refused" in output
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [

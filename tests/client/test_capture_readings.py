@@ -9,7 +9,7 @@ import pytest
 from loopback import eventually
 from signal_generator import SignalGenerator, values_of
 
-from glovecal_client.capture.device import Device, Reading, build_device, device_names
+from glovecal_client.capture.device import Device, Reading, build_device, check_description, device_names
 from glovecal_client.capture.reading_check import ReadingCheck
 from glovecal_client.capture.reopening_device import ReopeningDevice
 from glovecal_client.errors import DeviceError, DeviceFinished, DeviceLost, UnknownDevice
@@ -58,6 +58,39 @@ def test_time_must_go_forward_and_not_lie_in_the_future() -> None:
     future = device.reading(2, monotonic_ns=time.monotonic_ns() + 10**13)
     assert "in the future" in str(checking.fault(future))
     assert checking.fault(device.reading(3)) is None
+
+
+@pytest.mark.parametrize(
+    ("reading", "sentence"),
+    [
+        (Reading(np.array(["a", "b", "c", "d"]), 1, 1), "no numbers"),
+        (Reading(np.array([1e300, 0, 0, 0]), 1, 1, context=np.zeros(1)), "sensor A reads inf"),
+        (Reading(values_of(0), 1.5, 1, context=np.zeros(1)), "its time 1.5"),  # type: ignore[arg-type]
+        (Reading(values_of(0), 1, 1 << 63, context=np.zeros(1)), "whole number of nanoseconds"),
+    ],
+)
+def test_what_a_careless_driver_may_give_is_refused(reading: Reading, sentence: str) -> None:
+    assert sentence in str(check()[1].fault(reading))
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"sensors": ()}, "0 sensors"),
+        ({"sensors": ("A", "A")}, "more than once"),
+        ({"sensors": ("A", "supply_v")}, "more than once"),
+        ({"sensors": ("A B",)}, "not a channel name"),
+        ({"sensors": tuple(f"S{i}" for i in range(1025))}, "1025 sensors"),
+        ({"rate_hz": float("nan")}, "rate of nan"),
+        ({"rate_hz": 0.0}, "rate of 0"),
+    ],
+)
+def test_devices_that_describe_themselves_badly_are_refused(change: dict, sentence: str) -> None:
+    device = SignalGenerator()
+    for name, value in change.items():
+        setattr(device, name, value)
+    with pytest.raises(DeviceError, match=sentence):
+        check_description(device)
 
 
 def test_lost_device_is_opened_again_with_growing_pauses() -> None:

@@ -140,6 +140,13 @@ def test_bad_options_are_refused(tmp_path: Path, device: str, options: dict, sen
         build_device(device.format(table=table(tmp_path)), options)
 
 
+def test_table_that_is_not_utf8_is_refused(tmp_path: Path) -> None:
+    path = table(tmp_path)
+    path.write_bytes(TABLE.encode() + b"0.02,\xff,1,2,,\n" * 2)
+    with pytest.raises(BadOption, match="utf-8"):
+        ReplayDevice(path)
+
+
 def test_bad_log_header_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "run.glvlog"
     FrameLog.create(path, {"sensors": "A"}).close()

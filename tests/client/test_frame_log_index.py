@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from glovecal_client import Frame, FrameLog, decode_frame, encode_frame
-from glovecal_client.log_index import LogIndex
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from glovecal_client import Frame, FrameLog, decode_frame, encode_frame
+from glovecal_client.log_index import LogIndex
 
 NO_BOUND = 1 << 30
 

@@ -8,7 +8,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings, CaptureSummary
@@ -87,13 +87,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 endpoints=asked.connect or [os.environ.get("GLOVECAL_ZENOH", DEFAULT_ENDPOINT)],
                 data=asked.data,
                 stop=stop,
-                report=lambda sentence: print(sentence, file=sys.stderr, flush=True),
+                report=_tell,
             )
     except ClientError as error:
         print(f"glovecal-capture: {error}", file=sys.stderr)
         return 1
     print(summary)
     return 0
+
+
+def _tell(sentence: str) -> None:
+    """To standard error, if there still is one: a closed terminal must not end a recording."""
+    with suppress(OSError, ValueError):
+        print(sentence, file=sys.stderr, flush=True)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -6,6 +6,7 @@ can ask the log. Each start is a new run with a random run id and sequence numbe
 
 from __future__ import annotations
 
+import contextlib
 import json
 import secrets
 import threading
@@ -16,7 +17,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from glovecal_client.capture.device import Device, Reading
+from glovecal_client.capture.device import Device, Reading, check_description
 from glovecal_client.capture.link import CaptureLink, LinkSources
 from glovecal_client.capture.log_folder import LogFolder
 from glovecal_client.capture.log_queries import LogQueries
@@ -68,6 +69,8 @@ class CaptureDaemon:
     """One run. ``run`` returns when ``stop`` is set or the device has no more to give."""
 
     def __init__(self, device: Device, settings: CaptureSettings, report: Callable[[str], None]) -> None:
+        """Raises DeviceError for a device whose description cannot be."""
+        check_description(device)
         self._device = device
         self._settings = settings
         self._report = report
@@ -96,7 +99,7 @@ class CaptureDaemon:
         reopening = ReopeningDevice(self._device)
         syncing = BackgroundSync(self._log)
         try:
-            self._link.start()
+            self._link.start(stop.is_set)
             self._capture(reopening, stop)
         finally:
             reopening.close()
@@ -136,6 +139,8 @@ class CaptureDaemon:
             self._report(f"{self._refusal} ({self._status.bad_frames} refused so far)")
             self._refusal = None
         self._link.publish_status()
+        with contextlib.suppress(OSError):  # a disk that fails shows in the log's own problem
+            self._index.extend()
 
     def _note_opening(self, device: ReopeningDevice) -> None:
         if device.is_open and self._status.state != "streaming":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import metadata
@@ -10,7 +11,9 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from glovecal_client.errors import DeviceError, UnknownDevice
+from glovecal_client.errors import BadName, DeviceError, UnknownDevice
+from glovecal_client.names import check_channel_name
+from glovecal_client.wire.frame import MAX_CONTEXT, MAX_SENSORS
 
 DEVICE_GROUP = "glovecal.devices"
 
@@ -88,6 +91,25 @@ class Device(Protocol):
     def read(self, timeout_s: float) -> Reading | None:
         """The next reading, or None if there was none in time. Raises DeviceLost, DeviceFinished."""
         ...
+
+
+def check_description(device: Device) -> None:
+    """Raise DeviceError if what a device says about itself cannot be: names, numbers, its rate."""
+    names = (*device.sensors, *device.context)
+    try:
+        for name in names:
+            check_channel_name(name, f"device {device.name!r}")
+    except BadName as error:
+        raise DeviceError(str(error)) from error
+    if not 1 <= len(device.sensors) <= MAX_SENSORS or len(device.context) > MAX_CONTEXT:
+        raise DeviceError(
+            f"device {device.name!r} has {len(device.sensors)} sensors and {len(device.context)} context "
+            f"values; allowed are 1 to {MAX_SENSORS} and 0 to {MAX_CONTEXT}"
+        )
+    if len(set(names)) != len(names):
+        raise DeviceError(f"device {device.name!r} names a sensor or context value more than once")
+    if not 0 < device.rate_hz < math.inf:
+        raise DeviceError(f"device {device.name!r} states a rate of {device.rate_hz} Hz")
 
 
 def device_names() -> list[str]:

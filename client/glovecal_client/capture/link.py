@@ -52,6 +52,8 @@ class CaptureLink:
         self._report = report
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
+        self._stopped: Callable[[], bool] = self._stop.is_set
+        self._put_problem: str | None = None
         self._open = ExitStack()
         self._frames: zenoh.Publisher | None = None
         self._documents: dict[str, zenoh.Publisher] = {}
@@ -61,8 +63,12 @@ class CaptureLink:
         """Whether frames go out."""
         return self._frames is not None
 
-    def start(self) -> None:
-        """Try once now; without a router go on trying in a thread. Raises CaptureRefused."""
+    def start(self, stopped: Callable[[], bool]) -> None:
+        """Try once now; without a router go on trying in a thread. Raises CaptureRefused.
+
+        ``stopped`` ends the waiting for another publisher's token to go.
+        """
+        self._stopped = stopped
         try:
             self._connect(wait_s=0.0)
         except NoAnswer as error:
@@ -85,14 +91,17 @@ class CaptureLink:
     def _connect(self, wait_s: float | None) -> None:
         with ExitStack() as opened:
             session = opened.enter_context(
-                open_client(self._endpoints, wait_s=wait_s, cancelled=self._stop.is_set)
+                open_client(self._endpoints, wait_s=wait_s, cancelled=self._is_stopping)
             )
-            other = other_publisher(session, self._keys, self._stop.is_set)
+            other = other_publisher(session, self._keys, self._is_stopping)
             if other is not None:
                 raise CaptureRefused(other)
             self._declare(session, opened)
             self._open = opened.pop_all()
         self._report(f"publishing to {self._keys.raw}")
+
+    def _is_stopping(self) -> bool:
+        return self._stop.is_set() or self._stopped()
 
     def _declare(self, session: zenoh.Session, opened: ExitStack) -> None:
         keys = self._keys
@@ -117,8 +126,7 @@ class CaptureLink:
 
     def publish(self, message: bytes) -> None:
         """Send one frame, or nothing while there is no router. Never blocks, never raises for the wire."""
-        if self._frames is not None:
-            self._frames.put(message)
+        self._put(self._frames, message)
 
     def publish_status(self) -> None:
         """Send the status of this moment."""
@@ -129,9 +137,21 @@ class CaptureLink:
         self._publish_document(self._keys.meta, self._sources.meta)
 
     def _publish_document(self, key: str, text: Callable[[], str]) -> None:
-        publisher = self._documents.get(key)
-        if publisher is not None:
-            publisher.put(text())
+        if key in self._documents:
+            self._put(self._documents[key], text())
+
+    def _put(self, publisher: zenoh.Publisher | None, payload: bytes | str) -> None:
+        """Put; a failure is told once, not once a frame."""
+        if publisher is None:
+            return
+        problem = None
+        try:
+            publisher.put(payload)
+        except zenoh.ZError as error:
+            problem = f"publishing fails: {error}"
+        if problem != self._put_problem:
+            self._put_problem = problem
+            self._report(problem or "publishing works again")
 
     def close(self) -> None:
         """Stop trying, close the session. What was put before is still sent."""

@@ -42,15 +42,21 @@ class LogFolder:
         self._lock.close()
 
     def repair(self, report: Callable[[str], None]) -> None:
-        """Cut damaged tails off the logs of earlier runs and tell each to ``report``."""
-        for path in sorted(self.path.glob(f"*{SUFFIX}")):
-            try:
-                cut = cut_damaged_tail(path)
-            except (DamagedLog, OSError) as error:
-                report(f"earlier recording left as it is: {error}")
-            else:
-                if cut:
-                    report(f"earlier recording {path.name}: {cut} damaged bytes moved to {path.name}.cut")
+        """Cut a damaged tail off the log of the last run and tell it to ``report``.
+
+        Earlier logs were looked at when the run after them started, and are not touched again.
+        """
+        logs = list(self.path.glob(f"*{SUFFIX}"))
+        if not logs:
+            return
+        path = max(logs, key=lambda log: log.stat().st_mtime_ns)
+        try:
+            cut = cut_damaged_tail(path)
+        except (DamagedLog, OSError) as error:
+            report(f"earlier recording left as it is: {error}")
+        else:
+            if cut:
+                report(f"earlier recording {path.name}: {cut} damaged bytes moved to {path.name}.cut")
 
     def create(self, run_id: int, meta: Mapping[str, Any]) -> FrameLog:
         """The log of a new run. Raises CaptureRefused if it cannot be written."""

@@ -32,7 +32,10 @@ class ReadingCheck:
         return fault
 
     def _values_fault(self, reading: Reading) -> str | None:
-        readings, context = np.asarray(reading.readings), np.asarray(reading.context)
+        try:
+            readings, context = _as_sent(reading.readings), _as_sent(reading.context)
+        except (TypeError, ValueError) as error:
+            return f"its values are no numbers: {error}"
         if readings.shape != (len(self._sensors),):
             return f"{_size(readings)} sensor values instead of {len(self._sensors)}"
         if context.shape != (len(self._context),):
@@ -56,12 +59,21 @@ class ReadingCheck:
         return f"sensor {self._sensors[column]} reads {readings[column]:g}, outside {low:g} to {high:g}"
 
     def _time_fault(self, reading: Reading) -> str | None:
+        for stamp in (reading.monotonic_ns, reading.wall_ns):
+            if not isinstance(stamp, int) or not -(1 << 63) <= stamp < 1 << 63:
+                return f"its time {stamp!r} is not a whole number of nanoseconds"
         if self._last_ns is not None and reading.monotonic_ns < self._last_ns:
             return f"its time is {(self._last_ns - reading.monotonic_ns) / 1e6:g} ms before the one before it"
         ahead_ns = reading.monotonic_ns - time.monotonic_ns()
         if ahead_ns > _MAX_AHEAD_NS:
             return f"its time is {ahead_ns / 1e9:g} s in the future"
         return None
+
+
+def _as_sent(values: np.ndarray) -> np.ndarray:
+    """As float32, which is what a frame holds; what is too large for it becomes infinite."""
+    with np.errstate(over="ignore"):
+        return np.asarray(values, dtype=np.float32)
 
 
 def _size(values: np.ndarray) -> str:

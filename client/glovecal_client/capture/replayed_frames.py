@@ -102,10 +102,13 @@ class _TableRecording:
     def frames(self) -> Iterator[ReplayedFrame]:
         with self._path.open(encoding="utf-8-sig", newline="") as file:
             rows = csv.reader(file)
-            next(rows)
-            for row in rows:
-                if row:
-                    yield self._frame(row, rows.line_num)
+            try:
+                next(rows)
+                for row in rows:
+                    if row:
+                        yield self._frame(row, rows.line_num)
+            except (csv.Error, UnicodeDecodeError) as error:
+                raise BadOption(f"replay of {self._path}: after line {rows.line_num}: {error}") from error
 
     def _frame(self, row: list[str], line: int) -> ReplayedFrame:
         if len(row) != len(self._header):
