@@ -26,7 +26,7 @@ from glovecal_models.simulation.simulated_take import REFERENCE_NOISE_DEG, measu
 FASTEST_HZ = 1000.0
 _FRAMES_AT_ONCE = 32
 _FREE_PART_S = 20.0
-_LATE_S = 0.25
+LATE_S = 1.0
 """A frame this late is left out, as it would be by a glove whose computer was asleep."""
 _NS = 1_000_000_000
 _Number = TypeVar("_Number", int, float)
@@ -142,7 +142,7 @@ class SimulatedDevice:
     def _next_in_time(self, frames: Iterator[_SimulatedFrame]) -> _SimulatedFrame:
         """The next frame that is not too late to be worth sending."""
         for frame in frames:
-            if time.monotonic_ns() - self._due_ns(frame) < _LATE_S * _NS:
+            if time.monotonic_ns() - self._due_ns(frame) < LATE_S * _NS:
                 return frame
         raise DeviceFinished(f"{self.name}: the motion is over")
 
