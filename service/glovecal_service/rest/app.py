@@ -23,6 +23,7 @@ from glovecal_service.rest import (
     training,
     uploads,
 )
+from glovecal_service.rest.allowed_methods import AllowedMethods
 from glovecal_service.rest.answers import install_openapi
 from glovecal_service.rest.body_guard import BodyGuard
 from glovecal_service.rest.dependencies import Parts
@@ -79,6 +80,7 @@ def create_app(
     )
     for noun in ROUTERS:
         app.include_router(noun.router, prefix=PREFIX)
+    app.state.allowed_methods = AllowedMethods(PREFIX, [noun.router for noun in ROUTERS])
     install_error_handlers(app)
     install_openapi(app, gloves.LayoutBody)
     _guard(app, settings, metrics, body_patience_s)

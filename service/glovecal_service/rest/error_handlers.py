@@ -37,6 +37,8 @@ def install_error_handlers(app: FastAPI) -> None:
 
 
 async def _answer(request: Request, error: Exception) -> Response:
+    if isinstance(error, HTTPException) and error.status_code == 405:
+        error = _method_not_allowed(request.app.state.allowed_methods(request.url.path))
     return problem_of(error).response(getattr(request.state, "request_id", None))
 
 
@@ -95,12 +97,16 @@ def _http_problem(error: HTTPException) -> Problem:
     headers = dict(error.headers or {})
     if error.status_code == 404:
         return Problem(404, "not-found", "There is nothing under this path.", headers=headers)
-    if error.status_code == 405:
-        allowed = headers.get("Allow", "none")
-        return Problem(405, "method-not-allowed", f"This path answers to {allowed} only.", headers=headers)
     if error.status_code == 400:
         return Problem(422, "invalid-request", "The body cannot be read as JSON (too deep, or not UTF-8).")
     return Problem(error.status_code, "http", str(error.detail), headers=headers)
+
+
+def _method_not_allowed(methods: Sequence[str]) -> Problem:
+    allowed = ", ".join(methods)
+    return Problem(
+        405, "method-not-allowed", f"This path answers to {allowed} only.", headers={"Allow": allowed}
+    )
 
 
 def _bad_input(error: BadInput) -> Problem:

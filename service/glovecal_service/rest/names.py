@@ -10,7 +10,7 @@ from pydantic import Field, FiniteFloat, StringConstraints
 ID = r"^[0-9a-f]{12}$"
 IDENTIFIER = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 CHANNEL = r"^[A-Za-z][A-Za-z0-9_]{0,63}$"
-ONE_LINE = r"^[^\x00-\x1f\x7f]*$"
+ONE_LINE = r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]*$"
 SHA256 = r"^[0-9a-f]{64}$"
 SHA256_PREFIX = r"^[0-9a-f]{6,64}$"
 

@@ -91,6 +91,13 @@ def test_queries_refuse(http: httpx.Client, path: str, value: str) -> None:
     assert answer.status_code == 422, answer.text
 
 
+@pytest.mark.parametrize("text", ["a\x9ab", "a\u2028b", "a\nb", "\ud800", "x" * 201])
+def test_titles_are_one_line_of_text(http: httpx.Client, text: str) -> None:
+    answer = http.post("/subjects", content=json.dumps({"name": "titled", "title": text}), headers=JSON)
+    assert answer.status_code == 422
+    assert http.get("/subjects/titled").status_code == 404
+
+
 def test_refusal_never_repeats_the_input(http: httpx.Client) -> None:
     secret = "hunter2-" * 4
     answer = http.post("/subjects", json={"name": secret + "!", "title": 7, "password": secret})
@@ -114,4 +121,4 @@ def test_unknown_paths_and_methods(http: httpx.Client) -> None:
     answer = http.patch("/subjects/anna")
     assert answer.status_code == 405
     assert answer.headers["content-type"] == "application/problem+json"
-    assert "GET" in answer.headers["allow"]
+    assert answer.headers["allow"] == "DELETE, GET"

@@ -1,0 +1,28 @@
+"""Which methods a path answers to: Starlette's own 405 names those of one route only (RFC 9110, 10.2.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from fastapi import APIRouter
+from starlette.routing import Route, compile_path
+
+
+class AllowedMethods:
+    """Called with a path, gives the methods of all routes under ``prefix`` that match it, sorted.
+
+    A route without parameters is the only one its path means: ``models/train`` is no model's id.
+    """
+
+    def __init__(self, prefix: str, routers: Iterable[APIRouter]) -> None:
+        self._routes = [
+            (compile_path(prefix + route.path)[0], frozenset(route.methods or ()))
+            for router in routers
+            for route in router.routes
+            if isinstance(route, Route)
+        ]
+
+    def __call__(self, path: str) -> list[str]:
+        found = [(pattern, methods) for pattern, methods in self._routes if pattern.match(path)]
+        literal = [item for item in found if not item[0].groups]
+        return sorted(frozenset().union(*(methods for _, methods in literal or found)))
