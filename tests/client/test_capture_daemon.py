@@ -234,7 +234,7 @@ def test_device_that_comes_to_its_end_stops_the_capture_cleanly(wire: Wire, tmp_
 def test_missed_frames_are_fetched_from_the_log(wire: Wire, tmp_path: Path) -> None:
     device = SignalGenerator(rate_hz=5000, silent_after=9000)
     with capturing(device, wire.endpoint, tmp_path) as capture:
-        eventually(lambda: ask_json(wire.session, KEYS.status)["frames"] == 9000, "9000 frames are taken")
+        eventually(lambda: wire.statuses and wire.statuses[-1]["frames"] == 9000, "9000 frames are taken")
         run_id = wire.frames[0].run_id
         frames = fetch_frames(wire.session, "lab", "g1", run_id, 10, 8999)
         assert [frame.sequence for frame in frames] == list(range(10, 9000))
