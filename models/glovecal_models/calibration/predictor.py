@@ -40,7 +40,7 @@ class GlovePredictor:
 
     def __init__(self, model: CalibrationModel) -> None:
         self.rotations = model.rotation_names
-        self._sensors = model.layout.sensors
+        self.sensors = model.layout.sensors
         measured = [
             index
             for index, item in enumerate(model.rotations)
@@ -62,12 +62,12 @@ class GlovePredictor:
         Raises BadInput on a wrong shape and on readings that are not finite.
         """
         readings = np.asarray(readings, dtype=float)
-        if readings.ndim != 2 or readings.shape[1] != len(self._sensors):
-            raise BadInput(f"readings have shape {readings.shape}, expected (N, {len(self._sensors)})")
+        if readings.ndim != 2 or readings.shape[1] != len(self.sensors):
+            raise BadInput(f"readings have shape {readings.shape}, expected (N, {len(self.sensors)})")
         if not np.isfinite(readings).all():
             frame, sensor = np.argwhere(~np.isfinite(readings))[0]
             value = readings[frame, sensor]
-            raise BadInput(f"sensor {self._sensors[sensor]} reads {value} in frame {frame}; leave it out")
+            raise BadInput(f"sensor {self.sensors[sensor]} reads {value} in frame {frame}; leave it out")
         count = len(readings)
         if count <= self._block:
             return self._predict_block(readings)

@@ -28,26 +28,30 @@ from glovecal_models.regression.multi_start import (
     FEW,
     MOST_NODES,
     SAME_OPTIMUM,
+    SCREENED,
     Candidate,
     descend,
     screen,
     search_exactly,
+    some_samples,
 )
 from glovecal_models.regression.pivoted_cholesky import PivotedCholesky, pivoted_cholesky
 from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_models.regression.profiled_likelihood import Profile
+from glovecal_models.regression.profiled_likelihood import Profile, profile
 from glovecal_models.regression.served_nodes import NodeChooser, Reference, ServedNodes
 from glovecal_models.regression.standardise import Standardised, standardise
 from glovecal_models.regression.training_check import check_samples
 
 MOST_EXACT = 4000
 """Distinct inputs up to which an N x N matrix is formed; 128 MB each at this size."""
-LARGEST_FACTOR = 1.2e7
-"""Entries of a low-rank factor: 96 MB."""
+LARGEST_FACTOR = 8e6
+"""Entries of a low-rank factor: 64 MB."""
 MEAN_ERROR_DEG, SD_ERROR_DEG = 5e-4, 1e-3
 """How closely served nodes follow the exact process at training inputs."""
 SHORT_LENGTHSCALE = 0.5
 """Standard deviations of an input. Shorter ones that also need many nodes hint at a missing input."""
+CLEAR_GAIN = 20.0
+"""Nats over the plane below which a process's shape tells nothing."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +87,7 @@ def fit_lmc_gpr(
     generator = np.random.default_rng(seed)
     say = report or (lambda sentence, fraction: None)
     say("searching from several starts", 0.0)
-    found, account = screen(standard.x, standard.y, generator, cancelled)
+    found, account = screen(samples, standard.x, standard.y, generator, cancelled)
     _stop_if(cancelled)
     say("refining the best optimum", 0.4)
     refined = _refine_best(samples, standard, found, generator, cancelled)
@@ -107,7 +111,7 @@ def _refine_best(
 ) -> Candidate:
     """Refine the most promising optimum; others too while that is cheap, which exact searches are not."""
     best = _refine(samples, standard, found[0], generator, cancelled)
-    for candidate in found[1:3]:
+    for candidate in found[1:3] if len(samples.inputs) <= MOST_EXACT or best.low_rank else ():
         _stop_if(cancelled)
         if np.abs(candidate.parameters - best.parameters).max() < SAME_OPTIMUM:
             continue
@@ -125,7 +129,10 @@ def _refine(
     generator: np.random.Generator,
     cancelled: Callable[[], bool] | None,
 ) -> Candidate:
-    """The optimum to 1e-4 nats on nodes, to 1e-3 by exact evaluations, or from 3000 of very many samples."""
+    """The optimum to 1e-4 nats on nodes, to 1e-3 by exact evaluations, or from some of very many samples.
+
+    Exact searches start from the optimum of a subset, where an evaluation costs a fifteenth.
+    """
     distinct = len(samples.inputs)
     if distinct <= FEW:
         return search_exactly(samples, rough.parameters, tolerance=1e-6, cancelled=cancelled) or rough
@@ -134,8 +141,10 @@ def _refine(
     if refined is not None:
         return refined
     if distinct > MOST_EXACT:
-        rows = generator.choice(len(standard.y), 3000, replace=False)
-        samples = MergedSamples.of(standard.x[rows], standard.y[rows])
+        samples = some_samples(standard.x, standard.y, 2000, generator)
+    if len(samples.inputs) > 2 * SCREENED:
+        subset = some_samples(standard.x, standard.y, SCREENED, generator)
+        rough = search_exactly(subset, rough.parameters, tolerance=0.05, cancelled=cancelled) or rough
     return search_exactly(samples, rough.parameters, tolerance=1e-3, cancelled=cancelled) or rough
 
 
@@ -146,7 +155,7 @@ def _examine(samples: MergedSamples, refined: Candidate) -> _Trained:
     points = samples.inputs * np.exp(-parameters[:-1])
     exact = distinct <= FEW or (not refined.low_rank and distinct <= MOST_EXACT)
     tolerance = 1e-12 if exact else float(np.clip(0.05 * rho / samples.total**2, 1e-13, 1e-8))
-    most = int(min(600 if exact else 800, distinct, LARGEST_FACTOR / distinct))
+    most = int(min(800 if refined.low_rank else 600, distinct, LARGEST_FACTOR / distinct))
     factor = pivoted_cholesky(points, tolerance, most)
     if not exact:
         fit = NystromFit(samples, factor.rows, rho)
@@ -209,6 +218,7 @@ def _evidence(
 ) -> dict[str, Any]:
     lengthscales = np.exp(trained.parameters[:-1])
     certificate = trained.certificate
+    by_plane = _nlml_of_plane(samples)
     many = not refined.low_rank and len(samples.inputs) > FEW
     collapsed = float(lengthscales.min()) < (SHORT_LENGTHSCALE if many else 0.2 * SHORT_LENGTHSCALE)
     facts: dict[str, Any] = {
@@ -223,12 +233,20 @@ def _evidence(
         "variance_nodes": int(np.count_nonzero(served.variance_root.any(axis=1))),
         "served_mean_error_deg": served.mean_error * scale_deg,
         "served_sd_error_deg": served.sd_error * scale_deg,
-        "missing_input_suspected": collapsed,
+        "nlml_of_plane": by_plane,
+        "missing_input_suspected": collapsed and trained.profile.nlml < by_plane - CLEAR_GAIN,
     }
     if certificate is not None:
         facts["nlml_lower"], facts["nlml_upper"] = float(certificate.lower), float(certificate.upper)
         facts["certificate"] = certificate.how
     return facts
+
+
+def _nlml_of_plane(samples: MergedSamples) -> float:
+    """Of the linear model alone, standardised units: the limit of all noise and no signal."""
+    basis, target = samples.columns[:, :-1], samples.columns[:, -1]
+    left = float(target @ target) - float(np.sum((basis.T @ target) ** 2)) + samples.scatter
+    return profile(np.array([[1.0, 0.0], [0.0, max(left, 0.0)]]), 0.0, samples.total).nlml
 
 
 def _stop_if(cancelled: Callable[[], bool] | None) -> None:

@@ -22,9 +22,9 @@ LONGEST_LENGTHSCALE, LARGEST_LOG_RHO, SMALLEST_LOG_RHO, SHORTEST_LENGTHSCALE = 6
 SCREENED = 800
 """Samples on which starts are compared; the best go on with all."""
 SCREENING_NODES = 200
-SUBSET = 240
+SUBSET = 200
 """Samples on which short lengthscales are tried first, exactly."""
-SAME_OPTIMUM, HOPELESS = 0.5, 5.0
+SAME_OPTIMUM, HOPELESS = 0.25, 5.0
 """Largest difference of log parameters, and nats of the screening, by which optima are told apart."""
 FEW = 260
 """With no more distinct inputs than this, exact evaluations are cheap enough for every start."""
@@ -86,11 +86,11 @@ def descend(
     dimensions = len(start) - 1
     point, evaluations, reach, nlml = start, 0, 0.8 if fine else 0.6, np.inf
     for _ in range(REBUILDS):
-        lower = np.append(point[:-1] + np.log(reach), point[-1] - (1.5 if fine else 3.0))
+        lower = np.append(point[:-1] + np.log(reach), point[-1] - (1.5 if fine else 2.5))
         lower = np.maximum(lower, lower_bounds(dimensions))
-        tolerance = (1e-6 if fine else 1e-3) * float(np.exp(lower[-1]))
+        tolerance = (3e-5 if fine else 1e-2) * float(np.exp(lower[-1]))
         likelihood = LowRankLikelihood.at(
-            samples, np.exp(lower[:-1]), float(np.clip(tolerance, 1e-12, 1e-4)), most_nodes
+            samples, np.exp(lower[:-1]), float(np.clip(tolerance, 1e-12, 1e-3)), most_nodes
         )
         if likelihood is None:
             return None
@@ -99,7 +99,7 @@ def descend(
             point,
             lower,
             upper_bounds(dimensions),
-            tolerance=1e-5 if fine else 1e-2,
+            tolerance=1e-4 if fine else 2e-2,
             evaluations=60 if fine else 40,
             cancelled=cancelled,
         )
@@ -135,6 +135,7 @@ def search_exactly(
 
 
 def screen(
+    merged: MergedSamples,
     x: np.ndarray,
     y: np.ndarray,
     generator: np.random.Generator,
@@ -142,10 +143,12 @@ def screen(
 ) -> tuple[list[Candidate], list[dict[str, object]]]:
     """Distinct optima over all starts, best first, roughly located; and a JSON-able account of every start.
 
-    ``x`` (N, D), ``y`` (N,): standardised samples, of which a random ``SCREENED`` are used.
+    ``merged``: all of the standardised samples ``x`` (N, D), ``y`` (N,). Where these have many distinct
+    inputs, a random ``SCREENED`` of them are used.
     """
     dimensions = x.shape[1]
-    samples = _some(x, y, SCREENED, generator)
+    few = len(merged.inputs) <= FEW
+    samples = merged if few else some_samples(x, y, SCREENED, generator)
     found: list[Candidate] = []
     account: list[dict[str, object]] = []
     for start in long_starts(dimensions):
@@ -156,7 +159,7 @@ def screen(
             found.append(candidate)
     found.sort(key=lambda candidate: candidate.nlml)
     if dimensions > 1 or not found:
-        subset = _some(x, y, SUBSET, generator)
+        subset = some_samples(x, y, SUBSET, generator)
         short = _short_optimum(subset, found, cancelled)
         _note(account, short_start(dimensions), short)
         if short is not None:
@@ -166,7 +169,8 @@ def screen(
     return _distinct(found), account
 
 
-def _some(x: np.ndarray, y: np.ndarray, most: int, generator: np.random.Generator) -> MergedSamples:
+def some_samples(x: np.ndarray, y: np.ndarray, most: int, generator: np.random.Generator) -> MergedSamples:
+    """A random ``most`` of the samples, or all where there are fewer."""
     if len(y) > most:
         rows = generator.choice(len(y), most, replace=False)
         x, y = x[rows], y[rows]
@@ -178,7 +182,7 @@ def _short_optimum(
 ) -> Candidate | None:
     """The optimum reached from short lengthscales, if it beats the best rival on ``subset``."""
     start = short_start(subset.inputs.shape[1])
-    short = search_exactly(subset, start, tolerance=0.05, cancelled=cancelled)
+    short = search_exactly(subset, start, tolerance=0.1, cancelled=cancelled)
     if short is None or not rivals:
         return short
     there = ExactProfiledLikelihood(subset).evaluate(rivals[0].parameters)

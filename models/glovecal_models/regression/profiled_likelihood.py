@@ -19,6 +19,8 @@ import numpy as np
 from glovecal_models.regression.lapack_routines import posv, potrf
 
 LOG_2_PI = float(np.log(2.0 * np.pi))
+SMALLEST_SCALE = 1e-20
+"""Reached only by targets that are a plane to all digits."""
 
 Derivatives = tuple[np.ndarray, np.ndarray]
 """Gradient (D + 1,) by log lengthscales and log rho, and average information (D + 1, D + 1)."""
@@ -58,7 +60,7 @@ def profile(gram: np.ndarray, log_determinant: float, total: int) -> Profile:
     if info != 0:
         plane = np.linalg.lstsq(gram[:p, :p], gram[:p, p], rcond=None)[0]
     residual = np.append(-plane, 1.0)
-    scale = max(float(residual @ gram @ residual) / total, np.finfo(float).tiny)
+    scale = max(float(residual @ gram @ residual) / total, SMALLEST_SCALE)
     nlml = 0.5 * (total * (np.log(scale) + 1.0 + LOG_2_PI) + log_determinant)
     return Profile(float(nlml), scale, plane, residual, gram)
 
