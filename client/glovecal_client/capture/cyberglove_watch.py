@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-_NUDGE_S, _SILENT_S, _UNPLUGGED_S, _GARBAGE_S = 0.2, 0.42, 0.25, 2.0
+_NUDGE_S, _SILENT_S, _UNPLUGGED_S, _GARBAGE_S = 0.2, 0.4, 0.25, 2.0
 
 
 class StreamWatch:
