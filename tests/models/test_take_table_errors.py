@@ -175,12 +175,36 @@ def test_damaged_parquet_is_refused(tmp_path):
 def test_any_bytes_are_read_or_refused_but_never_crash(tmp_path_factory, content):
     path = tmp_path_factory.mktemp("wild") / "take.csv"
     path.write_bytes(content)
+    assert_read_or_refused(path)
+
+
+def assert_read_or_refused(path) -> None:
     refused, takes = None, []
     try:
         takes = read_takes(path)
     except BadTakeTable as error:
         refused = error
     if refused is not None:
-        assert refused.file == "take.csv"
+        assert refused.file == path.name
     else:
         assert all(len(take.time_s) for take in takes)
+
+
+@pytest.fixture(scope="module")
+def good_parquet(tmp_path_factory) -> bytes:
+    path = tmp_path_factory.mktemp("parquet") / "take.parquet"
+    write_parquet(
+        path, {"time_s": np.arange(20.0), "pose": ["flat"] * 20, "s.A": np.arange(20), "r.R": np.ones(20)}
+    )
+    return path.read_bytes()
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(st.tuples(st.integers(4, 10**6), st.integers(0, 255)), min_size=1, max_size=3))
+def test_parquet_with_changed_bytes_is_read_or_refused(tmp_path_factory, good_parquet, changes):
+    content = bytearray(good_parquet)
+    for place, byte in changes:
+        content[4 + place % (len(content) - 4)] = byte
+    path = tmp_path_factory.mktemp("flipped") / "take.parquet"
+    path.write_bytes(content)
+    assert_read_or_refused(path)

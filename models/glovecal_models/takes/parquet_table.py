@@ -35,16 +35,19 @@ def load_pyarrow() -> Any:
 def read_parquet_table(path: Path) -> RawTable:
     """The whole table, every cell checked. Raises BadTakeTable with file, row, column and value."""
     pyarrow = load_pyarrow()
-    file = path.name
     try:
-        with pyarrow.parquet.ParquetFile(path) as source:
-            headers = source.schema_arrow.names
-            columns = parse_header(headers, file)
-            if source.metadata.num_rows * len(columns) > MOST_CELLS:
-                raise BadTakeTable(f"more than {MOST_CELLS} cells; divide it into several files", file=file)
-            table = source.read(use_threads=False)
-    except (pyarrow.ArrowException, OSError) as error:
-        raise BadTakeTable(f"not a readable Parquet file: {str(error)[:200]}", file=file) from error
+        return _read(pyarrow, path)
+    except (pyarrow.ArrowException, OSError, UnicodeDecodeError) as error:
+        raise BadTakeTable(f"not a readable Parquet file: {str(error)[:200]}", file=path.name) from error
+
+
+def _read(pyarrow: Any, path: Path) -> RawTable:
+    file = path.name
+    with pyarrow.parquet.ParquetFile(path) as source:
+        columns = parse_header(source.schema_arrow.names, file)
+        if source.metadata.num_rows * len(columns) > MOST_CELLS:
+            raise BadTakeTable(f"more than {MOST_CELLS} cells; divide it into several files", file=file)
+        table = source.read(use_threads=False)
     if table.num_rows == 0:
         raise BadTakeTable("no rows", file=file)
     numbers: dict[str, np.ndarray] = {}
@@ -80,10 +83,7 @@ def _texts(pyarrow: Any, column: Column, values: Any, file: str) -> list[str]:
     is_text = pyarrow.types.is_string(kind) or pyarrow.types.is_large_string(kind)
     if not (is_text or pyarrow.types.is_integer(kind) or pyarrow.types.is_null(kind)):
         raise BadTakeTable(f"holds {kind}; write text", file=file, column=column.header)
-    try:
-        texts = ["" if value is None else str(value) for value in values.to_pylist()]
-    except UnicodeDecodeError as error:
-        raise BadTakeTable("holds text that is not UTF-8", file=file, column=column.header) from error
+    texts = ["" if value is None else str(value) for value in values.to_pylist()]
     unusable = unusable_text(column, texts)
     if unusable is not None:
         index, problem = unusable
