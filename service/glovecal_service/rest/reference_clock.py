@@ -17,12 +17,12 @@ def on_take_clock(time_s: np.ndarray, clock: ReferenceClock, record: TakeRecord)
     """``time_s`` (N,) in the take's own seconds. Raises Problem 409 for a take without a wall clock."""
     if clock == "take":
         return time_s
-    start = (record.accounting or {}).get("wall_start_s")
-    if not isinstance(start, int | float):
+    offset = (record.accounting or {}).get("wall_minus_time_s")
+    if not isinstance(offset, int | float):
         raise Problem(
             409,
             "no-wall-clock",
             f"take {record.id} ({record.name!r}) does not know when it was recorded; only takes recorded by "
             "the service do. Give the reference in the take's own time_s with clock=take.",
         )
-    return time_s - float(start)
+    return time_s - float(offset)

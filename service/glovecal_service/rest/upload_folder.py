@@ -81,17 +81,16 @@ class UploadFolder:
             for number, (name, upload) in enumerate(files):
                 place = Path(folder) / str(number)
                 place.mkdir()
-                os.link(upload, place / name)
+                _link(upload, place / name)
                 named.append(place / name)
             yield named
 
     def _keep(self, temporary: Path, digest: str, size: int) -> Upload:
         path = self.folder / digest
-        if path.is_file() and path.stat().st_size == size:
-            return Upload(path, digest, size, is_new=False)
-        os.replace(temporary, path)
+        is_new = not path.exists()
+        os.replace(temporary, path)  # also over an earlier one: that may have been damaged since
         _sync_folder(self.folder)
-        return Upload(path, digest, size, is_new=True)
+        return Upload(path, digest, size, is_new)
 
 
 async def _write(path: Path, chunks: AsyncIterator[bytes]) -> tuple[str, int]:
@@ -115,6 +114,13 @@ async def _write(path: Path, chunks: AsyncIterator[bytes]) -> tuple[str, int]:
                 waiting.clear()
         await run_in_threadpool(finish)
     return digest.hexdigest(), size
+
+
+def _link(source: Path, name: Path) -> None:
+    try:
+        os.link(source, name)
+    except OSError:  # a file system without hard links
+        shutil.copyfile(source, name)
 
 
 def _sync_folder(folder: Path) -> None:

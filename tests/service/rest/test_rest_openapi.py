@@ -42,7 +42,9 @@ parameters = {{ "path.id" = "{job}" }}
 """
 
 
-def test_schemathesis(serve: Callable[..., str], settings: Settings, write_table: Callable[..., Path]) -> None:
+def test_schemathesis(
+    serve: Callable[..., str], settings: Settings, write_table: Callable[..., Path]
+) -> None:
     url = serve(settings)
     with RestClient(url) as client:
         client.post("/subjects", {"name": "anna"})
@@ -50,9 +52,7 @@ def test_schemathesis(serve: Callable[..., str], settings: Settings, write_table
         body = {"subject": "anna", "layout": answer["layout"], "method": "linear"}
         job = client.wait_for_job(client.post("/models/train", body)["id"], patience_s=60)
     config = settings.data / "schemathesis.toml"
-    config.write_text(
-        CONFIG.format(take=answer["imported"][0], model=job["result"]["model"], job=job["id"])
-    )
+    config.write_text(CONFIG.format(take=answer["imported"][0], model=job["result"]["model"], job=job["id"]))
     run = subprocess.run(
         [
             str(Path(sys.executable).with_name("schemathesis")),
@@ -63,7 +63,7 @@ def test_schemathesis(serve: Callable[..., str], settings: Settings, write_table
             # its 20,000 x 512 readings take longer to make than to refuse
             "--exclude-path=/v1/models/{id}/predict",
             "--phases=coverage,fuzzing",
-            "--max-examples=5",
+            "--max-examples=3",
             "--generation-deterministic",
             "--continue-on-failure",
             "--request-timeout=10",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,9 @@ from glovecal_client.rest import Refused, RestClient
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.table import read_takes, write_takes
 from glovecal_models.takes.take import Take
+from glovecal_service.rest.in_process import in_process_client
 from glovecal_service.settings import Settings
+from glovecal_service.store import Store
 from glovecal_service.store.blobs import FolderBlobs
 from glovecal_service.store.errors import StorageFull
 
@@ -252,6 +255,29 @@ def test_attach_a_reference_later(client: RestClient, tmp_path: Path) -> None:
         client.attach_reference(take["id"], frames)
 
 
+def test_a_reference_in_wall_clock_time_for_a_recorded_take(tmp_path: Path, settings: Settings) -> None:
+    """A take as the recorder stores it: its own time is monotonic, its accounting knows the wall clock."""
+    time_s = 5000 + np.arange(100) / 100
+    unix = 1.76e9
+    with Store.open(settings) as store:
+        store.subjects.create("anna")
+        take = store.takes.add(
+            Take("wave", "first", ("A",), time_s, np.sin(time_s)[:, None]),
+            subject="anna",
+            layout="lucidglove",
+            source="recording",
+            accounting={"wall_minus_time_s": unix},
+        )
+    reference = tmp_path / "optitrack.csv"
+    reference.write_text("time_s,r.A\n" + "".join(f"{unix + 5000 + n / 50!r},{n}\n" for n in range(50)))
+    with in_process_client(settings) as client:
+        assert client.attach_reference(take.id, reference, clock="wall")["reference_rows"] == 50
+    with Store.open(settings) as store:
+        loaded = store.takes.load(take.id)
+    np.testing.assert_allclose(loaded.reference_time_s, 5000 + np.arange(50) / 50, atol=1e-6)
+    assert np.isfinite(loaded.reference_at_frames(["A"])).sum() > 90
+
+
 def test_layouts(client: RestClient, write_table: Write, tmp_path: Path) -> None:
     file = write_table()
     with pytest.raises(Refused, match="needs; its sensors are I_MCP, I_PIP"):
@@ -281,11 +307,27 @@ def test_a_reference_that_never_moves_is_said(client: RestClient, tmp_path: Path
     assert any("never moves" in sentence for sentence in answer["warnings"])
 
 
-def test_stray_temporary_files_do_not_hinder(
+def test_what_a_killed_process_left_is_swept_later(settings: Settings, write_table: Write) -> None:
+    settings.uploads_folder.mkdir(parents=True)
+    old, young = settings.uploads_folder / "0123.partial", settings.uploads_folder / "4567.partial"
+    for stray in (old, young):
+        stray.write_bytes(b"half")
+    os.utime(old, (0, 0))
+    with in_process_client(settings) as client:
+        assert [path.name for path in settings.uploads_folder.iterdir()] == [young.name]
+        client.post("/subjects", {"name": "anna"})
+        assert client.upload_takes(write_table(), subject="anna")["imported"]
+
+
+def test_a_kept_file_that_was_damaged_is_healed(
     client: RestClient, settings: Settings, write_table: Write
 ) -> None:
-    (settings.uploads_folder / "0123.partial").write_bytes(b"half")
-    assert client.upload_takes(write_table(), subject="anna")["imported"]
+    file = write_table()
+    sha256 = client.upload_takes(file, subject="anna")["original_sha256"]
+    kept = settings.uploads_folder / sha256
+    kept.write_bytes(b"x" * kept.stat().st_size)
+    client.upload_takes(file, subject="anna")
+    assert kept.read_bytes() == file.read_bytes()
 
 
 def test_import_for_nobody(shared: RestClient, write_table: Write) -> None:
