@@ -1,4 +1,4 @@
-"""A process that is killed by tests: opens a store, runs its jobs, says what it does on standard output."""
+"""A process that is killed by tests: it runs the jobs of a store."""
 
 from __future__ import annotations
 
@@ -20,23 +20,9 @@ def run_jobs(settings: Settings) -> None:
             time.sleep(0.05)
 
 
-def write_rows(settings: Settings) -> None:
-    """Create subjects and activate models for ever; a line is printed once a write was acknowledged."""
-    with Store.open(settings) as store:
-        subject = f"s{time.time_ns()}"
-        store.subjects.create(subject)
-        print("subject", subject, flush=True)
-        while True:
-            artifact = str(time.time_ns()).encode()
-            model = store.models.add(
-                artifact, subject=subject, layout="glove", method="linear", parent=None, facts={}
-            )
-            print("model", model.id, flush=True)
-            store.models.activate(model.id)
-            print("active", model.id, flush=True)
-
-
 if __name__ == "__main__":
-    what, data, database = sys.argv[1:4]
-    chosen = Settings(data=Path(data), database=database or None, artifacts=None, scheduler=None, workers=2)
-    {"jobs": run_jobs, "rows": write_rows}[what](chosen)
+    run_jobs(
+        Settings(
+            data=Path(sys.argv[1]), database=sys.argv[2] or None, artifacts=None, scheduler=None, workers=1
+        )
+    )

@@ -31,3 +31,11 @@ def result_of(store: Store, id: str) -> dict[str, Any]:
     assert job.state == "done", job.error
     assert job.result is not None
     return job.result
+
+
+def error_of(store: Store, id: str) -> str:
+    """Why a job failed that must fail."""
+    job = wait_for_job(store, id)
+    assert job.state == "failed"
+    assert job.error is not None
+    return job.error

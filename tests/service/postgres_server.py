@@ -7,6 +7,7 @@ import secrets
 import shutil
 import subprocess
 import tempfile
+import time
 from pathlib import Path
 
 import psycopg
@@ -37,11 +38,18 @@ class PostgresServer:
         options = f"-c fsync=off -c listen_addresses='' -c unix_socket_directories='{self.folder}'"
         self._run("pg_ctl", "-w", "-t", "30", "-l", str(self.folder / "log"), "-o", options, "start")
 
-    def stop(self, mode: str = "fast") -> None:
-        self._run("pg_ctl", "-w", "-t", "30", "-m", mode, "stop")
+    def start_after_kill(self) -> None:
+        """Start once the processes of the killed server have let go of its memory."""
+        for _ in range(100):
+            try:
+                return self.start()
+            except RuntimeError:
+                time.sleep(0.2)
+        raise RuntimeError(f"PostgreSQL does not start again: {(self.folder / 'log').read_text()[-500:]}")
 
     def remove(self) -> None:
-        self.stop("immediate")
+        if (self.folder / "data" / "postmaster.pid").exists():
+            self._run("pg_ctl", "-w", "-t", "30", "-m", "immediate", "stop")
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def new_database(self) -> str:

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from jobs_waiting import result_of, wait_for_job
+from jobs_waiting import error_of, result_of, wait_for_job
 from stored_takes import LAYOUT, make_take
 
 from glovecal_models.calibration.artifact import dump, load, model_id
@@ -92,34 +92,29 @@ def test_a_child_names_its_parent(trained):
     ],
 )
 def test_what_cannot_be_trained_fails_with_a_sentence(trained, payload, sentence):
-    job = wait_for_job(trained, create(trained, **{"method": "linear", **payload}))
-    assert job.state == "failed"
-    assert sentence in job.error
+    assert sentence in error_of(trained, create(trained, **{"method": "linear", **payload}))
 
 
 def test_takes_that_cannot_carry_a_model_are_named(trained):
     still = make_take(20)
     still = dataclasses.replace(still, reference=np.full_like(still.reference, 10.0))
-    mute = trained.takes.add(
-        make_take(21, measured=False), subject="anna", layout=LAYOUT.name, source="import"
-    )
-    stiff = trained.takes.add(still, subject="ben", layout=LAYOUT.name, source="import")
-    of_ben = wait_for_job(trained, create(trained, takes=[stiff.id]))
-    assert of_ben.error == f"take {stiff.id} is of subject 'ben', not of 'anna'"
-    never_moves = wait_for_job(trained, create(trained, subject="ben", method="linear"))
-    assert never_moves.state == "failed"
-    assert "I_MCP" in never_moves.error or "constant" in never_moves.error
-    nothing = wait_for_job(trained, create(trained, takes=[mute.id], method="linear"))
-    assert "no reference angle for any rotation" in nothing.error
-    other = wait_for_job(trained, create(trained, layout="cyberglove18", takes=[mute.id], method="linear"))
-    assert "has no sensor 'T_TMC'" in other.error
+    given = {"layout": LAYOUT.name, "source": "import"}
+    mute = trained.takes.add(make_take(21, measured=False), subject="anna", **given).id
+    stiff = trained.takes.add(still, subject="ben", **given).id
+    of_ben = error_of(trained, create(trained, takes=[stiff]))
+    assert of_ben == f"take {stiff} is of subject 'ben', not of 'anna'"
+    assert "constant" in error_of(trained, create(trained, subject="ben", method="linear"))
+    nothing = error_of(trained, create(trained, takes=[mute], method="linear"))
+    assert "no reference angle for any rotation" in nothing
+    other = error_of(trained, create(trained, layout="cyberglove18", takes=[mute], method="linear"))
+    assert "has no sensor 'T_TMC'" in other
 
 
-def test_a_damaged_take_is_named(trained, dispatched):
+def test_a_damaged_take_is_named(trained):
     take = trained.takes.add(make_take(30), subject="ben", layout=LAYOUT.name, source="import")
     path = trained.artifacts._blobs._folder / take.artifact
     content = path.read_bytes()
     path.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
-    job = wait_for_job(trained, create(trained, subject="ben", takes=[take.id]))
-    assert f"artifact {take.artifact}" in job.error
-    assert "is damaged" in job.error
+    error = error_of(trained, create(trained, subject="ben", takes=[take.id]))
+    assert f"artifact {take.artifact}" in error
+    assert "is damaged" in error

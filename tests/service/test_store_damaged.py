@@ -2,8 +2,10 @@
 
 import os
 import shutil
+import sqlite3
 import subprocess
-from contextlib import closing
+from contextlib import closing, suppress
+from pathlib import Path
 
 import pytest
 from stored_takes import LAYOUT, make_take
@@ -28,6 +30,17 @@ def small_disk(tmp_path):
     subprocess.run(["umount", str(folder)], check=True)
 
 
+def fill(file: Path) -> None:
+    with suppress(OSError), file.open("wb", buffering=0) as filler:
+        while True:
+            filler.write(b"\0" * 512)
+
+
+def create_many_subjects(store: Store) -> None:
+    for number in range(1000):
+        store.subjects.create(f"s{number}")
+
+
 def test_a_full_disk_is_said_and_survived(small_disk):
     filler = small_disk / "filler"
     with Store.open(Settings(data=small_disk / "data", database=None, artifacts=None)) as store:
@@ -35,12 +48,9 @@ def test_a_full_disk_is_said_and_survived(small_disk):
         kept = store.takes.add(make_take(0), subject="anna", layout=LAYOUT.name, source="import")
         with pytest.raises(StorageFull, match="no room left in"):
             store.takes.add(make_take(1, frames=40_000), subject="anna", layout=LAYOUT.name, source="import")
-        with filler.open("wb") as file, pytest.raises(OSError, match="No space"):
-            while file.write(b"\0" * 4096):
-                file.flush()
+        fill(filler)
         with pytest.raises(StorageFull):
-            for number in range(1000):
-                store.subjects.create(f"s{number}")
+            create_many_subjects(store)
         with pytest.raises(StorageFull):
             store.models.add(b"x" * 9000, subject="anna", layout="a", method="linear", parent=None, facts={})
         assert store.takes.list() == [kept]
@@ -66,8 +76,6 @@ def test_a_file_that_is_no_database_is_named(sqlite_settings):
 
 def test_no_overwritten_bytes_make_another_model_active(sqlite_settings):
     """Every occurrence of the active model's id in the file is changed, one at a time."""
-    import sqlite3
-
     with Store.open(sqlite_settings) as store:
         store.subjects.create("anna")
         model = store.models.add(

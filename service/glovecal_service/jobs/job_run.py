@@ -7,9 +7,9 @@ import time
 import traceback
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import structlog
-from distributed import Future
 
 from glovecal_models.errors import Cancelled, GlovecalError
 from glovecal_service.jobs.finished_tasks import FinishedTasks
@@ -19,6 +19,9 @@ from glovecal_service.jobs.workers import Workers, WorkersLost, finished, outcom
 from glovecal_service.store import Store
 from glovecal_service.store.errors import Conflict, StoreUnavailable
 from glovecal_service.store.records import JobRecord
+
+if TYPE_CHECKING:
+    from distributed import Future
 
 log = structlog.get_logger(__name__)
 

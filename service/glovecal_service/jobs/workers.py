@@ -2,7 +2,8 @@
 
 Dask distributed was chosen over procrastinate (needs PostgreSQL) and Ray (620 MB, 24 s to start): it starts
 in 2 s with SQLite alone, retries a task whose worker died, and a scheduler elsewhere is one setting. It is
-trusted with nothing but running: the database remembers jobs, the fits folder remembers results.
+trusted with nothing but running: the database remembers jobs, the fits folder remembers results. It is
+imported at the first task too: importing it takes a second that short commands do not have.
 """
 
 from __future__ import annotations
@@ -14,16 +15,15 @@ import threading
 import time
 from concurrent.futures import CancelledError
 from pathlib import Path
-from typing import cast
-
-from dask.config import set as configure
-from distributed import Client, Future, KilledWorker, LocalCluster
-from distributed.client import ClosedClientError
+from typing import TYPE_CHECKING, cast
 
 from glovecal_models.errors import GlovecalError
 from glovecal_service.jobs.job_kind import Task
 from glovecal_service.jobs.task_run import TaskOutcome, run_task
 from glovecal_service.settings import Settings
+
+if TYPE_CHECKING:
+    from distributed import Client, Future, LocalCluster
 
 START_TIMEOUT_S = 60
 LOOK_S = 0.01
@@ -72,6 +72,8 @@ class Workers:
 
     def submit(self, task: Task, folder: Path, cancel_file: Path) -> Future:
         """Hand a task out. Raises WorkersLost."""
+        from distributed.client import ClosedClientError
+
         try:
             return self._started().submit(run_task, task, folder, cancel_file, pure=False)
         except (OSError, TimeoutError, RuntimeError, ClosedClientError) as error:
@@ -90,6 +92,9 @@ class Workers:
         return [] if client is None else list(cast(dict[str, int], client.run(_pid)).values())
 
     def _started(self) -> Client:
+        from dask.config import set as configure
+        from distributed import Client
+
         with self._lock:
             if self._client is None:
                 configure(_CONFIG)
@@ -98,6 +103,8 @@ class Workers:
             return self._client
 
     def _local_cluster(self) -> LocalCluster:
+        from distributed import LocalCluster
+
         self._cluster = LocalCluster(
             n_workers=self._settings.workers,
             threads_per_worker=1,
@@ -133,6 +140,9 @@ def finished(futures: list[Future], timeout_s: float) -> list[Future]:
 
 def outcome(future: Future, task: Task) -> TaskOutcome:
     """What became of a finished future. Raises WorkersLost, TaskKilledWorkers."""
+    from distributed import KilledWorker
+    from distributed.client import ClosedClientError
+
     try:
         return future.result()
     except (*CANCELLED, OSError, ClosedClientError) as error:
