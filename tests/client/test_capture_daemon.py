@@ -180,6 +180,7 @@ def test_bad_readings_are_counted_and_never_published(wire: Wire, tmp_path: Path
             lambda: same[0],
         ]
         eventually(lambda: any("refused" in s["sentence"] for s in wire.statuses), "the refusal is told")
+        eventually(lambda: "refused" not in wire.statuses[-1]["sentence"], "it is not told for ever")
         summary = capture.finish()
     assert (summary.bad_frames, summary.duplicates) == (5, 2)
     frames = logged(summary.log)
@@ -214,6 +215,15 @@ def test_device_that_is_not_there_yet_is_waited_for(wire: Wire, tmp_path: Path) 
         device.unplugged.clear()
         eventually(lambda: len(wire.frames) > 5, "frames")
         assert capture.finish().reconnects == 0
+
+
+def test_device_that_is_open_but_silent_is_told(wire: Wire, tmp_path: Path) -> None:
+    with capturing(SignalGenerator(silent_after=5), wire.endpoint, tmp_path):
+        eventually(
+            lambda: any("no reading for 2 s" in s["sentence"] for s in wire.statuses), "silence is told"
+        )
+        assert wire.statuses[-1]["state"] == "streaming"
+        assert wire.statuses[-1]["rate_hz"] == 0.0
 
 
 def test_device_that_cannot_work_ends_the_capture_with_its_sentence(wire: Wire, tmp_path: Path) -> None:

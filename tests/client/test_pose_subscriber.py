@@ -6,6 +6,7 @@ import json
 import logging
 import threading
 from collections.abc import Iterator
+from contextlib import ExitStack
 
 import numpy as np
 import pytest
@@ -174,6 +175,22 @@ def test_slow_and_failing_callback_gets_the_newest_pose_and_blocks_nobody(
     keep.undeclare()
     assert seen == [0, 1000]
     assert "the tool's own mistake" in caplog.text
+
+
+def test_subscriber_comes_back_with_the_router() -> None:
+    endpoint = free_endpoint()
+    with ExitStack() as longer_than_the_router:
+        with open_router([endpoint]) as router:
+            client = longer_than_the_router.enter_context(open_client([endpoint]))
+            poses = longer_than_the_router.enter_context(
+                PoseSubscriber(client, "lab", "g1", stale_after_s=0.2)
+            )
+            first_pose(Service(router, endpoint), poses)
+        eventually(lambda: poses.stale, "silence is noticed")
+        with open_router([endpoint]) as router:
+            service = Service(router, endpoint)
+            eventually(lambda: service.put(pose(7)) or poses.counts.received == 2, "pose 7")
+            assert poses.angles(pose(7)) == {"I_MCP": 7.0, "I_PIP": -7.0}
 
 
 def test_closing_ends_the_iteration(service: Service, client: zenoh.Session) -> None:

@@ -135,9 +135,8 @@ class CaptureDaemon:
     def _beat(self) -> None:
         """Once a second: the status, with the last refused reading if there was one since."""
         if self._refusal is not None:
-            self._status.sentence = self._refusal
             self._report(f"{self._refusal} ({self._status.bad_frames} refused so far)")
-            self._refusal = None
+        self._status.refusal, self._refusal = self._refusal, None
         self._link.publish_status()
         with contextlib.suppress(OSError):  # a disk that fails shows in the log's own problem
             self._index.extend()

@@ -25,6 +25,8 @@ class CaptureStatus:
     bad_frames: int = 0
     duplicates: int = 0
     reconnects: int = 0
+    refusal: str | None = None
+    """Why readings were refused in the last second, None if none were."""
     disk_problem: str | None = None
     frames_not_logged: int = 0
     _times: deque[int] = field(default_factory=lambda: deque(maxlen=241))
@@ -58,10 +60,15 @@ class CaptureStatus:
                 "reconnects": self.reconnects,
                 "disk": "full" if self.disk_problem else "ok",
                 "frames_not_logged": self.frames_not_logged,
-                "sentence": self.disk_problem or self.sentence,
+                "sentence": self.disk_problem or self.refusal or self._silence(age) or self.sentence,
                 "run_id": f"{self.run_id:016x}",
                 "started_wall_ns": self.started_wall_ns,
             }
+
+    def _silence(self, age_s: float | None) -> str | None:
+        if self.state != "streaming" or (age_s is not None and age_s * 1e9 < _SILENT_NS):
+            return None
+        return "the device is open, but gave no reading " + ("yet" if age_s is None else f"for {age_s:.0f} s")
 
     def _measured_rate(self, now_ns: int) -> float:
         times = self._times
