@@ -69,6 +69,9 @@ class GlovePredictor:
             value = readings[frame, sensor]
             raise BadInput(f"sensor {self.sensors[sensor]} reads {value} in frame {frame}; leave it out")
         count = len(readings)
+        if count == 0:
+            nothing = np.empty((0, len(self.rotations)))
+            return GloveAngles(nothing, nothing, nothing.astype(np.uint8))
         if count <= self._block:
             return self._predict_block(readings)
         blocks = [
@@ -116,7 +119,7 @@ class _Range:
     def flags(self, columns: np.ndarray, rotations: int) -> np.ndarray:
         """uint8 (R, N): EXTRAPOLATING or 0."""
         flags = np.zeros((rotations, columns.shape[1]), dtype=np.uint8)
-        if not len(self._rows) or not columns.shape[1]:
+        if not len(self._rows):
             return flags
         inputs = self._select @ columns
         outside = (inputs < self._low) | (inputs > self._high)
