@@ -21,8 +21,5 @@ def run_jobs(settings: Settings) -> None:
 
 
 if __name__ == "__main__":
-    run_jobs(
-        Settings(
-            data=Path(sys.argv[1]), database=sys.argv[2] or None, artifacts=None, scheduler=None, workers=1
-        )
-    )
+    data, database = sys.argv[1:3]
+    run_jobs(Settings(data=Path(data), database=database or None, artifacts=None, scheduler=None, workers=1))

@@ -2,6 +2,8 @@
 
 import os
 import signal
+import urllib.error
+import urllib.request
 
 import pytest
 from jobs_counting import CountingJob, noted
@@ -43,10 +45,15 @@ def test_progress_is_told_task_by_task_and_kept(dispatched, ledger):
     assert store.jobs.events(job.id, after=events[-2].id) == events[-1:]
 
 
-def test_the_scheduler_listens_on_this_computer_only(dispatched, ledger):
+def test_the_scheduler_listens_on_this_computer_only_and_shows_nothing(dispatched, ledger):
     store, dispatcher = dispatched
     wait_for_job(store, create(store, ledger, [1]).id)
     assert dispatcher.workers.address.startswith("tcp://127.0.0.1:")
+    http = dispatcher.workers._cluster.scheduler.http_server
+    for port in {sock.getsockname() for sock in http._sockets.values()}:
+        assert port[0] == "127.0.0.1"
+        with pytest.raises(urllib.error.HTTPError, match="404"):
+            urllib.request.urlopen(f"http://127.0.0.1:{port[1]}/info/main/workers.html", timeout=5)
 
 
 def test_what_was_computed_once_is_not_computed_again(dispatched, ledger):

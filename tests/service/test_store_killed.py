@@ -35,17 +35,13 @@ def test_no_acknowledged_write_is_lost(store_settings):
     """Writers are killed at random moments; what they had printed must be there, verified."""
     Store.open(store_settings).close()
     rng, acknowledged = random.Random(4), []
-    writers = [
-        start("store_writer_process.py", store_settings, stdout=subprocess.PIPE, text=True) for _ in range(2)
-    ]
+    writers = [start_writer(store_settings) for _ in range(2)]
     for number in range(KILLS):
         process = writers.pop(0)
         assert process.stdout is not None
         lines = [process.stdout.readline() for _ in range(rng.randint(2, 12))]
         if number + len(writers) + 1 < KILLS:
-            writers.append(
-                start("store_writer_process.py", store_settings, stdout=subprocess.PIPE, text=True)
-            )
+            writers.append(start_writer(store_settings))
         kill(process)
         lines += process.stdout.read().splitlines(keepends=True)
         process.stdout.close()

@@ -32,6 +32,8 @@ _CONFIG = {
     "distributed.admin.large-graph-warning-threshold": "1GB",
     "distributed.scheduler.allowed-failures": 2,
     "distributed.comm.timeouts.connect": "30s",
+    "distributed.scheduler.http.routes": [],
+    "distributed.worker.http.routes": [],
 }
 
 
@@ -110,8 +112,8 @@ class Workers:
             threads_per_worker=1,
             processes=True,
             host="127.0.0.1",
-            dashboard_address=cast(str, None),  # no dashboard
-            worker_dashboard_address=None,
+            dashboard_address="127.0.0.1:0",
+            scheduler_kwargs={"dashboard": False},
             local_directory=str(self._settings.fits_folder.resolve() / "workers"),
             silence_logs=logging.CRITICAL,
             preload=["glovecal_service.jobs.worker_setup"],
