@@ -141,7 +141,7 @@ def _banner(settings: Settings) -> str:
 
 def _start(part: Part, settings: Settings) -> None:
     part.process = _SPAWN.Process(
-        target=_run_part, args=(part.work, settings, part.ready, os.getpid()), name=f"glovecal {part.name}"
+        target=run_part, args=(part.work, settings, part.ready, os.getpid()), name=f"glovecal {part.name}"
     )
     part.process.start()
     part.started_at = time.monotonic()
@@ -181,7 +181,7 @@ def _stop(parts: list[Part]) -> None:
             process.join()
 
 
-def _run_part(work: Work, settings: Settings, ready: Any, parent: int) -> None:
+def run_part(work: Work, settings: Settings, ready: Any, parent: int) -> None:
     """What a child does first: stop on signals, and when the parent is gone."""
     _log_to_stderr()
     stopped = Event()

@@ -92,10 +92,9 @@ class LiveRecording:
         known = bool(self.file.runs) and self._learn_the_end()
         self._arrivals.close()
         self.take_in()
-        deadline = time.monotonic() + patience_s
-        while self._gaps() and time.monotonic() < deadline:
-            if not self.repair():
-                time.sleep(0.1)
+        deadline = time.monotonic() + (patience_s if known else 0.0)
+        while self._gaps() and (self.repair() or time.monotonic() < deadline):
+            time.sleep(0.05)
         self.file.close()
         return known
 

@@ -24,7 +24,7 @@ from glovecal_service.realtime.glove_lane import GloveLane, Waiting
 from glovecal_service.realtime.refusal import Refusal, Refused
 from glovecal_service.realtime.served_model import ServedModel, ServedModels
 
-OLDEST_NS = 30_000_000
+OLDEST_NS = 25_000_000
 """A frame that waited longer is skipped; with a turn's budget this keeps a pose younger than 50 ms."""
 TURN_BUDGET_S = 0.010
 STALE_AFTER_NS = 500_000_000

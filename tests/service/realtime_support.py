@@ -1,0 +1,183 @@
+"""For the tests of the real-time half: gloves on a real zenoh, processes of the service, a small model."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import secrets
+import socket
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from multiprocessing.context import SpawnProcess
+from typing import Any, TypeVar
+
+import numpy as np
+import zenoh
+
+from glovecal_client.capture.device import Reading
+from glovecal_client.keys import GloveKeys, all_services
+from glovecal_client.queries import ask_json
+from glovecal_client.wire.frame import Frame, encode_frame
+from glovecal_models.calibration.artifact import dump
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.training import train
+from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.layout import Layout
+from glovecal_models.takes.take import Take
+from glovecal_service.serve import Work, run_part
+from glovecal_service.settings import Settings
+from glovecal_service.store import Store
+
+LAYOUT = Layout.from_toml("""
+name = "three-bends"
+sensors = ["I_MCP", "I_PIP", "M_MCP"]
+counts = [0, 255]
+[rotations]
+I_MCP = ["I_MCP"]
+I_PIP = ["I_PIP"]
+M_MCP = ["M_MCP", "I_MCP"]
+""")
+
+Value = TypeVar("Value")
+_SPAWN = multiprocessing.get_context("spawn")
+
+
+def free_endpoint() -> str:
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{listener.getsockname()[1]}"
+
+
+def eventually(condition: Callable[[], Value | None], what: str, deadline_s: float = 30.0) -> Value:
+    """The first true value of ``condition``; fails with ``what`` after the deadline."""
+    end = time.monotonic() + deadline_s
+    while not (value := condition()):
+        assert time.monotonic() < end, f"did not happen in {deadline_s} s: {what}"
+        time.sleep(0.02)
+    return value
+
+
+@contextmanager
+def part_of_service(work: Work, settings: Settings) -> Iterator[SpawnProcess]:
+    """One of the service's processes, ready, as ``glovecal serve`` starts it."""
+    ready = _SPAWN.Event()
+    process = _SPAWN.Process(target=run_part, args=(work, settings, ready, os.getpid()))
+    process.start()
+    try:
+        assert ready.wait(60), "the process did not get ready"
+        yield process
+    finally:
+        process.terminate()
+        process.join(15)
+        if process.is_alive():
+            process.kill()
+            process.join()
+
+
+def linear_model(subject: str, *, degrees_per_count: float) -> CalibrationModel:
+    """A plane through made-up samples: I_MCP = degrees_per_count * (reading - 100), the others alike."""
+    time_s = np.arange(200) / 100.0
+    readings = np.random.default_rng(0).uniform(20.0, 230.0, (200, 3))
+    reference = degrees_per_count * (readings - 100.0)
+    take = Take("t", "w", LAYOUT.sensors, time_s, readings, LAYOUT.rotations, time_s, reference)
+    return train([take], LAYOUT, subject, TrainingSettings(method="linear", folds=0))
+
+
+def store_model(store: Store, subject: str, *, degrees_per_count: float, activate: bool = True) -> str:
+    """Keep such a model under its subject; its id."""
+    if subject not in [record.name for record in store.subjects.list()]:
+        store.subjects.create(subject)
+    model = linear_model(subject, degrees_per_count=degrees_per_count)
+    record = store.models.add(
+        dump(model), subject=subject, layout=LAYOUT.name, method="linear", parent=None, facts={}
+    )
+    if activate:
+        store.models.activate(record.id)
+    return record.id
+
+
+class WireGlove:
+    """A glove that publishes exactly what a test wants, good and bad."""
+
+    def __init__(
+        self, session: zenoh.Session, settings: Settings, glove: str, *, subject: str | None = None
+    ) -> None:
+        self.keys = GloveKeys(settings.site, glove)
+        self.run_id = secrets.randbits(64)
+        self.sequence = 0
+        self.sent = 0
+        self._session = session
+        self._subject = subject
+        self._raw = session.declare_publisher(self.keys.raw, express=True)
+
+    def say_meta(self, **changes: Any) -> None:
+        meta = {
+            "glove": self.keys.glove,
+            "layout": LAYOUT.name,
+            "sensors": list(LAYOUT.sensors),
+            "context": [],
+            "subject": self._subject,
+            "wearing": "w",
+            "simulated": False,
+            "run_id": f"{self.run_id:016x}",
+        }
+        self._session.put(self.keys.meta, json.dumps(meta | changes))
+
+    def frame(self, readings: tuple[float, ...] = (120.0, 130.0, 140.0), **changes: Any) -> Frame:
+        """The next frame, or a variation of it."""
+        values = {
+            "sequence": self.sequence,
+            "run_id": self.run_id,
+            "monotonic_ns": time.monotonic_ns(),
+            "wall_ns": time.time_ns(),
+            "readings": np.array(readings, np.float32),
+        } | changes
+        return Frame(**values)
+
+    def send(self, readings: tuple[float, ...] = (120.0, 130.0, 140.0), **changes: Any) -> bytes:
+        """Send one good frame, or a variation of it; the bytes sent."""
+        message = encode_frame(self.frame(readings, **changes))
+        self.send_bytes(message)
+        self.sequence += 1
+        return message
+
+    def send_bytes(self, message: bytes) -> None:
+        self.sent += 1
+        self._raw.put(message)
+
+
+def service_status(session: zenoh.Session, settings: Settings) -> dict[str, Any]:
+    return ask_json(session, all_services(settings.site).removesuffix("alive") + "status")
+
+
+def glove_status(session: zenoh.Session, settings: Settings, glove: str) -> dict[str, Any]:
+    return service_status(session, settings)["gloves"].get(glove, {})
+
+
+class SteadyDevice:
+    """A device of the capture daemon that gives a slow wave, ``rate_hz`` times a second."""
+
+    def __init__(self, rate_hz: float = 200.0) -> None:
+        self.name, self.layout, self.simulated, self.rate_hz = "steady", LAYOUT.name, True, rate_hz
+        self.sensors, self.context = LAYOUT.sensors, ("supply_v",)
+        self._due = 0.0
+
+    @classmethod
+    def from_options(cls, argument: str | None, options: Mapping[str, str]) -> SteadyDevice:
+        return cls(float(argument or 200.0))
+
+    def open(self) -> None:
+        self._due = time.monotonic()
+
+    def close(self) -> None:
+        self._due = 0.0
+
+    def read(self, timeout_s: float) -> Reading | None:
+        self._due += 1.0 / self.rate_hz
+        time.sleep(max(0.0, min(timeout_s, self._due - time.monotonic())))
+        now = time.monotonic()
+        readings = 128 + 90 * np.sin(now + np.arange(len(self.sensors)))
+        supply = np.array([4.9], np.float32)
+        return Reading(readings.astype(np.float32), time.monotonic_ns(), time.time_ns(), supply)

@@ -1,0 +1,264 @@
+"""The real-time process over real zenoh: poses, model choice, bad input, exact books."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+import zenoh
+from realtime_support import (
+    LAYOUT,
+    WireGlove,
+    eventually,
+    free_endpoint,
+    glove_status,
+    linear_model,
+    part_of_service,
+    service_status,
+    store_model,
+)
+
+from glovecal_client.errors import NoAnswer
+from glovecal_client.keys import all_services
+from glovecal_client.pose_subscriber import PoseSubscriber
+from glovecal_client.queries import ask_json
+from glovecal_client.session import open_client
+from glovecal_client.wire.frame import encode_frame
+from glovecal_client.wire.pose import Pose, decode_pose
+from glovecal_models.calibration.predictor import GlovePredictor
+from glovecal_service.realtime.model_choice import choose
+from glovecal_service.serve import real_time
+from glovecal_service.settings import Settings
+from glovecal_service.store import Store
+
+
+@pytest.fixture(scope="module")
+def settings(tmp_path_factory: pytest.TempPathFactory) -> Settings:
+    data = tmp_path_factory.mktemp("realtime")
+    return Settings(data=data, database=None, artifacts=None, zenoh=free_endpoint(), site="lab")
+
+
+@pytest.fixture(scope="module")
+def store(settings: Settings) -> Iterator[Store]:
+    with Store.open(settings) as store:
+        yield store
+
+
+@pytest.fixture(scope="module")
+def session(settings: Settings, store: Store) -> Iterator[zenoh.Session]:
+    with part_of_service(real_time, settings), open_client([settings.zenoh], wait_s=20) as session:
+        yield session
+
+
+class Poses:
+    """Every pose of a glove, in the order it came."""
+
+    def __init__(self, session: zenoh.Session, glove: WireGlove) -> None:
+        self.all: list[Pose] = []
+        handler = zenoh.handlers.Callback(self._hear, indirect=False)
+        self._subscriber = session.declare_subscriber(glove.keys.pose, handler)
+
+    def _hear(self, sample: zenoh.Sample) -> None:
+        self.all.append(decode_pose(sample.payload.to_bytes()))
+
+    @property
+    def live(self) -> list[Pose]:
+        return [pose for pose in list(self.all) if not pose.stale]
+
+
+def ask_meta(session: zenoh.Session, glove: WireGlove) -> dict:
+    try:
+        return ask_json(session, glove.keys.pose_meta)
+    except NoAnswer:
+        return {}
+
+
+def served(session: zenoh.Session, glove: WireGlove, model: str | None) -> dict | None:
+    meta = ask_meta(session, glove)
+    return meta if meta and meta["model"] == model else None
+
+
+def balanced(session: zenoh.Session, settings: Settings, glove: WireGlove) -> dict | None:
+    """The glove's books once all that was sent is accounted for."""
+    books = glove_status(session, settings, glove.keys.glove)
+    if books.get("received") != glove.sent:
+        return None
+    accounted = books["predicted"] + books["skipped"] + sum(books["refused"].values())
+    return books if accounted == books["received"] else None
+
+
+def test_poses_are_what_the_active_model_predicts(
+    session: zenoh.Session, settings: Settings, store: Store
+) -> None:
+    model_id = store_model(store, "anna", degrees_per_count=0.5)
+    glove = WireGlove(session, settings, "g-anna", subject="anna")
+    poses = Poses(session, glove)
+    glove.say_meta()
+    eventually(lambda: served(session, glove, model_id), "the glove is served")
+    rows = [(120.0 + n, 130.0, 140.0 - n) for n in range(20)]
+    for row in rows:
+        glove.send(row)
+        time.sleep(0.004)
+    eventually(lambda: len(poses.live) == 20, "all poses")
+    expected = GlovePredictor(linear_model("anna", degrees_per_count=0.5)).predict(np.array(rows))
+    np.testing.assert_allclose([pose.degrees for pose in poses.live], expected.mean, rtol=1e-5)
+    np.testing.assert_allclose([pose.deviations for pose in poses.live], expected.sd, rtol=1e-5)
+    assert [pose.sequence for pose in poses.live] == list(range(20))
+    assert {(pose.model_sha256, pose.run_id) for pose in poses.live} == {(model_id, glove.run_id)}
+    with PoseSubscriber(session, settings.site, "g-anna") as subscriber:
+        assert subscriber.rotations(poses.live[-1]) == LAYOUT.rotations
+
+
+def test_activation_and_roll_back_change_the_model_between_two_frames(
+    session: zenoh.Session, settings: Settings, store: Store
+) -> None:
+    first = store_model(store, "ben", degrees_per_count=0.5)
+    second = store_model(store, "ben", degrees_per_count=1.0, activate=False)
+    glove = WireGlove(session, settings, "g-ben", subject="ben")
+    poses = Poses(session, glove)
+    glove.say_meta()
+    eventually(lambda: served(session, glove, first), "first model")
+    for change, model_id in ((lambda: store.models.activate(second), second),
+                             (lambda: store.models.rollback("ben", LAYOUT.name), first)):  # fmt: skip
+        change()
+
+        def is_served(model_id: str = model_id) -> bool:
+            glove.send((140.0, 140.0, 140.0))
+            return bool(poses.live) and poses.live[-1].model_sha256 == model_id
+
+        eventually(is_served, "the other model")
+    degrees = {pose.model_sha256: round(float(pose.degrees[0]), 2) for pose in poses.live}
+    assert degrees == {first: 20.0, second: 40.0}
+    assert [pose.sequence for pose in poses.live] == sorted({pose.sequence for pose in poses.live})
+    eventually(lambda: balanced(session, settings, glove), "balanced books")
+
+
+def test_a_damaged_artifact_is_named_and_the_model_before_it_stays(
+    session: zenoh.Session, settings: Settings, store: Store
+) -> None:
+    good = store_model(store, "carla", degrees_per_count=0.5)
+    glove = WireGlove(session, settings, "g-carla", subject="carla")
+    glove.say_meta()
+    eventually(lambda: served(session, glove, good), "good model")
+    bad = store_model(store, "carla", degrees_per_count=1.0, activate=False)
+    path = next(settings.artifacts_folder.rglob(f"*{bad}*"))
+    content = path.read_bytes()
+    store.models.activate(bad)
+    path.chmod(0o644)
+    path.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
+    for damaged in (True, False):
+        if not damaged:
+            path.unlink()
+        serving = choose(store, "g-carla", None, {})
+        assert serving.model is not None
+        assert serving.model.model_id == good
+        assert bad in serving.sentence
+        assert f"model {good[:12]}, active before it, is served" in serving.sentence
+    path.write_bytes(content)
+    eventually(lambda: served(session, glove, bad), "the repaired model, without being told")
+
+
+def test_an_unknown_wearer_gets_marked_poses_without_angles(
+    session: zenoh.Session, settings: Settings
+) -> None:
+    glove = WireGlove(session, settings, "g-nobody")
+    poses = Poses(session, glove)
+    glove.say_meta()
+    glove.send()
+    eventually(lambda: poses.live, "a pose")
+    assert poses.live[0].uncalibrated
+    assert len(poses.live[0].degrees) == 0
+    assert poses.live[0].model_sha256 is None
+    meta = eventually(lambda: ask_meta(session, glove), "pose meta")
+    eventually(lambda: "nobody wears" in ask_meta(session, glove)["sentence"], "the reason")
+    assert meta["state"] == "uncalibrated"
+
+
+def test_a_silent_glove_is_marked_stale_about_once_a_second(
+    session: zenoh.Session, settings: Settings
+) -> None:
+    glove = WireGlove(session, settings, "g-silent")
+    poses = Poses(session, glove)
+    glove.send()
+    eventually(lambda: len(poses.all) >= 3, "stale poses")
+    assert [pose.stale for pose in poses.all[:3]] == [False, True, True]
+    ages = [pose.age_us for pose in poses.all[:3]]
+    assert ages[0] < ages[1] < ages[2]
+    assert ages[1] >= 500_000
+    assert ages[2] - ages[1] >= 900_000
+
+
+def test_bad_frames_are_counted_by_reason_and_reach_no_model(
+    session: zenoh.Session, settings: Settings, store: Store
+) -> None:
+    model_id = store_model(store, "dora", degrees_per_count=0.5)
+    glove = WireGlove(session, settings, "g-dora", subject="dora")
+    poses = Poses(session, glove)
+    glove.say_meta()
+    eventually(lambda: served(session, glove, model_id), "the glove is served")
+    good = glove.send()
+    glove.send_bytes(good)
+    glove.send_bytes(good[:-1])
+    glove.send_bytes(good[:4] + b"\x07" + good[5:])
+    glove.send_bytes(bytes(40_000))
+    glove.send((120.0, 130.0))
+    glove.send((120.0, 130.0, 400.0))
+    glove.send(monotonic_ns=5)
+    glove.send_bytes(encode_frame(glove.frame(run_id=7, sequence=0)))
+    glove.send()
+    books = eventually(lambda: balanced(session, settings, glove), "balanced books")
+    assert books["refused"] == {
+        "duplicate": 1, "damaged": 2, "unknown_version": 1, "sensor_count": 1, "out_of_range": 1,
+        "time_backwards": 1, "second_publisher": 1,
+    }  # fmt: skip
+    assert books["predicted"] == 2
+    assert [pose.sequence for pose in poses.live] == [0, glove.sequence - 1]
+
+
+def test_a_glove_with_other_sensors_than_its_model_stays_uncalibrated(
+    session: zenoh.Session, settings: Settings, store: Store
+) -> None:
+    store_model(store, "emil", degrees_per_count=0.5)
+    glove = WireGlove(session, settings, "g-emil", subject="emil")
+    glove.say_meta(sensors=["A", "B"])
+    sentence = eventually(lambda: ask_meta(session, glove).get("sentence"), "the reason")
+    assert "sends 2 sensors" in sentence
+    assert ask_meta(session, glove)["model"] is None
+
+
+def test_a_flood_is_accounted_for_to_the_last_frame(
+    session: zenoh.Session, settings: Settings, store: Store
+) -> None:
+    model_id = store_model(store, "fritz", degrees_per_count=0.5)
+    glove = WireGlove(session, settings, "g-fritz", subject="fritz")
+    glove.say_meta()
+    eventually(lambda: served(session, glove, model_id), "the glove is served")
+    for _ in range(3000):
+        glove.send()
+    time.sleep(0.3)
+
+    def settled() -> dict | None:
+        before = glove_status(session, settings, "g-fritz")
+        time.sleep(0.1)
+        after = glove_status(session, settings, "g-fritz")
+        return after if after["received"] == before["received"] and not after["waiting"] else None
+
+    books = eventually(settled, "the flood is over")
+    assert 0 < books["received"] <= 3000
+    assert books["predicted"] + books["skipped"] == books["received"]
+    glove.send()
+    poses = Poses(session, glove)
+    eventually(lambda: poses.all or (glove.send() and None), "served after the flood")
+    assert poses.all[0].skipped == books["skipped"]
+
+
+def test_status_and_liveliness_tell_that_the_service_is_there(
+    session: zenoh.Session, settings: Settings
+) -> None:
+    status = service_status(session, settings)
+    assert status["database"] == ""
+    tokens = [reply.ok for reply in session.liveliness().get(all_services(settings.site), timeout=5)]
+    assert [str(token.key_expr).split("/")[3] for token in tokens if token] == [status["instance"]]
+    assert (settings.data / "realtime.alive").exists()

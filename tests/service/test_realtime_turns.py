@@ -1,0 +1,84 @@
+"""What is taken, what is skipped, and that the books balance."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from glovecal_client.keys import GloveKeys
+from glovecal_service.realtime.glove_lane import WAITING_LIMIT, GloveLane
+from glovecal_service.realtime.pace import Pace
+
+MILLISECOND = 1_000_000
+
+
+def lane() -> GloveLane:
+    return GloveLane(GloveKeys("lab", "g1"))
+
+
+def test_all_waiting_frames_are_taken_when_there_is_room() -> None:
+    it = lane()
+    for at in range(5):
+        it.add(b"m", at * MILLISECOND)
+    assert [item.received_ns for item in it.newest(64, 0)] == [at * MILLISECOND for at in range(5)]
+    assert it.skipped == 0
+
+
+def test_with_little_room_the_newest_are_taken_and_the_rest_counted() -> None:
+    it = lane()
+    for at in range(10):
+        it.add(b"m", at)
+    assert [item.received_ns for item in it.newest(2, 0)] == [8, 9]
+    assert (it.received, it.skipped) == (10, 8)
+
+
+def test_frames_that_waited_too_long_are_skipped() -> None:
+    it = lane()
+    for at in (1, 2, 30, 31):
+        it.add(b"m", at)
+    assert [item.received_ns for item in it.newest(64, 30)] == [30, 31]
+    assert it.skipped == 2
+
+
+@given(
+    st.lists(
+        st.one_of(st.integers(1, 40), st.tuples(st.integers(1, 8), st.integers(0, 50))),
+        min_size=1,
+        max_size=40,
+    )
+)
+def test_every_message_is_taken_skipped_or_waiting(steps: list[int | tuple[int, int]]) -> None:
+    it, now, taken = lane(), 0, 0
+    for step in steps:
+        if isinstance(step, int):
+            for _ in range(step):
+                now += 1
+                it.add(b"m", now)
+        else:
+            limit, age = step
+            got = it.newest(limit, now - age)
+            assert len(got) <= limit
+            assert all(item.received_ns >= now - age for item in got)
+            taken += len(got)
+        assert len(it) <= WAITING_LIMIT
+        assert it.received == taken + it.skipped + len(it)
+
+
+def test_pace_starts_cautious_learns_quickly_and_forgives_one_slow_turn() -> None:
+    pace = Pace()
+    assert pace.frames_within(0.010) == 2
+    pace.observe(4, 0.0004)
+    assert pace.frames_within(0.010) in (99, 100)
+    pace.observe(1, 0.050)
+    assert pace.frames_within(0.010) >= 60
+    for _ in range(20):
+        pace.observe(1, 0.020)
+    assert pace.frames_within(0.010) == 1
+
+
+@given(st.lists(st.tuples(st.integers(0, 100), st.floats(0, 10)), max_size=50))
+def test_pace_always_lets_something_go_on(turns: list[tuple[int, float]]) -> None:
+    pace = Pace()
+    for frames, seconds in turns:
+        pace.observe(frames, seconds)
+        assert 1 <= pace.frames_within(0.010) <= 10_000

@@ -1,0 +1,215 @@
+"""Recordings with the real capture daemon: exact accounts through outages, kill -9 and a full disk."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from realtime_support import LAYOUT, SteadyDevice, WireGlove, eventually, free_endpoint, part_of_service
+
+from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings
+from glovecal_client.keys import GloveKeys
+from glovecal_client.session import open_client, open_router
+from glovecal_service.realtime.recorder import Recorder
+from glovecal_service.serve import recorder
+from glovecal_service.settings import Settings
+from glovecal_service.store import Store
+from glovecal_service.store.records import RecordingRecord
+
+GLOVE = "g1"
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Settings:
+    return Settings(data=tmp_path, database=None, artifacts=None, zenoh=free_endpoint(), site="lab")
+
+
+@pytest.fixture
+def store(settings: Settings) -> Iterator[Store]:
+    with Store.open(settings) as store:
+        store.gloves.seen(GLOVE, {"layout": LAYOUT.name, "subject": "anna", "wearing": "morning"})
+        yield store
+
+
+@contextmanager
+def capturing(settings: Settings, data: Path) -> Iterator[None]:
+    """The capture daemon with a glove at 200 Hz, in a thread."""
+    stop = threading.Event()
+    capture = CaptureSettings(
+        GloveKeys(settings.site, GLOVE), "anna", "morning", (settings.zenoh,), data / "captured"
+    )
+    daemon = CaptureDaemon(SteadyDevice(200.0), capture, lambda sentence: None)
+    thread = threading.Thread(target=daemon.run, args=(stop,))
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join(10)
+
+
+@contextmanager
+def recording_thread(settings: Settings) -> Iterator[Recorder]:
+    """The recorder as its process runs it, in a thread."""
+    stop = threading.Event()
+    with open_client([settings.zenoh], wait_s=20) as session:
+        it = Recorder(session, settings, lambda: Store.open(settings))
+        thread = threading.Thread(target=it.run, args=(stop,))
+        thread.start()
+        try:
+            yield it
+        finally:
+            stop.set()
+            thread.join(15)
+
+
+def frames(store: Store, id: str, at_least: int) -> Callable[[], RecordingRecord | None]:
+    def enough() -> RecordingRecord | None:
+        record = store.recordings.get(id)
+        return record if record.facts.get("recorded", 0) >= at_least else None
+
+    return enough
+
+
+def sentence(store: Store, id: str) -> str:
+    return store.recordings.get(id).facts.get("sentence", "")
+
+
+def finished(store: Store, id: str) -> RecordingRecord:
+    eventually(lambda: not store.recordings.get(id).is_open, "the end of the recording")
+    return store.recordings.get(id)
+
+
+def check_exact(store: Store, record: RecordingRecord) -> None:
+    """Sent is recorded plus missing, by counts and by ranges; the take holds what was recorded."""
+    facts = record.facts
+    assert record.state == "done", facts
+    assert facts["sent"] == facts["recorded"] + facts["missing_frames"]
+    assert facts["missing_frames"] == sum(last - first + 1 for first, last in facts["missing"])
+    take = store.takes.load(facts["take"])
+    assert len(take.time_s) == facts["recorded"]
+    assert store.takes.get(facts["take"]).recording == record.id
+
+
+def test_a_recording_becomes_a_take_with_nothing_missing(settings: Settings, store: Store) -> None:
+    with open_router([settings.zenoh]), capturing(settings, settings.data), recording_thread(settings):
+        asked = store.recordings.request(GLOVE, name="walk")
+        eventually(frames(store, asked.id, 150), "150 frames")
+        store.recordings.stop(asked.id)
+        record = finished(store, asked.id)
+    check_exact(store, record)
+    assert record.facts["missing"] == []
+    assert record.facts["sent"] == record.facts["last_sequence"] - record.facts["first_sequence"] + 1
+    kept = store.takes.get(record.facts["take"])
+    assert (kept.subject, kept.layout, kept.wearing, kept.simulated) == ("anna", LAYOUT.name, "morning", True)
+    take = store.takes.load(kept.id)
+    assert take.sensors == LAYOUT.sensors
+    np.testing.assert_allclose(take.context["supply_v"], 4.9, rtol=1e-6)
+    assert abs(take.time_s[-1] - time.monotonic()) < 60
+    assert kept.accounting is not None
+    assert abs(kept.accounting["wall_minus_time_s"] - (time.time() - time.monotonic())) < 1.0
+
+
+def test_frames_missed_while_the_router_was_away_are_repaired(settings: Settings, store: Store) -> None:
+    with ExitStack() as running:
+        router = running.enter_context(ExitStack())
+        router.enter_context(open_router([settings.zenoh]))
+        running.enter_context(capturing(settings, settings.data))
+        running.enter_context(recording_thread(settings))
+        asked = store.recordings.request(GLOVE, name="outage")
+        eventually(frames(store, asked.id, 60), "60 frames")
+        router.close()
+        time.sleep(0.5)
+        running.enter_context(open_router([settings.zenoh]))
+        eventually(
+            lambda: store.recordings.get(asked.id).facts.get("repaired", 0) > 50,
+            "frames from the log",
+        )
+        store.recordings.stop(asked.id)
+        record = finished(store, asked.id)
+    check_exact(store, record)
+    assert record.facts["missing"] == []
+    assert record.facts["repaired"] > 50
+
+
+def test_what_capture_can_no_longer_give_is_reported_missing(settings: Settings, store: Store) -> None:
+    """Capture is gone, and with it the log: the account says which frames are missing."""
+    with open_router([settings.zenoh]), open_client([settings.zenoh]) as session, recording_thread(settings):
+        glove = WireGlove(session, settings, GLOVE, subject="anna")
+        store.gloves.seen(GLOVE, {"layout": LAYOUT.name, "sensors": list(LAYOUT.sensors), "subject": "anna"})
+        asked = store.recordings.request(GLOVE, name="lossy")
+        eventually(lambda: store.recordings.get(asked.id).state == "recording", "recording began")
+        for sequence in [*range(10, 20), *range(25, 30), 31, 31, 28]:
+            glove.send(sequence=sequence)
+            time.sleep(0.002)
+        glove.send_bytes(b"GLVF damaged")
+        eventually(frames(store, asked.id, 16), "16 frames")
+        store.recordings.stop(asked.id)
+        record = finished(store, asked.id)
+    check_exact(store, record)
+    assert record.facts["missing"] == [[20, 24], [30, 30]]
+    assert (record.facts["sent"], record.facts["recorded"], record.facts["refused"]) == (22, 16, 1)
+    assert record.facts["end_known"] is False
+
+
+def test_a_killed_recorder_goes_on_and_fetches_what_it_missed(settings: Settings, store: Store) -> None:
+    with open_router([settings.zenoh]), capturing(settings, settings.data):
+        with part_of_service(recorder, settings) as process:
+            asked = store.recordings.request(GLOVE, name="killed")
+            eventually(frames(store, asked.id, 100), "100 frames")
+            process.kill()
+            process.join()
+        with (settings.recordings_folder / f"{asked.id}.glog").open("ab") as file:
+            file.write(b"\x20\x00\x00\x00half a record")
+        with recording_thread(settings):
+            before = store.recordings.get(asked.id).facts["recorded"]
+            eventually(frames(store, asked.id, before + 100), "100 frames more")
+            store.recordings.stop(asked.id)
+            record = finished(store, asked.id)
+    check_exact(store, record)
+    assert record.facts["missing"] == []
+    assert record.facts["repaired"] > 0
+    assert len(record.facts["interruptions"]) == 1
+
+
+def test_stopping_without_a_single_frame_fails_with_a_sentence(settings: Settings, store: Store) -> None:
+    with open_router([settings.zenoh]), recording_thread(settings):
+        asked = store.recordings.request(GLOVE, name="nothing")
+        eventually(lambda: store.recordings.get(asked.id).state == "recording", "recording began")
+        store.recordings.stop(asked.id)
+        record = finished(store, asked.id)
+    assert record.state == "failed"
+    assert "no frame of glove g1 arrived" in record.facts["sentence"]
+
+
+@pytest.fixture
+def small_disk(settings: Settings, store: Store) -> Iterator[Path]:
+    """The recordings folder on a disk of 40 kB."""
+    folder = str(settings.recordings_folder)
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=40k", "tmpfs", folder], capture_output=True)
+    if mounted.returncode:
+        pytest.skip("only root can mount a small disk to fill it")
+    yield settings.recordings_folder
+    subprocess.run(["umount", "-l", folder], check=True)
+
+
+def test_a_full_disk_is_said_and_what_was_recorded_stays(
+    settings: Settings, store: Store, small_disk: Path
+) -> None:
+    with open_router([settings.zenoh]), capturing(settings, settings.data), recording_thread(settings):
+        asked = store.recordings.request(GLOVE, name="full")
+        eventually(lambda: "frames wait in memory" in sentence(store, asked.id), "the sentence")
+        assert re.search("no room|No space left", sentence(store, asked.id))
+        time.sleep(0.5)
+        store.recordings.stop(asked.id)
+        record = finished(store, asked.id)
+    check_exact(store, record)
+    assert record.facts["recorded"] > 100
+    assert record.facts["missing_frames"] > 0
