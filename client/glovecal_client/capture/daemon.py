@@ -137,6 +137,8 @@ class CaptureDaemon:
         if self._refusal is not None:
             self._report(f"{self._refusal} ({self._status.bad_frames} refused so far)")
         self._status.refusal, self._refusal = self._refusal, None
+        damaged = getattr(self._device, "counters", None)
+        self._status.damaged_frames = damaged.bad_frames if damaged is not None else 0
         self._link.publish_status()
         with contextlib.suppress(OSError):  # a disk that fails shows in the log's own problem
             self._index.extend()
@@ -144,7 +146,8 @@ class CaptureDaemon:
     def _note_opening(self, device: ReopeningDevice) -> None:
         if device.is_open and self._status.state != "streaming":
             self._status.reconnects = device.openings - 1
-            self._change("streaming", f"{self._device.name} is open")
+            notice = getattr(self._device, "notice", None)
+            self._change("streaming", f"{self._device.name} is open" + (f"; {notice}" if notice else ""))
 
     def _take(self, reading: Reading) -> None:
         """Refuse the reading, or number, log and publish it."""

@@ -41,8 +41,9 @@ class Reading:
 class Device(Protocol):
     """A source of readings. It says what it produces before it is opened.
 
-    Two more attributes are looked at if the device has them: ``counts``, the pair of smallest and largest
-    raw value its hardware can send, and ``hand``, one of ``left``, ``right``, ``unknown``.
+    Four more attributes are looked at if the device has them: ``counts``, the pair of smallest and largest
+    raw value its hardware can send; ``hand``, one of ``left``, ``right``, ``unknown``; ``counters`` with
+    ``bad_frames``, the records thrown away since they came damaged; ``notice``, a sentence for the user.
     """
 
     @property

@@ -23,6 +23,9 @@ class CaptureStatus:
     sentence: str = "opening the device"
     frames: int = 0
     bad_frames: int = 0
+    """Readings the daemon refused."""
+    damaged_frames: int = 0
+    """Records that the driver threw away because they came damaged from the glove."""
     duplicates: int = 0
     reconnects: int = 0
     refusal: str | None = None
@@ -55,6 +58,7 @@ class CaptureStatus:
                 "frames": self.frames,
                 "rate_hz": self._measured_rate(now_ns),
                 "bad_frames": self.bad_frames,
+                "damaged_frames": self.damaged_frames,
                 "duplicates": self.duplicates,
                 "last_frame_age_s": age,
                 "reconnects": self.reconnects,
