@@ -70,7 +70,7 @@ def _installed() -> dict[str, ModuleType | None]:
     for name, module in PEERS.items():
         try:
             found[name] = importlib.import_module(module)
-        except ImportError as error:
+        except (ImportError, OSError) as error:
             print(f"{name}: not installed ({error})")
             found[name] = None
     pin_blas_to_one_thread()
@@ -273,7 +273,7 @@ def _text(value: Any) -> str:
 def _draw(result: dict[str, Any], path: Path) -> None:
     try:
         from gaussian_process_picture import draw
-    except ImportError as error:
+    except (ImportError, OSError) as error:
         print(f"picture: matplotlib is not installed ({error})")
         return
     draw(result, path)

@@ -1,5 +1,6 @@
 """fit_lmc_gpr: the optimum other libraries find, the exact process served on few nodes, and wild inputs."""
 
+import json
 import warnings
 from typing import Any
 
@@ -104,7 +105,7 @@ def test_same_seed_same_model() -> None:
 def test_survives_storage() -> None:
     inputs, target, _ = make_joint(200)
     fitted = fit_lmc_gpr(inputs, target)
-    again = ProcessRegressor.restore(fitted.arrays(), fitted.settings())
+    again = ProcessRegressor.restore(fitted.arrays(), json.loads(json.dumps(fitted.settings())))
     np.testing.assert_array_equal(again.predict(inputs).mean, fitted.predict(inputs).mean)
 
 

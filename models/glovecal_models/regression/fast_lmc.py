@@ -46,6 +46,8 @@ MOST_EXACT = 4000
 """Distinct inputs up to which an N x N matrix is formed; 128 MB each at this size."""
 LARGEST_FACTOR = 8e6
 """Entries of a low-rank factor: 64 MB."""
+TIGHT = 0.05
+"""Nats: a factorisation that brackets the likelihood so closely stands for the exact process."""
 MEAN_ERROR_DEG, SD_ERROR_DEG = 5e-4, 1e-3
 """How closely served nodes follow the exact process at training inputs."""
 SHORT_LENGTHSCALE = 0.5
@@ -60,7 +62,7 @@ class _Trained:
 
     parameters: np.ndarray
     profile: Profile
-    certificate: Certificate | None
+    certificate: Certificate
     factor: PivotedCholesky
     reference: Reference | None
     """The exact process at the training inputs, where it was evaluated."""
@@ -78,7 +80,8 @@ def fit_lmc_gpr(
 
     ``evidence`` tells: ``nlml`` (standardised units; + N log target_scale_deg in degrees) and the bracket
     ``nlml_lower``..``nlml_upper`` of the exact value, ``starts``, ``evaluations``, ``exact_evaluation``,
-    ``served_mean_error_deg`` and ``served_sd_error_deg``, ``missing_input_suspected``.
+    ``served_mean_error_deg`` and ``served_sd_error_deg`` (None where the exact process is out of reach:
+    very many samples and short lengthscales), ``missing_input_suspected``.
     Raises NotTrainable on unusable samples, Cancelled when ``cancelled`` answers True.
     """
     inputs, target = check_samples(inputs, target)
@@ -162,7 +165,7 @@ def _examine(samples: MergedSamples, refined: Candidate) -> _Trained:
         best = fit.profile()
         trace = float(samples.root_count**2 @ factor.residual)
         certificate = certify(fit, trace, best.plane, best.scale)
-        if certificate.width <= 0.05 or distinct > MOST_EXACT:
+        if certificate.width <= TIGHT or distinct > MOST_EXACT:
             return _Trained(parameters, best, certificate, factor, None)
     process = ExactProfiledLikelihood(samples).training_process(parameters)
     if process is None:
@@ -218,28 +221,28 @@ def _evidence(
 ) -> dict[str, Any]:
     lengthscales = np.exp(trained.parameters[:-1])
     certificate = trained.certificate
+    known = trained.reference is not None or certificate.width <= TIGHT
     by_plane = _nlml_of_plane(samples)
     many = not refined.low_rank and len(samples.inputs) > FEW
     collapsed = float(lengthscales.min()) < (SHORT_LENGTHSCALE if many else 0.2 * SHORT_LENGTHSCALE)
-    facts: dict[str, Any] = {
+    return {
         "samples": samples.total,
         "distinct_inputs": len(samples.inputs),
         "nlml": trained.profile.nlml,
+        "nlml_lower": float(certificate.lower),
+        "nlml_upper": float(certificate.upper),
+        "certificate": certificate.how,
         "target_scale_deg": scale_deg,
         "lengthscales": lengthscales.tolist(),
         "evaluations": refined.evaluations,
         "exact_evaluation": trained.reference is not None,
         "served_nodes": len(served.pivots),
         "variance_nodes": int(np.count_nonzero(served.variance_root.any(axis=1))),
-        "served_mean_error_deg": served.mean_error * scale_deg,
-        "served_sd_error_deg": served.sd_error * scale_deg,
+        "served_mean_error_deg": served.mean_error * scale_deg if known else None,
+        "served_sd_error_deg": served.sd_error * scale_deg if known else None,
         "nlml_of_plane": by_plane,
         "missing_input_suspected": collapsed and trained.profile.nlml < by_plane - CLEAR_GAIN,
     }
-    if certificate is not None:
-        facts["nlml_lower"], facts["nlml_upper"] = float(certificate.lower), float(certificate.upper)
-        facts["certificate"] = certificate.how
-    return facts
 
 
 def _nlml_of_plane(samples: MergedSamples) -> float:
