@@ -41,7 +41,7 @@ from glovecal_models.covariance.squared_exponential_ard import SquaredExponentia
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.threads import pin_blas_to_one_thread
-from glovecal_service.serve import run_part, real_time
+from glovecal_service.serve import real_time, run_part
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
 
@@ -63,7 +63,7 @@ class Case:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--quick", action="store_true", help="shorter runs")
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     arguments = parser.parse_args()

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from glovecal_models.calibration.predictor import GloveAngles, GlovePredictor
 
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.predictor import GloveAngles, GlovePredictor
 from glovecal_service.realtime.pace import Pace
 from glovecal_service.realtime.refusal import Refusal, Refused
 
