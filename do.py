@@ -64,7 +64,21 @@ def check(arguments: list[str]) -> int:
 
 
 def bench(arguments: list[str]) -> int:
+    install_gpytorch()
     return run("python", "tests/bench/bench.py", *arguments, groups=("bench",))
+
+
+def install_gpytorch() -> None:
+    """GPyTorch stays out of the lock file: on Linux its torch brings gigabytes of GPU libraries.
+
+    pip puts both into a folder of their own, where pip may be told to find a smaller build of torch.
+    """
+    folder = TOOLS / "gpytorch"
+    if folder.is_dir():
+        return
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    if subprocess.run([*pip, "--target", str(folder), "torch==2.13.0", "gpytorch==1.15.2"]).returncode:
+        print("GPyTorch could not be installed: the bench goes on without it", file=sys.stderr)
 
 
 VERBS = {"demo": demo, "serve": serve, "glovecal": glovecal, "test": test, "check": check, "bench": bench}

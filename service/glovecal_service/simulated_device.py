@@ -42,13 +42,24 @@ class SimulationOptions:
     wearing: int = 0
     rate_hz: float = 120.0
     reference: Path | None = None
+    reference_noise_deg: float = REFERENCE_NOISE_DEG
+    """Standard deviation of the reference system's noise; 0 writes the truth."""
     duration_s: float | None = None
 
     @classmethod
     def parse(cls, options: Mapping[str, str]) -> SimulationOptions:
         """From ``seed=N``, ``layout=``, ``motion=``, ``wearing=N``, ``rate_hz=``, ``reference=FILE``,
-        ``duration=SECONDS``. Raises BadOption."""
-        known = ("seed", "layout", "motion", "wearing", "rate_hz", "reference", "duration")
+        ``reference_noise_deg=``, ``duration=SECONDS``. Raises BadOption."""
+        known = (
+            "seed",
+            "layout",
+            "motion",
+            "wearing",
+            "rate_hz",
+            "reference",
+            "reference_noise_deg",
+            "duration",
+        )
         unknown = sorted(set(options) - set(known))
         if unknown:
             raise BadOption(f"simulated: no option {unknown[0]!r}; there are {', '.join(known)}")
@@ -61,6 +72,9 @@ class SimulationOptions:
             wearing=_number(options, "wearing", 0, int, 0, 2**32),
             rate_hz=_number(options, "rate_hz", 120.0, float, 1.0, FASTEST_HZ),
             reference=None if reference is None else Path(reference),
+            reference_noise_deg=_number(
+                options, "reference_noise_deg", REFERENCE_NOISE_DEG, float, 0.0, 90.0
+            ),
             duration_s=None if duration is None else _number(options, "duration", 0.0, float, 0.0, 1e9),
         )
 
@@ -87,7 +101,8 @@ class SimulatedDevice:
         self.counts = self._glove.layout.counts
         self._reference = None
         if self._options.reference is not None:
-            self._reference = _ReferenceFile(self._options.reference, self._glove)
+            noise = self._options.reference_noise_deg
+            self._reference = _ReferenceFile(self._options.reference, self._glove, noise)
         self._frames: Iterator[_SimulatedFrame] | None = None
         self._waiting: _SimulatedFrame | None = None
 
@@ -186,12 +201,13 @@ def _planned_segments(options: SimulationOptions) -> list[Segment] | Iterator[Se
 class _ReferenceFile:
     """A reference table written line by line: time of the frame, pose, measured rotations."""
 
-    def __init__(self, path: Path, glove: SimulatedGlove) -> None:
+    def __init__(self, path: Path, glove: SimulatedGlove, noise_deg: float) -> None:
         if path.exists():
             raise BadOption(f"simulated: reference={path} exists already; name a new file")
         if not path.parent.is_dir():
             raise BadOption(f"simulated: reference={path}: there is no folder {path.parent}")
         self._path = path
+        self._noise_deg = noise_deg
         measured = measured_rotations(glove)
         self._columns = [glove.rotations.index(rotation) for rotation in measured]
         self._header = ",".join(["time_s", "pose", *(f"r.{rotation}" for rotation in measured)])
@@ -215,7 +231,7 @@ class _ReferenceFile:
         """One row, on disk before the next frame; digits beyond a thousandth of a degree are noise."""
         if self._stream is None:
             return
-        noise = REFERENCE_NOISE_DEG * self._random.standard_normal(len(self._columns))
+        noise = self._noise_deg * self._random.standard_normal(len(self._columns))
         angles = (frame.truth[self._columns] + noise).round(4).tolist()
         self._stream.write(",".join([repr(monotonic_ns / 1e9), frame.pose, *map(repr, angles)]) + "\n")
 

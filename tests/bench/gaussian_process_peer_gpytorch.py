@@ -67,8 +67,8 @@ def train_exact(x: np.ndarray, y: np.ndarray, most_evaluations: int) -> Trained:
     seconds = time.process_time() - start
     given = Hyperparameters(
         model.smooth.base_kernel.lengthscale.detach().numpy().ravel(),
-        float(model.smooth.outputscale),
-        float(likelihood.noise),
+        float(model.smooth.outputscale.detach()),
+        float(likelihood.noise.detach()),
     )
     note = f"stopped after {counted[0]} evaluations" if counted[0] >= most_evaluations else ""
     return Trained("GPyTorch exact", seconds, given, note, None, counted[0])

@@ -1,5 +1,6 @@
 """Layouts: the built-in ones against the paper, any other from TOML, clear refusals."""
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -70,7 +71,7 @@ def test_a_small_layout_and_its_pseudo_sensor():
     layout = Layout.from_toml(HALF_HAND)
     dip = layout.correspondence("I_DIP")
     assert dip.kind == "0S1R"
-    columns = dip.input_columns([[10.0, 30.0, 20.0, 5.0]], layout.sensors)
+    columns = dip.input_columns(np.array([[10.0, 30.0, 20.0, 5.0]]), layout.sensors)
     assert columns.tolist() == [[20.0]]
 
 

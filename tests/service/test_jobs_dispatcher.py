@@ -9,6 +9,7 @@ import pytest
 from jobs_counting import CountingJob, noted
 from jobs_waiting import result_of, wait_for, wait_for_job
 
+from glovecal_service.jobs import workers
 from glovecal_service.jobs.dispatcher import Dispatcher
 from glovecal_service.jobs.owner import Owner
 
@@ -142,3 +143,12 @@ def test_the_scheduler_can_be_lost_in_the_middle_of_a_job(dispatched, ledger):
     dispatcher.workers._cluster.close()
     assert result_of(store, job.id)["sums"] == [1, 3, 6, 10]
     assert len(noted(ledger, "done")) <= 6, "only the two fits in flight may be repeated"
+
+
+def test_processes_that_never_come_back_are_replaced(dispatched, ledger, monkeypatch):
+    store, dispatcher = dispatched
+    monkeypatch.setattr(workers, "LONGEST_ABSENCE_S", 1.0)
+    job = create(store, ledger, [1, 2, 3], seconds=0.3)
+    wait_for(lambda: noted(ledger, "done"))
+    dispatcher.workers._cluster.scale(0)
+    assert result_of(store, job.id)["sums"] == [1, 3, 6]

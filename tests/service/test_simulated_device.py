@@ -76,9 +76,7 @@ def test_frames_that_are_too_late_are_left_out_as_by_a_real_glove(monkeypatch):
     device.open()
     assert device.read(1.0) is not None
     time.sleep(0.2)
-    assert (
-        len(read_all(device)) < 59 - 25
-    )  # 0.2 s slept, 0.05 s made up for: 30 frames lost
+    assert len(read_all(device)) < 59 - 25  # 0.2 s slept, 0.05 s made up for: 30 frames lost
 
 
 def test_the_same_seed_gives_the_same_readings_also_when_opened_again():

@@ -88,7 +88,7 @@ def descend(
     for _ in range(REBUILDS):
         lower = np.append(point[:-1] + np.log(reach), point[-1] - (1.5 if fine else 2.5))
         lower = np.maximum(lower, lower_bounds(dimensions))
-        tolerance = (3e-5 if fine else 1e-2) * float(np.exp(lower[-1]))
+        tolerance = (1e-5 if fine else 1e-2) * float(np.exp(lower[-1]))
         likelihood = LowRankLikelihood.at(
             samples, np.exp(lower[:-1]), float(np.clip(tolerance, 1e-12, 1e-3)), most_nodes
         )
@@ -99,7 +99,7 @@ def descend(
             point,
             lower,
             upper_bounds(dimensions),
-            tolerance=1e-4 if fine else 2e-2,
+            tolerance=1e-5 if fine else 2e-2,
             evaluations=60 if fine else 40,
             cancelled=cancelled,
         )
@@ -153,7 +153,7 @@ def screen(
     account: list[dict[str, object]] = []
     for start in long_starts(dimensions):
         nodes = min(SCREENING_NODES, len(samples.inputs))
-        candidate = descend(samples, start, fine=False, most_nodes=nodes, cancelled=cancelled)
+        candidate = descend(samples, start, fine=few, most_nodes=nodes, cancelled=cancelled)
         _note(account, start, candidate)
         if candidate is not None:
             found.append(candidate)

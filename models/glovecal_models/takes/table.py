@@ -20,6 +20,7 @@ from glovecal_models.takes.columns import ColumnKind
 from glovecal_models.takes.csv_table import read_csv_table
 from glovecal_models.takes.equal_times import spread_equal_times
 from glovecal_models.takes.parquet_table import MAGIC, read_parquet_table
+from glovecal_models.takes.pose_names import poses_at_frames
 from glovecal_models.takes.raw_table import RawTable
 from glovecal_models.takes.reference_check import reference_warnings
 from glovecal_models.takes.take import Take
@@ -254,7 +255,7 @@ def _build_take(
         rotations, reference = _only_measured(table.names("rotation"), table.matrix("rotation", rows))
         own = ReferenceRows(time, rotations, reference, None)
     elif poses is None and own.poses is not None:
-        poses = _poses_at(time, own.time_s, own.poses)
+        poses = poses_at_frames(time, own.time_s, own.poses)
     measured = len(own.rotations) > 0
     names, values = _only_measured(table.names("context"), table.matrix("context", rows))
     context = dict(zip(names, values.T.copy(), strict=True))
@@ -272,10 +273,3 @@ def _build_take(
         poses=poses,
         simulated=bool((np.nan_to_num(simulated) != 0).any()),
     )
-
-
-def _poses_at(time: np.ndarray, pose_time: np.ndarray, poses: tuple[str, ...]) -> tuple[str, ...] | None:
-    """The pose named by the latest reference row at or before each frame, "" before the first."""
-    index = np.searchsorted(pose_time, time, side="right") - 1
-    named = tuple(poses[i] if i >= 0 else "" for i in index)
-    return named if any(named) else None

@@ -63,3 +63,7 @@ def main() -> None:
     except (GlovecalError, ClientError) as error:
         err.print(str(error), markup=False, style="red")
         sys.exit(getattr(error, "exit_code", 1))
+
+
+if __name__ == "__main__":
+    main()

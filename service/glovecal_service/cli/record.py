@@ -47,17 +47,16 @@ def finish_recording(service: RestClient, recording: str) -> dict[str, Any]:
     """Stop a recording and wait for its take. Raises ServiceError when it failed or takes too long."""
     service.post(f"/recordings/{recording}/stop")
     until = time.monotonic() + PATIENCE_S
-    while time.monotonic() < until:
-        document = service.get(f"/recordings/{recording}")
-        if document["state"] == "done":
-            return document
+    while (document := service.get(f"/recordings/{recording}"))["state"] != "done":
         if document["state"] == "failed":
             raise ServiceError(
                 409, "Recording failed", document["facts"].get("sentence", "no reason was given")
             )
+        if time.monotonic() > until:
+            raise ServiceError(
+                504,
+                "Recording not finished",
+                f"recording {recording} is still {document['state']}; is glovecal serve running?",
+            )
         time.sleep(0.1)
-    raise ServiceError(
-        504,
-        "Recording not finished",
-        f"recording {recording} is still {document['state']}; is the service running (glovecal serve)?",
-    )
+    return document

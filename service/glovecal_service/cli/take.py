@@ -7,11 +7,15 @@ from typing import Annotated
 
 import typer
 
+from glovecal_client.errors import ServiceError
 from glovecal_service.cli.connection import connect
 from glovecal_service.cli.options import AsJson, LayoutName, Subject
 from glovecal_service.cli.printing import err, out, print_facts, print_json, print_table
 
 app = typer.Typer(help="Takes: recordings with or without reference angles.", no_args_is_help=True)
+
+CONFLICT = 409
+"""The service's answer when a take is two tables."""
 
 COLUMNS = {
     "id": "take",
@@ -37,6 +41,9 @@ def import_takes(
         Path | None,
         typer.Option(exists=True, dir_okay=False, help="Reference table of a single frames file."),
     ] = None,
+    spread_equal_times: Annotated[
+        bool, typer.Option(help="Frames stamped in batches: spread each batch up to the next time.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Import take tables. X.reference.csv beside X.frames.csv is found by itself."""
@@ -48,7 +55,11 @@ def import_takes(
         name = service.add_layout(Path(layout)) if layout and Path(layout).is_file() else layout
         for file in frames:
             answer = service.upload_takes(
-                file, reference=reference or _beside(file), subject=subject, layout=name
+                file,
+                reference=reference or _beside(file),
+                subject=subject,
+                layout=name,
+                equal_times="spread" if spread_equal_times else "refuse",
             )
             rows.extend(answer["takes"])
             for sentence in answer.get("warnings", []):
@@ -101,11 +112,24 @@ def export(
     take: str,
     file: Annotated[Path, typer.Argument(help="Where to write; .csv or .parquet.")],
 ) -> None:
-    """Write a take as a take table."""
+    """Write a take as a take table; two tables when its reference has a clock of its own."""
     file_format = file.suffix.lstrip(".").lower()
+    path = f"/takes/{take}/export"
     with connect() as service:
-        file.write_bytes(service.download(f"/takes/{take}/export", {"format": file_format}))
-    out.print(f"Wrote {file}.")
+        try:
+            tables = {file: service.download(path, {"format": file_format})}
+        except ServiceError as error:
+            if error.status != CONFLICT:
+                raise
+            tables = {
+                file.with_name(f"{file.stem}.{part}{file.suffix}"): service.download(
+                    path, {"format": file_format, "part": part}
+                )
+                for part in ("frames", "reference")
+            }
+    for name, content in tables.items():
+        name.write_bytes(content)
+        out.print(f"Wrote {name}.", markup=False)
 
 
 @app.command("remove")

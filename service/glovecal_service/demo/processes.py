@@ -15,7 +15,7 @@ from pathlib import Path
 from glovecal_client.errors import ServiceError
 from glovecal_client.rest import RestClient
 
-START_PATIENCE_S = 40.0
+START_PATIENCE_S = 90.0
 STOP_PATIENCE_S = 15.0
 
 
@@ -101,7 +101,9 @@ def _wait_until_ready(service: RestClient, process: subprocess.Popen[bytes], log
         except ServiceError as error:
             if process.poll() is not None or time.monotonic() > until:
                 last = log.read_text(errors="replace").strip().splitlines()[-3:]
-                raise ServiceError(503, "Service did not start", " / ".join(last) or str(error)) from error
+                raise ServiceError(
+                    503, "Service did not start", " / ".join(last) or "it said nothing"
+                ) from error
         time.sleep(0.1)
 
 

@@ -7,12 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from glovecal_client.errors import ServiceError
 from glovecal_client.rest import RestClient
 from glovecal_service.cli.record import finish_recording
 from glovecal_service.demo.live import PoseMeter, metered_poses
 from glovecal_service.demo.processes import DemoPlace, running_capture
 
 SUBJECT, GLOVE, SITE, LAYOUT = "demo-subject", "demo-right", "lab", "cyberglove18"
+FREE_MOTION_S = 7.0
 SAMPLING = ("key_poses", "cross_couple", "thumb", "wrist", "free")
 METHODS = ("raw", "linear", "lmc_gpr", "spgp")
 SERVED = "lmc_gpr"
@@ -66,13 +68,17 @@ def _record(
         "motion": motion,
         "wearing": "0" if wearing == "first" else "1",
         "reference": str(reference),
-        "lead_s": "1.5",
     }
+    if motion == "free":
+        options["duration"] = str(FREE_MOTION_S)  # it has no end of its own
     if motion == "evaluation":
         options["reference_noise_deg"] = "0"  # the simulated hand's truth itself
+    wanted = {"glove": GLOVE, "name": f"{wearing}-{motion}", "subject": SUBJECT, "wearing": wearing}
+    recording = service.post("/recordings", wanted) if _is_seen(service) else None
     with running_capture(place, glove=GLOVE, subject=SUBJECT, wearing=wearing, options=options) as capture:
-        _wait_until_seen(service, wearing)
-        recording = service.post("/recordings", {"glove": GLOVE, "name": f"{wearing}-{motion}"})
+        if recording is None:
+            _wait_until_seen(service)
+            recording = service.post("/recordings", wanted)
         capture.wait(CAPTURE_PATIENCE_S)
         finished = finish_recording(service, recording["id"])
     take = service.attach_reference(finished["facts"]["take"], reference)
@@ -83,13 +89,16 @@ def _record(
     return take
 
 
-def _wait_until_seen(service: RestClient, wearing: str) -> None:
+def _is_seen(service: RestClient) -> bool:
+    return any(glove["name"] == GLOVE for glove in service.get("/gloves")["seen"])
+
+
+def _wait_until_seen(service: RestClient) -> None:
     until = time.monotonic() + 20
-    while time.monotonic() < until:
-        if any(g["name"] == GLOVE and g["wearing"] == wearing for g in service.get("/gloves")["seen"]):
-            return
+    while not _is_seen(service):
+        if time.monotonic() > until:
+            raise ServiceError(504, "No glove", f"the service did not see glove {GLOVE} within 20 s")
         time.sleep(0.05)
-    raise TimeoutError(f"the service did not see glove {GLOVE} within 20 s")
 
 
 def _train(service: RestClient, method: str, takes: list[str], found: Walk, say: Say) -> None:

@@ -127,7 +127,7 @@ class JobRun:
                 if restart == WORKER_RESTARTS:
                     raise
                 log.warning("training processes lost, starting again", job=self._job.id, reason=str(error))
-                self._workers.reset()
+                self._workers.reset(error.client)
 
     def _hand_out(self, plan: JobPlan, results: dict[int, TaskResult]) -> None:
         """Keep every worker busy with one task and one waiting; futures are dropped as they finish."""
@@ -143,6 +143,7 @@ class JobRun:
                     task = plan.tasks[number]
                     future = self._workers.submit(task, self._finished.folder, self._cancel_file)
                     running[future] = number
+                self._workers.check()
                 for future in finished(list(running), WATCH_S):
                     number = running.pop(future)
                     self._take(plan, number, outcome(future, plan.tasks[number]), results)

@@ -14,6 +14,7 @@ import os
 import threading
 import time
 from concurrent.futures import CancelledError
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 START_TIMEOUT_S = 60
 LOOK_S = 0.01
+LONGEST_ABSENCE_S = 45.0
 CANCELLED = (asyncio.CancelledError, CancelledError)
 _CONFIG = {
     "distributed.admin.large-graph-warning-threshold": "1GB",
@@ -38,7 +40,14 @@ _CONFIG = {
 
 
 class WorkersLost(GlovecalError):
-    """The scheduler is gone; whatever was in flight has to be handed out again."""
+    """Nobody works any more; whatever was in flight has to be handed out again.
+
+    ``client`` is the one that was lost, so that two jobs do not each throw away the other's new one.
+    """
+
+    def __init__(self, sentence: str, client: Client | None = None) -> None:
+        super().__init__(sentence)
+        self.client = client
 
 
 class TaskKilledWorkers(GlovecalError):
@@ -53,6 +62,7 @@ class Workers:
         self._lock = threading.Lock()
         self._client: Client | None = None
         self._cluster: LocalCluster | None = None
+        self._absent_since: float | None = None
 
     @property
     def started(self) -> bool:
@@ -76,17 +86,40 @@ class Workers:
         """Hand a task out. Raises WorkersLost."""
         from distributed.client import ClosedClientError
 
+        client = None
         try:
-            return self._started().submit(run_task, task, folder, cancel_file, pure=False)
+            client = self._started()
+            return client.submit(run_task, task, folder, cancel_file, pure=False)
         except (OSError, TimeoutError, RuntimeError, ClosedClientError) as error:
-            raise WorkersLost(f"the training processes cannot be reached: {error}") from error
+            raise WorkersLost(f"the training processes cannot be reached: {error}", client) from error
 
-    def reset(self) -> None:
-        """Forget the scheduler, so that the next ``submit`` finds or starts another."""
+    def check(self) -> None:
+        """Raise WorkersLost when every process of our own has been gone for long.
+
+        Dask starts a killed process again, but gives up when that takes too long on a busy computer; tasks
+        would then wait for ever.
+        """
+        client, cluster = self._client, self._cluster
+        scheduler = None if cluster is None else cluster.scheduler
+        if client is None or scheduler is None or scheduler.workers:
+            self._absent_since = None
+            return
+        now = time.monotonic()
+        self._absent_since = self._absent_since or now
+        if now - self._absent_since > LONGEST_ABSENCE_S:
+            raise WorkersLost("the training processes died and were not started again", client)
+
+    def reset(self, lost: Client | None = None) -> None:
+        """Forget the scheduler, so that the next ``submit`` finds or starts another.
+
+        With ``lost``, only if that is still the client in use.
+        """
         with self._lock:
-            self._close()
+            if lost is None or lost is self._client:
+                self._close()
 
-    close = reset
+    def close(self) -> None:
+        self.reset()
 
     def pids(self) -> list[int]:
         """Process ids of the workers, none before they are started."""
@@ -100,8 +133,12 @@ class Workers:
         with self._lock:
             if self._client is None:
                 configure(_CONFIG)
-                address = self._settings.scheduler or self._local_cluster()
-                self._client = Client(address, timeout=START_TIMEOUT_S, set_as_default=False)
+                try:
+                    address = self._settings.scheduler or self._local_cluster()
+                    self._client = Client(address, timeout=START_TIMEOUT_S, set_as_default=False)
+                except BaseException:
+                    self._close()
+                    raise
             return self._client
 
     def _local_cluster(self) -> LocalCluster:
@@ -123,10 +160,11 @@ class Workers:
     def _close(self) -> None:
         client, self._client = self._client, None
         cluster, self._cluster = self._cluster, None
-        if client is not None:
-            client.close(timeout=5)
-        if cluster is not None:
-            cluster.close(timeout=10)
+        self._absent_since = None
+        for part, timeout_s in ((client, 5), (cluster, 10)):
+            with suppress(TimeoutError, OSError):  # it is thrown away in any case
+                if part is not None:
+                    part.close(timeout=timeout_s)
 
 
 def finished(futures: list[Future], timeout_s: float) -> list[Future]:
@@ -148,7 +186,7 @@ def outcome(future: Future, task: Task) -> TaskOutcome:
     try:
         return future.result()
     except (*CANCELLED, OSError, ClosedClientError) as error:
-        raise WorkersLost("the scheduler of the training processes was lost") from error
+        raise WorkersLost("the scheduler of the training processes was lost", future.client) from error
     except KilledWorker as error:
         raise TaskKilledWorkers(
             f"{task.label}: every process that worked on it died (killed, or out of memory)"

@@ -234,7 +234,7 @@ def _attach(parts: Parts, id: str, named: tuple[str, Path], clock: ReferenceCloc
             422, "bad-take-table", f"{path.name} holds no rows for take {record.name!r}", file=path.name
         )
     time_s = on_take_clock(rows.time_s, clock, record)
-    return parts.store.takes.attach_reference(id, time_s, rows.rotations, rows.reference)
+    return parts.store.takes.attach_reference(id, time_s, rows.rotations, rows.reference, rows.poses)
 
 
 def _chosen_part(written: list[Path], part: str, take: TakeArrays) -> Path:

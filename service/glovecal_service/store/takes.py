@@ -12,6 +12,7 @@ from sqlalchemy.exc import IntegrityError
 
 from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier
+from glovecal_models.takes.pose_names import poses_at_frames
 from glovecal_models.takes.take import Take
 from glovecal_service.store import tables
 from glovecal_service.store.artifacts import Artifacts, check_sha256
@@ -96,9 +97,16 @@ class Takes:
         return load_take(self._artifacts.get(self.get(id).artifact))
 
     def attach_reference(
-        self, id: str, time_s: np.ndarray, rotations: Sequence[str], reference: np.ndarray
+        self,
+        id: str,
+        time_s: np.ndarray,
+        rotations: Sequence[str],
+        reference: np.ndarray,
+        poses: Sequence[str] | None = None,
     ) -> TakeRecord:
         """Give a take its reference angles, (R,) seconds and (R, len(rotations)) degrees.
+
+        ``poses`` (R,) names the pose at each reference row; None leaves the take's own names as they are.
 
         The id stays; the artifact that was there is listed in ``facts["history"]``. Raises NotFound,
         BadInput, StorageFull, Conflict if the take was changed meanwhile.
@@ -106,7 +114,11 @@ class Takes:
         earlier = self.get(id)
         take = load_take(self._artifacts.get(earlier.artifact))
         take = dataclasses.replace(
-            take, reference_time_s=time_s, rotations=tuple(rotations), reference=reference
+            take,
+            reference_time_s=time_s,
+            rotations=tuple(rotations),
+            reference=reference,
+            poses=take.poses if poses is None else poses_at_frames(take.time_s, time_s, poses),
         )
         content = self._content(take)
         history = [

@@ -265,7 +265,7 @@ def test_refusals_cancel_and_progress() -> None:
     def cancelled() -> bool:
         nonlocal asked
         asked += 1
-        return asked > 200
+        return asked > 20
 
     with pytest.raises(Cancelled):
         fit_spgp(inputs, target, iterations=10_000, cancelled=cancelled)
