@@ -37,6 +37,9 @@ class PoseOrder:
         last = self._last
         if last is None or pose.run_id != last.run_id:
             self._runs += 1
+            if pose.stale:  # a repetition of a frame from before this subscriber listened
+                self._last = pose
+                return True
         elif pose.sequence == last.sequence and pose.stale and not last.stale:
             self._last = pose
             return True

@@ -68,7 +68,10 @@ class FusedProcesses:
             self._put(index, process, selection)
         self._signal = np.exp(self._log_signal[:, :, 0])
         self._mean_apart = self._variance_nodes < m
-        if not self._mean_apart:
+        if self._mean_apart:
+            # hundreds of nodes: a frame costs what reading the root costs; 7 digits do for a variance
+            self._root = self._root.astype(np.float32)
+        else:
             self._root = np.ascontiguousarray(np.concatenate([self._root, self._weights], axis=2))
         self._select = self._select.reshape(d * r, sensors)
         self._work: dict[int, tuple[np.ndarray, ...]] = {}
@@ -107,14 +110,15 @@ class FusedProcesses:
         np.add.reduce(away, axis=0, out=kernel)
         np.subtract(self._log_signal, kernel, out=kernel)
         np.exp(kernel, out=kernel)
-        np.matmul(kernel[:, :, : self._variance_nodes], self._root, out=explained)
+        to_nodes = kernel[:, :, : self._variance_nodes].astype(self._root.dtype, copy=False)
+        np.matmul(to_nodes, self._root, out=explained)
         if self._mean_apart:
             mean += np.matmul(kernel, self._weights)[:, :, 0]
             part = explained
         else:
             mean += explained[:, :, -1]
             part = explained[:, :, :-1]
-        np.einsum("rfk,rfk->rf", part, part, out=variance)
+        np.einsum("rfk,rfk->rf", part, part, out=variance, dtype=float)
         np.subtract(self._signal, variance, out=variance)
         np.maximum(variance, 0.0, out=variance)
         return mean, variance
@@ -125,7 +129,7 @@ class FusedProcesses:
             np.empty((d, r, frames)),
             np.empty((d, r, frames, m)),
             np.empty((r, frames, m)),
-            np.empty((r, frames, self._root.shape[2])),
+            np.empty((r, frames, self._root.shape[2]), self._root.dtype),
             np.empty((r, frames)),
             np.empty((r, frames)),
         )

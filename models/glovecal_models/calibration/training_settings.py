@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from glovecal_models.calibration.representative import DEFAULT_SAMPLES
+from glovecal_models.errors import BadInput
 
 Method = Literal["raw", "linear", "lmc_gpr", "spgp"]
 METHODS: tuple[Method, ...] = ("raw", "linear", "lmc_gpr", "spgp")
@@ -27,3 +28,10 @@ class TrainingSettings:
     pseudo_inputs: int = 100
     iterations: int = 200
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.folds < 0 or self.folds == 1:
+            raise BadInput(
+                f"folds is {self.folds}: one fold would hold out everything; 0 trains without an error "
+                "estimate, 2 or more with one"
+            )

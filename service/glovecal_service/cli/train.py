@@ -21,6 +21,10 @@ def train(
     ] = None,
     leave_out: Annotated[list[str] | None, typer.Option(help="Take to keep for testing; repeat.")] = None,
     pseudo_inputs: Annotated[int, typer.Option(help="SPGP's number of pseudo-inputs.")] = 100,
+    samples: Annotated[int, typer.Option(help="Most samples for one rotation; fewer train faster.")] = 2000,
+    folds: Annotated[
+        int, typer.Option(help="Held-out folds for the error estimate; 0: no estimate, fastest.")
+    ] = 3,
     activate: Annotated[bool, typer.Option(help="Predict live with the new model.")] = True,
     as_json: AsJson = False,
 ) -> None:
@@ -36,6 +40,8 @@ def train(
                 "takes": chosen,
                 "activate": activate,
                 "pseudo_inputs": pseudo_inputs,
+                "samples": samples,
+                "folds": folds,
             },
         )
         result = wait_for_job(service, job["id"], quiet=as_json)["result"]

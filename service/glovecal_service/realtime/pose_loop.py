@@ -1,7 +1,7 @@
 """The thread that turns frames into poses: takes what arrived, predicts, publishes, keeps the books.
 
-Turns go round the models: gloves that share a model share a turn and one prediction. A turn is kept to a
-few milliseconds by what earlier turns cost, and takes the newest frames; normally these are all frames.
+Turns go round the models: gloves that share a model share a turn and one prediction. A round of turns is
+kept to a few milliseconds by what earlier turns cost, and takes the newest frames; normally that is all.
 So under overload every glove still gets fresh poses, fewer of them, and the frames left out are counted.
 """
 
@@ -26,7 +26,7 @@ from glovecal_service.realtime.served_model import ServedModel, ServedModels
 
 OLDEST_NS = 25_000_000
 """A frame that waited longer is skipped; with a turn's budget this keeps a pose younger than 50 ms."""
-TURN_BUDGET_S = 0.010
+ROUND_BUDGET_S = 0.010
 STALE_AFTER_NS = 500_000_000
 STALE_AGAIN_NS = 1_000_000_000
 GLOVES_LIMIT = 256
@@ -125,7 +125,8 @@ class PoseLoop:
             for lane in lanes:
                 self._serve_uncalibrated(lane)
             return
-        allowed = model.pace.frames_within(TURN_BUDGET_S)
+        share = len(lanes) / len(self._pending)  # so that all models have had a turn within the budget
+        allowed = model.pace.frames_within(ROUND_BUDGET_S * share)
         lanes = lanes[:allowed]
         served = self._serve(model, lanes, allowed // len(lanes))
         model.pace.observe(served, time.perf_counter() - started)

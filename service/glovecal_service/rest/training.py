@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Response
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from glovecal_models.calibration.training_settings import Method
 from glovecal_models.errors import LayoutMismatch, NotTrainable
@@ -38,6 +38,13 @@ class Training(StrictBody):
     folds: Annotated[int, Field(ge=0, le=20)] = Field(3, description="Held-out folds; 0: no error estimate.")
     iterations: Annotated[int, Field(ge=1, le=2000)] = Field(200, description="SPGP only.")
     seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = 0
+
+    @field_validator("folds")
+    @classmethod
+    def _not_one(cls, folds: int) -> int:
+        if folds == 1:
+            raise ValueError("one fold would hold out everything; 0 or at least 2")
+        return folds
 
 
 @router.post(
