@@ -1,31 +1,43 @@
 """``python3 do.py bench``: Glovecal beside its peers, in one run, as ratios.
 
 Two parts: Gaussian-process training and prediction against scikit-learn, GPy, GPyTorch and GPBoost, and
-capture to pose through real zenoh. Each can be run alone: ``bench.py gaussian_process`` or ``streaming``.
+capture to pose through real zenoh. Figures and the picture go to a folder.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-PARTS = {"gaussian_process": "gaussian_process_bench.py", "streaming": "streaming_bench.py"}
+PARTS = {"gaussian-process": "gaussian_process_bench.py", "streaming": "streaming_bench.py"}
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
-def main(arguments: list[str]) -> int:
-    chosen = [argument for argument in arguments if argument in PARTS] or list(PARTS)
-    options = [argument for argument in arguments if argument not in PARTS]
-    codes = []
-    for part in chosen:
-        print(f"== {part.replace('_', ' ')} ==", flush=True)
-        command = [sys.executable, str(HERE / PARTS[part]), *options]
-        codes.append(subprocess.run(command, env={**os.environ, **ONE_THREAD}).returncode)
-    return max(codes)
+def main() -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"{' or '.join(PARTS)}; default: both")
+    parser.add_argument("--quick", action="store_true", help="fewer frames, shorter runs")
+    parser.add_argument("--folder", type=Path, default=Path(".bench"), help="for figures and picture")
+    options = parser.parse_args()
+    unknown = sorted(set(options.parts) - set(PARTS))
+    if unknown:
+        parser.error(f"there is no part {unknown[0]!r}; there are {', '.join(PARTS)}")
+    options.folder.mkdir(parents=True, exist_ok=True)
+    return max(_run(part, options.folder, options.quick) for part in options.parts or PARTS)
+
+
+def _run(part: str, folder: Path, quick: bool) -> int:
+    print(f"\n== {part} ==", flush=True)
+    command = [sys.executable, str(HERE / PARTS[part]), "--json", str(folder / f"{part}.json")]
+    if part == "gaussian-process":
+        command += ["--picture", str(folder / f"{part}.png")]
+    command += ["--quick"] if quick else []
+    return subprocess.run(command, env={**os.environ, **ONE_THREAD}).returncode
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

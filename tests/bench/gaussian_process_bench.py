@@ -43,6 +43,8 @@ PEERS = {
     "scikit-learn": "gaussian_process_peer_sklearn",
     "GPyTorch": "gaussian_process_peer_gpytorch",
 }
+GPYTORCH = Path(__file__).resolve().parents[2] / ".tools" / "gpytorch"
+"""Where ``do.py bench`` installs it."""
 SPARSE_ITERATIONS = 200
 
 
@@ -67,6 +69,7 @@ def main(arguments: Iterable[str] | None = None) -> int:
 
 
 def _installed() -> dict[str, ModuleType | None]:
+    sys.path.append(str(GPYTORCH))  # last: what the lock file names goes first
     found: dict[str, ModuleType | None] = {}
     for name, module in PEERS.items():
         try:

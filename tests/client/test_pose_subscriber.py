@@ -107,6 +107,16 @@ def test_silence_makes_it_stale(service: Service, client: zenoh.Session) -> None
         assert poses.stale
 
 
+def test_a_stale_pose_from_before_is_shown_but_is_no_frame_of_now() -> None:
+    order = PoseOrder()
+    assert order.accept(pose(41, run_id=1, flags=PoseFlag.STALE))
+    assert not order.accept(pose(41, run_id=1, flags=PoseFlag.STALE))
+    assert order.counts().received == 0
+    for sequence in range(3):
+        assert order.accept(pose(sequence, run_id=2))
+    assert (order.counts().received, order.counts().lost) == (3, 0)
+
+
 def test_names_follow_the_model_of_the_pose(service: Service, client: zenoh.Session) -> None:
     with PoseSubscriber(client, "lab", "g1") as poses:
         assert poses.rotations(first_pose(service, poses)) == ("I_MCP", "I_PIP")

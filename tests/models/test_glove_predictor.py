@@ -1,5 +1,7 @@
 """GlovePredictor: the same numbers as each regressor alone, flags, rules, one frame or many."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -83,6 +85,28 @@ def test_equals_each_regressor_alone(sizes: tuple[int, ...], frames: int) -> Non
         np.testing.assert_allclose(angles.sd[:, column], sd, atol=1e-9, rtol=0)
         uncertain = np.sqrt(alone.variance) > item.uncertain_above_deg
         np.testing.assert_array_equal(angles.flags[:, column] & TOO_UNCERTAIN > 0, uncertain)
+
+
+def test_nodes_that_serve_the_mean_only() -> None:
+    model = make_model(6, (300,))
+    items = []
+    for item in model.rotations:
+        regressor = item.regressor
+        if isinstance(regressor, ProcessRegressor) and len(regressor.nodes) == 300:
+            root = regressor.variance_root.copy()
+            root[200:] = 0.0
+            items.append(replace(item, regressor=replace(regressor, variance_root=root)))
+        else:
+            items.append(item)
+    model = replace(model, rotations=tuple(items))
+    readings = np.random.default_rng(2).uniform(20, 235, (9, 18))
+    angles = GlovePredictor(model).predict(readings)
+    for column, item in enumerate(model.rotations):
+        if not isinstance(item.regressor, RuleRegressor):
+            alone = item.regressor.predict(item.correspondence.input_columns(readings, LAYOUT.sensors))
+            np.testing.assert_allclose(angles.mean[:, column], alone.mean, atol=1e-9, rtol=0)
+            sd = np.sqrt(alone.variance + item.regressor.noise_variance)
+            np.testing.assert_allclose(angles.sd[:, column], sd, atol=2e-3, rtol=0)  # single precision
 
 
 def test_frame_by_frame_equals_all_at_once() -> None:

@@ -1,6 +1,7 @@
 """Representative samples and held-out folds: nothing lost, nothing random where time matters."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -8,6 +9,8 @@ from glovecal_models.calibration.folds import folds_over_takes
 from glovecal_models.calibration.linear_samples import linear_correspondence, linear_samples
 from glovecal_models.calibration.representative import representative_index
 from glovecal_models.calibration.samples import Samples
+from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 
 
@@ -60,6 +63,12 @@ def test_one_take_is_cut_into_stretches_of_time():
     assert np.array_equal(sum(fold.held_out.astype(int) for fold in folds), np.ones(800))
     assert all(np.count_nonzero(np.diff(fold.held_out.astype(int))) <= 8 for fold in folds)
     assert folds_over_takes(np.zeros(10, dtype=int), 0) == []
+
+
+@pytest.mark.parametrize("folds", [1, -1])
+def test_a_fold_that_would_hold_out_everything_is_refused(folds):
+    with pytest.raises(BadInput, match=f"folds is {folds}"):
+        TrainingSettings(folds=folds)
 
 
 def test_a_linear_calibration_reads_the_measuring_sensor_at_the_key_poses():

@@ -112,6 +112,16 @@ def test_the_reference_table_has_a_row_for_each_frame_at_the_frame_time(tmp_path
         quick(reference=str(path))
 
 
+def test_a_reference_without_noise_is_the_truth(tmp_path):
+    path = tmp_path / "held.reference.csv"
+    device = quick(motion="evaluation", reference=str(path), reference_noise_deg="0")
+    device.open()
+    read_all(device)
+    device.close()
+    held = read_reference(path)[None].reference
+    assert np.diff(held, axis=0).std() < 0.2  # the hand is still; what moves is rounding and tremor
+
+
 def test_a_motion_ends_when_it_was_done_and_repeats_to_fill_a_duration():
     once = SimulatedDevice.from_options(None, {"motion": "wrist", "rate_hz": "10"})
     assert sum(1 for _ in once._simulate()) == 40
@@ -132,6 +142,7 @@ def test_a_motion_ends_when_it_was_done_and_repeats_to_fill_a_duration():
         ({"rate_hz": "nan"}, "must be a number from 1 to 1000"),
         ({"rate_hz": "1e9"}, "must be a number from 1 to 1000"),
         ({"duration": "soon"}, "must be a number"),
+        ({"reference_noise_deg": "-1"}, "from 0"),
         ({"reference": "/no/such/folder/r.csv"}, "there is no folder"),
     ],
 )

@@ -244,6 +244,11 @@ def test_attach_a_reference_later(client: RestClient, tmp_path: Path) -> None:
     changed = client.attach_reference(take["id"], reference)
     assert (changed["id"], changed["rotations"], changed["reference_rows"]) == (take["id"], ["A"], 60)
     assert changed["facts"]["history"][0]["artifact"] == take["artifact"]
+    posed = tmp_path / "posed.reference.csv"
+    first, *rows = reference.read_text().splitlines()
+    posed.write_text("\n".join([f"pose,{first}", *(f"fist,{row}" for row in rows)]))
+    client.attach_reference(take["id"], posed)
+    assert b"fist" in client.download(f"/takes/{take['id']}/export", {"format": "csv", "part": "frames"})
     with pytest.raises(Refused, match="when it was recorded") as refused:
         client.attach_reference(take["id"], reference, clock="wall")
     assert refused.value.status == 409
