@@ -25,8 +25,8 @@ from glovecal_service.realtime.refusal import Refusal, Refused
 from glovecal_service.realtime.served_model import ServedModel, ServedModels
 
 OLDEST_NS = 25_000_000
-"""A frame that waited longer is skipped; with a turn's budget this keeps a pose younger than 50 ms."""
-ROUND_BUDGET_S = 0.010
+"""A frame that waited longer is skipped; with the budget of a round this keeps a pose younger than 50 ms."""
+ROUND_BUDGET_S = 0.020
 STALE_AFTER_NS = 500_000_000
 STALE_AGAIN_NS = 1_000_000_000
 GLOVES_LIMIT = 256
