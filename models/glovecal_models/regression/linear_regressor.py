@@ -12,6 +12,7 @@ from scipy.linalg import cholesky, lstsq, solve_triangular
 from glovecal_models.errors import BadInput, Cancelled, DamagedArtifact
 from glovecal_models.regression.regressor import Prediction
 from glovecal_models.regression.standardise import standardise
+from glovecal_models.regression.stored_number import stored_number
 from glovecal_models.regression.training_check import check_samples
 
 _PRIOR_SLOPE = 10.0
@@ -77,8 +78,8 @@ class LinearRegressor:
             raise DamagedArtifact(f"evidence is {evidence!r}, expected an object")
         return cls(
             **arrays,
-            intercept=_number(settings, "intercept", -np.inf),
-            noise_variance=_number(settings, "noise_variance", 0.0),
+            intercept=stored_number(settings, "intercept", -np.inf),
+            noise_variance=stored_number(settings, "noise_variance", 0.0),
             evidence=dict(evidence),
         )
 
@@ -131,15 +132,3 @@ def _posterior_root(basis: np.ndarray, noise: float) -> np.ndarray:
     precision += 1e-14 * len(basis) * np.eye(basis.shape[1])
     lower = cholesky(precision, lower=True)
     return np.sqrt(noise) * solve_triangular(lower, np.eye(len(lower)), lower=True).T
-
-
-def _number(settings: Mapping[str, Any], name: str, least: float) -> float:
-    value = settings.get(name)
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, (int, float))
-        or not np.isfinite(value)
-        or value < least
-    ):
-        raise DamagedArtifact(f"{name} is {value!r}, expected a finite number of at least {least:g}")
-    return float(value)

@@ -19,6 +19,7 @@ import numpy as np
 from glovecal_models.covariance.base import Covariance, restore_covariance
 from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.regression.regressor import Prediction
+from glovecal_models.regression.stored_number import stored_number
 
 METHODS = ("lmc_gpr", "spgp", "gpr")
 """``gpr`` is any exact process other than the paper's linear mean and covariance."""
@@ -113,9 +114,9 @@ class ProcessRegressor:
         return cls(
             method=str(method),
             covariance=covariance,
-            intercept=_number(settings, "intercept", -np.inf),
-            noise_variance=_number(settings, "noise_variance", 0.0),
-            jitter=_number(settings, "jitter", 0.0),
+            intercept=stored_number(settings, "intercept", -np.inf),
+            noise_variance=stored_number(settings, "noise_variance", 0.0),
+            jitter=stored_number(settings, "jitter", 0.0),
             evidence=dict(evidence),
             **checked,
         )
@@ -151,15 +152,3 @@ def _checked_arrays(arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
     if lengths["D"] == 0:
         raise DamagedArtifact("input_shift is empty; a regressor has at least one sensor")
     return dict(arrays)
-
-
-def _number(settings: Mapping[str, Any], name: str, least: float) -> float:
-    value = settings.get(name)
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, (int, float))
-        or not np.isfinite(value)
-        or value < least
-    ):
-        raise DamagedArtifact(f"{name} is {value!r}, expected a finite number of at least {least:g}")
-    return float(value)
