@@ -5,16 +5,21 @@ import random
 import signal
 import subprocess
 import sys
+import time
+from collections import Counter
 from pathlib import Path
 
 from jobs_counting import noted
 from jobs_waiting import result_of, wait_for
+from store_import_process import TAKES_OF_A_FILE
+from stored_takes import LAYOUT
 
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 
 HERE = Path(__file__).parent
 KILLS = 5
+IMPORTS_KILLED = 3
 
 
 def start(program: str, settings: Settings, output: int | None = None) -> subprocess.Popen[str]:
@@ -58,6 +63,34 @@ def test_no_acknowledged_write_is_lost(store_settings):
             theirs = {id for what, id in acknowledged if what == "active" and models[id].subject == subject}
             assert theirs <= history
     assert len(acknowledged) >= 2 * KILLS
+
+
+def test_no_half_of_a_file_is_imported(store_settings):
+    """Importers are killed at random moments: of each file all takes are there, or none."""
+    with Store.open(store_settings) as store:
+        store.subjects.create("anna")
+        store.layouts.put(LAYOUT)
+    rng, acknowledged = random.Random(5), set()
+    for _ in range(IMPORTS_KILLED):
+        process = start("store_import_process.py", store_settings, subprocess.PIPE)
+        assert process.stdout is not None
+        lines = [process.stdout.readline()]
+        time.sleep(rng.uniform(0, 0.1))
+        kill(process)
+        lines += process.stdout.read().splitlines(keepends=True)
+        process.stdout.close()
+        acknowledged |= {line.strip() for line in lines if line.endswith("\n")}
+    with Store.open(store_settings) as store:
+        records = store.takes.list("anna")
+        counts = Counter(record.original_sha256 for record in records)
+        assert set(counts.values()) == {TAKES_OF_A_FILE}
+        assert acknowledged <= set(counts)
+        assert len(acknowledged) >= IMPORTS_KILLED
+        for file in counts:
+            order = [record.name for record in records if record.original_sha256 == file]
+            assert order == [f"t{n}" for n in range(TAKES_OF_A_FILE)]
+        for record in records[:TAKES_OF_A_FILE]:
+            assert len(store.takes.load(record.id).time_s) == record.frames
 
 
 def test_a_killed_service_repeats_only_the_fits_in_flight(sqlite_settings, tmp_path):

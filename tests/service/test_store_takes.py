@@ -52,6 +52,22 @@ def test_a_take_comes_back_bit_for_bit(anna):
     assert (record.frames, record.duration_s) == (300, pytest.approx(299 / 60))
 
 
+def test_the_takes_of_a_file_are_kept_all_or_none(anna):
+    """The third has the frames of the first: the first two are not kept either."""
+    good = [make_take(1, "one"), make_take(2, "two")]
+    file = {"subject": "anna", "layout": LAYOUT.name, "source": "import", "original_sha256": "ab" * 32}
+    with pytest.raises(Conflict, match="frames of 'three'"):
+        anna.takes.add_all([*good, make_take(1, "three")], **file)
+    assert anna.takes.list() == []
+    with pytest.raises(BadInput, match="'empty' holds no frames"):
+        anna.takes.add_all([*good, make_take(3, "empty", frames=0, measured=False)], **file)
+    assert anna.takes.list() == []
+    kept = anna.takes.add_all(good, **file)
+    assert [record.name for record in kept] == ["one", "two"]
+    assert anna.takes.list() == kept
+    assert anna.takes.add_all([], **file) == []
+
+
 numbers = st.floats(allow_nan=False, allow_infinity=False, width=64)
 
 

@@ -11,7 +11,7 @@ from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 from glovecal_models.takes.reference_check import reference_warnings
 from glovecal_models.takes.take import Take
-from glovecal_service.store.errors import Conflict, StoreError
+from glovecal_service.store.errors import Conflict
 from glovecal_service.store.records import TakeRecord
 from glovecal_service.store.store import Store
 
@@ -59,7 +59,9 @@ def import_takes(
     }
     existing = {take.name: _same(take, stored[take.name]) for take in takes if take.name in stored}
     new = [take for take in takes if take.name not in stored]
-    added = _add_all(store, new, subject=subject, layout=chosen.name, original_sha256=original_sha256)
+    added = store.takes.add_all(
+        new, subject=subject, layout=chosen.name, source="import", original_sha256=original_sha256
+    )
     by_name = existing | {record.name: record for record in added}
     warnings = [sentence for take in takes for sentence in reference_warnings(take)]
     return Import(
@@ -97,32 +99,6 @@ def _same(take: Take, record: TakeRecord) -> TakeRecord:
             f"attach the new one with PUT /v1/takes/{record.id}/reference"
         )
     return record
-
-
-def _add_all(
-    store: Store, takes: list[Take], *, subject: str, layout: str, original_sha256: str
-) -> list[TakeRecord]:
-    added: list[TakeRecord] = []
-    try:
-        for take in takes:
-            record = store.takes.add(
-                take, subject=subject, layout=layout, source="import", original_sha256=original_sha256
-            )
-            added.append(record)
-    except BaseException:
-        for record in added:
-            _take_back(store, record)
-        raise
-    return added
-
-
-def _take_back(store: Store, record: TakeRecord) -> None:
-    try:
-        store.takes.remove(record.id)
-    except StoreError as error:
-        raise Conflict(
-            f"take {record.id} ({record.name!r}) of a file that could not be imported stays: {error}"
-        ) from error
 
 
 def _layout_of_columns(store: Store, takes: list[Take]) -> Layout:

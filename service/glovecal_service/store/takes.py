@@ -41,41 +41,58 @@ class Takes:
         accounting: Mapping[str, Any] | None = None,
         recording: str | None = None,
     ) -> TakeRecord:
-        """Keep a take. The arrays are on disk before the row exists, so a row never points at nothing.
+        """Keep one take: ``add_all`` of it alone, with what its recording has to say about it."""
+        (record,) = self._keep(
+            [take],
+            subject,
+            layout=layout,
+            source=source,
+            original_sha256=original_sha256,
+            accounting=None if accounting is None else dict(accounting),
+            recording=recording,
+        )
+        return record
 
-        Raises BadInput (bad names, no frames), NotFound (unknown subject), Conflict if the subject has the
-        very same frames already (they would be trained and tested on at once), StorageFull.
+    def add_all(
+        self,
+        takes: Sequence[Take],
+        *,
+        subject: str,
+        layout: str,
+        source: str,
+        original_sha256: str | None = None,
+    ) -> list[TakeRecord]:
+        """Keep the takes of one file in their order, all in one transaction or none.
+
+        The arrays are on disk before any row exists, so a row never points at nothing; what is killed in
+        between leaves artifacts that nobody names, never half a file. Raises BadInput (bad names, no
+        frames), NotFound (unknown subject), Conflict if the subject has the very same frames already
+        (they would be trained and tested on at once), StorageFull; then nothing was kept.
         """
-        check_text(take.name, "name of the take")
-        check_text(take.wearing, f"wearing of take {take.name!r}", empty=True)
-        check_identifier(layout, "layout")
-        if len(take.time_s) == 0:
-            raise BadInput(f"take {take.name!r} holds no frames")
-        if original_sha256 is not None:
-            check_sha256(original_sha256)
+        return self._keep(
+            takes, subject, layout=layout, source=source, original_sha256=original_sha256,
+            accounting=None, recording=None,
+        )  # fmt: skip
+
+    def _keep(self, takes: Sequence[Take], subject: str, **shared: Any) -> list[TakeRecord]:
+        """``shared`` are the columns that do not come from the take itself."""
+        check_identifier(shared["layout"], "layout")
+        check_identifier(shared["source"], "source of the take")
+        if shared["original_sha256"] is not None:
+            check_sha256(shared["original_sha256"])
+        for take in takes:
+            _check_keepable(take)
         with self._database.read() as connection:
             require_subject(connection, subject)
-        record = TakeRecord(
-            id=new_id(),
-            subject=subject,
-            layout=layout,
-            source=check_identifier(source, "source of the take"),
-            original_sha256=original_sha256,
-            recording=recording,
-            accounting=None if accounting is None else dict(accounting),
-            created_at=now(),
-            **self._content(take),
-        )
-        try:
-            with self._database.write() as connection:
-                require_subject(connection, subject)
-                values = {**record.__dict__, "frames_sha256": frames_hash(take)}
-                connection.execute(insert(tables.takes).values(**values))
-        except IntegrityError as error:
-            raise Conflict(
-                f"subject {subject!r} already has a take with exactly the frames of {take.name!r}"
-            ) from error
-        return record
+        records = [
+            TakeRecord(id=new_id(), subject=subject, created_at=now(), **shared, **self._content(take))
+            for take in takes
+        ]
+        with self._database.write() as connection:
+            require_subject(connection, subject)
+            for take, record in zip(takes, records, strict=True):
+                _insert(connection, take, record)
+        return records
 
     def get(self, id: str) -> TakeRecord:
         """Raises NotFound."""
@@ -155,6 +172,23 @@ class Takes:
             "duration_s": take.duration_s,
             "simulated": take.simulated,
         }
+
+
+def _check_keepable(take: Take) -> None:
+    check_text(take.name, "name of the take")
+    check_text(take.wearing, f"wearing of take {take.name!r}", empty=True)
+    if len(take.time_s) == 0:
+        raise BadInput(f"take {take.name!r} holds no frames")
+
+
+def _insert(connection: Connection, take: Take, record: TakeRecord) -> None:
+    values = {**record.__dict__, "frames_sha256": frames_hash(take)}
+    try:
+        connection.execute(insert(tables.takes).values(**values))
+    except IntegrityError as error:
+        raise Conflict(
+            f"subject {record.subject!r} already has a take with exactly the frames of {take.name!r}"
+        ) from error
 
 
 def _require(connection: Connection, id: str) -> TakeRecord:
