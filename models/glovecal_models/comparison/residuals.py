@@ -1,0 +1,72 @@
+"""What is left between a model's prediction and the measurement, take by take."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.predictor import GlovePredictor
+from glovecal_models.calibration.samples import require_layout
+from glovecal_models.errors import BadInput
+from glovecal_models.takes.take import Take
+
+
+@dataclass(frozen=True)
+class TakeResiduals:
+    """N frames and R rotations of one take; NaN where nothing was measured."""
+
+    take: Take
+    predicted: np.ndarray
+    """(N, R), degrees."""
+    sd: np.ndarray
+    """Claimed standard deviation of a measurement, (N, R), degrees."""
+    measured: np.ndarray
+    """Reference at the frames, (N, R), degrees."""
+
+    @property
+    def error(self) -> np.ndarray:
+        """Predicted minus measured, (N, R), degrees."""
+        return self.predicted - self.measured
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """A model's residuals on takes, at least one of them measured."""
+
+    rotations: tuple[str, ...]
+    """Rotations of the model, the columns of every take."""
+    takes: tuple[TakeResiduals, ...]
+
+    @property
+    def measured_rotations(self) -> tuple[str, ...]:
+        """Rotations that some take measured."""
+        some = np.any([np.isfinite(item.measured).any(axis=0) for item in self.takes], axis=0)
+        return tuple(name for name, is_measured in zip(self.rotations, some, strict=True) if is_measured)
+
+    def column(self, rotation: str) -> int:
+        return self.rotations.index(rotation)
+
+    def stacked(self, name: str) -> np.ndarray:
+        """``error``, ``sd``, ``predicted`` or ``measured`` of all takes after one another, (sum of N, R)."""
+        return np.concatenate([getattr(item, name) for item in self.takes])
+
+
+def residuals(model: CalibrationModel, takes: Sequence[Take]) -> Residuals:
+    """Predict every frame of ``takes``. Raises LayoutMismatch, and BadInput when nothing was measured."""
+    predictor = GlovePredictor(model)
+    names = predictor.rotations
+    found = []
+    for take in takes:
+        require_layout(take, model.layout)
+        index = [take.sensors.index(name) for name in model.layout.sensors]
+        angles = predictor.predict(take.readings[:, index])
+        found.append(TakeResiduals(take, angles.mean, angles.sd, take.reference_at_frames(names)))
+    result = Residuals(names, tuple(found))
+    if not found or not result.measured_rotations:
+        raise BadInput(
+            "none of the takes measured a rotation of this model; compare needs r.ROTATION columns"
+        )
+    return result

@@ -1,0 +1,115 @@
+"""Does the error change from one wearing to the next by more than from take to take?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from math import comb
+
+import numpy as np
+
+from glovecal_models.comparison.residuals import Residuals
+
+MOST_PARTITIONS = 2000
+FEWEST_PARTITIONS = 20
+"""With fewer ways to share out the takes no answer can be better than one in twenty."""
+
+
+@dataclass(frozen=True)
+class WearingErrors:
+    """Mean error of one rotation in each wearing."""
+
+    rotation: str
+    wearings: tuple[str, ...]
+    mean_deg: tuple[float, ...]
+    takes: tuple[int, ...]
+    spread_deg: float
+    """Root mean square of the wearings' means about their mean."""
+    probability: float | None
+    """Share of other ways to deal the takes to wearings that spread as widely; None: too few takes to say."""
+    sentence: str
+
+
+def wearing_errors(found: Residuals, rotation: str, generator: np.random.Generator) -> WearingErrors | None:
+    """None with fewer than two wearings in which the rotation was measured."""
+    column = found.column(rotation)
+    means, labels = [], []
+    for item in found.takes:
+        error = item.error[:, column]
+        if np.isfinite(error).any():
+            means.append(float(np.nanmean(error)))
+            labels.append(item.take.wearing)
+    names = tuple(dict.fromkeys(labels))
+    if len(names) < 2:
+        return None
+    values, owners = np.array(means), np.array([names.index(label) for label in labels])
+    each = tuple(float(values[owners == i].mean()) for i in range(len(names)))
+    counts = tuple(int((owners == i).sum()) for i in range(len(names)))
+    probability = _probability(values, owners, counts, generator)
+    spread = float(np.std(each))
+    return WearingErrors(
+        rotation, names, each, counts, spread, probability, _sentence(names, each, probability)
+    )
+
+
+def _sentence(names: tuple[str, ...], each: tuple[float, ...], probability: float | None) -> str:
+    low, high = int(np.argmin(each)), int(np.argmax(each))
+    ends = f"from {each[low]:+.1f} degrees in wearing {names[low]} to {each[high]:+.1f} in {names[high]}"
+    if probability is None:
+        return f"The mean error goes {ends}; these are too few takes to say whether that is the wearing."
+    if probability <= 0.05:
+        return f"The mean error changes with the wearing, {ends}."
+    return f"The mean error goes {ends}, no more than it changes from take to take."
+
+
+def _probability(
+    values: np.ndarray, owners: np.ndarray, counts: tuple[int, ...], generator: np.random.Generator
+) -> float | None:
+    """Over distinct ways to deal the takes, the true one left out: random draws would repeat it."""
+    if _partitions(counts) < FEWEST_PARTITIONS or min(counts) < 2:
+        return None
+    true = _spread(values, owners)
+    others = [_spread(values, dealt) for dealt in _deals(owners, counts, generator)]
+    return (1 + sum(other >= true - 1e-12 for other in others)) / (1 + len(others))
+
+
+def _spread(values: np.ndarray, owners: np.ndarray) -> float:
+    """Between-wearing sum of squares."""
+    sums, counts = np.bincount(owners, values - values.mean()), np.bincount(owners)
+    return float(np.sum(sums**2 / counts))
+
+
+def _partitions(counts: tuple[int, ...]) -> int:
+    """Distinct ways to split the takes into groups of these sizes, groups of equal size not told apart."""
+    left, ways = sum(counts), 1
+    for count in counts:
+        ways *= comb(left, count)
+        left -= count
+    for size in set(counts):
+        same = counts.count(size)
+        for number in range(2, same + 1):
+            ways //= number
+    return ways
+
+
+def _deals(owners: np.ndarray, counts: tuple[int, ...], generator: np.random.Generator) -> list[np.ndarray]:
+    """All other partitions when they are few, else many random ones, each at most once."""
+    true = _canonical(owners)
+    found: dict[tuple[int, ...], np.ndarray] = {}
+    if len(counts) == 2 and _partitions(counts) <= MOST_PARTITIONS:
+        for chosen in combinations(range(len(owners)), counts[0]):
+            dealt = np.ones(len(owners), dtype=int)
+            dealt[list(chosen)] = 0
+            found[_canonical(dealt)] = dealt
+    else:
+        for _ in range(2 * MOST_PARTITIONS):
+            dealt = generator.permutation(owners)
+            found[_canonical(dealt)] = dealt
+    found.pop(true, None)
+    return list(found.values())[:MOST_PARTITIONS]
+
+
+def _canonical(owners: np.ndarray) -> tuple[int, ...]:
+    """The same for partitions that differ only in the groups' names."""
+    names: dict[int, int] = {}
+    return tuple(names.setdefault(int(owner), len(names)) for owner in owners)

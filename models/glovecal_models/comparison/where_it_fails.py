@@ -1,0 +1,132 @@
+"""Where a model fails: noise floor, what the error depends on, wearings, worst stretches; with sentences."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from glovecal_models.comparison.covariates import covariates
+from glovecal_models.comparison.noise_floor import NoiseFloor, noise_floor
+from glovecal_models.comparison.residuals import Residuals
+from glovecal_models.comparison.stretches import Stretch, worst_stretches
+from glovecal_models.comparison.structure import Dependence, dependence
+from glovecal_models.comparison.wearings import WearingErrors, wearing_errors
+
+STRUCTURE_PROBABILITY = 0.005
+STRUCTURE_SHARE = 0.04
+"""Share of the mean squared error a column must explain to be worth a user's time."""
+MOSTLY = 0.6
+"""A mean error of this share of the RMSE is worth saying."""
+RESTLESS = 1.5
+"""A prediction that jitters by so many times the reference's noise is restless."""
+AT_FLOOR = 1.15
+"""An error up to this many times the floor has nothing left to gain."""
+
+
+@dataclass(frozen=True)
+class RotationFindings:
+    """One rotation: how far from its floor, and what its error depends on."""
+
+    rotation: str
+    rmse_deg: float
+    bias_deg: float
+    floor: NoiseFloor | None
+    dependences: tuple[Dependence, ...]
+    """Every column tested, the one that explains most first."""
+    wearings: WearingErrors | None
+    sentence: str
+
+    @property
+    def structure(self) -> tuple[Dependence, ...]:
+        """Dependences that are no noise, the largest first."""
+        return tuple(item for item in self.dependences if is_structure(item, self.rmse_deg))
+
+
+@dataclass(frozen=True)
+class WhereItFails:
+    """The answer for all rotations, the one farthest above its floor first."""
+
+    rotations: tuple[RotationFindings, ...]
+    stretches: tuple[Stretch, ...]
+
+    def to_document(self) -> dict[str, Any]:
+        """Plain JSON-able data; every dependence says whether it is structure."""
+        rotations = []
+        for item in self.rotations:
+            document = asdict(item)
+            document["dependences"] = list(document["dependences"])
+            for held, given in zip(document["dependences"], item.dependences, strict=True):
+                held["is_structure"] = is_structure(given, item.rmse_deg)
+                for name in ("edges", "mean_deg", "count"):
+                    held[name] = getattr(given, name).tolist()
+            rotations.append(document)
+        return {"rotations": rotations, "stretches": [asdict(item) for item in self.stretches]}
+
+
+def is_structure(item: Dependence, rmse_deg: float) -> bool:
+    """Whether a dependence is no noise, and large enough to matter."""
+    matters = item.explained_deg**2 >= STRUCTURE_SHARE * rmse_deg**2
+    return item.probability <= STRUCTURE_PROBABILITY and matters
+
+
+def where_it_fails(found: Residuals, *, seed: int = 0) -> WhereItFails:
+    """Every measured rotation against every column; same seed, same answer."""
+    generator = np.random.default_rng(seed)
+    findings = [_findings(found, name, generator) for name in found.measured_rotations]
+    findings.sort(key=lambda item: -_above_floor(item))
+    return WhereItFails(tuple(findings), worst_stretches(found))
+
+
+def _findings(found: Residuals, rotation: str, generator: np.random.Generator) -> RotationFindings:
+    column = found.column(rotation)
+    errors = tuple(item.error[:, column] for item in found.takes)
+    tested = [dependence(errors, covariate, generator) for covariate in covariates(found, rotation)]
+    ranked = sorted((item for item in tested if item is not None), key=lambda item: -item.explained_deg)
+    every = np.concatenate(errors)
+    rmse, bias = float(np.sqrt(np.nanmean(every**2))), float(np.nanmean(every))
+    floor = noise_floor(found, rotation, generator)
+    wearings = wearing_errors(found, rotation, generator)
+    return RotationFindings(
+        rotation, rmse, bias, floor, tuple(ranked), wearings, _sentence(rotation, rmse, bias, floor, ranked)
+    )
+
+
+def _above_floor(item: RotationFindings) -> float:
+    floor = item.floor.floor_deg if item.floor is not None else 0.0
+    return item.rmse_deg**2 - floor**2
+
+
+def _sentence(
+    rotation: str, rmse: float, bias: float, floor: NoiseFloor | None, ranked: list[Dependence]
+) -> str:
+    structure = [item for item in ranked if is_structure(item, rmse)]
+    start = f"{rotation} is off by {rmse:.1f} degrees"
+    if floor is not None:
+        least = "at least " if floor.is_lower_bound else ""
+        start += f" (noise floor {least}{floor.floor_deg:.1f})"
+        if rmse <= AT_FLOOR * floor.high_deg and not floor.is_lower_bound:
+            return f"{start}: {_at_floor(floor)}."
+    if abs(bias) >= MOSTLY * rmse:
+        start += f", mostly by a constant {bias:+.1f}"
+    if not structure:
+        return f"{start}; no recorded column explains it."
+    first = structure[0]
+    low, high = float(np.min(first.mean_deg)), float(np.max(first.mean_deg))
+    rest = len(structure) - 1
+    also = f"; {rest} other column{'s' if rest > 1 else ''} too" if rest else ""
+    return (
+        f"{start}. It depends on {first.phrase}: from {low:+.1f} to {high:+.1f} degrees, "
+        f"{first.explained_deg:.1f} in all{also}."
+    )
+
+
+def _at_floor(floor: NoiseFloor) -> str:
+    reference = np.sqrt(max(floor.floor_deg**2 - floor.prediction_deg**2, 0.0))
+    if floor.prediction_deg > RESTLESS * reference:
+        return (
+            f"no more than the prediction's own jitter of {floor.prediction_deg:.1f} while the hand is "
+            "still; the model follows its sensors too closely"
+        )
+    return "nothing is left to gain"
