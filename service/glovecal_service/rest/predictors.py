@@ -5,10 +5,9 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 
-from glovecal_models.calibration.predictor import GlovePredictor
-
 from glovecal_models.calibration import artifact
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_service.store.store import Store
 
 MOST_KEPT = 8
