@@ -6,6 +6,7 @@ its own process). It is an extra, ``pip install 'glovecal-client[rest]'``, impor
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -94,10 +95,10 @@ class RestClient:
         return self._send("GET", path, params=query).content
 
     def add_layout(self, file: Path) -> str:
-        """Store the layout in a TOML file and return its name; a file without one gives its own name."""
+        """Store the layout in a TOML or .json file, return its name; a file without one gives its own."""
         content = file.read_bytes()
         name = layout_name(content, file)
-        headers = {"Content-Type": "application/toml"}
+        headers = {"Content-Type": "application/json" if _is_json(file) else "application/toml"}
         return self._json("PUT", f"/gloves/{quote(name, safe='')}", content=content, headers=headers)["name"]
 
     def upload_takes(
@@ -183,7 +184,9 @@ class RestClient:
 
 
 def layout_name(content: bytes, file: Path) -> str:
-    """The ``name`` in a layout file, else the file's own name. Raises BadName if it cannot be one."""
+    """The ``name`` in a layout file, else the file's own name; the service judges whether it can be one."""
+    if _is_json(file):
+        return _name_in_json(content) or file.stem.lower()
     for line in content.decode("utf-8", "replace").splitlines():
         if line.lstrip().startswith("["):
             break
@@ -191,6 +194,19 @@ def layout_name(content: bytes, file: Path) -> str:
         if equals and key.strip() == "name":
             return value.split("#")[0].strip().strip("\"'")
     return file.stem.lower()
+
+
+def _name_in_json(content: bytes) -> str | None:
+    try:
+        document = json.loads(content)
+    except (ValueError, RecursionError):
+        return None
+    name = document.get("name") if isinstance(document, dict) else None
+    return name if isinstance(name, str) else None
+
+
+def _is_json(file: Path) -> bool:
+    return file.suffix.lower() == ".json"
 
 
 def _refusal(response: httpx.Response) -> ServiceError:

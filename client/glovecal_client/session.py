@@ -82,9 +82,7 @@ def _connect(
     try:
         client_config(endpoints)
     except zenoh.ZError as error:
-        raise BadName(
-            f"endpoint {', '.join(endpoints)!r} is not like {DEFAULT_ENDPOINT!r}: {error}"
-        ) from error
+        raise BadName(f"endpoint {', '.join(endpoints)!r} is not like {DEFAULT_ENDPOINT!r}") from error
     started = time.monotonic()
     while True:
         try:

@@ -8,7 +8,13 @@ from typing import Annotated
 
 import typer
 
+from glovecal_service.cli.options import DEFAULT_ZENOH, Site, Zenoh, identifier
 from glovecal_service.cli.printing import err, out
+
+GloveOption = Annotated[
+    str,
+    typer.Option("--glove", help="Its name on the wire, such as right-hand.", callback=identifier("glove")),
+]
 
 
 def capture(
@@ -18,24 +24,22 @@ def capture(
             help="cyberglove, cyberglove:PORT, replay:FILE, simulated, or another's NAME[:ARGUMENT]."
         ),
     ],
-    glove: Annotated[str, typer.Option(help="Name of this glove on the wire, such as right-hand.")],
-    subject: Annotated[str | None, typer.Option(help="Who wears it.")] = None,
-    wearing: Annotated[str | None, typer.Option(help="Name of this donning.")] = None,
+    glove: GloveOption,
+    subject: Annotated[str | None, typer.Option(help="Who wears it.", callback=identifier("subject"))] = None,
+    wearing: Annotated[
+        str | None, typer.Option(help="Name of this donning.", callback=identifier("wearing"))
+    ] = None,
     option: Annotated[list[str] | None, typer.Option(help="KEY=VALUE for the device; repeat.")] = None,
-    connect: Annotated[str | None, typer.Option(help="The service's zenoh endpoint.")] = None,
-    site: Annotated[str, typer.Option(envvar="GLOVECAL_SITE")] = "lab",
+    connect: Zenoh = DEFAULT_ZENOH,
+    site: Site = "lab",
     data: Annotated[Path, typer.Option(envvar="GLOVECAL_DATA", help="Where the local log goes.")] = Path(
         "glovecal-data"
     ),
 ) -> None:
     """Record a glove to the local log and publish it. Ctrl-C stops it."""
-    import os
-
     from glovecal_client.capture.command import parse_options, run_capture, stopped_by_signals
-    from glovecal_client.session import DEFAULT_ENDPOINT
 
     stop = threading.Event()
-    endpoint = connect or os.environ.get("GLOVECAL_ZENOH", DEFAULT_ENDPOINT)
     with stopped_by_signals(stop):
         summary = run_capture(
             device,
@@ -44,9 +48,9 @@ def capture(
             site=site,
             subject=subject,
             wearing=wearing,
-            endpoints=[endpoint],
+            endpoints=[connect],
             data=data,
             stop=stop,
-            report=lambda sentence: err.print(sentence, markup=False),
+            report=lambda sentence: err.print(sentence),
         )
-    out.print(str(summary), markup=False)
+    out.print(str(summary))

@@ -6,7 +6,10 @@ Exit codes: 0 done, 1 refused (the sentence says why), 2 wrong use of the comman
 
 from __future__ import annotations
 
+import signal
 import sys
+from importlib.metadata import version
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -25,12 +28,14 @@ from glovecal_service.cli import (
     train,
     watch,
 )
-from glovecal_service.cli.printing import err
+from glovecal_service.cli.printing import err, out
+from glovecal_service.cli.refusal import EXPECTED, INTERRUPTED, exit_code_of, sentence_of
 
 app = typer.Typer(
     name="glovecal",
-    help="Joint rotations you can trust, from data gloves. "
-    "With GLOVECAL_URL set it speaks to that service, else it works on the local folder GLOVECAL_DATA.",
+    help="Joint rotations you can trust, from data gloves.\n\n"
+    "With GLOVECAL_URL set it speaks to that service, else it works on the local folder GLOVECAL_DATA "
+    "(./glovecal-data).",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -50,19 +55,38 @@ app.command("compare")(compare.compare)
 app.add_typer(job.app, name="job")
 
 
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        out.print(f"glovecal {version('glovecal-service')}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    show_version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit."),
+    ] = False,
+) -> None:
+    pass
+
+
 def main() -> None:
     """Entry point of the ``glovecal`` script."""
-    from glovecal_client.errors import ClientError
-    from glovecal_models.errors import GlovecalError
-
+    signal.signal(signal.SIGTERM, _stop)
     try:
         app()
     except KeyboardInterrupt:
         err.print("interrupted")
-        sys.exit(130)
-    except (GlovecalError, ClientError) as error:
-        err.print(str(error), markup=False, style="red")
-        sys.exit(getattr(error, "exit_code", 1))
+        sys.exit(INTERRUPTED)
+    except EXPECTED as error:
+        err.print(sentence_of(error), style="red")
+        sys.exit(exit_code_of(error))
+
+
+def _stop(number: int, _frame: object) -> NoReturn:
+    """Asked to stop: go through every ``finally``, so that no process of ours is left behind."""
+    raise SystemExit(128 + number)
 
 
 if __name__ == "__main__":

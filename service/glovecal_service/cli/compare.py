@@ -2,54 +2,114 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from glovecal_service.cli.connection import connect
-from glovecal_service.cli.options import AsJson
+from glovecal_service.cli.options import AsJson, Models
 from glovecal_service.cli.printing import err, out, print_json, print_table
+from glovecal_service.cli.refusal import Refusal
+from glovecal_service.cli.takes_named import find_takes
+
+if TYPE_CHECKING:
+    from glovecal_client.rest import RestClient
 
 COLUMNS = {
     "rotation": "rotation",
     "rmse_deg": "RMSE",
-    "mae_deg": "mean |error|",
+    "mae_deg": "mean",
     "bias_deg": "bias",
-    "percentile_95_deg": "95 % below",
-    "coverage": "within 1 sd (0.68 is truthful)",
-    "baseline_deg": "its own spread",
+    "percentile_95_deg": "95 %",
+    "coverage": "in 1 sd",
+    "baseline_deg": "spread",
     "count": "frames",
 }
+LEGEND = (
+    "Degrees. mean: of |error|; 95 %: of the frames are below; in 1 sd: share of errors within the "
+    "claimed standard deviation, 0.68 is truthful; spread: the error of always answering the mean angle."
+)
+POSES = {"pose": "pose", "mean_deg": "mean |error|", "sd_deg": "sd", "count": "angles"}
 
 
 def compare(
-    model: Annotated[list[str], typer.Argument(help="Model ids, or their first 6 or more characters.")],
-    take: Annotated[list[str], typer.Option("--take", "-t", help="Take to compare with; repeat.")],
+    model: Models,
+    take: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--take",
+            "-t",
+            help="Take to compare with; repeat. Default: all that none of them was trained on.",
+        ),
+    ] = None,
+    poses: Annotated[bool, typer.Option("--poses", help="Errors of each pose too.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Hold models against measurements. All figures in degrees; "its own spread" is the error of no model."""
+    """Hold models against measurements; several models are shown side by side."""
     with connect() as service:
-        takes = [_take_id(service, name) for name in take]
-        results = {name: service.post(f"/models/{name}/compare", {"takes": takes}) for name in model}
+        documents = {name: service.get(f"/models/{name}") for name in dict.fromkeys(model)}
+        takes = _choose(service, list(documents.values()), take or [])
+        body = {"takes": [row["id"] for row in takes]}
+        results = {name: service.post(f"/models/{name}/compare", body) for name in documents}
     if as_json:
         print_json(results)
         return
+    out.print(f"Against {', '.join(row['name'] for row in takes)}:")
+    if len(results) == 1:
+        print_table(_rows(next(iter(results.values()))), COLUMNS, empty="Nothing was measured.")
+        err.print(LEGEND)
+    else:
+        _print_side_by_side(documents, results)
+    if poses:
+        for name, result in results.items():
+            out.print(f"\nModel {name} ({documents[name]['method']}), each pose:")
+            print_table(result["poses"], POSES, empty="No frame of these takes has the name of a pose.")
     for name, result in results.items():
-        rows = [{"rotation": "all", **result["over_all"]}]
-        rows += [{"rotation": key, **value} for key, value in result["rotations"].items()]
-        out.print(f"Model {name}, degrees:", markup=False)
-        print_table(rows, COLUMNS, empty="Nothing was measured.")
-        for key in result.get("trained_on", []):
-            err.print(
-                f"Careful: the model was trained on take {key}; this is not a held-out error.", style="yellow"
-            )
-        out.print()
+        _warn(name, result, takes)
 
 
-def _take_id(service, name: str) -> str:
-    matches = [
-        row["id"] for row in service.get("/takes") if row["name"] == name or row["id"].startswith(name)
-    ]
-    if len(matches) != 1:
-        raise typer.BadParameter(f"{len(matches)} takes are called {name!r}; give a take's id")
-    return matches[0]
+def _choose(service: RestClient, models: list[dict[str, Any]], wanted: list[str]) -> list[dict[str, Any]]:
+    if wanted:
+        return find_takes(service.get("/takes"), wanted)
+    subject, layout = models[0]["subject"], models[0]["layout"]
+    rows = service.get("/takes", {"subject": subject, "layout": layout})
+    trained = {take["id"] for document in models for take in document["facts"].get("takes", [])}
+    rows = [row for row in rows if row["rotations"] and row["id"] not in trained]
+    if not rows:
+        raise Refusal(
+            f"every take of {subject} with layout {layout} and reference angles was trained on, so none can "
+            "test; name one with --take, or keep one from training with glovecal train --leave-out"
+        )
+    return rows
+
+
+def _rows(result: dict[str, Any]) -> list[dict[str, Any]]:
+    rotations = [{"rotation": key, **value} for key, value in result["rotations"].items()]
+    return [{"rotation": "all", **result["over_all"]}, *rotations] if rotations else []
+
+
+def _print_side_by_side(documents: dict[str, dict[str, Any]], results: dict[str, dict[str, Any]]) -> None:
+    names = dict.fromkeys(row["rotation"] for result in results.values() for row in _rows(result))
+    rows: list[dict[str, Any]] = [{"rotation": name} for name in names]
+    for model, result in results.items():
+        errors = {row["rotation"]: row for row in _rows(result)}
+        for row in rows:
+            measured = errors.get(row["rotation"], {})
+            row[model] = measured.get("rmse_deg")
+            row["spread"] = measured.get("baseline_deg", row.get("spread"))
+    headings = {name: f"{document['method']} {name[:6]}" for name, document in documents.items()}
+    print_table(
+        rows, {"rotation": "RMSE (deg)", **headings, "spread": "spread"}, empty="Nothing was measured."
+    )
+    err.print("spread: the error of always answering the mean angle.")
+
+
+def _warn(name: str, result: dict[str, Any], takes: list[dict[str, Any]]) -> None:
+    by_id = {row["id"]: row["name"] for row in takes}
+    for id in result["trained_on"]:
+        err.print(
+            f"Careful: model {name[:12]} was trained on take {by_id[id]}; this is not a held-out error.",
+            style="yellow",
+        )
+    if result["not_predicted"]:
+        err.print(f"Model {name[:12]} does not predict {', '.join(result['not_predicted'])}.", style="yellow")

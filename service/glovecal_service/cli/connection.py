@@ -7,25 +7,69 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from glovecal_models.errors import BadInput
+from glovecal_service.cli.refusal import Refusal, sentence_of
+
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
+    from glovecal_service.settings import Settings
+
+
+def is_remote() -> bool:
+    """Whether the verbs speak to a service that goes on after this command."""
+    return bool(os.environ.get("GLOVECAL_URL"))
 
 
 @contextmanager
 def connect() -> Iterator[RestClient]:
     """A REST client. Without GLOVECAL_URL the service is mounted in this process on GLOVECAL_DATA.
 
-    The heavy packages are imported here, so that ``glovecal --help`` answers at once.
+    The heavy packages are imported here, so that ``glovecal --help`` answers at once. Raises Refusal for a
+    data folder that cannot be used, BadInput for settings, and what opening the store raises.
     """
     url = os.environ.get("GLOVECAL_URL")
     if url:
+        from glovecal_client.errors import BadName
         from glovecal_client.rest import RestClient
 
-        with RestClient(url) as client:
+        try:
+            client = RestClient(url)
+        except BadName as error:
+            raise BadInput(f"GLOVECAL_URL: {error}") from error
+        with client:
             yield client
         return
     from glovecal_service.rest.in_process import in_process_client
+
+    settings = settings_of_environment()
+    _require_usable(settings)
+    with in_process_client(settings) as client:
+        yield client
+
+
+def settings_of_environment() -> Settings:
+    """The service's settings. Raises BadInput that names the variable, its value and what is wrong."""
+    from pydantic import ValidationError
+
     from glovecal_service.settings import Settings
 
-    with in_process_client(Settings()) as client:
-        yield client
+    try:
+        return Settings()
+    except ValidationError as error:
+        found = error.errors(include_url=False)[0]
+        variable = "GLOVECAL_" + ".".join(map(str, found["loc"])).upper()
+        problem = found["msg"].removeprefix("Value error, ")
+        raise BadInput(f"{variable} is {os.environ.get(variable)!r}: {problem}") from error
+
+
+def _require_usable(settings: Settings) -> None:
+    """The folder is made here, where its name and its variable are known."""
+    try:
+        settings.data.mkdir(parents=True, exist_ok=True)
+        if not os.access(settings.data, os.W_OK | os.X_OK):
+            raise PermissionError(13, os.strerror(13), str(settings.data))
+    except OSError as error:
+        raise Refusal(
+            f"the data folder {str(settings.data)!r} cannot be used ({sentence_of(error)}); set "
+            "GLOVECAL_DATA to a folder that you may write to, or GLOVECAL_URL to a service"
+        ) from error

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from glovecal_service.cli.printing import err, out
+from glovecal_service.cli.printing import err, out, show_table
 
 
 def demo(
@@ -30,20 +30,20 @@ def demo(
     started = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="glovecal-demo-") as folder:
         place = demo_place(Path(folder))
-        err.print("Starting glovecal serve ...", markup=False)
+        err.print("Starting glovecal serve ...")
         with running_service(place) as service:
-            found = walk(service, place, seed, lambda sentence: err.print(sentence, markup=False))
+            found = walk(service, place, seed, lambda sentence: err.print(sentence))
             out.print()
-            out.print(error_table(found))
+            show_table(error_table(found))
             out.print()
             for sentence in sentences(found, time.monotonic() - started):
-                out.print(sentence, markup=False)
-            out.print(NEXT, markup=False)
+                out.print(sentence)
+            out.print(NEXT)
             if as_json:
                 sys.stdout.write(json.dumps(contract(found)) + "\n")
                 sys.stdout.flush()
             if keep:
-                keep_running(place, seed, lambda sentence: err.print(sentence, markup=False))
+                keep_running(place, seed, lambda sentence: err.print(sentence))
 
 
 NEXT = """

@@ -14,7 +14,7 @@ def find_port(
     port: Annotated[list[str] | None, typer.Argument(help="More ports to look at, or patterns.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Look at every serial port and say what answers."""
+    """Look at every serial port and say what answers. Takes some seconds."""
     from glovecal_client.capture.find_port import find_ports
 
     found = [item.to_json() for item in find_ports(port or [])]

@@ -8,10 +8,12 @@ from typing import Annotated
 import typer
 
 from glovecal_service.cli.connection import connect
-from glovecal_service.cli.options import AsJson
-from glovecal_service.cli.printing import out, print_json, print_table
+from glovecal_service.cli.options import AsJson, Glove, identifier
+from glovecal_service.cli.printing import moment, out, print_json, print_table
 
 app = typer.Typer(help="Layouts, and the gloves that were seen.", no_args_is_help=True)
+
+Layout = Annotated[str, typer.Argument(help="Layout name.", callback=identifier("layout"))]
 
 
 @app.command("list")
@@ -33,44 +35,57 @@ def list_gloves(as_json: AsJson = False) -> None:
     )
     out.print()
     print_table(
-        document["seen"],
+        [{**item, "last_seen_at": moment(item["last_seen_at"])} for item in document["seen"]],
         {
             "name": "glove",
             "layout": "layout",
             "subject": "worn by",
             "wearing": "wearing",
             "simulated": "simulated",
+            "last_seen_at": "last seen",
         },
         empty="No glove was seen yet. Start one: glovecal capture --device cyberglove:PORT --glove NAME",
     )
 
 
 @app.command("show")
-def show(name: str) -> None:
-    """Print a layout as JSON, a starting point for one's own."""
+def show(name: Layout, as_json: AsJson = False) -> None:
+    """Print a layout as a layout file (JSON): change its name and go on from there.
+
+    With --json everything the service knows of it.
+    """
     with connect() as service:
-        print_json(service.get(f"/gloves/{name}"))
+        document = service.get(f"/gloves/{name}")
+    print_json(document if as_json else document["document"])
 
 
 @app.command("add")
 def add(
-    file: Annotated[Path, typer.Argument(exists=True, dir_okay=False, help="A layout file (TOML).")],
+    file: Annotated[Path, typer.Argument(exists=True, dir_okay=False, help="A layout file, TOML or JSON.")],
 ) -> None:
-    """Add a layout of your own from a TOML file."""
+    """Add a layout of your own from a file."""
     with connect() as service:
         name = service.add_layout(file)
-    out.print(f"Added layout {name}.")
+        document = service.get(f"/gloves/{name}")
+    out.print(
+        f"Added layout {name}: {len(document['sensors'])} sensors, {len(document['rotations'])} rotations."
+    )
 
 
 @app.command("wear")
 def wear(
-    glove: Annotated[str, typer.Argument(help="The glove's name.")],
-    subject: Annotated[str, typer.Argument(help="Who wears it now.")],
-    wearing: Annotated[
-        str | None, typer.Option(help="Name of this donning; new readings shift between them.")
+    glove: Glove,
+    subject: Annotated[
+        str | None, typer.Argument(help="Who wears it now.", callback=identifier("subject"))
     ] = None,
+    wearing: Annotated[
+        str | None, typer.Option(help="Name of this donning; readings shift between them.")
+    ] = None,
+    nobody: Annotated[bool, typer.Option("--nobody", help="It was taken off.")] = False,
 ) -> None:
     """Say who wears a glove now; the live service changes to that subject's model."""
+    if (subject is None) != nobody:
+        raise typer.BadParameter("say who wears it: SUBJECT, or --nobody")
     with connect() as service:
         service.put(f"/gloves/{glove}/wearer", {"subject": subject, "wearing": wearing})
-    out.print(f"{glove} is worn by {subject}.")
+    out.print(f"{glove} is worn by {subject or 'nobody'}.")

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import typer
 
 from glovecal_service.cli.connection import connect
-from glovecal_service.cli.options import AsJson
-from glovecal_service.cli.printing import out, print_facts, print_json, print_table
+from glovecal_service.cli.options import AsJson, Job
+from glovecal_service.cli.printing import moment, out, print_facts, print_json, print_table
 from glovecal_service.cli.waiting import wait_for_job
 
 app = typer.Typer(help="Long work: state, progress, cancel.", no_args_is_help=True)
-
-Job = Annotated[str, typer.Argument(help="Job id.")]
 
 
 @app.command("list")
@@ -24,8 +20,12 @@ def list_jobs(as_json: AsJson = False) -> None:
     if as_json:
         print_json(rows)
         return
-    columns = {"id": "job", "kind": "kind", "subject": "subject", "state": "state", "sentence": "last word"}
-    print_table(rows, columns, empty="No jobs.")
+    shown = [
+        {**row, "done": f"{100 * row['fraction']:.0f} %", "last": row["error"] or row["sentence"]}
+        for row in rows
+    ]
+    columns = {"id": "job", "kind": "kind", "subject": "subject", "state": "state", "done": "done"}
+    print_table(shown, {**columns, "last": "last word"}, empty="No jobs yet. glovecal train starts one.")
 
 
 @app.command("show")
@@ -33,20 +33,45 @@ def show(job: Job, as_json: AsJson = False) -> None:
     """Show one job."""
     with connect() as service:
         document = service.get(f"/jobs/{job}")
-    print_json(document) if as_json else print_facts(document)
+    if as_json:
+        print_json(document)
+        return
+    result = document["result"] or {}
+    print_facts(
+        {
+            "job": document["id"],
+            "kind": f"{document['kind']} {document['payload'].get('method', '')}".strip(),
+            "subject": document["subject"],
+            "state": document["state"],
+            "done": f"{100 * document['fraction']:.0f} %",
+            "last word": document["sentence"] or None,
+            "error": document["error"],
+            "model": result.get("model"),
+            "attempt": document["attempt"],
+            "asked": moment(document["created_at"]),
+            "started": moment(document["started_at"]),
+            "finished": moment(document["finished_at"]),
+        }
+    )
 
 
 @app.command("wait")
-def wait(job: Job) -> None:
-    """Wait until a job has ended."""
+def wait(job: Job, as_json: AsJson = False) -> None:
+    """Wait until a job has ended; exit code 1 unless it is done. Ctrl-C leaves the job running."""
     with connect() as service:
-        wait_for_job(service, job)
-    out.print(f"Job {job} is done.")
+        document = wait_for_job(service, job, quiet=as_json, cancel=False)
+    if as_json:
+        print_json(document)
+    else:
+        out.print(f"Job {job} is done.")
 
 
 @app.command("cancel")
 def cancel(job: Job) -> None:
     """Stop a job; what it finished so far is kept for the next try."""
     with connect() as service:
-        service.post(f"/jobs/{job}/cancel")
-    out.print(f"Job {job} is being cancelled.")
+        document = service.post(f"/jobs/{job}/cancel")
+    if document["finished_at"] is None:
+        out.print(f"Job {job} is being cancelled.")
+    else:
+        out.print(f"Job {job} is {document['state']}.")

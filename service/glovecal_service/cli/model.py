@@ -3,41 +3,42 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from glovecal_service.cli.connection import connect
-from glovecal_service.cli.options import AsJson, Subject
-from glovecal_service.cli.printing import out, print_facts, print_json, print_table
+from glovecal_service.cli.options import AsJson, Model, OnlyLayout, OnlySubject, Subject
+from glovecal_service.cli.printing import err, moment, out, print_facts, print_json, print_table
+from glovecal_service.cli.refusal import Refusal
+from glovecal_service.cli.writing import Overwrite, require_place, write_whole
+
+if TYPE_CHECKING:
+    from glovecal_client.rest import RestClient
 
 app = typer.Typer(help="Calibration models: versions, activation, export.", no_args_is_help=True)
 
-Model = Annotated[str, typer.Argument(help="Model id, or its first 6 or more characters.")]
-
 
 @app.command("list")
-def list_models(
-    subject: Annotated[str | None, typer.Option("--subject", "-s")] = None, as_json: AsJson = False
-) -> None:
-    """List models; the active one of each subject and layout is marked."""
+def list_models(subject: OnlySubject = None, layout: OnlyLayout = None, as_json: AsJson = False) -> None:
+    """List models, oldest first; the active one of each subject and layout is marked."""
+    wanted = {"subject": subject, "layout": layout}
     with connect() as service:
-        rows = service.get("/models", {"subject": subject} if subject else None)
+        rows = service.get("/models", {key: value for key, value in wanted.items() if value})
     if as_json:
         print_json(rows)
         return
-    for row in rows:
-        row["short"] = row["id"][:12]
+    shown = [{**row, "short": row["id"][:12], "created_at": moment(row["created_at"])} for row in rows]
     columns = {
         "short": "model",
         "subject": "subject",
         "layout": "layout",
         "method": "method",
-        "held_out_rmse_deg": "held-out error (deg)",
+        "held_out_rmse_deg": "error (deg)",
         "active": "active",
         "created_at": "trained",
     }
-    print_table(rows, columns, empty="No models yet. Train one: glovecal train --subject NAME")
+    print_table(shown, columns, empty="No models yet. Train one: glovecal train --subject NAME")
 
 
 @app.command("show")
@@ -45,42 +46,75 @@ def show(model: Model, as_json: AsJson = False) -> None:
     """Show one model: errors of each rotation, takes, lineage."""
     with connect() as service:
         document = service.get(f"/models/{model}")
+        lineage = service.get(f"/models/{document['id']}/lineage")
     if as_json:
-        print_json(document)
+        print_json({**document, "lineage": [row["id"] for row in lineage]})
         return
-    rotations = document.pop("rotations", [])
-    print_facts(document)
+    print_facts(_facts(document, lineage))
     out.print()
     columns = {
         "rotation": "rotation",
+        "kind": "kind",
         "method": "method",
-        "held_out_rmse_deg": "held-out error (deg)",
+        "held_out_rmse_deg": "error (deg)",
+        "noise_deg": "noise (deg)",
         "samples": "samples",
+        "sensors": "sensors",
     }
-    print_table(rotations, columns, empty="No rotations.")
+    print_table(document["rotations"], columns, empty="No rotations.")
+
+
+def _facts(document: dict[str, Any], lineage: list[dict[str, Any]]) -> dict[str, Any]:
+    return {
+        "model": document["id"],
+        "subject": document["subject"],
+        "layout": document["layout"],
+        "method": document["method"],
+        "active": document["active"],
+        "error (deg)": document["held_out_rmse_deg"],
+        "estimated on": document["error_estimate"].get("how"),
+        "trained on": [take["name"] for take in document["facts"].get("takes", [])],
+        "simulated": document["simulated"],
+        "trained": moment(document["created_at"]),
+        "made from": [row["id"][:12] for row in lineage[1:]],
+    }
 
 
 @app.command("activate")
 def activate(model: Model) -> None:
     """Predict live with this model from the next frame on."""
     with connect() as service:
-        service.post(f"/models/{model}/activate")
-    out.print(f"Model {model} is active.")
+        document = service.post(f"/models/{model}/activate")
+    out.print(f"Model {document['model'][:12]} is active for {document['subject']}, {document['layout']}.")
 
 
 @app.command("rollback")
-def rollback(
-    subject: Subject, layout: Annotated[str, typer.Option("--layout", "-l")] = "cyberglove18"
-) -> None:
-    """Return to the model that was active before."""
+def rollback(subject: Subject, layout: OnlyLayout = None) -> None:
+    """Return to the model that was active before. The layout is needed only if there are several."""
     with connect() as service:
-        document = service.post("/models/rollback", {"subject": subject, "layout": layout})
-    out.print(f"Model {document['model'][:12]} is active again.")
+        wanted = {"subject": subject, "layout": layout or _only_layout(service, subject)}
+        document = service.post("/models/rollback", wanted)
+    out.print(f"Model {document['model'][:12]} is active again for {subject}, {wanted['layout']}.")
+
+
+def _only_layout(service: RestClient, subject: str) -> str:
+    service.get(f"/subjects/{subject}")
+    layouts = sorted({row["layout"] for row in service.get("/models", {"subject": subject})})
+    if len(layouts) > 1:
+        raise Refusal(f"subject {subject} has models of {', '.join(layouts)}; choose one with --layout")
+    if not layouts:
+        raise Refusal(f"subject {subject} has no models; train one: glovecal train --subject {subject}")
+    return layouts[0]
 
 
 @app.command("export")
-def export(model: Model, file: Annotated[Path, typer.Argument(help="Where to write the artifact.")]) -> None:
-    """Write the model's artifact (safetensors with its manifest inside)."""
+def export(
+    model: Model,
+    file: Annotated[Path, typer.Argument(help="Where to write the artifact (.safetensors).")],
+    overwrite: Overwrite = False,
+) -> None:
+    """Write the model's artifact (safetensors with its manifest inside); its sha256 is the model's id."""
+    require_place(file, overwrite=overwrite)
     with connect() as service:
-        file.write_bytes(service.download(f"/models/{model}/export"))
-    out.print(f"Wrote {file}.")
+        write_whole({file: service.download(f"/models/{model}/export")})
+    err.print(f"In Python: glovecal_models.calibration.artifact.load(open({str(file)!r}, 'rb').read())")

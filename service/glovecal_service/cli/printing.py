@@ -5,24 +5,17 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Mapping, Sequence
+from datetime import datetime
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-WIDTH_OF_A_FILE = 200
-"""Columns to use where there is no terminal to fit into."""
+WIDTH_OF_A_FILE = 400
+"""Columns to use where there is no terminal to fit into: lines stay whole for grep."""
 
-
-def _console(*, stderr: bool) -> Console:
-    console = Console(stderr=stderr, highlight=False, soft_wrap=True)
-    if not console.is_terminal:
-        console.width = WIDTH_OF_A_FILE
-    return console
-
-
-out = _console(stderr=False)
-err = _console(stderr=True)
+out = Console(highlight=False, markup=False, emoji=False, soft_wrap=True)
+err = Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
 
 
 def print_json(document: Any) -> None:
@@ -30,30 +23,52 @@ def print_json(document: Any) -> None:
     sys.stdout.write(json.dumps(document, indent=2, allow_nan=False) + "\n")
 
 
-def print_table(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str], *, empty: str) -> None:
-    """``columns`` maps a row's key to its heading; ``empty`` is the sentence for no rows."""
+def print_table(
+    rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str], *, empty: str, folds: str | None = None
+) -> None:
+    """``columns`` maps a row's key to its heading; ``empty`` is the sentence for no rows.
+
+    On a narrow terminal the column ``folds`` (else the last) is what wraps.
+    """
     if not rows:
         out.print(empty)
         return
     table = Table(box=None, pad_edge=False, header_style="bold")
     for key, heading in columns.items():
-        numeric = all(isinstance(row.get(key), int | float) for row in rows)
-        table.add_column(heading, justify="right" if numeric else "left", no_wrap=True)
+        justify = "right" if all(_is_number(row.get(key)) for row in rows) else "left"
+        whole = key != (folds or list(columns)[-1])
+        table.add_column(heading, justify=justify, no_wrap=whole, min_width=len(heading), overflow="fold")
     for row in rows:
         table.add_row(*(text(row.get(key)) for key in columns))
-    out.print(table)
+    show_table(table)
+
+
+def _is_number(value: Any) -> bool:
+    return value is None or (isinstance(value, int | float) and not isinstance(value, bool))
+
+
+def show_table(table: Table) -> None:
+    """Fitted into a terminal; elsewhere as wide as it is."""
+    if out.is_terminal:
+        out.print(table, soft_wrap=False)
+        return
+    wide = Console(width=WIDTH_OF_A_FILE, markup=False, emoji=False, highlight=False)
+    with wide.capture() as captured:
+        wide.print(table)
+    for line in captured.get().splitlines():
+        sys.stdout.write(line.rstrip() + "\n")
 
 
 def print_facts(document: Mapping[str, Any]) -> None:
     """One line a fact, for a single thing."""
     width = max((len(key) for key in document), default=0)
     for key, value in document.items():
-        out.print(f"{key:<{width}}  {text(value)}", markup=False)
+        out.print(f"{key:<{width}}  {text(value)}")
 
 
 def text(value: Any) -> str:
     """A value as a person reads it."""
-    if value is None:
+    if value is None or value in ({}, [], ()):
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
@@ -64,3 +79,10 @@ def text(value: Any) -> str:
     if isinstance(value, dict):
         return ", ".join(f"{key} {text(item)}" for key, item in value.items())
     return str(value)
+
+
+def moment(value: str | None) -> str | None:
+    """A time stamp of the service as this computer's clock shows it, to the minute."""
+    if value is None:
+        return None
+    return datetime.fromisoformat(value).astimezone().strftime("%Y-%m-%d %H:%M")

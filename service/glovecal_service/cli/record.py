@@ -9,29 +9,42 @@ import typer
 
 from glovecal_client.errors import ServiceError
 from glovecal_service.cli.connection import connect
-from glovecal_service.cli.options import AsJson
+from glovecal_service.cli.options import AsJson, Glove, identifier
 from glovecal_service.cli.printing import err, out, print_json
+from glovecal_service.cli.refusal import NobodyThere
+from glovecal_service.cli.waiting import wait_seconds
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
 
+BEGINS_WITHIN_S = 10.0
 PATIENCE_S = 30.0
 
 
 def record(
-    glove: Annotated[str, typer.Argument(help="The glove's name.")],
+    glove: Glove,
     name: Annotated[str, typer.Argument(help="What the take will be called.")],
-    seconds: Annotated[float, typer.Option(help="How long.")] = 10.0,
+    seconds: Annotated[float, typer.Option(min=0.1, help="How long.")] = 10.0,
+    subject: Annotated[
+        str | None,
+        typer.Option("--subject", "-s", help="Default: who wears it.", callback=identifier("subject")),
+    ] = None,
+    wearing: Annotated[str | None, typer.Option(help="Default: the glove's wearing.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Record a take from a glove that is streaming to the service at GLOVECAL_URL."""
+    """Record a take from a glove that is streaming to the service. Ctrl-C ends it sooner."""
+    wanted = {"glove": glove, "name": name, "subject": subject, "wearing": wearing}
     with connect() as service:
-        started = service.post("/recordings", {"glove": glove, "name": name})
-        err.print(f"Recording {name} for {seconds:g} s; Ctrl-C ends it sooner.", markup=False)
+        started = service.post("/recordings", {key: value for key, value in wanted.items() if value})
         try:
-            time.sleep(seconds)
+            _wait_for_the_recorder(service, started["id"], glove)
+            err.print(f"Recording {name} for {seconds:g} s; Ctrl-C ends it sooner.")
+            wait_seconds(seconds, f"recording {name}", quiet=as_json)
         except KeyboardInterrupt:
             err.print("Stopped.")
+        except SystemExit:
+            service.post(f"/recordings/{started['id']}/stop")
+            raise
         finished = finish_recording(service, started["id"])
     if as_json:
         print_json(finished)
@@ -41,6 +54,19 @@ def record(
         f"Take {facts['take'][:12]}: {facts['recorded']} of {facts['sent']} frames sent, "
         f"{facts['repaired']} of them fetched again from the capture log, {len(facts['missing'])} gaps left."
     )
+
+
+def _wait_for_the_recorder(service: RestClient, recording: str, glove: str) -> None:
+    """Raises NobodyThere when no recorder takes it on: then nothing would be recorded."""
+    until = time.monotonic() + BEGINS_WITHIN_S
+    while service.get(f"/recordings/{recording}")["state"] == "requested":
+        if time.monotonic() > until:
+            service.post(f"/recordings/{recording}/stop")
+            raise NobodyThere(
+                f"nobody records glove {glove}: no recorder took recording {recording} on within "
+                f"{BEGINS_WITHIN_S:g} s; is glovecal serve running on this data folder?"
+            )
+        time.sleep(0.05)
 
 
 def finish_recording(service: RestClient, recording: str) -> dict[str, Any]:

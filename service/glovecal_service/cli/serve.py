@@ -7,11 +7,12 @@ def serve() -> None:
     """Run the service: zenoh router, real-time prediction, recorder and REST. Ctrl-C stops it.
 
     Settings are environment variables: GLOVECAL_DATA, GLOVECAL_HOST, GLOVECAL_PORT, GLOVECAL_ZENOH,
-    GLOVECAL_SITE, GLOVECAL_DATABASE.
+    GLOVECAL_SITE, GLOVECAL_DATABASE, GLOVECAL_ARTIFACTS, GLOVECAL_WORKERS, GLOVECAL_SCHEDULER,
+    GLOVECAL_UPLOAD_LIMIT_MB.
     """
     import sys
 
+    from glovecal_service.cli.connection import settings_of_environment
     from glovecal_service.serve import serve as run
-    from glovecal_service.settings import Settings
 
-    sys.exit(run(Settings()))
+    sys.exit(run(settings_of_environment()))

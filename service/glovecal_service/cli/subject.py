@@ -7,12 +7,12 @@ from typing import Annotated
 import typer
 
 from glovecal_service.cli.connection import connect
-from glovecal_service.cli.options import AsJson
-from glovecal_service.cli.printing import out, print_facts, print_json, print_table
+from glovecal_service.cli.options import AsJson, identifier
+from glovecal_service.cli.printing import moment, out, print_facts, print_json, print_table
 
 app = typer.Typer(help="The people who wear gloves.", no_args_is_help=True)
 
-Name = Annotated[str, typer.Argument(help="Short name: a-z, 0-9, _ and -.")]
+Name = Annotated[str, typer.Argument(help="Short name: a-z, 0-9, _ and -.", callback=identifier("subject"))]
 
 
 @app.command("add")
@@ -34,16 +34,34 @@ def list_subjects(as_json: AsJson = False) -> None:
     if as_json:
         print_json(rows)
         return
+    rows = [{**row, "title": row["title"] or None, "created_at": moment(row["created_at"])} for row in rows]
     columns = {"name": "subject", "title": "name", "created_at": "added"}
     print_table(rows, columns, empty="No subjects yet. Add one: glovecal subject add NAME")
 
 
 @app.command("show")
 def show(name: Name, as_json: AsJson = False) -> None:
-    """Show one subject."""
+    """Show one subject: takes, models, which one predicts live."""
     with connect() as service:
         document = service.get(f"/subjects/{name}")
-    print_json(document) if as_json else print_facts(document)
+        if as_json:
+            print_json(document)
+            return
+        takes = service.get("/takes", {"subject": name})
+        models = service.get("/models", {"subject": name})
+    print_facts(
+        {
+            "subject": name,
+            "name": document["title"] or None,
+            "hand (mm)": document["dimensions"],
+            "added": moment(document["created_at"]),
+            "takes": len(takes),
+            "models": len(models),
+            "active": [
+                f"{row['id'][:12]} ({row['method']}, {row['layout']})" for row in models if row["active"]
+            ],
+        }
+    )
 
 
 @app.command("remove")

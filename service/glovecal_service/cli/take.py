@@ -3,153 +3,152 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from glovecal_client.errors import ServiceError
+from glovecal_service.cli import take_import
 from glovecal_service.cli.connection import connect
-from glovecal_service.cli.options import AsJson, LayoutName, Subject
-from glovecal_service.cli.printing import err, out, print_facts, print_json, print_table
+from glovecal_service.cli.options import AsJson, OnlyLayout, OnlySubject, Take
+from glovecal_service.cli.printing import err, moment, out, print_facts, print_json, print_table
+from glovecal_service.cli.take_rows import print_takes
+from glovecal_service.cli.takes_named import find_take
+from glovecal_service.cli.writing import Overwrite, require_place, write_whole
+
+if TYPE_CHECKING:
+    from glovecal_client.rest import RestClient
 
 app = typer.Typer(help="Takes: recordings with or without reference angles.", no_args_is_help=True)
+app.command("import")(take_import.import_takes)
 
 CONFLICT = 409
 """The service's answer when a take is two tables."""
-
-COLUMNS = {
-    "id": "take",
-    "name": "name",
-    "subject": "subject",
-    "layout": "layout",
-    "wearing": "wearing",
-    "frames": "frames",
-    "duration_s": "seconds",
-    "measured": "rotations measured",
-    "simulated": "simulated",
-}
-
-
-@app.command("import")
-def import_takes(
-    files: Annotated[
-        list[Path], typer.Argument(exists=True, dir_okay=False, help="CSV or Parquet take tables.")
-    ],
-    subject: Subject,
-    layout: LayoutName = None,
-    reference: Annotated[
-        Path | None,
-        typer.Option(exists=True, dir_okay=False, help="Reference table of a single frames file."),
-    ] = None,
-    spread_equal_times: Annotated[
-        bool, typer.Option(help="Frames stamped in batches: spread each batch up to the next time.")
-    ] = False,
-    as_json: AsJson = False,
-) -> None:
-    """Import take tables. X.reference.csv beside X.frames.csv is found by itself."""
-    if reference and len(files) > 1:
-        raise typer.BadParameter("--reference goes with one frames file")
-    frames = [file for file in files if not _is_reference_of_another(file, files)]
-    rows = []
-    with connect() as service:
-        name = service.add_layout(Path(layout)) if layout and Path(layout).is_file() else layout
-        for file in frames:
-            answer = service.upload_takes(
-                file,
-                reference=reference or _beside(file),
-                subject=subject,
-                layout=name,
-                equal_times="spread" if spread_equal_times else "refuse",
-            )
-            rows.extend(answer["takes"])
-            for sentence in answer.get("warnings", []):
-                err.print(f"{file.name}: {sentence}", style="yellow", markup=False)
-    if as_json:
-        print_json(rows)
-        return
-    print_table(_readable(rows), COLUMNS, empty="Nothing was imported.")
+FORMATS = (".csv", ".parquet")
 
 
 @app.command("list")
-def list_takes(
-    subject: Annotated[str | None, typer.Option("--subject", "-s")] = None, as_json: AsJson = False
-) -> None:
-    """List takes."""
+def list_takes(subject: OnlySubject = None, layout: OnlyLayout = None, as_json: AsJson = False) -> None:
+    """List takes, oldest first."""
+    wanted = {"subject": subject, "layout": layout}
     with connect() as service:
-        rows = service.get("/takes", {"subject": subject} if subject else None)
+        rows = service.get("/takes", {key: value for key, value in wanted.items() if value})
     if as_json:
         print_json(rows)
         return
-    print_table(
-        _readable(rows), COLUMNS, empty="No takes yet. Import some: glovecal take import FILE --subject NAME"
-    )
+    print_takes(rows, empty="No takes yet. Import some: glovecal take import FILE --subject NAME")
 
 
 @app.command("examine")
-def examine(take: str, as_json: AsJson = False) -> None:
+def examine(take: Take, as_json: AsJson = False) -> None:
     """Show one take: how long, how regular, what was measured, what looks wrong."""
     with connect() as service:
-        document = service.get(f"/takes/{take}")
-    print_json(document) if as_json else print_facts(document)
+        found = service.get(f"/takes/{_id(service, take)}/examination")
+    if as_json:
+        print_json(found)
+        return
+    print_facts(_facts(found))
+    out.print()
+    sensors = {"sensor": "sensor", "low": "lowest", "high": "highest", "changed": "changes"}
+    print_table(found["sensors"], sensors, empty="No sensors.")
+    out.print()
+    rotations = {
+        "rotation": "rotation",
+        "low_deg": "lowest (deg)",
+        "high_deg": "highest (deg)",
+        "rows": "rows",
+    }
+    print_table(
+        found["rotations"], rotations, empty="No reference angles: nothing to train on or compare with."
+    )
+    for sentence in found["sentences"]:
+        err.print(sentence, style="yellow")
+
+
+def _facts(found: dict[str, Any]) -> dict[str, Any]:
+    take = found["take"]
+    gaps = f"{found['gaps']}, longest interval {found['longest_interval_s'] or 0:.3g} s"
+    accounting = take["accounting"] or {}
+    return {
+        "take": f"{take['id']} {take['name']}",
+        "subject": take["subject"],
+        "layout": take["layout"],
+        "wearing": take["wearing"],
+        "simulated": take["simulated"],
+        "source": take["source"],
+        "added": moment(take["created_at"]),
+        "frames": f"{take['frames']} in {take['duration_s']:.2f} s",
+        **({"frames sent": accounting["sent"]} if "sent" in accounting else {}),
+        "rate (Hz)": found["rate_hz"],
+        "gaps": gaps,
+        "repeated frames": f"{100 * found['repeated_frames']:.0f} %",
+        "with reference": f"{100 * found['frames_with_reference']:.0f} % of the frames",
+        "context": take["context"],
+    }
 
 
 @app.command("reference")
 def reference(
-    take: str,
+    take: Take,
     file: Annotated[
         Path, typer.Argument(exists=True, dir_okay=False, help="Table with time_s and r.* columns.")
     ],
-    clock: Annotated[str, typer.Option(help="take: same time_s as the take; wall: Unix seconds.")] = "take",
+    clock: Annotated[
+        Literal["take", "wall"],
+        typer.Option(help="What time_s counts. take: as in the take itself; wall: Unix seconds."),
+    ] = "take",
 ) -> None:
     """Attach reference angles that were measured elsewhere to a recorded take."""
     with connect() as service:
-        document = service.attach_reference(take, file, clock=clock)
-    out.print(f"Take {document['name']} now has {document['reference_rows']} reference rows.")
+        document = service.attach_reference(_id(service, take), file, clock=clock)
+        found = service.get(f"/takes/{document['id']}/examination")
+    out.print(
+        f"Take {document['name']} now has {document['reference_rows']} reference rows; "
+        f"{100 * found['frames_with_reference']:.0f} % of its frames have a reference."
+    )
+    for sentence in found["sentences"]:
+        err.print(sentence, style="yellow")
 
 
 @app.command("export")
 def export(
-    take: str,
+    take: Take,
     file: Annotated[Path, typer.Argument(help="Where to write; .csv or .parquet.")],
+    overwrite: Overwrite = False,
 ) -> None:
     """Write a take as a take table; two tables when its reference has a clock of its own."""
-    file_format = file.suffix.lstrip(".").lower()
-    path = f"/takes/{take}/export"
+    if file.suffix.lower() not in FORMATS:
+        raise typer.BadParameter(f"{file.name!r} must end in .csv or .parquet, the formats of a take table")
     with connect() as service:
-        try:
-            tables = {file: service.download(path, {"format": file_format})}
-        except ServiceError as error:
-            if error.status != CONFLICT:
-                raise
-            tables = {
-                file.with_name(f"{file.stem}.{part}{file.suffix}"): service.download(
-                    path, {"format": file_format, "part": part}
-                )
-                for part in ("frames", "reference")
-            }
-    for name, content in tables.items():
-        name.write_bytes(content)
-        out.print(f"Wrote {name}.", markup=False)
+        write_whole(_tables(service, take, file, overwrite))
+
+
+def _tables(service: RestClient, take: str, file: Path, overwrite: bool) -> dict[Path, bytes]:
+    path, table_format = f"/takes/{_id(service, take)}/export", file.suffix.lstrip(".").lower()
+    try:
+        whole = service.download(path, {"format": table_format})
+    except ServiceError as error:
+        if error.status != CONFLICT:
+            raise
+        stem = file.stem.removesuffix(".frames")
+        parts = {part: file.with_name(f"{stem}.{part}{file.suffix}") for part in ("frames", "reference")}
+        require_place(*parts.values(), overwrite=overwrite)
+        return {
+            name: service.download(path, {"format": table_format, "part": part})
+            for part, name in parts.items()
+        }
+    require_place(file, overwrite=overwrite)
+    return {file: whole}
 
 
 @app.command("remove")
-def remove(take: str) -> None:
-    """Remove a take that no model was trained on."""
+def remove(take: Take) -> None:
+    """Remove a take that no model was trained on. The file it came from stays in the data folder."""
     with connect() as service:
-        service.delete(f"/takes/{take}")
-    out.print(f"Removed take {take}.")
+        row = find_take(service.get("/takes"), take)
+        service.delete(f"/takes/{row['id']}")
+    out.print(f"Removed take {row['name']} ({row['id']}).")
 
 
-def _beside(frames: Path) -> Path | None:
-    """X.reference.csv for X.frames.csv, when it is there."""
-    stem, mark, rest = frames.name.rpartition(".frames.")
-    partner = frames.with_name(f"{stem}.reference.{rest}")
-    return partner if mark and partner.is_file() else None
-
-
-def _is_reference_of_another(file: Path, files: list[Path]) -> bool:
-    return any(_beside(other) == file for other in files if other != file)
-
-
-def _readable(rows: list[dict]) -> list[dict]:
-    return [{**row, "id": row["id"][:12], "measured": len(row["rotations"]) or None} for row in rows]
+def _id(service: RestClient, take: str) -> str:
+    return find_take(service.get("/takes"), take)["id"]

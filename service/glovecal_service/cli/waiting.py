@@ -1,30 +1,57 @@
-"""Waiting for a job, with a progress bar on a terminal and silence elsewhere."""
+"""Waiting with a progress bar on a terminal and silence elsewhere: for a job, for some seconds."""
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING, Any
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from glovecal_client.errors import ServiceError
 from glovecal_service.cli.printing import err
+from glovecal_service.cli.refusal import Refusal
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
 
+STEP_S = 0.1
 
-def wait_for_job(service: RestClient, job: str, *, quiet: bool = False) -> dict[str, Any]:
-    """The finished job. Raises ServiceError when it failed; Ctrl-C cancels the job and raises on."""
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
-    shown = err.is_terminal and not quiet
-    with Progress(*columns, TimeElapsedColumn(), console=err, transient=True, disable=not shown) as progress:
+
+def wait_for_job(
+    service: RestClient, job: str, *, quiet: bool = False, cancel: bool = True
+) -> dict[str, Any]:
+    """The finished job. Raises Refusal when it failed; Ctrl-C cancels it, if ``cancel``, and raises on."""
+    with _bar(quiet) as progress:
         bar = progress.add_task("waiting for a worker", total=1.0)
 
         def show(document: dict[str, Any]) -> None:
             sentence = document["sentence"] or "waiting for a worker"
-            progress.update(bar, completed=document["fraction"], description=sentence)
+            progress.update(bar, completed=document["fraction"], description=sentence[:48])
 
         try:
             return service.wait_for_job(job, progress=show)
-        except KeyboardInterrupt:
-            service.post(f"/jobs/{job}/cancel")
+        except (KeyboardInterrupt, SystemExit):
+            if cancel:
+                service.post(f"/jobs/{job}/cancel")
             raise
+        except ServiceError as error:
+            if not error.title.startswith("Job "):
+                raise
+            reason = f": {error.detail}" if error.detail else ""
+            raise Refusal(f"job {job} {error.title.removeprefix('Job ')}{reason}") from error
+
+
+def wait_seconds(seconds: float, what: str, *, quiet: bool = False) -> None:
+    """Let time pass, with a bar; Ctrl-C raises on."""
+    until = time.monotonic() + seconds
+    with _bar(quiet) as progress:
+        bar = progress.add_task(what, total=seconds)
+        while (left := until - time.monotonic()) > 0:
+            time.sleep(min(STEP_S, left))
+            progress.update(bar, completed=seconds - max(0.0, until - time.monotonic()))
+
+
+def _bar(quiet: bool) -> Progress:
+    columns = (TextColumn("{task.description}"), BarColumn(20), TextColumn("{task.percentage:>3.0f} %"))
+    shown = err.is_terminal and not quiet
+    return Progress(*columns, TimeElapsedColumn(), console=err, transient=True, disable=not shown)

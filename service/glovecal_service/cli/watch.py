@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import suppress
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.live import Live
 from rich.table import Table
 
-from glovecal_service.cli.options import AsJson
-from glovecal_service.cli.printing import out
+from glovecal_client.errors import NoAnswer
+from glovecal_service.cli.options import DEFAULT_ZENOH, AsJson, Glove, Site, Zenoh
+from glovecal_service.cli.printing import err, out, show_table
+from glovecal_service.cli.refusal import NobodyThere, Refusal
 
 if TYPE_CHECKING:
     from glovecal_client.pose_subscriber import PoseSubscriber
@@ -21,45 +24,78 @@ if TYPE_CHECKING:
 
 REDRAW_S = 0.1
 WAIT_S = 5.0
+HINT_AFTER_S = 3.0
+WIDEST_BAR, DEGREES_A_BLOCK = 30, 4.0
 
 
 def watch(
-    glove: Annotated[str, typer.Argument(help="The glove's name.")],
-    seconds: Annotated[float | None, typer.Option(help="Stop after so many seconds.")] = None,
-    connect: Annotated[str | None, typer.Option(help="The service's zenoh endpoint.")] = None,
-    site: Annotated[str, typer.Option(envvar="GLOVECAL_SITE")] = "lab",
+    glove: Glove,
+    seconds: Annotated[float | None, typer.Option(min=0.1, help="Stop after so many seconds.")] = None,
+    connect: Zenoh = DEFAULT_ZENOH,
+    site: Site = "lab",
     as_json: AsJson = False,
 ) -> None:
-    """Show a glove's calibrated rotations as they come; with --json one line a pose."""
+    """Show a glove's calibrated rotations as they come; with --json one line a pose. Ctrl-C ends it."""
     from glovecal_client.pose_subscriber import PoseSubscriber
-    from glovecal_client.session import DEFAULT_ENDPOINT, open_client
+    from glovecal_client.session import open_client
 
-    endpoint = connect or os.environ.get("GLOVECAL_ZENOH", DEFAULT_ENDPOINT)
-    until = None if seconds is None else time.monotonic() + seconds
-    with open_client([endpoint], wait_s=WAIT_S) as session, PoseSubscriber(session, site, glove) as poses:
-        if as_json:
-            _print_lines(poses, until)
-        else:
-            _draw(poses, glove, until)
+    try:
+        with open_client([connect], wait_s=WAIT_S) as session, PoseSubscriber(session, site, glove) as poses:
+            until = None if seconds is None else time.monotonic() + seconds
+            with suppress(KeyboardInterrupt):
+                _follow(poses, glove, until, as_json)
+            came = poses.latest is not None
+    except NoAnswer as error:
+        raise NobodyThere(str(error)) from error
+    if not came:
+        raise Refusal(f"no pose of glove {glove} came; {_HINT}")
 
 
-def _print_lines(poses: PoseSubscriber, until: float | None) -> None:
-    while until is None or time.monotonic() < until:
-        pose = poses.wait(REDRAW_S)
-        if pose is not None:
-            sys.stdout.write(json.dumps(_document(poses, pose)) + "\n")
+_HINT = "is it captured (glovecal glove list shows the gloves seen), and at this site?"
+
+
+def _follow(poses: PoseSubscriber, glove: str, until: float | None, as_json: bool) -> None:
+    if not as_json and out.is_terminal:
+        with Live(console=out, auto_refresh=False) as live:
+            for pose in _poses(poses, until, glove):
+                live.update(_table(poses, pose, glove), refresh=True)
+        return
+    last = None
+    for pose in _poses(poses, until, glove):
+        if pose is None:
+            continue
+        last = pose
+        if as_json and (document := _document(poses, pose)) is not None:
+            sys.stdout.write(json.dumps(document) + "\n")
             sys.stdout.flush()
+    if last is not None and not as_json:
+        show_table(_table(poses, last, glove))
 
 
-def _draw(poses: PoseSubscriber, glove: str, until: float | None) -> None:
-    with Live(console=out, refresh_per_second=10) as live:
-        while until is None or time.monotonic() < until:
-            pose = poses.wait(REDRAW_S)
-            live.update(_table(poses, pose or poses.latest, glove))
+def _poses(poses: PoseSubscriber, until: float | None, glove: str) -> Iterator[Pose | None]:
+    """The newest pose whenever there is one, None when nothing came for a moment."""
+    hint_at = time.monotonic() + HINT_AFTER_S
+    while until is None or time.monotonic() < until:
+        yield poses.wait(REDRAW_S)
+        if time.monotonic() > hint_at and poses.latest is None:
+            err.print(f"No pose of glove {glove} yet; {_HINT}")
+            hint_at = float("inf")
 
 
-def _document(poses: PoseSubscriber, pose: Pose) -> dict[str, Any]:
-    names = poses.rotations(pose) if len(pose.degrees) else ()
+def _names(poses: PoseSubscriber, pose: Pose) -> tuple[str, ...] | None:
+    """Names of the pose's rotations; None for the moment in which the service changes to another model."""
+    if not len(pose.degrees):
+        return ()
+    try:
+        return poses.rotations(pose)
+    except NoAnswer:
+        return None
+
+
+def _document(poses: PoseSubscriber, pose: Pose) -> dict[str, Any] | None:
+    names = _names(poses, pose)
+    if names is None:
+        return None
     return {
         "sequence": pose.sequence,
         "state": _state(poses, pose),
@@ -72,18 +108,20 @@ def _document(poses: PoseSubscriber, pose: Pose) -> dict[str, Any]:
 
 
 def _table(poses: PoseSubscriber, pose: Pose | None, glove: str) -> Table:
+    pose = pose or poses.latest
     if pose is None:
-        return Table(title=f"{glove}: no pose yet. Is it captured, and is the service running?")
-    model = pose.model_sha256[:12] if pose.model_sha256 else "none"
-    table = Table(
-        title=f"{glove}: {_state(poses, pose)}, model {model}, age {pose.age_us / 1000:.1f} ms", box=None
-    )
+        return Table(title=f"{glove}: no pose yet", title_justify="left", box=None)
+    model = f"model {pose.model_sha256[:12]}" if pose.model_sha256 else "no model is active"
+    title = f"{glove}: {_state(poses, pose)}; {model}; age {pose.age_us / 1000:.1f} ms"
+    table = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False)
+    names = _names(poses, pose)
+    if not names:
+        return table
     for heading in ("rotation", "degrees", "± sd", ""):
-        table.add_column(heading, justify="left" if heading in ("rotation", "") else "right")
-    if len(pose.degrees):
-        for index, name in enumerate(poses.rotations(pose)):
-            bar = "█" * max(0, min(40, round(float(pose.degrees[index]) / 3)))
-            table.add_row(name, f"{pose.degrees[index]:.1f}", f"{pose.deviations[index]:.1f}", bar)
+        table.add_column(heading, justify="right" if heading in ("degrees", "± sd") else "left")
+    for name, degrees, deviation in zip(names, pose.degrees, pose.deviations, strict=True):
+        blocks = max(0, min(WIDEST_BAR, round(float(degrees) / DEGREES_A_BLOCK)))
+        table.add_row(name, f"{degrees:.1f}", f"{deviation:.1f}", "█" * blocks)
     return table
 
 

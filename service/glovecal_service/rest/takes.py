@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import tempfile
+from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -14,11 +15,13 @@ from fastapi.responses import FileResponse
 from pydantic import BaseModel, Field
 from starlette.background import BackgroundTask
 
+from glovecal_models.takes.examination import examine
 from glovecal_models.takes.table import read_reference, read_takes, write_takes
 from glovecal_models.takes.take import Take as TakeArrays
 from glovecal_service.rest.answers import change_problems, problems
 from glovecal_service.rest.dependencies import Parts, PartsNeeded, StoreNeeded
 from glovecal_service.rest.names import IDENTIFIER, SHA256, IdInPath, LayoutFilter, SubjectFilter, WearingName
+from glovecal_service.rest.plain import plain
 from glovecal_service.rest.problem import Problem
 from glovecal_service.rest.reference_clock import ReferenceClock, on_take_clock
 from glovecal_service.rest.table_upload import (
@@ -55,6 +58,32 @@ class Take(BaseModel):
     accounting: dict[str, Any] | None
     facts: dict[str, Any]
     created_at: datetime | None
+
+
+class SensorRangeView(BaseModel):
+    sensor: str
+    low: float
+    high: float
+    changed: float = Field(description="Share of frames whose reading differs from the one before.")
+
+
+class RotationRangeView(BaseModel):
+    rotation: str
+    rows: int = Field(description="Reference rows that have it.")
+    low_deg: float
+    high_deg: float
+
+
+class ExaminationView(BaseModel):
+    take: Take
+    rate_hz: float | None = Field(description="By the median interval between frames.")
+    gaps: int = Field(description="Intervals in which frames are missing.")
+    longest_interval_s: float | None
+    repeated_frames: float = Field(description="Share of frames that are the same as the one before.")
+    frames_with_reference: float = Field(description="Share of frames with at least one reference angle.")
+    sensors: list[SensorRangeView]
+    rotations: list[RotationRangeView]
+    sentences: list[str] = Field(description="What looks wrong.")
 
 
 class ImportedTakes(BaseModel):
@@ -135,6 +164,16 @@ def list_takes(
 @router.get("/{id}", response_model=Take, summary="One take", responses=problems())
 def get_take(id: IdInPath, store: StoreNeeded) -> TakeRecord:
     return store.takes.get(id)
+
+
+@router.get(
+    "/{id}/examination",
+    response_model=ExaminationView,
+    summary="How regular a take is, what was measured, what looks wrong",
+    responses=problems(),
+)
+def examine_take(id: IdInPath, store: StoreNeeded) -> dict[str, Any]:
+    return {"take": store.takes.get(id), **plain(asdict(examine(store.takes.load(id))))}
 
 
 @router.delete(

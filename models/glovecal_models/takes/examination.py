@@ -1,0 +1,112 @@
+"""A take looked at before it is trusted: its rhythm, what each sensor did, what was measured, what is odd."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from glovecal_models.takes.reference_check import reference_warnings
+from glovecal_models.takes.take import Take
+
+GAP_INTERVALS = 2.5
+"""An interval longer than this many median ones is a gap: at least one frame in between is missing."""
+MOSTLY_REPEATED = 0.5
+"""From this share of repeated frames on, the readings are older than their time stamps say. A hand held
+still repeats 8-bit frames too, so a smaller share says nothing."""
+
+
+@dataclass(frozen=True)
+class SensorRange:
+    """What one sensor did; ``changed`` is the share of frames whose reading differs from the one before."""
+
+    sensor: str
+    low: float
+    high: float
+    changed: float
+
+
+@dataclass(frozen=True)
+class RotationRange:
+    """What was measured of one rotation, degrees; ``rows`` are the reference rows that have it."""
+
+    rotation: str
+    rows: int
+    low_deg: float
+    high_deg: float
+
+
+@dataclass(frozen=True)
+class Examination:
+    """Facts about a take, and ``sentences`` on what looks wrong (none when nothing does)."""
+
+    rate_hz: float | None
+    """Frames a second by the median interval; None for a single frame."""
+    gaps: int
+    longest_interval_s: float | None
+    repeated_frames: float
+    """Share of frames that are the same as the one before in every sensor."""
+    frames_with_reference: float
+    """Share of frames that have at least one reference angle."""
+    sensors: tuple[SensorRange, ...]
+    rotations: tuple[RotationRange, ...]
+    sentences: tuple[str, ...]
+
+
+def examine(take: Take) -> Examination:
+    """Look at a take with at least one frame."""
+    intervals = np.diff(take.time_s)
+    typical = float(np.median(intervals)) if len(intervals) else None
+    gaps = 0 if typical is None else int((intervals > GAP_INTERVALS * typical).sum())
+    changed = take.readings[1:] != take.readings[:-1]
+    repeated = float((~changed.any(axis=1)).mean()) if len(changed) else 0.0
+    sensors = tuple(_sensor(take, index, changed[:, index]) for index in range(len(take.sensors)))
+    paired = np.isfinite(take.reference_at_frames(take.rotations)).any(axis=1) if take.rotations else None
+    return Examination(
+        rate_hz=None if typical is None else 1.0 / typical,
+        gaps=gaps,
+        longest_interval_s=float(intervals.max()) if len(intervals) else None,
+        repeated_frames=repeated,
+        frames_with_reference=0.0 if paired is None else float(paired.mean()),
+        sensors=sensors,
+        rotations=tuple(
+            item for index in range(len(take.rotations)) if (item := _rotation(take, index)) is not None
+        ),
+        sentences=(*_frame_warnings(take, intervals, gaps, repeated, sensors), *reference_warnings(take)),
+    )
+
+
+def _sensor(take: Take, index: int, changed: np.ndarray) -> SensorRange:
+    readings = take.readings[:, index]
+    share = float(changed.mean()) if len(changed) else 0.0
+    return SensorRange(take.sensors[index], float(readings.min()), float(readings.max()), share)
+
+
+def _rotation(take: Take, index: int) -> RotationRange | None:
+    angles = take.reference[:, index]
+    angles = angles[np.isfinite(angles)]
+    if not len(angles):
+        return None
+    return RotationRange(take.rotations[index], len(angles), float(angles.min()), float(angles.max()))
+
+
+def _frame_warnings(
+    take: Take, intervals: np.ndarray, gaps: int, repeated: float, sensors: tuple[SensorRange, ...]
+) -> list[str]:
+    who, warnings = f"Take {take.name!r}", []
+    if gaps:
+        longest = int(intervals.argmax())
+        warnings.append(
+            f"{who}: {gaps} gap{'s' if gaps > 1 else ''} in the frames, the longest of "
+            f"{intervals[longest]:.3g} s at {take.time_s[longest]:g} s."
+        )
+    still = [item for item in sensors if item.low == item.high]
+    if still and len(take.time_s) > 1:
+        named = ", ".join(f"{item.sensor} (always {item.low:g})" for item in still)
+        warnings.append(f"{who}: sensors that never change: {named}. Is a wire broken?")
+    if repeated >= MOSTLY_REPEATED:
+        warnings.append(
+            f"{who}: {100 * repeated:.0f} % of the frames repeat the one before; did the hand hold still, "
+            "or does the glove measure more slowly than it was recorded?"
+        )
+    return warnings

@@ -1,0 +1,45 @@
+"""What went wrong, as one sentence and an exit code."""
+
+from __future__ import annotations
+
+from glovecal_client.errors import ClientError, ServiceError
+from glovecal_models.errors import GlovecalError
+
+REFUSED, WRONG_USE, NO_SERVICE, INTERRUPTED = 1, 2, 3, 130
+
+
+class Refusal(GlovecalError):
+    """The command itself found what was asked for impossible."""
+
+
+class NobodyThere(Refusal):
+    """No service, or nothing that would answer."""
+
+    exit_code = NO_SERVICE
+
+
+def sentence_of(error: Exception) -> str:
+    """For a person: without HTTP's status numbers, and with the fields the service found wrong."""
+    fields = getattr(error, "problem", {}).get("errors") if isinstance(error, ServiceError) else None
+    if fields:
+        return "; ".join(f"{_field(item['location'])}: {item['problem']}" for item in fields)
+    if isinstance(error, ServiceError):
+        return error.detail or error.title
+    if isinstance(error, OSError):
+        named = f"{error.filename}: " if error.filename else ""
+        return named + (error.strerror or str(error))
+    return str(error)
+
+
+def exit_code_of(error: Exception) -> int:
+    return getattr(error, "exit_code", REFUSED)
+
+
+def _field(location: str) -> str:
+    """``body.folds`` is ``folds`` to somebody who never saw the body."""
+    part, _, rest = location.partition(".")
+    return rest if rest and part in ("body", "query", "path", "header") else location
+
+
+EXPECTED = (GlovecalError, ClientError, OSError)
+"""What is told in a sentence; anything else is a mistake of ours and keeps its traceback."""

@@ -1,0 +1,100 @@
+"""``glovecal take import``: take tables into the store, each file whole or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from glovecal_client.errors import ServiceError
+from glovecal_service.cli.connection import connect
+from glovecal_service.cli.layout_file import layout_named
+from glovecal_service.cli.options import AsJson, Subject
+from glovecal_service.cli.printing import err, print_json
+from glovecal_service.cli.refusal import REFUSED, sentence_of
+from glovecal_service.cli.take_rows import print_takes
+
+if TYPE_CHECKING:
+    from glovecal_client.rest import RestClient
+
+SERVER_FAULT = 500
+
+
+def import_takes(
+    files: Annotated[
+        list[Path], typer.Argument(exists=True, dir_okay=False, help="CSV or Parquet take tables.")
+    ],
+    subject: Subject,
+    layout: Annotated[
+        str | None,
+        typer.Option("--layout", "-l", help="Layout name or layout file. Default: made of the columns."),
+    ] = None,
+    reference: Annotated[
+        Path | None,
+        typer.Option(exists=True, dir_okay=False, help="Reference table of a single frames file."),
+    ] = None,
+    name: Annotated[
+        str | None, typer.Option(help="Name of the take. Default: in the file, else the file's.")
+    ] = None,
+    wearing: Annotated[str | None, typer.Option(help="The wearing, where the file does not say it.")] = None,
+    spread_equal_times: Annotated[
+        bool,
+        typer.Option("--spread-equal-times", help="Frames stamped in batches: spread each up to the next."),
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Import take tables. X.reference.csv beside X.frames.csv is found by itself.
+
+    A file that cannot be imported is told and the others are imported; the exit code is 1 then.
+    """
+    if reference and len(files) > 1:
+        raise typer.BadParameter("--reference goes with one frames file")
+    frames = [file for file in files if not _is_reference_of_another(file, files)]
+    options = {"name": name, "wearing": wearing, "equal_times": "spread" if spread_equal_times else None}
+    rows, refused = [], 0
+    with connect() as service:
+        service.get(f"/subjects/{subject}")
+        chosen = layout_named(service, layout)
+        for file in frames:
+            try:
+                rows += _import(service, file, reference or _beside(file), subject, chosen, options)
+            except ServiceError as error:
+                if error.status >= SERVER_FAULT:
+                    raise
+                refused += 1
+                err.print(f"{file}: not imported: {sentence_of(error)}", style="red")
+    if as_json:
+        print_json(rows)
+    elif rows or not refused:
+        print_takes(rows, empty="Nothing was imported.")
+    if refused:
+        raise typer.Exit(REFUSED)
+
+
+def _import(
+    service: RestClient,
+    file: Path,
+    reference: Path | None,
+    subject: str,
+    layout: str | None,
+    options: dict[str, str | None],
+) -> list[dict[str, Any]]:
+    given = {key: value for key, value in options.items() if value is not None}
+    answer = service.upload_takes(file, reference=reference, subject=subject, layout=layout, **given)
+    if not answer["imported"]:
+        err.print(f"{file}: its takes were here already", style="yellow")
+    for sentence in answer["warnings"]:
+        err.print(f"{file}: {sentence}", style="yellow")
+    return answer["takes"]
+
+
+def _beside(frames: Path) -> Path | None:
+    """X.reference.csv for X.frames.csv, when it is there."""
+    stem, mark, rest = frames.name.rpartition(".frames.")
+    partner = frames.with_name(f"{stem}.reference.{rest}")
+    return partner if mark and partner.is_file() else None
+
+
+def _is_reference_of_another(file: Path, files: list[Path]) -> bool:
+    return any(_beside(other) == file for other in files if other != file)
