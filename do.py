@@ -59,7 +59,8 @@ def test(arguments: list[str]) -> int:
 
 
 def check(arguments: list[str]) -> int:
-    steps = (["ruff", "format", "--check", "."], ["ruff", "check", "."], ["pyright", *arguments])
+    ruff = (["ruff", "format", "--no-cache", "--check", "."], ["ruff", "check", "--no-cache", "."])
+    steps = (*ruff, ["pyright", *arguments])
     return max(run(*step, dev=True) for step in steps)
 
 

@@ -90,6 +90,10 @@ class RestClient:
     def delete(self, path: str) -> None:
         self._send("DELETE", path)
 
+    def page(self, path: str, body: Any) -> str:
+        """An HTML page that the service makes from what is asked."""
+        return self._send("POST", path, json=body).text
+
     def download(self, path: str, query: Mapping[str, Any] | None = None) -> bytes:
         """The bytes of an export."""
         return self._send("GET", path, params=query).content

@@ -9,16 +9,14 @@ import numpy as np
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field, FiniteFloat
 
-from glovecal_models.calibration.comparison import compare
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.errors import LayoutMismatch
 from glovecal_service.rest.answers import change_problems, problems
 from glovecal_service.rest.dependencies import PartsNeeded, StoreNeeded
-from glovecal_service.rest.names import Channel, Id, Identifier, LayoutFilter, ModelInPath, SubjectFilter
+from glovecal_service.rest.names import Channel, Identifier, LayoutFilter, ModelInPath, SubjectFilter
 from glovecal_service.rest.plain import plain
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.records import Activation, ModelRecord
-from glovecal_service.store.store import Store
 
 router = APIRouter(prefix="/models", tags=["models"])
 
@@ -89,39 +87,6 @@ class Angles(BaseModel):
     mean_deg: list[list[float | None]]
     sd_deg: list[list[float | None]] = Field(description="Of the rotation with its measurement noise.")
     flags: list[list[int]] = Field(description="Sum of 1 extrapolating, 2 too uncertain, 4 by rule.")
-
-
-class Against(StrictBody):
-    takes: Annotated[list[Id], Field(min_length=1, max_length=MOST_TAKES)]
-
-
-class Errors(BaseModel):
-    count: int
-    rmse_deg: float | None
-    mae_deg: float | None
-    bias_deg: float | None
-    percentile_95_deg: float | None
-    coverage: float | None = Field(
-        description="Errors within one claimed standard deviation; 0.68 is truthful."
-    )
-    baseline_deg: float | None = Field(description="Error of always answering the mean of the measurements.")
-
-
-class PoseErrors(BaseModel):
-    pose: str
-    count: int
-    mean_deg: float | None
-    sd_deg: float | None
-
-
-class ComparisonView(BaseModel):
-    model: str
-    over_all: Errors
-    rotations: dict[str, Errors]
-    poses: list[PoseErrors]
-    not_measured: list[str]
-    not_predicted: list[str]
-    trained_on: list[str] = Field(description="Takes among those given that the model was trained on.")
 
 
 @router.get("", response_model=list[Model], summary="Models, oldest first", responses=problems())
@@ -225,25 +190,6 @@ def predict(id: ModelInPath, body: Readings, parts: PartsNeeded) -> dict[str, An
     }
 
 
-@router.post(
-    "/{id}/compare",
-    response_model=ComparisonView,
-    summary="The model against measurements",
-    responses=change_problems(409),
-)
-def compare_model(id: ModelInPath, body: Against, parts: PartsNeeded) -> dict[str, Any]:
-    """Errors in degrees over the takes given; `trained_on` says which of them it has seen before."""
-    record = parts.store.models.get(id)
-    model, _ = parts.predictors.get(record.id)
-    wanted = list(dict.fromkeys(body.takes))
-    comparison = compare(model, [parts.store.takes.load(take) for take in wanted])
-    seen = _trained_on(parts.store, model, record)
-    return plain(comparison.to_document()) | {
-        "model": record.id,
-        "trained_on": [take for take in wanted if take in seen],
-    }
-
-
 def _row(record: ModelRecord, active: bool) -> dict[str, Any]:
     row = {**record.__dict__, "active": active, "facts": plain(record.facts)}
     return row | {"held_out_rmse_deg": plain(record.facts.get("held_out_rmse_deg"))}
@@ -275,10 +221,3 @@ def _in_model_order(body: Readings, model: CalibrationModel) -> np.ndarray:
                 f"{', '.join(given)}"
             )
     return np.array(body.readings, dtype=float)[:, [given.index(name) for name in wanted]]
-
-
-def _trained_on(store: Store, model: CalibrationModel, record: ModelRecord) -> set[str]:
-    """Ids of the takes whose frames the model has seen."""
-    named = {take["id"] if isinstance(take, dict) else take for take in record.facts.get("takes", [])}
-    by_hash = {take.id for take in store.takes.list(subject=record.subject) if take.artifact in model.takes}
-    return named | by_hash

@@ -1,0 +1,181 @@
+"""``models/{id}/compare``, ``where`` and ``report``: a model against measurements, numbers to pictures."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Response
+from pydantic import BaseModel, Field
+
+from glovecal_models.calibration.comparison import compare
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.comparison.residuals import residuals
+from glovecal_models.comparison.where_it_fails import where_it_fails
+from glovecal_service.report.page import report_page
+from glovecal_service.rest.answers import change_problems
+from glovecal_service.rest.dependencies import Parts, PartsNeeded
+from glovecal_service.rest.names import Id, ModelInPath
+from glovecal_service.rest.plain import plain
+from glovecal_service.rest.strict_body import StrictBody
+from glovecal_service.store.records import ModelRecord
+from glovecal_service.store.store import Store
+
+router = APIRouter(prefix="/models", tags=["models"])
+
+MOST_TAKES = 1000
+
+
+class Against(StrictBody):
+    takes: Annotated[list[Id], Field(min_length=1, max_length=MOST_TAKES)]
+
+
+class Errors(BaseModel):
+    count: int
+    rmse_deg: float | None
+    mae_deg: float | None
+    bias_deg: float | None
+    percentile_95_deg: float | None
+    coverage: float | None = Field(
+        description="Errors within one claimed standard deviation; 0.68 is truthful."
+    )
+    baseline_deg: float | None = Field(description="Error of always answering the mean of the measurements.")
+
+
+class PoseErrors(BaseModel):
+    pose: str
+    count: int
+    mean_deg: float | None
+    sd_deg: float | None
+
+
+class ComparisonView(BaseModel):
+    model: str
+    over_all: Errors
+    rotations: dict[str, Errors]
+    poses: list[PoseErrors]
+    not_measured: list[str]
+    not_predicted: list[str]
+    trained_on: list[str] = Field(description="Takes among those given that the model was trained on.")
+
+
+class Floor(BaseModel):
+    floor_deg: float | None = Field(description="How small an error can get on these measurements.")
+    low_deg: float | None
+    high_deg: float | None
+    prediction_deg: float | None = Field(description="What of it is the prediction's own jitter.")
+    how: str = Field(description='"frame to frame" is a lower bound.')
+    holds: int
+
+
+class DependenceView(BaseModel):
+    covariate: str
+    unit: str
+    phrase: str
+    edges: list[float | None]
+    mean_deg: list[float | None] = Field(description="Mean error in each bin.")
+    count: list[int]
+    explained_deg: float | None
+    probability: float | None = Field(description="Share of time shifts that explain as much.")
+    is_structure: bool = Field(description="No noise, and large enough to matter.")
+
+
+class WearingsView(BaseModel):
+    rotation: str
+    wearings: list[str]
+    mean_deg: list[float | None]
+    takes: list[int]
+    spread_deg: float | None
+    probability: float | None = Field(description="Null: too few takes to say.")
+    sentence: str
+
+
+class Findings(BaseModel):
+    rotation: str
+    rmse_deg: float | None
+    bias_deg: float | None
+    floor: Floor | None
+    dependences: list[DependenceView]
+    wearings: WearingsView | None
+    sentence: str
+
+
+class StretchView(BaseModel):
+    take: str
+    start_s: float
+    end_s: float
+    rmse_deg: float | None
+    rotation: str
+    rotation_rmse_deg: float | None
+    pose: str
+
+
+class WhereView(BaseModel):
+    model: str
+    rotations: list[Findings] = Field(description="The one farthest above its noise floor first.")
+    stretches: list[StretchView] = Field(description="The worst seconds, worst first.")
+    trained_on: list[str] = Field(description="Takes among those given that the model was trained on.")
+
+
+@router.post(
+    "/{id}/compare",
+    response_model=ComparisonView,
+    summary="The model against measurements",
+    responses=change_problems(409),
+)
+def compare_model(id: ModelInPath, body: Against, parts: PartsNeeded) -> dict[str, Any]:
+    """Errors in degrees over the takes given; `trained_on` says which of them it has seen before."""
+    record, model, wanted, seen = _chosen(id, body, parts)
+    comparison = compare(model, [parts.store.takes.load(take) for take in wanted])
+    return plain(comparison.to_document()) | {"model": record.id, "trained_on": seen}
+
+
+@router.post(
+    "/{id}/where",
+    response_model=WhereView,
+    summary="Where the model fails",
+    responses=change_problems(409),
+)
+def where_model_fails(id: ModelInPath, body: Against, parts: PartsNeeded) -> dict[str, Any]:
+    """Noise floor, what each error depends on (against chance), wearings, and the worst seconds."""
+    record, model, wanted, seen = _chosen(id, body, parts)
+    found = residuals(model, [parts.store.takes.load(take) for take in wanted])
+    document = plain(where_it_fails(found).to_document())
+    return document | {"model": record.id, "trained_on": seen}
+
+
+@router.post(
+    "/{id}/report",
+    response_class=Response,
+    summary="The comparison as a page with pictures",
+    responses=change_problems(409)
+    | {
+        200: {
+            "description": "One HTML file that needs nothing else.",
+            "content": {"text/html": {"schema": {"type": "string"}}},
+        }
+    },
+)
+def report_on_model(id: ModelInPath, body: Against, parts: PartsNeeded) -> Response:
+    """Errors, where they are, what they depend on; each picture with a sentence that says what it shows."""
+    record, model, wanted, seen = _chosen(id, body, parts)
+    takes = [parts.store.takes.load(take) for take in wanted]
+    page = report_page(record.id, model, takes, seen)
+    return Response(page, media_type="text/html; charset=utf-8")
+
+
+def _chosen(
+    id: str, body: Against, parts: Parts
+) -> tuple[ModelRecord, CalibrationModel, list[str], list[str]]:
+    """The model, the takes wanted, and those of them it was trained on."""
+    record = parts.store.models.get(id)
+    model, _ = parts.predictors.get(record.id)
+    wanted = list(dict.fromkeys(body.takes))
+    seen = _trained_on(parts.store, model, record)
+    return record, model, wanted, [take for take in wanted if take in seen]
+
+
+def _trained_on(store: Store, model: CalibrationModel, record: ModelRecord) -> set[str]:
+    """Ids of the takes whose frames the model has seen."""
+    named = {take["id"] if isinstance(take, dict) else take for take in record.facts.get("takes", [])}
+    by_hash = {take.id for take in store.takes.list(subject=record.subject) if take.artifact in model.takes}
+    return named | by_hash
