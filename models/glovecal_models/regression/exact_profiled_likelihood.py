@@ -44,7 +44,7 @@ class ExactProfiledLikelihood:
 
     def __init__(self, samples: MergedSamples) -> None:
         self._samples = samples
-        self._merged = bool(samples.root_count.max() > 1.0)
+        self._merged = bool((samples.root_count != 1.0).any())
 
     def evaluate(self, parameters: np.ndarray) -> Evaluation | None:
         """The likelihood at (log lengthscales, log rho) (D + 1,); None where rounding breaks it."""

@@ -72,11 +72,14 @@ def fit_lmc_gpr(
     inputs: np.ndarray,
     target: np.ndarray,
     *,
+    sample_weight: float = 1.0,
     seed: int = 0,
     cancelled: Callable[[], bool] | None = None,
     report: Callable[[str, float], None] | None = None,
 ) -> ProcessRegressor:
     """Train on ``inputs`` (N, D), raw counts, and ``target`` (N,), degrees; same seed, same result.
+
+    Each sample counts ``sample_weight``, at most 1: less where neighbours repeat each other's errors.
 
     ``evidence`` tells: ``nlml`` (standardised units; + N log target_scale_deg in degrees) and the bracket
     ``nlml_lower``..``nlml_upper`` of the exact value, ``starts``, ``evaluations``, ``exact_evaluation``,
@@ -86,11 +89,11 @@ def fit_lmc_gpr(
     """
     inputs, target = check_samples(inputs, target)
     standard = standardise(inputs, target)
-    samples = MergedSamples.of(standard.x, standard.y)
+    samples = MergedSamples.of(standard.x, standard.y, sample_weight)
     generator = np.random.default_rng(seed)
     say = report or (lambda sentence, fraction: None)
     say("searching from several starts", 0.0)
-    found, account = screen(samples, standard.x, standard.y, generator, cancelled)
+    found, account = screen(samples, standard.x, standard.y, generator, cancelled, sample_weight)
     _stop_if(cancelled)
     say("refining the best optimum", 0.4)
     refined = _refine_best(samples, standard, found, generator, cancelled)
@@ -100,7 +103,7 @@ def fit_lmc_gpr(
     scale_deg = standard.target_scale
     served = _served(samples, trained, scale_deg)
     evidence = _evidence(samples, trained, refined, served, scale_deg)
-    evidence["starts"] = account
+    evidence |= {"samples": len(target), "sample_weight": sample_weight, "starts": account}
     say("trained", 1.0)
     return _regressor(samples, standard, trained, served, evidence)
 
@@ -136,7 +139,7 @@ def _refine(
 
     Exact searches start from the optimum of a subset, where an evaluation costs a fifteenth.
     """
-    distinct = len(samples.inputs)
+    distinct, weight = len(samples.inputs), samples.total / len(standard.y)
     if distinct <= FEW:
         return search_exactly(samples, rough.parameters, tolerance=1e-6, cancelled=cancelled) or rough
     nodes = min(MOST_NODES, distinct // 2)
@@ -144,9 +147,9 @@ def _refine(
     if refined is not None:
         return refined
     if distinct > MOST_EXACT:
-        samples = some_samples(standard.x, standard.y, 2000, generator)
+        samples = some_samples(standard.x, standard.y, 2000, generator, weight)
     if len(samples.inputs) > 2 * SCREENED:
-        subset = some_samples(standard.x, standard.y, SCREENED, generator)
+        subset = some_samples(standard.x, standard.y, SCREENED, generator, weight)
         rough = search_exactly(subset, rough.parameters, tolerance=0.05, cancelled=cancelled) or rough
     return search_exactly(samples, rough.parameters, tolerance=1e-3, cancelled=cancelled) or rough
 
@@ -226,7 +229,6 @@ def _evidence(
     many = not refined.low_rank and len(samples.inputs) > FEW
     collapsed = float(lengthscales.min()) < (SHORT_LENGTHSCALE if many else 0.2 * SHORT_LENGTHSCALE)
     return {
-        "samples": samples.total,
         "distinct_inputs": len(samples.inputs),
         "nlml": trained.profile.nlml,
         "nlml_lower": float(certificate.lower),

@@ -4,6 +4,9 @@ With K = k(z, z) + jitter I = L L^T and V = L^-1 k(z, x), the target's covarianc
 Lambda = diag(k(x, x) - V^T V) + sigma^2 I. Everything follows from S = V Lambda^-1/2 and A = I + S S^T.
 One evaluation costs seven products of size M x M x N and two passes of the covariance function, and all
 derivatives, those by the pseudo-inputs included, come out of the same matrices.
+
+Given the pseudo-inputs' values the samples are independent, so a sample that counts only w of one enters
+with its Gaussian to the power w: that of variance Lambda / w, times (2 pi Lambda)^((1 - w) / 2) w^(-1/2).
 """
 
 from __future__ import annotations
@@ -41,11 +44,11 @@ class FitcState:
     solved: np.ndarray
     """A^-1 S (M, N)."""
     deviations: np.ndarray
-    """Root of Lambda's diagonal (N,)."""
+    """Root of the diagonal of Lambda / w (N,)."""
     coefficients: np.ndarray
     """Of the mean (C,)."""
     projected: np.ndarray
-    """b = A^-1 V Lambda^-1 (y - mean), (M,); the process's weights are L^-T b."""
+    """b = A^-1 V (Lambda / w)^-1 (y - mean), (M,); the process's weights are L^-T b."""
     alpha: np.ndarray
     """Inverse covariance times (y - mean), (N,)."""
     value: float
@@ -60,10 +63,17 @@ class FitcLikelihood:
     """
 
     def __init__(
-        self, x: np.ndarray, y: np.ndarray, mean: Mean, covariance: Covariance, jitter: float = JITTER
+        self,
+        x: np.ndarray,
+        y: np.ndarray,
+        mean: Mean,
+        covariance: Covariance,
+        jitter: float = JITTER,
+        sample_weight: float = 1.0,
     ) -> None:
-        """Samples x (N, D) and y (N,) in working units."""
+        """Samples x (N, D) and y (N,) in working units, each of which counts ``sample_weight``."""
         self.x, self.y, self.mean, self.covariance, self.jitter = x, y, mean, covariance, jitter
+        self.sample_weight = sample_weight
         self._basis = mean.basis(x)
         self._buffers = np.empty((4, 0, len(x)))
 
@@ -83,7 +93,7 @@ class FitcLikelihood:
         cross, cross_pullback = self.covariance.with_pullback(theta, z, self.x, self._buffer(0, len(z)))
         inner, inner_pullback = self.covariance.with_pullback(theta, z, z)
         state = self._state(theta, noise, cross, inner)
-        by_cross, by_inner, by_diagonal = _weights(state, self._buffer(3, len(z)))
+        by_cross, by_inner, by_diagonal = _weights(state, self._buffer(3, len(z)), self.sample_weight)
         theta_cross, z_cross = cross_pullback(by_cross)
         theta_inner, z_inner = inner_pullback(by_inner)
         theta_diagonal, _ = self.covariance.diagonal_pullback(theta, self.x, by_diagonal)
@@ -109,7 +119,7 @@ class FitcLikelihood:
         # both in place and the faster of the two.
         _trsm(1.0, root, scaled.T, side=1, lower=1, trans_a=1, overwrite_b=1)
         variances = self.covariance.diagonal(theta, self.x) - np.einsum("mn,mn->n", scaled, scaled)
-        deviations = np.sqrt(np.maximum(variances, 0.0) + noise)
+        deviations = np.sqrt((np.maximum(variances, 0.0) + noise) / self.sample_weight)
         scaled *= 1.0 / deviations
         product = _syrk(1.0, scaled.T, trans=1, lower=1) + np.eye(len(root))
         inner_root = _lower_root(product)
@@ -121,9 +131,16 @@ class FitcLikelihood:
         alpha = (residual - projected @ scaled) / deviations
         log_determinant = 2 * float(np.log(deviations).sum() + np.log(np.diagonal(inner_root)).sum())
         value = 0.5 * (float((residual * deviations) @ alpha) + log_determinant + len(self.y) * _LOG_2PI)
+        value -= self._log_normaliser(deviations)
         return FitcState(
             root, scaled, product, inner_root, solved, deviations, coefficients, projected, alpha, value
         )
+
+    def _log_normaliser(self, deviations: np.ndarray) -> float:
+        """Log of what the powers of the samples' Gaussians leave beside Gaussians; 0 for whole samples."""
+        weight = self.sample_weight
+        logs = _LOG_2PI + 2 * np.log(deviations) + np.log(weight)
+        return float(0.5 * ((1 - weight) * logs.sum() - len(self.y) * np.log(weight)))
 
     def _fit_mean(
         self, scaled: np.ndarray, solved: np.ndarray, deviations: np.ndarray
@@ -136,14 +153,16 @@ class FitcLikelihood:
         return coefficients, target - basis @ coefficients
 
 
-def _weights(state: FitcState, spare: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _weights(
+    state: FitcState, spare: np.ndarray, sample_weight: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Derivatives of the value by k(z, x) (M, N), k(z, z) (M, M, symmetric) and Lambda's diagonal (N,).
 
     Consumes ``state.solved``; ``spare`` (M, N) is overwritten.
     """
     scaled, solved, alpha = state.scaled, state.solved, state.alpha
     leverage = np.einsum("mn,mn->n", scaled, solved)
-    surprise = leverage + (alpha * state.deviations) ** 2
+    surprise = (leverage + (alpha * state.deviations) ** 2) / sample_weight
     by_diagonal = 0.5 * (1.0 - surprise) / state.deviations**2
     by_inner = _inner_weights(state, np.multiply(scaled, np.sqrt(surprise), out=spare))
 

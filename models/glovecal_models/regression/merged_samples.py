@@ -3,6 +3,10 @@
 n samples at one input with noise variance s^2 carry the same information about the function as their mean
 with noise s^2 / n, plus their scatter about it. Written with rows multiplied by sqrt(n) the noise stays
 uniform: S K S + s^2 I, S = diag(sqrt(n)). A single bend sensor has 120 distinct values in 2000 samples.
+
+Counts need not be whole: where neighbouring samples repeat each other's errors, each counts as a part of
+one (its likelihood to that power: Pauli, Racugno & Ventura 2011, composite likelihoods), and two equal
+samples that count a half each are one.
 """
 
 from __future__ import annotations
@@ -24,13 +28,13 @@ class MergedSamples:
     inputs: np.ndarray
     """Distinct inputs, shape (m, D), standardised."""
     root_count: np.ndarray
-    """Square root of the number of samples at each input, shape (m,)."""
+    """Square root of what the samples at each input count, shape (m,)."""
     columns: np.ndarray
     """sqrt(count) * [basis of the plane, mean target], shape (m, p + 1)."""
-    total: int
-    """Number N of samples before merging."""
+    total: float
+    """What all samples count: their number before merging, times their weight."""
     scatter: float
-    """Sum of squares of the targets about the mean target of their input."""
+    """Weighted sum of squares of the targets about the mean target of their input."""
     to_plane: np.ndarray
     """basis = [inputs 1] @ to_plane, shape (D + 1, p); p < D + 1 for collinear inputs."""
     first: np.ndarray
@@ -41,20 +45,20 @@ class MergedSamples:
         return self.columns.shape[1] - 1
 
     @classmethod
-    def of(cls, inputs: np.ndarray, target: np.ndarray) -> MergedSamples:
-        """Merge ``inputs`` (N, D) and ``target`` (N,), both standardised."""
+    def of(cls, inputs: np.ndarray, target: np.ndarray, weight: float = 1.0) -> MergedSamples:
+        """Merge ``inputs`` (N, D) and ``target`` (N,), both standardised; each sample counts ``weight``."""
         order = np.lexsort(inputs.T[::-1])
         ordered = inputs[order]
         starts = np.flatnonzero(np.r_[True, (ordered[1:] != ordered[:-1]).any(axis=1)])
         counts = np.diff(np.r_[starts, len(order)])
         distinct = np.ascontiguousarray(ordered[starts])
         means = np.add.reduceat(target[order], starts) / counts
-        scatter = float(np.sum((target[order] - np.repeat(means, counts)) ** 2))
-        root = np.sqrt(counts.astype(float))
+        scatter = weight * float(np.sum((target[order] - np.repeat(means, counts)) ** 2))
+        root = np.sqrt(weight * counts)
         basis, to_plane = _plane_basis(distinct, root)
         columns = np.column_stack([basis, root * means])
         first = np.minimum.reduceat(order, starts)
-        return cls(distinct, root, columns, len(target), scatter, to_plane, first)
+        return cls(distinct, root, columns, weight * len(target), scatter, to_plane, first)
 
 
 def _plane_basis(inputs: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

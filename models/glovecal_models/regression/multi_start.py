@@ -140,15 +140,16 @@ def screen(
     y: np.ndarray,
     generator: np.random.Generator,
     cancelled: Callable[[], bool] | None = None,
+    weight: float = 1.0,
 ) -> tuple[list[Candidate], list[dict[str, object]]]:
     """Distinct optima over all starts, best first, roughly located; and a JSON-able account of every start.
 
     ``merged``: all of the standardised samples ``x`` (N, D), ``y`` (N,). Where these have many distinct
-    inputs, a random ``SCREENED`` of them are used.
+    inputs, a random ``SCREENED`` of them are used. ``weight``: what each sample counts in ``merged``.
     """
     dimensions = x.shape[1]
     few = len(merged.inputs) <= FEW
-    samples = merged if few else some_samples(x, y, SCREENED, generator)
+    samples = merged if few else some_samples(x, y, SCREENED, generator, weight)
     found: list[Candidate] = []
     account: list[dict[str, object]] = []
     for start in long_starts(dimensions):
@@ -159,7 +160,7 @@ def screen(
             found.append(candidate)
     found.sort(key=lambda candidate: candidate.nlml)
     if dimensions > 1 or not found:
-        subset = some_samples(x, y, SUBSET, generator)
+        subset = some_samples(x, y, SUBSET, generator, weight)
         short = _short_optimum(subset, found, cancelled)
         _note(account, short_start(dimensions), short)
         if short is not None:
@@ -169,12 +170,18 @@ def screen(
     return _distinct(found), account
 
 
-def some_samples(x: np.ndarray, y: np.ndarray, most: int, generator: np.random.Generator) -> MergedSamples:
-    """A random ``most`` of the samples, or all where there are fewer."""
+def some_samples(
+    x: np.ndarray, y: np.ndarray, most: int, generator: np.random.Generator, weight: float = 1.0
+) -> MergedSamples:
+    """A random ``most`` of the samples, or all where there are fewer.
+
+    Fewer are less alike: each counts for more, up to a whole one.
+    """
     if len(y) > most:
         rows = generator.choice(len(y), most, replace=False)
+        weight = min(1.0, weight * len(y) / most)
         x, y = x[rows], y[rows]
-    return MergedSamples.of(x, y)
+    return MergedSamples.of(x, y, weight)
 
 
 def _short_optimum(

@@ -23,7 +23,8 @@ TOLERATED_LOSS = 0.02
 """Nats per sample by which the exact likelihood may be worse than at the start. A noise variance 25 % too
 low costs as much; sparse training of well-posed rotations costs a tenth of it."""
 
-_SAMPLES = 500
+_MOST, _LEAST = 500, 100
+"""Samples the exact likelihood is taken of: as many as they count for, within these."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,8 @@ def judge(
     likelihood: FitcLikelihood, trained: np.ndarray, start: np.ndarray, generator: np.random.Generator
 ) -> Verdict:
     """Compare two parameter vectors of ``likelihood`` by the exact likelihood of up to 500 samples."""
-    chosen = generator.permutation(len(likelihood.y))[:_SAMPLES]
+    worth = int(likelihood.sample_weight * len(likelihood.y))
+    chosen = generator.permutation(len(likelihood.y))[: max(_LEAST, min(_MOST, worth))]
     x, y = likelihood.x[chosen], likelihood.y[chosen]
     exact = ExactLikelihood(x, y, likelihood.mean, likelihood.covariance)
     values = []

@@ -43,6 +43,7 @@ def fit_spgp(
     mean: Mean | None = None,
     covariance: Covariance | None = None,
     start: ProcessRegressor | None = None,
+    sample_weight: float = 1.0,
     seed: int = 0,
     sensor_names: Sequence[str] | None = None,
     cancelled: Callable[[], bool] | None = None,
@@ -57,7 +58,7 @@ def fit_spgp(
     may not fall below half the start's, and hyperparameters that the exact likelihood refuses are
     replaced by the start's (``noise_guard``); ``evidence`` says which happened, its NLML values are in
     standardised units. The mean is linear and the covariance squared exponential with one relevance per
-    sensor unless given.
+    sensor unless given. Each sample counts ``sample_weight``, at most 1, as in ``fit_lmc_gpr``.
     Raises NotTrainable, Cancelled, and BadInput when ``start`` has another covariance or sensor count.
     """
     inputs, target = check_samples(inputs, target, sensor_names)
@@ -65,7 +66,9 @@ def fit_spgp(
         raise BadInput(f"pseudo_inputs is {pseudo_inputs}, expected at least 1")
     if start is None and mean is None and covariance is None:
         first_part = report and (lambda sentence, fraction: report(sentence, _START_SHARE * fraction))
-        start = fit_lmc_gpr(inputs, target, seed=seed, cancelled=cancelled, report=first_part)
+        start = fit_lmc_gpr(
+            inputs, target, sample_weight=sample_weight, seed=seed, cancelled=cancelled, report=first_part
+        )
     if start is not None and covariance is not None and covariance.settings() != start.covariance.settings():
         raise BadInput(f"the start has covariance {start.covariance!r}, not {covariance!r}")
     if start is not None and len(start.input_shift) != inputs.shape[1]:
@@ -82,7 +85,9 @@ def fit_spgp(
         theta = covariance.scaled(start.theta, working.target_scale**-2)
         noise = start.noise_variance / working.target_scale**2
     noise = float(np.clip(noise, *np.exp(LOG_NOISE_BOUNDS)))
-    likelihood, first = _first(working, mean, covariance, theta, noise, pseudo_inputs, generator)
+    likelihood = FitcLikelihood(working.x, working.y, mean, covariance, sample_weight=sample_weight)
+    z = choose_pseudo_inputs(covariance, theta, working.x, pseudo_inputs, generator)
+    first = likelihood.pack(theta, noise, z)
     on_evaluation = counted_progress(
         report, f"moving pseudo-inputs of {len(target)} samples", _START_SHARE, 1.0
     )
@@ -131,21 +136,6 @@ def _in_units_of(start: ProcessRegressor, working: Standardised) -> Standardised
     return replace(working, x=x, input_shift=start.input_shift, input_scale=start.input_scale)
 
 
-def _first(
-    working: Standardised,
-    mean: Mean,
-    covariance: Covariance,
-    theta: np.ndarray,
-    noise: float,
-    pseudo_inputs: int,
-    generator: np.random.Generator,
-) -> tuple[FitcLikelihood, np.ndarray]:
-    """The likelihood, and its parameters where the search starts."""
-    likelihood = FitcLikelihood(working.x, working.y, mean, covariance)
-    z = choose_pseudo_inputs(covariance, theta, working.x, pseudo_inputs, generator)
-    return likelihood, likelihood.pack(theta, noise, z)
-
-
 def _bounds(
     covariance: Covariance, noise: float, x: np.ndarray, parameters: int
 ) -> list[tuple[float, float]]:
@@ -167,6 +157,7 @@ def _evidence(
     return {
         "trainer": "spgp",
         "samples": len(working.y),
+        "sample_weight": likelihood.sample_weight,
         "pseudo_inputs": len(z),
         "evaluations": optimum.evaluations,
         "fitc_nlml_trained": optimum.value,
