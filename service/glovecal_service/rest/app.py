@@ -12,6 +12,7 @@ from starlette.concurrency import run_in_threadpool
 from glovecal_models.threads import pin_blas_to_one_thread
 from glovecal_service.jobs.dispatcher import Dispatcher
 from glovecal_service.rest import (
+    clocks,
     comparisons,
     gloves,
     health,
@@ -41,7 +42,7 @@ JSON_LIMIT_BYTES = 8_000_000
 """Enough for 20,000 frames of 18 sensors to predict."""
 BODY_PATIENCE_S = 30.0
 ROUTERS = (
-    *(subjects, gloves, takes, uploads, recordings),
+    *(subjects, gloves, clocks, takes, uploads, recordings),
     *(training, models, comparisons, jobs, health, metrics_page),
 )
 

@@ -24,6 +24,9 @@ from glovecal_service.store.subjects import require_subject
 from glovecal_service.store.take_file import dump_take, frames_hash, load_take
 from glovecal_service.store.texts import check_text
 
+CLOCK_OFFSET = "clock_offset_s"
+"""Fact of a take: by how much its reference clock was ahead of the frames' before it was repaired."""
+
 
 class Takes:
     def __init__(self, database: Database, artifacts: Artifacts) -> None:
@@ -137,17 +140,34 @@ class Takes:
             reference=reference,
             poses=take.poses if poses is None else poses_at_frames(take.time_s, time_s, poses),
         )
+        return self._replace(earlier, take, {CLOCK_OFFSET: 0.0} if CLOCK_OFFSET in earlier.facts else {})
+
+    def shift_reference(self, id: str, seconds: float) -> TakeRecord:
+        """Move a take's reference in time, later by ``seconds``; ``facts`` keep the sum of all shifts.
+
+        Raises NotFound, BadInput without a reference, StorageFull, Conflict if it was changed meanwhile.
+        """
+        earlier = self.get(id)
+        if not earlier.reference_rows:
+            raise BadInput(f"take {id} ({earlier.name}) has no reference whose clock could be moved")
+        take = load_take(self._artifacts.get(earlier.artifact))
+        take = dataclasses.replace(take, reference_time_s=take.reference_time_s + seconds)
+        total = earlier.facts.get(CLOCK_OFFSET, 0.0) - seconds
+        return self._replace(earlier, take, {CLOCK_OFFSET: round(total, 9)})
+
+    def _replace(self, earlier: TakeRecord, take: Take, facts: dict[str, Any]) -> TakeRecord:
+        """Store ``take`` in the place of ``earlier``, whose artifact stays on file."""
         content = self._content(take)
         history = [
             *earlier.facts.get("history", []),
             {"artifact": earlier.artifact, "until": now().isoformat()},
         ]
-        values = {**content, "facts": {**earlier.facts, "history": history}}
-        same = (tables.takes.c.id == id) & (tables.takes.c.artifact == earlier.artifact)
+        values = {**content, "facts": {**earlier.facts, **facts, "history": history}}
+        same = (tables.takes.c.id == earlier.id) & (tables.takes.c.artifact == earlier.artifact)
         with self._database.write() as connection:
             if not connection.execute(update(tables.takes).where(same).values(**values)).rowcount:
-                raise Conflict(f"take {id} was changed or removed meanwhile; look at it again")
-            return _require(connection, id)
+                raise Conflict(f"take {earlier.id} was changed or removed meanwhile; look at it again")
+            return _require(connection, earlier.id)
 
     def remove(self, id: str) -> None:
         """Forget a take (its artifact stays). Raises NotFound, Conflict if a model was trained on it."""

@@ -1,0 +1,1 @@
+"""Physical effects that make a glove's readings miss the measured angle."""
