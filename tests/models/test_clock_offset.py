@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -65,10 +64,6 @@ def test_what_cannot_be_judged_is_said(takes: list[Take]) -> None:
 @pytest.mark.needs_shared_data
 def test_every_ankle_recording_has_an_offset_of_its_own_and_is_repaired() -> None:
     """12 to 19 degrees of error become 1.5 to 4: the largest effect in these recordings is the clock."""
-    if not (RECORDINGS / "ankle").is_dir():
-        if os.environ.get("GLOVECAL_REQUIRE_EVERYTHING") == "1":
-            pytest.fail("the shared recordings are missing")
-        pytest.skip("needs the shared recordings, which are not part of the repository")
     files = sorted((RECORDINGS / "ankle").glob("*.frames.csv"))
     takes = [take for file in files for take in read_takes(file, reference_beside(file))]
     found = clock_offsets(takes)

@@ -16,10 +16,7 @@ SETS = [  # folder, files, sensors, rotations, own reference clock
     ("cyberglove-robot-thumb", 3, 20, 16, False),
     ("flex-static", 1, 1, 1, False),
 ]
-pytestmark = [
-    pytest.mark.needs_shared_data,
-    pytest.mark.skipif(not DATA.is_dir(), reason=f"the real recordings are not at {DATA}"),
-]
+pytestmark = pytest.mark.needs_shared_data
 
 
 def frame_files(folder: str) -> list[Path]:

@@ -1,0 +1,22 @@
+"""What tests need beside the repository: without it they skip with a sentence, or fail where CI has it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    if item.get_closest_marker("needs_shared_data") is not None and not SHARED_DATA.is_dir():
+        missing("needs the real recordings, which are not part of the repository")
+
+
+def missing(sentence: str) -> None:
+    """Skip; in CI, where everything must be there, fail."""
+    if os.environ.get("GLOVECAL_REQUIRE_EVERYTHING") == "1":
+        pytest.fail(sentence)
+    pytest.skip(sentence)
