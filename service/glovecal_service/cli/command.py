@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import signal
 import sys
+from collections.abc import Sequence
 from importlib.metadata import version
 from typing import Annotated, NoReturn
 
@@ -27,6 +28,7 @@ from glovecal_service.cli import (
     take,
     train,
     watch,
+    where,
 )
 from glovecal_service.cli.printing import err, out
 from glovecal_service.cli.refusal import EXPECTED, INTERRUPTED, exit_code_of, sentence_of
@@ -52,6 +54,7 @@ app.add_typer(take.app, name="take")
 app.command("train")(train.train)
 app.add_typer(model.app, name="model")
 app.command("compare")(compare.compare)
+app.command("where")(where.where)
 app.add_typer(job.app, name="job")
 
 
@@ -71,11 +74,11 @@ def options(
     pass
 
 
-def main() -> None:
-    """Entry point of the ``glovecal`` script."""
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Entry point of the ``glovecal`` script, on the process's arguments by default; ends in SystemExit."""
     signal.signal(signal.SIGTERM, _stop)
     try:
-        app()
+        app(arguments, prog_name="glovecal")
     except KeyboardInterrupt:
         err.print("interrupted")
         sys.exit(INTERRUPTED)

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from glovecal_service.cli.connection import connect
+from glovecal_service.cli.held_out_takes import HeldOutTakes, held_out_takes, warn_trained_on
 from glovecal_service.cli.options import AsJson, Models
 from glovecal_service.cli.printing import err, out, print_json, print_table
-from glovecal_service.cli.refusal import Refusal
-from glovecal_service.cli.takes_named import find_takes
-
-if TYPE_CHECKING:
-    from glovecal_client.rest import RestClient
 
 COLUMNS = {
     "rotation": "rotation",
@@ -34,21 +30,14 @@ POSES = {"pose": "pose", "mean_deg": "mean |error|", "sd_deg": "sd", "count": "a
 
 def compare(
     model: Models,
-    take: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--take",
-            "-t",
-            help="Take to compare with; repeat. Default: all that none of them was trained on.",
-        ),
-    ] = None,
+    take: HeldOutTakes = None,
     poses: Annotated[bool, typer.Option("--poses", help="Errors of each pose too.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Hold models against measurements; several models are shown side by side."""
     with connect() as service:
         documents = {name: service.get(f"/models/{name}") for name in dict.fromkeys(model)}
-        takes = _choose(service, list(documents.values()), take or [])
+        takes = held_out_takes(service, list(documents.values()), take or [])
         body = {"takes": [row["id"] for row in takes]}
         results = {name: service.post(f"/models/{name}/compare", body) for name in documents}
     if as_json:
@@ -66,21 +55,6 @@ def compare(
             print_table(result["poses"], POSES, empty="No frame of these takes has the name of a pose.")
     for name, result in results.items():
         _warn(name, result, takes)
-
-
-def _choose(service: RestClient, models: list[dict[str, Any]], wanted: list[str]) -> list[dict[str, Any]]:
-    if wanted:
-        return find_takes(service.get("/takes"), wanted)
-    subject, layout = models[0]["subject"], models[0]["layout"]
-    rows = service.get("/takes", {"subject": subject, "layout": layout})
-    trained = {take["id"] for document in models for take in document["facts"].get("takes", [])}
-    rows = [row for row in rows if row["rotations"] and row["id"] not in trained]
-    if not rows:
-        raise Refusal(
-            f"every take of {subject} with layout {layout} and reference angles was trained on, so none can "
-            "test; name one with --take, or keep one from training with glovecal train --leave-out"
-        )
-    return rows
 
 
 def _rows(result: dict[str, Any]) -> list[dict[str, Any]]:
@@ -105,11 +79,6 @@ def _print_side_by_side(documents: dict[str, dict[str, Any]], results: dict[str,
 
 
 def _warn(name: str, result: dict[str, Any], takes: list[dict[str, Any]]) -> None:
-    by_id = {row["id"]: row["name"] for row in takes}
-    for id in result["trained_on"]:
-        err.print(
-            f"Careful: model {name[:12]} was trained on take {by_id[id]}; this is not a held-out error.",
-            style="yellow",
-        )
+    warn_trained_on(name, result["trained_on"], takes)
     if result["not_predicted"]:
         err.print(f"Model {name[:12]} does not predict {', '.join(result['not_predicted'])}.", style="yellow")
