@@ -51,7 +51,7 @@ def compare(
         _print_side_by_side(documents, results)
     if poses:
         for name, result in results.items():
-            out.print(f"\nModel {name} ({documents[name]['method']}), each pose:")
+            out.print(f"\nModel {name[:12]} ({documents[name]['method']}), each pose:")
             print_table(result["poses"], POSES, empty="No frame of these takes has the name of a pose.")
     for name, result in results.items():
         _warn(name, result, takes)

@@ -58,7 +58,7 @@ def settings_of_environment() -> Settings:
     except ValidationError as error:
         found = error.errors(include_url=False)[0]
         variable = "GLOVECAL_" + ".".join(map(str, found["loc"])).upper()
-        problem = found["msg"].removeprefix("Value error, ")
+        problem = found["msg"].removeprefix("Value error, ").removeprefix(f"{variable}: ")
         raise BadInput(f"{variable} is {os.environ.get(variable)!r}: {problem}") from error
 
 

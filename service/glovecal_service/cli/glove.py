@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from glovecal_service.cli.connection import connect
+from glovecal_service.cli.layout_file import add_layout_file
 from glovecal_service.cli.options import AsJson, Glove, identifier
 from glovecal_service.cli.printing import moment, out, print_json, print_table
 
@@ -65,7 +66,7 @@ def add(
 ) -> None:
     """Add a layout of your own from a file."""
     with connect() as service:
-        name = service.add_layout(file)
+        name = add_layout_file(service, file)
         document = service.get(f"/gloves/{name}")
     out.print(
         f"Added layout {name}: {len(document['sensors'])} sensors, {len(document['rotations'])} rotations."

@@ -1,0 +1,85 @@
+"""Runs the ``glovecal`` command for tests: in this process, or as a process of its own."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from typing import Any
+
+from glovecal_service.cli.command import main
+
+COMMAND = [sys.executable, "-m", "glovecal_service.cli.command"]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a verb said and how it ended."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> Any:
+        """Standard output as one JSON document: fails when anything else is on it."""
+        assert self.code == 0, self.err
+        return json.loads(self.out)
+
+    @property
+    def said(self) -> str:
+        """Standard error as one line, without the frame that typer draws around wrong use."""
+        words = " ".join(line.strip("│╭╮╰╯─ ") for line in self.err.splitlines()).split()
+        return " ".join(words)
+
+
+def environment(given: Mapping[str, str]) -> dict[str, str]:
+    """That of the test, with no settings of Glovecal but those given."""
+    mine = {name: value for name, value in os.environ.items() if not name.startswith("GLOVECAL_")}
+    return mine | {"COLUMNS": "80", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"} | dict(given)
+
+
+def glovecal(settings: Mapping[str, str], *arguments: object) -> Answer:
+    """Run a verb in this process, exactly as the script does."""
+    out, err = io.StringIO(), io.StringIO()
+    code: Any = None
+    with _environment(environment(settings)), redirect_stdout(out), redirect_stderr(err):
+        before = signal.getsignal(signal.SIGTERM)
+        try:
+            main([str(argument) for argument in arguments])
+        except SystemExit as end:
+            code = end.code
+        finally:
+            signal.signal(signal.SIGTERM, before)
+    return Answer(code or 0, out.getvalue(), err.getvalue())
+
+
+def start(settings: Mapping[str, str], *arguments: object, **options: Any) -> subprocess.Popen[str]:
+    """Run a verb as a process that leads a session of its own, as from a terminal."""
+    return subprocess.Popen(
+        [*COMMAND, *map(str, arguments)],
+        env=environment(settings),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        **options,
+    )
+
+
+@contextmanager
+def _environment(wanted: Mapping[str, str]) -> Iterator[None]:
+    before = dict(os.environ)
+    os.environ.clear()
+    os.environ.update(wanted)
+    try:
+        yield
+    finally:
+        os.environ.clear()
+        os.environ.update(before)

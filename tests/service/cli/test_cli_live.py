@@ -1,0 +1,185 @@
+"""The command line against a real service with a real simulated glove streaming over zenoh."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+
+import pytest
+from cli_running import glovecal, start
+from realtime_support import eventually, free_endpoint
+
+GLOVE = "right-hand"
+
+
+@pytest.fixture(scope="module")
+def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
+    """Settings with which every verb reaches a running ``glovecal serve``; subject ``anna`` is there."""
+    folder, endpoint = tmp_path_factory.mktemp("live"), free_endpoint()
+    port = free_endpoint().rpartition(":")[2]
+    settings = {"GLOVECAL_DATA": str(folder / "data"), "GLOVECAL_ZENOH": endpoint, "GLOVECAL_PORT": port}
+    process = start(settings, "serve")
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline().startswith("Glovecal is running")
+        reach = {"GLOVECAL_URL": f"http://127.0.0.1:{port}", "GLOVECAL_ZENOH": endpoint}
+        reach["GLOVECAL_DATA"] = str(folder / "capture")
+        assert glovecal(reach, "subject", "add", "anna").code == 0
+        yield reach
+    finally:
+        _, complaints = _end(process)
+    assert process.returncode == 0
+    assert "Traceback" not in complaints
+
+
+def _end(process: subprocess.Popen[str], number: int = signal.SIGINT) -> tuple[str, str]:
+    """As Ctrl-C does; what the process said."""
+    if process.poll() is None:
+        process.send_signal(number)
+    try:
+        return process.communicate(timeout=30)
+    finally:
+        process.kill()
+
+
+@contextmanager
+def streaming(live: dict[str, str], *options: str) -> Iterator[None]:
+    """``glovecal capture`` of the simulated glove until the block ends; it must end cleanly."""
+    arguments = [word for option in ("seed=1", *options) for word in ("--option", option)]
+    arguments += ["--subject", "anna", "--wearing", "monday"]
+    process = start(live, "capture", "--device", "simulated", "--glove", GLOVE, *arguments)
+    try:
+        yield
+    finally:
+        said, complaints = _end(process)
+    assert process.returncode == 0, complaints
+    assert said.startswith("run ")
+    assert "Traceback" not in complaints
+
+
+def is_seen(run) -> bool:
+    return any(glove["name"] == GLOVE for glove in run("glove", "list", "--json").json["seen"])
+
+
+@pytest.fixture(scope="module")
+def recorded(live: dict[str, str], tmp_path_factory) -> Path:
+    """Take ``first`` of three seconds, recorded by ``glovecal record``; its reference file."""
+    reference = tmp_path_factory.mktemp("reference") / "first.csv"
+    run = partial(glovecal, live)
+    with streaming(live, "motion=key_poses", f"reference={reference}"):
+        eventually(lambda: is_seen(run), "the service sees the glove")
+        done = run("record", GLOVE, "first", "--seconds", 3, "--json").json
+    assert done["state"] == "done"
+    assert done["facts"]["recorded"] == done["facts"]["sent"] > 200
+    assert done["facts"]["missing"] == []
+    return reference
+
+
+def test_a_recorded_take_becomes_a_model_that_predicts_live(live, recorded):
+    run = partial(glovecal, live)
+    (take,) = run("take", "list", "--json").json
+    assert (take["name"], take["subject"], take["wearing"]) == ("first", "anna", "monday")
+    assert "no reference angles" in run("train", "-s", "anna", "-t", "first").said
+    attached = run("take", "reference", "first", recorded)
+    assert attached.code == 0, attached.err
+    assert "; 100 % of its frames" in attached.out
+    begun = run("train", "-s", "anna", "--method", "linear", "--folds", 0, "--no-wait", "--json").json
+    assert run("job", "wait", begun["id"], "--json").json["state"] == "done"
+    assert run("job", "wait", begun["id"]).out == f"Job {begun['id']} is done.\n"
+    (model,) = run("model", "list", "--json").json
+    assert model["active"]
+
+    with streaming(live, "motion=free"):
+        poses: list[dict] = []
+
+        def is_calibrated() -> bool:
+            answer = run("watch", GLOVE, "--json", "--seconds", 0.5)
+            poses[:] = [json.loads(line) for line in answer.out.splitlines()]
+            return bool(poses) and poses[-1]["model"] == model["id"]
+
+        eventually(is_calibrated, "poses of the new model")
+        assert len(poses[-1]["degrees"]) == len(poses[-1]["sd_deg"]) == 22
+        assert "simulated glove" in poses[-1]["state"]
+        sequence = [pose["sequence"] for pose in poses]
+        assert sequence == sorted(set(sequence))
+        drawn = run("watch", GLOVE, "--seconds", 0.3)
+        assert drawn.out.startswith(f"{GLOVE}: ")
+        assert f"model {model['id'][:12]}" in drawn.out
+        assert "I_MCP" in drawn.out
+        _watch_until_interrupted(live)
+        assert "worn by nobody" in run("glove", "wear", GLOVE, "--nobody").out
+        eventually(lambda: "no model is active" in run("watch", GLOVE, "--seconds", 0.2).out, "nobody's pose")
+    silent = run("watch", "left-hand", "--seconds", 0.3, "--json")
+    assert (silent.code, silent.out) == (1, "")
+    assert "no pose of glove left-hand came" in silent.said
+
+
+def _watch_until_interrupted(live: dict[str, str]) -> None:
+    """Ctrl-C is how one stops watching: exit code 0, whole lines."""
+    process = start(live, "watch", GLOVE, "--json")
+    assert process.stdout is not None
+    assert json.loads(process.stdout.readline())["degrees"]
+    said, complaints = _end(process)
+    assert (process.returncode, complaints) == (0, "")
+    assert all(json.loads(line) for line in said.splitlines())
+
+
+def test_a_job_is_cancelled(live, tables):
+    run = partial(glovecal, live)
+    run("subject", "add", "ben")
+    assert run("take", "import", tables / "train.csv", "-s", "ben").code == 0
+    begun = run("train", "-s", "ben", "--folds", 5, "--no-wait")
+    job = begun.out.split()[1]
+    assert f"glovecal job wait {job}" in begun.out
+    assert run("job", "cancel", job).out in (f"Job {job} is being cancelled.\n", f"Job {job} is cancelled.\n")
+    waited = run("job", "wait", job)
+    assert (waited.code, waited.out) == (1, "")
+    assert f"job {job} cancelled" in waited.said
+    assert run("job", "cancel", job).out == f"Job {job} is cancelled.\n"
+    assert "cancelled" in run("job", "list").out
+    assert run("model", "list", "-s", "ben", "--json").json == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_training_leaves_nothing(anna_of_its_own, number):
+    """The job is cancelled, the workers are gone, nothing but a sentence is said."""
+    settings = anna_of_its_own
+    process = start(settings, "train", "-s", "anna")
+    eventually(lambda: len(_session(process.pid)) > 2, "workers have started", 60)
+    time.sleep(0.5)
+    said, complaints = _end(process, number)
+    assert process.returncode == {signal.SIGINT: 130, signal.SIGTERM: 143}[number]
+    assert said == ""
+    assert complaints.endswith("is cancelled; what it finished is kept for the next try.\n")
+    assert len(complaints.splitlines()) == 1
+    eventually(lambda: not _session(process.pid), "no process is left")
+    (job,) = glovecal(settings, "job", "list", "--json").json
+    assert job["state"] == "cancelled"
+
+
+@pytest.fixture
+def anna_of_its_own(tmp_path, tables) -> dict[str, str]:
+    settings = {"GLOVECAL_DATA": str(tmp_path / "data")}
+    assert glovecal(settings, "subject", "add", "anna").code == 0
+    assert glovecal(settings, "take", "import", tables / "train.csv", "-s", "anna").code == 0
+    return settings
+
+
+def _session(leader: int) -> list[int]:
+    """Processes alive in a session."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        try:
+            if entry.name.isdecimal() and os.getsid(int(entry.name)) == leader:
+                state = (entry / "stat").read_text().rpartition(")")[2].split()[0]
+                found += [int(entry.name)] * (state != "Z")
+        except OSError:
+            continue
+    return found

@@ -1,0 +1,149 @@
+"""A walk through the command line in one process: import, train, compare, activate, roll back, export."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cli_running import glovecal
+
+from glovecal_models.calibration.artifact import load
+from glovecal_models.calibration.predictor import GlovePredictor
+from glovecal_models.takes.table import read_takes
+
+
+@pytest.fixture(scope="module")
+def walked(tmp_path_factory, tables: Path):
+    """A data folder with a linear model and a raw one (active) of ``anna``; take ``second`` is left out."""
+    run = partial(glovecal, {"GLOVECAL_DATA": str(tmp_path_factory.mktemp("walk") / "data")})
+    assert run("subject", "add", "anna").code == 0
+    files = (tables / "train.csv", tables / "test.frames.csv", tables / "test.reference.csv")
+    assert run("take", "import", *files, "-s", "anna").code == 0
+    linear = run("train", "-s", "anna", "--method", "linear", "--leave-out", "second", "--folds", 2)
+    assert linear.code == 0, linear.err
+    raw = run("train", "-s", "anna", "--method", "raw", "-t", "poses", "-t", "cross", "--folds", 0, "--json")
+    return run, linear, raw.json
+
+
+def by_method(run) -> dict[str, dict]:
+    return {row["method"]: row for row in run("model", "list", "--json").json}
+
+
+def test_training_says_what_it_did(walked):
+    run, linear, raw = walked
+    models = by_method(run)
+    assert set(models) == {"linear", "raw"}
+    id = models["linear"]["id"]
+    assert linear.out.startswith(f"Model {id[:12]} (linear) for anna, error on left-out takes ")
+    assert linear.out.endswith("Active.\n")
+    assert "2 takes" in linear.err
+    assert "PALM_ARCH" in linear.err
+    assert raw["model"]["id"] == models["raw"]["id"] == raw["result"]["model"]
+    assert raw["model"]["active"]
+    assert raw["model"]["held_out_rmse_deg"] is None
+    trained = [take["name"] for take in raw["model"]["facts"]["takes"]]
+    assert trained == ["poses", "cross"]
+    assert {job["state"] for job in run("job", "list", "--json").json} == {"done"}
+
+
+def test_models_are_compared_side_by_side_on_takes_they_have_not_seen(walked):
+    run, _, _ = walked
+    models = by_method(run)
+    ids = [models[method]["id"] for method in ("raw", "linear")]
+    results = run("compare", *ids, "--json").json
+    assert list(results) == ids
+    raw, linear = (results[id]["over_all"]["rmse_deg"] for id in ids)
+    assert linear < 0.7 * raw
+    beside = run("compare", *(id[:6] for id in ids))
+    assert beside.out.splitlines()[0] == "Against second:"
+    everywhere = next(line.split() for line in beside.out.splitlines() if line.startswith("all"))
+    assert everywhere[1:3] == [f"{raw:.2f}", f"{linear:.2f}"]
+    assert "Careful" not in beside.err
+    one = run("compare", ids[1], "--poses", "--take", "second")
+    assert "fist" in one.out
+    assert max(map(len, one.out.splitlines())) <= 80
+    seen = run("compare", ids[1], "-t", "poses", "-t", "second", "-t", "poses")
+    assert seen.out.startswith("Against poses, second:\n")
+    assert f"Careful: model {ids[1][:12]} was trained on take poses" in seen.err
+
+
+def test_comparing_agrees_with_the_exported_model(walked, tables, tmp_path):
+    """The artifact read back in Python, its prediction held against the take's file by hand."""
+    run, _, _ = walked
+    id = by_method(run)["linear"]["id"]
+    file = tmp_path / "anna.safetensors"
+    exported = run("model", "export", id[:8], file)
+    assert exported.out == f"Wrote {file}.\n"
+    assert "artifact.load" in exported.err
+    content = file.read_bytes()
+    assert hashlib.sha256(content).hexdigest() == id
+    predictor = GlovePredictor(load(content))
+    (take,) = read_takes(tables / "test.frames.csv", tables / "test.reference.csv")
+    angles = predictor.predict(take.readings)
+    measured = take.reference_at_frames(take.rotations)
+    for rotation in ("I_MCP", "T_VIR"):
+        errors = (
+            angles.mean[:, predictor.rotations.index(rotation)] - measured[:, take.rotations.index(rotation)]
+        )
+        told = run("compare", id, "--json").json[id]["rotations"][rotation]
+        assert told["rmse_deg"] == pytest.approx(np.sqrt(np.nanmean(errors**2)), rel=1e-9)
+    assert "exists already" in run("model", "export", id, file).said
+    assert run("model", "export", id, file, "--overwrite").code == 0
+
+
+def test_show_tells_takes_and_lineage(walked):
+    run, _, _ = walked
+    id = by_method(run)["linear"]["id"]
+    shown = run("model", "show", id, "--json").json
+    assert shown["lineage"] == [id]
+    assert len(shown["rotations"]) == 22
+    read = run("model", "show", id[:6]).out
+    assert "poses, cross" in read
+    assert "T_VIR" in read
+    about = run("subject", "show", "anna").out
+    assert "models" in about
+    listed = run("model", "list", "-s", "anna", "-l", "cyberglove18").out.splitlines()
+    assert len(listed) == 3
+    assert max(map(len, listed)) <= 80
+    assert "No models yet" in run("model", "list", "-l", "lucidglove").out
+
+
+def test_activate_and_roll_back(walked):
+    run, _, _ = walked
+    models = by_method(run)
+    raw, linear = models["raw"]["id"], models["linear"]["id"]
+    assert run("model", "activate", linear).out == f"Model {linear[:12]} is active for anna, cyberglove18.\n"
+    assert by_method(run)["linear"]["active"]
+    assert run("model", "rollback", "-s", "anna").out.startswith(f"Model {raw[:12]} is active again")
+    assert run("model", "rollback", "-s", "anna").out.startswith(f"Model {linear[:12]} is active again")
+    ended = run("model", "rollback", "-s", "anna", "-l", "cyberglove18")
+    assert ended.code == 1
+    assert "nothing earlier was active" in ended.said
+    assert by_method(run)["linear"]["active"]
+
+
+def test_what_models_stand_on_stays(walked):
+    run, _, _ = walked
+    assert "was trained on take" in run("take", "remove", "cross").said
+    assert "still owns" in run("subject", "remove", "anna").said
+    everything = run(
+        "train", "-s", "anna", "--leave-out", "poses", "--leave-out", "cross", "--leave-out", "second"
+    )
+    assert everything.code == 1
+    assert "besides those left out" in everything.said
+    assert run("job", "cancel", run("job", "list", "--json").json[0]["id"]).out.endswith(" is done.\n")
+
+
+def test_nothing_is_left_to_compare_with(run, tables):
+    """A model trained on all takes is not held against them unasked."""
+    run("subject", "add", "ben")
+    assert run("take", "import", tables / "other.parquet", "-s", "ben").code == 0
+    trained = run("train", "-s", "ben", "--method", "raw", "--folds", 0, "--no-activate")
+    assert trained.out.endswith("error not estimated. Not active.\n")
+    (model,) = run("model", "list", "--json").json
+    refused = run("compare", model["id"])
+    assert refused.code == 1
+    assert "--leave-out" in refused.said
