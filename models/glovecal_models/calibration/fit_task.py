@@ -9,15 +9,15 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
+from glovecal_models.calibration.sample_weight import Recorded, fit_weighted
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
-from glovecal_models.regression.fast_lmc import fit_lmc_gpr
 from glovecal_models.regression.linear_regressor import fit_linear
 from glovecal_models.regression.regressor import Regressor
 from glovecal_models.regression.rescaling import rescale_readings
@@ -32,6 +32,10 @@ class FitTask:
     fold: int | None
     inputs: np.ndarray
     target: np.ndarray
+    take: np.ndarray
+    """Index of the take that each sample comes from."""
+    position: np.ndarray
+    """Number of each sample's frame, counted through all takes."""
     held_out_inputs: np.ndarray
     held_out_target: np.ndarray
     sensors: tuple[str, ...]
@@ -81,19 +85,22 @@ def _fit(task: FitTask, cancelled: Callable[[], bool] | None, report: Report | N
         return rescale_readings(task.inputs, task.target, span, sensor_names=task.sensors)
     if settings.method == "linear":
         return fit_linear(task.inputs, task.target, sensor_names=task.sensors, cancelled=cancelled)
-    start = fit_lmc_gpr(task.inputs, task.target, seed=settings.seed, cancelled=cancelled, report=report)
+    samples = Recorded(task.inputs, task.target, task.take, task.position)
+    start = fit_weighted(samples, seed=settings.seed, cancelled=cancelled, report=report)
     if settings.method == "lmc_gpr":
-        return start
-    return fit_spgp(
+        return start.regressor
+    sparse = fit_spgp(
         task.inputs,
         task.target,
         pseudo_inputs=settings.pseudo_inputs,
         iterations=settings.iterations,
         seed=settings.seed,
-        start=start,
+        start=start.regressor,
+        sample_weight=start.weight,
         cancelled=cancelled,
         report=report,
     )
+    return replace(sparse, evidence=sparse.evidence | start.evidence)
 
 
 def _key(task: FitTask) -> str:
@@ -106,7 +113,8 @@ def _key(task: FitTask) -> str:
         "software": version("glovecal-models"),
     }
     digest.update(json.dumps(facts, sort_keys=True).encode())
-    for array in (task.inputs, task.target, task.held_out_inputs, task.held_out_target):
+    samples = (task.inputs, task.target, task.take, task.position)
+    for array in (*samples, task.held_out_inputs, task.held_out_target):
         digest.update(repr(array.shape).encode())
         digest.update(np.ascontiguousarray(array, dtype=np.float64).tobytes())
     return digest.hexdigest()

@@ -113,6 +113,8 @@ def _task(
         fold=fold,
         inputs=samples.inputs[index],
         target=samples.target[index],
+        take=samples.take[index],
+        position=index,
         held_out_inputs=held_out.inputs if held_out else np.empty((0, samples.inputs.shape[1])),
         held_out_target=held_out.target if held_out else np.empty(0),
         sensors=correspondence.inputs,

@@ -53,7 +53,7 @@ class Evaluation:
         return self.profile.nlml
 
 
-def profile(gram: np.ndarray, log_determinant: float, total: int) -> Profile:
+def profile(gram: np.ndarray, log_determinant: float, total: float) -> Profile:
     """From columns' K^-1 columns (p+1, p+1) of [basis, target], log |K + rho I| and N."""
     p = len(gram) - 1
     _, plane, info = posv(gram[:p, :p], gram[:p, p])
@@ -87,7 +87,7 @@ def trace_by_lengthscales(sums: np.ndarray, crossed: np.ndarray, points: np.ndar
 class Inside:
     """What derivatives need from either likelihood, apart from traces."""
 
-    total: int
+    total: float
     rho: float
     columns: np.ndarray
     """Whitened columns inside, shape (r, p + 1)."""
