@@ -32,12 +32,7 @@ def check_samples(
     names = _names(sensor_names, inputs.shape[1])
     _check_finite(inputs, target, names)
     _check_enough(len(target), inputs.shape[1], least)
-    for column, name in enumerate(names):
-        if _is_still(inputs[:, column]):
-            raise NotTrainable(
-                f"sensor {name} reads {inputs[0, column]:g} in all {len(target)} samples; "
-                "move the joint while recording, or take the sensor out of the correspondence"
-            )
+    _check_moving(inputs, names)
     if _is_still(target):
         raise NotTrainable(
             f"the reference angle is {target[0]:g} degrees in all {len(target)} samples; "
@@ -84,6 +79,19 @@ def _check_enough(samples: int, dimensions: int, least: int | None) -> None:
             f"{samples} samples are too few for {dimensions} sensor{'s' if dimensions > 1 else ''}; "
             f"at least {least} are needed"
         )
+
+
+def _check_moving(inputs: np.ndarray, names: list[str]) -> None:
+    still = [column for column in range(len(names)) if _is_still(inputs[:, column])]
+    if not still:
+        return
+    each = ", ".join(f"sensor {names[column]} reads {inputs[0, column] + 0.0:g}" for column in still)
+    alive = [name for column, name in enumerate(names) if column not in still]
+    others = f"; name the others ({', '.join(alive)}) in a layout file" if alive else ""
+    raise NotTrainable(
+        f"{each} in all {len(inputs)} samples; move the joint while recording, or leave the "
+        f"sensor{'s' if len(still) > 1 else ''} out{others}"
+    )
 
 
 def _is_still(column: np.ndarray) -> bool:

@@ -102,7 +102,7 @@ def _frame_warnings(
         )
     still = [item for item in sensors if item.low == item.high]
     if still and len(take.time_s) > 1:
-        named = ", ".join(f"{item.sensor} (always {item.low:g})" for item in still)
+        named = ", ".join(f"{item.sensor} (always {item.low + 0.0:g})" for item in still)
         warnings.append(f"{who}: sensors that never change: {named}. Is a wire broken?")
     if repeated >= MOSTLY_REPEATED:
         warnings.append(

@@ -54,7 +54,7 @@ class TrainJob:
             tasks=[Task(task.key, _label(task), fit, task) for task in plan.tasks],
             step=_stepper(plan),
             finish=finish,
-            in_this_process=settings.method == "linear",
+            in_this_process=settings.method in ("raw", "linear"),
         )
 
 

@@ -47,6 +47,11 @@ def test_constant_sensor_and_constant_target_are_refused_by_name() -> None:
     still[:, 0] = 17.0
     with pytest.raises(NotTrainable, match="sensor I_MCP reads 17 in all 20 samples"):
         check_samples(still, target, ["I_MCP", "I_PIP"])
+    with pytest.raises(NotTrainable, match=r"sensor out; name the others \(I_PIP\) in a layout file"):
+        check_samples(still, target, ["I_MCP", "I_PIP"])
+    still[:, 1] = -0.0
+    with pytest.raises(NotTrainable, match="sensor I_MCP reads 17, sensor I_PIP reads 0 in all 20 samples"):
+        check_samples(still, target, ["I_MCP", "I_PIP"])
     with pytest.raises(NotTrainable, match="reference angle is 0 degrees in all 20"):
         check_samples(inputs, np.zeros(20))
 
