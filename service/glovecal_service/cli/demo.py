@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from glovecal_service.cli.printing import err, out, show_table
+from glovecal_service.cli.printing import err, out, show
 
 
 def demo(
@@ -34,7 +34,7 @@ def demo(
         with running_service(place) as service:
             found = walk(service, place, seed, lambda sentence: err.print(sentence))
             out.print()
-            show_table(error_table(found))
+            show(error_table(found))
             out.print()
             for sentence in sentences(found, time.monotonic() - started):
                 out.print(sentence)

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.table import Table
 
 WIDTH_OF_A_FILE = 400
@@ -40,21 +40,21 @@ def print_table(
         table.add_column(heading, justify=justify, no_wrap=whole, min_width=len(heading), overflow="fold")
     for row in rows:
         table.add_row(*(text(row.get(key)) for key in columns))
-    show_table(table)
+    show(table)
 
 
 def _is_number(value: Any) -> bool:
     return value is None or (isinstance(value, int | float) and not isinstance(value, bool))
 
 
-def show_table(table: Table) -> None:
+def show(picture: RenderableType) -> None:
     """Fitted into a terminal; elsewhere as wide as it is."""
     if out.is_terminal:
-        out.print(table, soft_wrap=False)
+        out.print(picture, soft_wrap=False)
         return
     wide = Console(width=WIDTH_OF_A_FILE, markup=False, emoji=False, highlight=False)
     with wide.capture() as captured:
-        wide.print(table)
+        wide.print(picture)
     for line in captured.get().splitlines():
         sys.stdout.write(line.rstrip() + "\n")
 

@@ -10,12 +10,14 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.console import Group
 from rich.live import Live
 from rich.table import Table
+from rich.text import Text
 
 from glovecal_client.errors import NoAnswer
 from glovecal_service.cli.options import DEFAULT_ZENOH, AsJson, Glove, Site, Zenoh
-from glovecal_service.cli.printing import err, out, show_table
+from glovecal_service.cli.printing import err, out, show
 from glovecal_service.cli.refusal import NobodyThere, Refusal
 
 if TYPE_CHECKING:
@@ -58,7 +60,7 @@ def _follow(poses: PoseSubscriber, glove: str, until: float | None, as_json: boo
     if not as_json and out.is_terminal:
         with Live(console=out, auto_refresh=False) as live:
             for pose in _poses(poses, until, glove):
-                live.update(_table(poses, pose, glove), refresh=True)
+                live.update(_picture(poses, pose, glove), refresh=True)
         return
     last = None
     for pose in _poses(poses, until, glove):
@@ -69,7 +71,7 @@ def _follow(poses: PoseSubscriber, glove: str, until: float | None, as_json: boo
             sys.stdout.write(json.dumps(document) + "\n")
             sys.stdout.flush()
     if last is not None and not as_json:
-        show_table(_table(poses, last, glove))
+        show(_picture(poses, last, glove))
 
 
 def _poses(poses: PoseSubscriber, until: float | None, glove: str) -> Iterator[Pose | None]:
@@ -107,16 +109,19 @@ def _document(poses: PoseSubscriber, pose: Pose) -> dict[str, Any] | None:
     }
 
 
-def _table(poses: PoseSubscriber, pose: Pose | None, glove: str) -> Table:
+def _picture(poses: PoseSubscriber, pose: Pose | None, glove: str) -> Group:
+    """A line on the whole pose, then a table with a line for each rotation."""
     pose = pose or poses.latest
     if pose is None:
-        return Table(title=f"{glove}: no pose yet", title_justify="left", box=None)
+        return Group(Text(f"{glove}: no pose yet", style="bold"))
     model = f"model {pose.model_sha256[:12]}" if pose.model_sha256 else "no model is active"
     title = f"{glove}: {_state(poses, pose)}; {model}; age {pose.age_us / 1000:.1f} ms"
-    table = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False)
     names = _names(poses, pose)
-    if not names:
-        return table
+    return Group(Text(title, style="bold"), *([_rotations(names, pose)] if names else []))
+
+
+def _rotations(names: tuple[str, ...], pose: Pose) -> Table:
+    table = Table(box=None, pad_edge=False)
     for heading in ("rotation", "degrees", "± sd", ""):
         table.add_column(heading, justify="right" if heading in ("degrees", "± sd") else "left")
     for name, degrees, deviation in zip(names, pose.degrees, pose.deviations, strict=True):

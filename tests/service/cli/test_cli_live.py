@@ -152,8 +152,8 @@ def test_interrupted_training_leaves_nothing(anna_of_its_own, number):
     """The job is cancelled, the workers are gone, nothing but a sentence is said."""
     settings = anna_of_its_own
     process = start(settings, "train", "-s", "anna")
-    eventually(lambda: len(_session(process.pid)) > 2, "workers have started", 60)
-    time.sleep(0.5)
+    eventually(lambda: len(_session(process.pid)) > 3, "workers have started", 60)
+    time.sleep(1.0)
     said, complaints = _end(process, number)
     assert process.returncode == {signal.SIGINT: 130, signal.SIGTERM: 143}[number]
     assert said == ""
