@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from glovecal_models.calibration.independent_share import independent_share
-from glovecal_models.calibration.sample_weight import Recorded, fit_weighted
+from glovecal_models.calibration.sample_weight import Recorded, fit_weighted, weight_sentence
 from glovecal_models.errors import Cancelled
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
 
@@ -83,6 +83,9 @@ def test_where_errors_last_samples_count_less_and_new_takes_are_predicted_better
     assert evidence["sample_weight"] == chosen.weight
     assert evidence["independent_share"] < 0.5
     assert evidence["held_out_rmse_deg"][f"{chosen.weight:g}"] < evidence["held_out_rmse_deg"]["1"]
+    sentence = weight_sentence("I_PIP", evidence)
+    assert sentence is not None
+    assert f"count {chosen.weight:g}, which does best" in sentence
     believing = fit_lmc_gpr(samples.inputs, samples.target)
     assert error_on_others(chosen.regressor, 4.0) < 0.95 * error_on_others(believing, 4.0)
 
@@ -92,6 +95,7 @@ def test_where_errors_are_noise_every_sample_counts_and_nothing_is_tried() -> No
     chosen = fit_weighted(samples)
     assert chosen.weight == 1.0
     assert "held_out_rmse_deg" not in chosen.regressor.evidence
+    assert weight_sentence("I_PIP", chosen.regressor.evidence) is None
     plain = fit_lmc_gpr(samples.inputs, samples.target)
     assert np.array_equal(chosen.regressor.predict(samples.inputs).mean, plain.predict(samples.inputs).mean)
 

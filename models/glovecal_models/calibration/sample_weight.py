@@ -11,7 +11,7 @@ up a good part of the independent samples that there are.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -85,6 +85,21 @@ def fit_weighted(
             samples.inputs, samples.target, sample_weight=best, seed=seed, cancelled=cancelled
         )
     return Weighted(_with(whole, evidence), best, evidence)
+
+
+def weight_sentence(rotation: str, evidence: Mapping[str, Any]) -> str | None:
+    """What a user should know of weights that were tried; None where there was no need to."""
+    errors = evidence.get("held_out_rmse_deg")
+    if not errors:
+        return None
+    weight = evidence["sample_weight"]
+    tried = ", ".join(f"{error:.2f} degrees at {name}" for name, error in errors.items())
+    return (
+        f"{rotation} errs alike for many frames in a row: a frame tells "
+        f"{evidence['independent_share']:.2f} as much as an independent sample would, so something that its "
+        f"sensors do not read may turn it. Each sample was made to count {weight:g}, which does best on "
+        f"takes left out ({tried})."
+    )
 
 
 def _held_out_errors(

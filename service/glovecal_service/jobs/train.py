@@ -11,10 +11,12 @@ from glovecal_models.calibration.artifact import dump
 from glovecal_models.calibration.fit_task import FitResult, FitTask
 from glovecal_models.calibration.fit_task import run_task as run_fit
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.sample_weight import weight_sentence
 from glovecal_models.calibration.training import assemble
 from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput, NotTrainable
+from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_service.jobs.job_kind import JobPlan, Step, Task, TaskResult
 from glovecal_service.store import Store
 from glovecal_service.store.records import JobRecord, TakeRecord
@@ -138,9 +140,18 @@ def _facts(model: CalibrationModel, plan: TrainingPlan, records: Sequence[TakeRe
         "held_out_rmse_deg": model.error_estimate.get("rmse_deg"),
         "held_out_how": model.error_estimate.get("how"),
         "per_rotation": {item.rotation: item.held_out_rmse_deg for item in model.rotations},
-        "sentences": list(plan.sentences),
+        "sentences": [*plan.sentences, *_weight_sentences(model)],
         "simulated": model.simulated,
     }
+
+
+def _weight_sentences(model: CalibrationModel) -> list[str]:
+    said = [
+        weight_sentence(item.rotation, item.regressor.evidence)
+        for item in model.rotations
+        if isinstance(item.regressor, ProcessRegressor)
+    ]
+    return [sentence for sentence in said if sentence]
 
 
 def _keep(
