@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
 from glovecal_client.keys import GloveKeys
+from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_service.realtime.glove_lane import WAITING_LIMIT, GloveLane
 from glovecal_service.realtime.pace import Pace
 
@@ -62,6 +64,43 @@ def test_every_message_is_taken_skipped_or_waiting(steps: list[int | tuple[int, 
             taken += len(got)
         assert len(it) <= WAITING_LIMIT
         assert it.received == taken + it.skipped + len(it)
+
+
+def test_the_first_frames_of_a_run_are_counted_when_they_are_skipped() -> None:
+    """A service that stood still while a capture began: frames before the first pose belong to its run."""
+
+    def add(run_id: int, sequences: range) -> None:
+        for sequence in sequences:
+            readings = np.zeros(3, np.float32)
+            at = run_id * 1000 * MILLISECOND + sequence
+            frame = Frame(sequence=sequence, run_id=run_id, monotonic_ns=at, wall_ns=at, readings=readings)
+            it.add(encode_frame(frame), at)
+
+    def open_newest(limit: int) -> None:
+        for waiting in it.newest(limit, 0):
+            assert it.open(waiting) is not None
+
+    it = lane()
+    add(1, range(10))
+    open_newest(4)
+    assert it.skipped_in_run == 6
+    add(1, range(10, 13))
+    open_newest(1)
+    assert it.skipped_in_run == 8
+    add(2, range(5))
+    open_newest(2)
+    assert (it.skipped, it.skipped_in_run) == (11, 3)
+    add(2, range(5, 7))
+    open_newest(1)
+    assert it.skipped_in_run == 4
+    add(1, range(20, 24))  # nobody knows whose they are until one is looked into
+    add(3, range(100, 101))
+    open_newest(1)
+    assert it.skipped_in_run == 4
+    add(3, range(101, 104))
+    add(4, range(1))
+    open_newest(1)
+    assert it.skipped_in_run == 0
 
 
 def test_pace_starts_cautious_learns_quickly_and_forgives_one_slow_turn() -> None:

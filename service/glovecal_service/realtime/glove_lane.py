@@ -36,6 +36,8 @@ class GloveLane:
         self.predicted = 0
         self.skipped = 0
         self.skipped_in_run = 0
+        self._skipped_unseen = 0
+        """Skipped since the last frame that passed: perhaps the first frames of a run still unknown."""
         self.last_received_ns = 0
         self.last_pose: Pose | None = None
         self.last_pose_received_ns = 0
@@ -63,6 +65,7 @@ class GloveLane:
     def skip(self, count: int) -> None:
         self.skipped += count
         self.skipped_in_run += count
+        self._skipped_unseen += count
 
     def newest(self, limit: int, oldest_ns: int) -> list[Waiting]:
         """Take the newest ``limit`` messages received since ``oldest_ns``, in order; skip all others."""
@@ -85,7 +88,9 @@ class GloveLane:
             self.refusals.add(refused)
             return None
         if self.gate.runs != runs:
-            self.skipped_in_run = 0
+            # a run's frames before its first that passed are as many as its sequence number says, at most
+            self.skipped_in_run = min(self._skipped_unseen, frame.sequence)
+        self._skipped_unseen = 0
         return frame
 
     def status(self) -> dict[str, Any]:
