@@ -26,6 +26,8 @@ class PoseMeter:
         self._order = PoseOrder()
         self._latency_ns: list[int] = []
         self._calibrated = 0
+        self._run_id = 0
+        self._skipped = 0
 
     def hear(self, sample: zenoh.Sample) -> None:
         now = time.monotonic_ns()
@@ -35,12 +37,24 @@ class PoseMeter:
             self._order.note_damage()
             return
         if self._order.accept(pose) and not pose.stale:
+            self._count_skipped(pose)
             self._latency_ns.append(now - pose.monotonic_ns)
             self._calibrated += not pose.uncalibrated
 
     @property
     def counts(self) -> PoseCounts:
         return self._order.counts()
+
+    def _count_skipped(self, pose: Pose) -> None:
+        """The service counts from the start of a run; the first frames may have been skipped already."""
+        if pose.run_id != self._run_id:
+            self._run_id, self._skipped = pose.run_id, 0
+        self._skipped = max(self._skipped, pose.skipped)
+
+    @property
+    def skipped(self) -> int:
+        """Frames of the newest run that the service left out to stay current."""
+        return self._skipped
 
     @property
     def calibrated(self) -> int:

@@ -35,7 +35,8 @@ def rmse_deg(found: Walk) -> dict[str, float]:
 
 def sentences(found: Walk, seconds: float) -> list[str]:
     """What the figures say, with a scale for each."""
-    rmse, counts = rmse_deg(found), found.meter.counts
+    rmse, frames = rmse_deg(found), contract(found)["frames"]
+    lost = frames["sent"] - frames["received"] - frames["skipped"]
     spread = found.comparisons["linear"]["over_all"]["baseline_deg"]
     median, late = found.meter.latency_ms(50), found.meter.latency_ms(99)
     return [
@@ -45,8 +46,8 @@ def sentences(found: Walk, seconds: float) -> list[str]:
         f"{rmse['spgp'] / rmse['lmc_gpr']:.2f} of LMC-GPR.",
         f"Live: reading to pose {median:.2f} ms (median), {late:.2f} ms (99 %) through two hops of zenoh; "
         "a frame lasts 8.3 ms at 120 Hz.",
-        f"Frames: {found.recording['sent']} sent, {counts.received} poses received, "
-        f"{counts.skipped} skipped by the service, {counts.lost} lost.",
+        f"Frames: {frames['sent']} sent, {frames['received']} poses received, "
+        f"{frames['skipped']} skipped by the service, {lost} lost.",
         f"All this was done by glovecal serve, capture and REST in {seconds:.0f} s. The glove and the hand "
         "in it are simulated; their truth is known.",
     ]
@@ -54,12 +55,16 @@ def sentences(found: Walk, seconds: float) -> list[str]:
 
 def contract(found: Walk) -> dict[str, Any]:
     """The JSON of ``glovecal demo --json``."""
-    counts = found.meter.counts
+    meter = found.meter
     return {
         "rmse_deg": {method: round(value, 4) for method, value in rmse_deg(found).items()},
         "latency_ms": {
             "p50": round(found.meter.latency_ms(50), 4),
             "p99": round(found.meter.latency_ms(99), 4),
         },
-        "frames": {"sent": found.recording["sent"], "received": counts.received, "skipped": counts.skipped},
+        "frames": {
+            "sent": found.recording["sent"],
+            "received": meter.counts.received,
+            "skipped": meter.skipped,
+        },
     }

@@ -91,6 +91,7 @@ def _record(
     take = service.attach_reference(finished["facts"]["take"], reference)
     say(
         f"  take {take['name']}: {take['frames']} frames in {take['duration_s']:.1f} s, "
+        f"{finished['facts']['repaired']} fetched from the capture log, "
         f"{len(finished['facts']['missing'])} gaps, {len(take['rotations'])} rotations measured"
     )
     return take
