@@ -24,8 +24,8 @@ from glovecal_models.regression.fast_lmc import fit_lmc_gpr
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.regression.training_check import check_samples
 
-WEIGHTS = (1.0, 0.2, 0.04)
-"""Tried in turn; the last leaves little more than a plane."""
+WEIGHTS = (1.0, 0.4, 0.2, 0.08, 0.03)
+"""Tried in turn until the error on left-out takes rises; the last leaves little more than a plane."""
 LEAST_WORTH = 10
 """Whole samples per coefficient of the plane that all samples together must count for."""
 CROWDED = 0.5
@@ -106,21 +106,39 @@ def _held_out_errors(
     samples: Recorded, seed: int, cancelled: Callable[[], bool] | None
 ) -> dict[float, float]:
     """RMSE in degrees by weight; empty where too little is left to train on when takes are left out."""
-    least = LEAST_WORTH * (samples.inputs.shape[1] + 1)
-    weights = sorted({max(weight, min(1.0, least / len(samples.target))) for weight in WEIGHTS}, reverse=True)
-    squared, count = dict.fromkeys(weights, 0.0), 0
-    for fold in folds_over_takes(samples.take, FOLDS):
-        inputs, target = samples.inputs[~fold.held_out], samples.target[~fold.held_out]
-        try:
-            check_samples(inputs, target)
-        except NotTrainable:
-            continue
-        count += int(fold.held_out.sum())
-        for weight in weights:
-            process = fit_lmc_gpr(inputs, target, sample_weight=weight, seed=seed, cancelled=cancelled)
-            error = process.predict(samples.inputs[fold.held_out]).mean - samples.target[fold.held_out]
-            squared[weight] += float(error @ error)
-    return {weight: float(np.sqrt(value / count)) for weight, value in squared.items()} if count else {}
+    folds = [fold.held_out for fold in folds_over_takes(samples.take, FOLDS)]
+    folds = [held_out for held_out in folds if _can_be_left_out(samples, held_out)]
+    least = LEAST_WORTH * (samples.inputs.shape[1] + 1) / len(samples.target)
+    errors: dict[float, float] = {}
+    for weight in WEIGHTS if folds else ():
+        if weight < min(least, 1.0):
+            break
+        each = [_squared_errors(samples, held_out, weight, seed, cancelled) for held_out in folds]
+        errors[weight] = float(np.sqrt(np.concatenate(each).mean()))
+        if errors[weight] > min(errors.values()):
+            break
+    return errors
+
+
+def _can_be_left_out(samples: Recorded, held_out: np.ndarray) -> bool:
+    try:
+        check_samples(samples.inputs[~held_out], samples.target[~held_out])
+    except NotTrainable:
+        return False
+    return True
+
+
+def _squared_errors(
+    samples: Recorded,
+    held_out: np.ndarray,
+    weight: float,
+    seed: int,
+    cancelled: Callable[[], bool] | None,
+) -> np.ndarray:
+    """Of a process that has not seen the samples ``held_out``, at these."""
+    inputs, target = samples.inputs[~held_out], samples.target[~held_out]
+    process = fit_lmc_gpr(inputs, target, sample_weight=weight, seed=seed, cancelled=cancelled)
+    return (process.predict(samples.inputs[held_out]).mean - samples.target[held_out]) ** 2
 
 
 def _with(regressor: ProcessRegressor, evidence: dict[str, Any]) -> ProcessRegressor:
