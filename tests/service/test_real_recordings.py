@@ -26,7 +26,10 @@ LINEAR_DEG = {  # person and side: flexion, inversion
     ("P003", "L"): (4.71, 4.03),
     ("P003", "R"): (5.19, 3.95),
 }
-LMC_GPR_DEG = {("P002", "R"): (2.57, 2.92), ("P003", "L"): (2.95, 2.95)}
+LMC_GPR_DEG = {  # with 1000 samples a rotation, which take a quarter of the time
+    ("P002", "R"): (2.59, 3.00),
+    ("P003", "L"): (3.11, 3.31),
+}
 LIVE = [f"G{number:02d}" for number in range(20) if number not in (8, 15, 16)]
 """The CyberGlove's sensors that move: G08 and G16 never do, G15 does in one file only."""
 
@@ -47,8 +50,22 @@ def held_out_errors(run: Run, person: str, side: str, method: str) -> dict[str, 
     """Train without every third walk, compare with these: figures by rotation."""
     left_out = [path.stem for path in walks(person, side)[::3]]
     without = [word for name in left_out for word in ("--leave-out", name)]
-    trained = run("train", "--subject", "walker", "--method", method, "--folds", 0, *without, "--json").json
+    trained = run(
+        "train",
+        "--subject",
+        "walker",
+        "--method",
+        method,
+        "--folds",
+        0,
+        "--samples",
+        1000,
+        *without,
+        "--json",
+    ).json
     model = trained["result"]["model"]
+    if method == "lmc_gpr":
+        assert any("errs alike for many frames" in said for said in trained["result"]["sentences"])
     against = [word for name in left_out for word in ("--take", name)]
     result = run("compare", model, *against, "--json").json[model]
     assert result["trained_on"] == []
@@ -73,7 +90,7 @@ def test_a_linear_map_of_gait_has_the_error_known_for_it(run: Run, person: str, 
 
 @pytest.mark.parametrize(("person", "side"), LMC_GPR_DEG)
 def test_lmc_gpr_is_better_than_linear_on_walks_it_has_not_seen(run: Run, person: str, side: str) -> None:
-    """Believing every frame it lost here: 4.03 against 3.39 degrees on P002's right inversion."""
+    """Believing every frame it lost: 3.60 against 3.42 degrees on P002's right inversion."""
     begin(run, person, side)
     linear = held_out_errors(run, person, side, "linear")
     process = held_out_errors(run, person, side, "lmc_gpr")
