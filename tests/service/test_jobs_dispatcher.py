@@ -148,7 +148,24 @@ def test_the_scheduler_can_be_lost_in_the_middle_of_a_job(dispatched, ledger):
 def test_processes_that_never_come_back_are_replaced(dispatched, ledger, monkeypatch):
     store, dispatcher = dispatched
     monkeypatch.setattr(workers, "LONGEST_ABSENCE_S", 1.0)
+    monkeypatch.setattr(workers, "FETCH_WITHIN_S", 2.0)
     job = create(store, ledger, [1, 2, 3], seconds=0.3)
     wait_for(lambda: noted(ledger, "done"))
     dispatcher.workers._cluster.scale(0)
     assert result_of(store, job.id)["sums"] == [1, 3, 6]
+
+
+def test_a_result_that_went_with_its_process_is_not_waited_for_for_ever(
+    dispatched, ledger, monkeypatch, tmp_path
+):
+    """It was announced, and then the process that held it ended."""
+    store, dispatcher = dispatched
+    monkeypatch.setattr(workers, "FETCH_WITHIN_S", 1.0)
+    [task] = CountingJob().plan(store, create(store, ledger, [2])).tasks
+    future = dispatcher.workers.submit(task, tmp_path / "fits", tmp_path / "cancel")
+    wait_for(future.done)
+    cluster = dispatcher.workers._cluster
+    cluster.scale(0)
+    wait_for(lambda: not cluster.scheduler.workers)
+    with pytest.raises(workers.WorkersLost):
+        workers.outcome(future, task)

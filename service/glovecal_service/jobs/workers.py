@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 START_TIMEOUT_S = 60
 LOOK_S = 0.01
 LONGEST_ABSENCE_S = 45.0
+FETCH_WITHIN_S = 30.0
+"""A finished task's answer is a few hundred bytes."""
 CANCELLED = (asyncio.CancelledError, CancelledError)
 _CONFIG = {
     "distributed.admin.large-graph-warning-threshold": "1GB",
@@ -184,8 +186,9 @@ def outcome(future: Future, task: Task) -> TaskOutcome:
     from distributed.client import ClosedClientError
 
     try:
-        return future.result()
-    except (*CANCELLED, OSError, ClosedClientError) as error:
+        # a result can go with its process after it was announced; without a limit this would wait for ever
+        return future.result(timeout=FETCH_WITHIN_S)
+    except (*CANCELLED, OSError, TimeoutError, ClosedClientError) as error:
         raise WorkersLost("the scheduler of the training processes was lost", future.client) from error
     except KilledWorker as error:
         raise TaskKilledWorkers(
