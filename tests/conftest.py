@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
@@ -15,7 +17,13 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         missing("needs the real recordings, which are not part of the repository")
 
 
-def missing(sentence: str) -> None:
+@pytest.fixture(scope="session")
+def not_here() -> Callable[[str], NoReturn]:
+    """Call it with a sentence when what a test needs is not on this computer."""
+    return missing
+
+
+def missing(sentence: str) -> NoReturn:
     """Skip; in CI, where everything must be there, fail."""
     if os.environ.get("GLOVECAL_REQUIRE_EVERYTHING") == "1":
         pytest.fail(sentence)

@@ -4,9 +4,9 @@ import json
 import os
 import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
-
-import pytest
+from typing import NoReturn
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = """
@@ -18,24 +18,16 @@ assert decode_frame(encode_frame(frame)).readings.tolist() == list(range(18))
 """
 
 
-def uv() -> str:
-    found = shutil.which("uv") or shutil.which("uv", path=str(ROOT / ".tools" / "bin"))
-    if found is None:
-        sentence = "needs uv, which python3 do.py installs"
-        if os.environ.get("GLOVECAL_REQUIRE_EVERYTHING") == "1":
-            pytest.fail(sentence)
-        pytest.skip(sentence)
-    return found
-
-
 def run(*command: str, **more: str) -> str:
     result = subprocess.run(command, capture_output=True, text=True, timeout=150, env={**os.environ, **more})
     assert result.returncode == 0, result.stderr
     return result.stdout
 
 
-def test_it_installs_with_numpy_and_zenoh_only(tmp_path: Path) -> None:
-    tool = uv()
+def test_it_installs_with_numpy_and_zenoh_only(tmp_path: Path, not_here: Callable[[str], NoReturn]) -> None:
+    tool = shutil.which("uv") or shutil.which("uv", path=str(ROOT / ".tools" / "bin"))
+    if tool is None:
+        not_here("needs uv, which python3 do.py installs")
     run(tool, "build", "--wheel", "--quiet", "--out-dir", str(tmp_path), str(ROOT / "client"))
     (wheel,) = tmp_path.glob("glovecal_client-*.whl")
     run(tool, "venv", "--quiet", str(tmp_path / "empty"))

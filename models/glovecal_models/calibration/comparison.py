@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_models.calibration.samples import require_layout
-from glovecal_models.errors import BadInput
+from glovecal_models.comparison.residuals import Residuals, residuals
 from glovecal_models.takes.take import Take
 
 WITHIN_ONE_SD = 0.6827
@@ -63,37 +61,29 @@ class Comparison:
 
 def compare(model: CalibrationModel, takes: Sequence[Take]) -> Comparison:
     """Hold ``model`` against ``takes``. Raises LayoutMismatch, and BadInput when nothing was measured."""
-    predictor = GlovePredictor(model)
-    names = predictor.rotations
-    errors, spreads, measured, poses = [], [], [], []
-    for take in takes:
-        require_layout(take, model.layout)
-        index = [take.sensors.index(name) for name in model.layout.sensors]
-        angles = predictor.predict(take.readings[:, index])
-        reference = take.reference_at_frames(names)
-        errors.append(angles.mean - reference)
-        spreads.append(angles.sd)
-        measured.append(reference)
-        poses.append(np.array(take.poses if take.poses is not None else [""] * len(reference), dtype=object))
-    error = np.concatenate(errors) if errors else np.empty((0, len(names)))
-    if not np.isfinite(error).any():
-        raise BadInput(
-            "none of the takes measured a rotation of this model; compare needs r.ROTATION columns"
-        )
-    spread, reference = np.concatenate(spreads), np.concatenate(measured)
-    each = {
-        name: _errors(error[:, [column]], spread[:, [column]], reference[:, [column]])
-        for column, name in enumerate(names)
-        if np.isfinite(error[:, column]).any()
-    }
-    in_takes = {name for take in takes for name in take.rotations}
+    return summed_up(residuals(model, takes))
+
+
+def summed_up(found: Residuals) -> Comparison:
+    """Residuals as numbers: over all, for each rotation, for each pose."""
+    error, spread, reference = (found.stacked(name) for name in ("error", "sd", "measured"))
+    measured = found.measured_rotations
+    columns = {name: [found.column(name)] for name in measured}
+    in_takes = {name for item in found.takes for name in item.take.rotations}
     return Comparison(
         over_all=_errors(error, spread, reference),
-        rotations=each,
-        poses=_pose_errors(error, np.concatenate(poses)),
-        not_measured=tuple(name for name in names if name not in each),
-        not_predicted=tuple(sorted(in_takes - set(names))),
+        rotations={
+            name: _errors(error[:, column], spread[:, column], reference[:, column])
+            for name, column in columns.items()
+        },
+        poses=_pose_errors(error, np.concatenate([_poses(item.take) for item in found.takes])),
+        not_measured=tuple(name for name in found.rotations if name not in measured),
+        not_predicted=tuple(sorted(in_takes - set(found.rotations))),
     )
+
+
+def _poses(take: Take) -> np.ndarray:
+    return np.array(take.poses if take.poses is not None else [""] * len(take.time_s), dtype=object)
 
 
 def _errors(error: np.ndarray, spread: np.ndarray, reference: np.ndarray) -> RotationErrors:

@@ -39,6 +39,11 @@ class RotationFindings:
     sentence: str
 
     @property
+    def is_at_floor(self) -> bool:
+        """Nothing is left to gain: noise is all there is, and it is not the prediction's own."""
+        return _is_near(self.rmse_deg, self.floor) and not _is_restless(self.floor)
+
+    @property
     def structure(self) -> tuple[Dependence, ...]:
         """Dependences that are no noise, the largest first."""
         return tuple(item for item in self.dependences if is_structure(item, self.rmse_deg))
@@ -106,7 +111,7 @@ def _sentence(
     if floor is not None:
         least = "at least " if floor.is_lower_bound else ""
         start += f" (noise floor {least}{floor.floor_deg:.1f})"
-        if rmse <= AT_FLOOR * floor.high_deg and not floor.is_lower_bound:
+        if _is_near(rmse, floor):
             return f"{start}: {_at_floor(floor)}."
     if abs(bias) >= MOSTLY * rmse:
         start += f", mostly by a constant {bias:+.1f}"
@@ -122,9 +127,20 @@ def _sentence(
     )
 
 
-def _at_floor(floor: NoiseFloor) -> str:
+def _is_near(rmse: float, floor: NoiseFloor | None) -> bool:
+    return floor is not None and not floor.is_lower_bound and rmse <= AT_FLOOR * floor.high_deg
+
+
+def _is_restless(floor: NoiseFloor | None) -> bool:
+    """Whether the prediction jitters by more than the reference's noise accounts for."""
+    if floor is None:
+        return False
     reference = np.sqrt(max(floor.floor_deg**2 - floor.prediction_deg**2, 0.0))
-    if floor.prediction_deg > RESTLESS * reference:
+    return bool(floor.prediction_deg > RESTLESS * reference)
+
+
+def _at_floor(floor: NoiseFloor) -> str:
+    if _is_restless(floor):
         return (
             f"no more than the prediction's own jitter of {floor.prediction_deg:.1f} while the hand is "
             "still; the model follows its sensors too closely"

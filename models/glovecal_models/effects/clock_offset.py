@@ -77,10 +77,11 @@ class _Grid:
 def clock_offsets(takes: Sequence[Take]) -> tuple[ClockOffset, ...]:
     """One answer per take, in their order; takes of one wearing are judged together."""
     grids = [_on_grid(take) for take in takes]
-    coarse = [None if grid is None else _coarse(grid) for grid in grids]
-    polished = _polished(takes, grids, coarse)
+    scans = [None if grid is None else _scan(grid, grid.readings) for grid in grids]
+    polished = _polished(takes, grids, [None if scan is None else _least(scan) for scan in scans])
     return tuple(
-        _judged(take, grid, offset) for take, grid, offset in zip(takes, grids, polished, strict=True)
+        _judged(take, grid, scan, offset)
+        for take, grid, scan, offset in zip(takes, grids, scans, polished, strict=True)
     )
 
 
@@ -108,6 +109,9 @@ def _offsets(width_s: float, step_s: float, centre_s: float = 0.0) -> np.ndarray
     return centre_s + step_s * np.arange(-steps, steps + 1)
 
 
+_COARSE = _offsets(RANGE_S, COARSE_S)
+
+
 def _unexplained(grid: _Grid, readings: np.ndarray, offset_s: float) -> float:
     """Share of the reference's variance that a ridge-linear map of ``readings`` leaves; NaN: no overlap."""
     reference = grid.reference(offset_s)
@@ -123,14 +127,13 @@ def _unexplained(grid: _Grid, readings: np.ndarray, offset_s: float) -> float:
     return float(left / max(np.sum(y * y), 1e-12))
 
 
-def _scan(grid: _Grid, readings: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    return np.array([_unexplained(grid, readings, offset) for offset in offsets])
+def _scan(grid: _Grid, readings: np.ndarray) -> np.ndarray:
+    """The unexplained share at each of ``_COARSE``."""
+    return np.array([_unexplained(grid, readings, offset) for offset in _COARSE])
 
 
-def _coarse(grid: _Grid) -> float:
-    offsets = _offsets(RANGE_S, COARSE_S)
-    shares = _scan(grid, grid.readings, offsets)
-    return float(offsets[np.nanargmin(shares)]) if np.isfinite(shares).any() else 0.0
+def _least(scan: np.ndarray) -> float:
+    return float(_COARSE[np.nanargmin(scan)]) if np.isfinite(scan).any() else 0.0
 
 
 def _polished(
@@ -182,16 +185,14 @@ def _best_for_map(
     return float(offsets[int(np.argmin(left))])
 
 
-def _judged(take: Take, grid: _Grid | None, offset_s: float | None) -> ClockOffset:
-    if grid is None or offset_s is None:
+def _judged(take: Take, grid: _Grid | None, scan: np.ndarray | None, offset_s: float | None) -> ClockOffset:
+    if grid is None or scan is None or offset_s is None:
         sentence = f"Take {take.name}: the clocks cannot be judged; too short, or the reference never moves."
         return ClockOffset(take.name, "not judgeable", 0.0, -RANGE_S, RANGE_S, 1.0, 1.0, 1.0, sentence)
-    offsets = _offsets(RANGE_S, COARSE_S)
-    shares = _scan(grid, grid.readings, offsets)
     before = _unexplained(grid, grid.readings, 0.0)
     after = _unexplained(grid, grid.readings, offset_s)
-    least = float(np.nanmin(_scan(grid, grid.readings[::-1], offsets)))
-    near = offsets[shares <= 2.0 * after]
+    least = float(np.nanmin(_scan(grid, grid.readings[::-1])))
+    near = _COARSE[scan <= 2.0 * after]
     low, high = (float(near.min()), float(near.max())) if len(near) else (offset_s, offset_s)
     verdict: Verdict = "offset"
     if after > BETTER_THAN_REVERSED * least:

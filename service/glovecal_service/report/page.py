@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from html import escape
 from importlib.metadata import version
 
-from glovecal_models.calibration.comparison import Comparison, compare
+from glovecal_models.calibration.comparison import Comparison, summed_up
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.comparison.where_it_fails import RotationFindings, WhereItFails, where_it_fails
@@ -38,7 +38,7 @@ def report_page(
 ) -> str:
     """HTML. Raises LayoutMismatch, and BadInput when nothing was measured."""
     found = residuals(model, takes)
-    numbers, where = compare(model, takes), where_it_fails(found)
+    numbers, where = summed_up(found), where_it_fails(found)
     parts = [
         f"<h1>Model {escape(model_id[:12])} against {counted(len(takes), 'take')}</h1>",
         _what(model, takes, trained_on),

@@ -24,7 +24,7 @@ def in_one_sentence(numbers: Comparison, where: WhereItFails) -> str:
 
 def floors_sentence(where: WhereItFails) -> str:
     """Which rotations cannot get better."""
-    done = [item.rotation for item in where.rotations if "nothing is left to gain" in item.sentence]
+    done = [item.rotation for item in where.rotations if item.is_at_floor]
     if not done:
         return "No rotation is at its noise floor yet."
     return f"{len(done)} of {len(where.rotations)} rotations are at their noise floor: {', '.join(done)}."

@@ -22,7 +22,6 @@ router = APIRouter(prefix="/models", tags=["models"])
 
 MOST_FRAMES = 20_000
 MOST_SENSORS = 512
-MOST_TAKES = 1000
 
 
 class Model(BaseModel):

@@ -10,6 +10,7 @@ import numpy as np
 from sqlalchemy import Connection, Row, delete, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
+from glovecal_models.effects.clock_offset import aligned
 from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier
 from glovecal_models.takes.pose_names import poses_at_frames
@@ -151,7 +152,7 @@ class Takes:
         if not earlier.reference_rows:
             raise BadInput(f"take {id} ({earlier.name}) has no reference whose clock could be moved")
         take = load_take(self._artifacts.get(earlier.artifact))
-        take = dataclasses.replace(take, reference_time_s=take.reference_time_s + seconds)
+        take = aligned(take, -seconds)
         total = earlier.facts.get(CLOCK_OFFSET, 0.0) - seconds
         return self._replace(earlier, take, {CLOCK_OFFSET: round(total, 9)})
 
