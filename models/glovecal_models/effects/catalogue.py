@@ -1,0 +1,38 @@
+"""The catalogue: every effect that is known by name, found by the entry-point group ``glovecal.effects``.
+
+A package of one's own adds an effect by an entry point that names its class; nothing here changes.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.metadata import entry_points
+
+from glovecal_models.effects.effect import Effect
+from glovecal_models.errors import BadInput
+
+GROUP = "glovecal.effects"
+
+
+@cache
+def catalogue() -> dict[str, Effect]:
+    """Every effect by its name. Raises BadInput for an entry point that is none."""
+    found: dict[str, Effect] = {}
+    for point in sorted(entry_points(group=GROUP), key=lambda item: item.name):
+        effect = point.load()()
+        if not isinstance(effect, Effect) or effect.name != point.name:
+            raise BadInput(
+                f"entry point {point.value} of {GROUP} is not an effect of the name {point.name!r}"
+            )
+        if point.name in found:
+            raise BadInput(f"two packages bring an effect of the name {point.name!r}")
+        found[point.name] = effect
+    return found
+
+
+def effect(name: str) -> Effect:
+    """One effect by its name. Raises BadInput that lists those there are."""
+    known = catalogue()
+    if name not in known:
+        raise BadInput(f"no effect {name!r}; there are {', '.join(known)}")
+    return known[name]

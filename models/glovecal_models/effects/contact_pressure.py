@@ -1,0 +1,14 @@
+"""Contact pressure: gripping something presses on the sensor beside bending it."""
+
+from typing import ClassVar
+
+from glovecal_models.effects.context_effect import ContextEffect
+from glovecal_models.effects.effect import Decoy
+
+
+class ContactPressure(ContextEffect):
+    name = "contact_pressure"
+    explanation = "Pressing against an object changes the reading although the joint does not move."
+    source = "offset and gain per newton"
+    context: ClassVar = ("contact_n",)
+    decoy: ClassVar[Decoy] = "rolled in time"

@@ -1,0 +1,56 @@
+"""Effects of a recorded context column: an offset and a gain that change with it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from glovecal_models.effects.effect import Decoy, InstantEffect, Settings, Signals
+from glovecal_models.effects.joint_units import in_joint_units, settle_joint_units
+
+
+class ContextEffect(InstantEffect):
+    """Columns h and h x joint, h a function of one context column, zero at that column's usual value.
+
+    Outside the range seen in training the column is held at the end of that range: no extrapolation.
+    """
+
+    decoy: ClassVar[Decoy] = "context of other takes"
+
+    @property
+    def column(self) -> str:
+        return self.context[0]
+
+    def settle(self, takes: Sequence[Signals]) -> Settings:
+        values = np.concatenate([take.context[self.column] for take in takes])
+        values = values[np.isfinite(values)]
+        return {
+            "low": float(values.min()),
+            "high": float(values.max()),
+            "usual": float(np.median(values)),
+            **settle_joint_units(takes),
+        }
+
+    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
+        return np.zeros((1, takes[0].own.shape[1], 0))
+
+    def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        value = take.context.get(self.column)
+        value = np.full(len(take), settings["usual"]) if value is None else value
+        value = np.where(np.isfinite(value), value, settings["usual"])
+        value = np.clip(value, settings["low"], settings["high"])
+        offsets = self.functions(value, settings, shape)
+        joint = in_joint_units(take.own, settings)[:, :, None]
+        return np.concatenate([offsets, offsets * joint], axis=2)
+
+    def functions(self, value: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        """(N, L, F) of the clipped context column (N,): by default its distance from the usual value."""
+        span = max(settings["high"] - settings["low"], 1e-9)
+        distance = (value - settings["usual"]) / span
+        return np.repeat(distance[:, None, None], len(shape), axis=1)
+
+    def weight_names(self, settings: Settings) -> tuple[str, ...]:
+        span = max(settings["high"] - settings["low"], 1e-9)
+        return (f"offset_deg_per_{span:.3g}", f"gain_deg_per_{span:.3g}_and_sd")

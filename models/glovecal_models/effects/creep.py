@@ -1,0 +1,53 @@
+"""Creep: after each movement the reading goes on changing for seconds, as foam and glue give way.
+
+One to three relaxations (standard linear solid): x' = (joint - x) / tau; the columns are x of each time
+constant, in the ratio of a logarithmic grid. What came before a take is not known; the state starts where the
+hand is, as if it had rested there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from glovecal_models.effects.effect import Parameter, Settings, Signals
+from glovecal_models.effects.history_effect import HistoryEffect
+
+LONG_TO_SHORT = 5.0
+SLOW_S = (4.0, 6.5, 10.0, 16.0, 25.0, 40.0)
+LONGEST_SHARE = 0.7
+"""Of a take's length: a slower relaxation cannot be told from a constant."""
+
+
+class Creep(HistoryEffect):
+    name = "creep"
+    explanation = "After a movement the reading goes on drifting for seconds although the joint is held."
+    source = "standard linear solid, relaxations of 1 to 40 s: Springer 10.1007/978-3-030-25261-8_34"
+    parameters: ClassVar = (
+        Parameter("fast_tau", "s", 0.5, 60.0, "1 to 60 s"),
+        Parameter("slow_tau", "s", 0.5, 60.0, "1 to 60 s"),
+    )
+
+    def missing(self, takes: Sequence[Signals]) -> str | None:
+        longest = max((float(take.time_s[-1] - take.time_s[0]) for take in takes), default=0.0)
+        return None if longest >= 8.0 else f"the longest take lasts {longest:.0f} s; creep needs 8 s or more"
+
+    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
+        longest = max(float(take.time_s[-1] - take.time_s[0]) for take in takes)
+        slow = np.array([tau for tau in SLOW_S if tau <= LONGEST_SHARE * longest] or SLOW_S[:1])
+        pairs = np.column_stack([slow / LONG_TO_SHORT, slow])
+        return np.repeat(pairs[:, None, :], takes[0].own.shape[1], axis=1)
+
+    def start(self, own: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        return np.repeat(own[:, None], shape.shape[1], axis=1)
+
+    def step(
+        self, state: np.ndarray, elapsed_s: float, own: np.ndarray, settings: Settings, shape: np.ndarray
+    ) -> np.ndarray:
+        state += -np.expm1(-elapsed_s / shape) * (own[:, None] - state)
+        return state - own[:, None]
+
+    def weight_names(self, settings: Settings) -> tuple[str, ...]:
+        return ("fast_share", "slow_share")

@@ -1,0 +1,46 @@
+"""Cross-coupling: a neighbouring joint pulls at the sensor through the cloth.
+
+Columns are each neighbour and its product with the joint (linear and bilinear, Kahlesz et al. 2004; Wang &
+Neff 2013, Table 1). Signals that the base already reads are left out by whoever makes the signals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from glovecal_models.effects.effect import Decoy, InstantEffect, Settings, Signals
+from glovecal_models.effects.joint_units import in_joint_units, settle_joint_units
+
+
+class CrossCoupling(InstantEffect):
+    name = "cross_coupling"
+    explanation = "Moving a neighbouring joint changes what this sensor reads."
+    source = "Wang & Neff 2013, section 3.1 and Table 1; Kahlesz, Zachmann, Klein 2004"
+    decoy: ClassVar[Decoy] = "rolled in time"
+
+    def missing(self, takes: Sequence[Signals]) -> str | None:
+        return None if any(take.others for take in takes) else "no other sensor was recorded"
+
+    def settle(self, takes: Sequence[Signals]) -> Settings:
+        names = list(dict.fromkeys(name for take in takes for name in take.others))
+        return {
+            "neighbours": names,
+            **settle_joint_units(takes),
+        }
+
+    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
+        return np.zeros((1, takes[0].own.shape[1], 0))
+
+    def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        lanes = take.own.shape[1]
+        joint = in_joint_units(take.own, settings)[:, :, None]
+        others = np.column_stack([take.others[name] for name in settings["neighbours"]])[:, None, :]
+        others = np.repeat(others, lanes, axis=1)
+        return np.concatenate([others, others * joint], axis=2)
+
+    def weight_names(self, settings: Settings) -> tuple[str, ...]:
+        names = settings["neighbours"]
+        return (*(f"deg_per_sd[{name}]" for name in names), *(f"deg_per_sd[{name} x own]" for name in names))

@@ -1,0 +1,142 @@
+"""What an effect is: a named physical cause that changes readings, and what it has to answer.
+
+An effect adds *columns* to a calibration: functions of the joint's own signal, of other signals and of the
+context, in degrees. Their weights are linear and learned in closed form; what they do not depend on linearly
+(a time constant, a width) is the effect's *shape*, tried on a grid. The same columns serve in both
+directions: of the measured angle they distort a sensor (forward: simulation, diagnosis), of the predicted
+angle they correct it (inverse: training, serving), because the inverse of a play, a low pass or a gain is of
+its own family to first order.
+
+Lanes are joints (and, while a shape is searched, joints times shapes): everything works on all lanes at once.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+Settings = dict[str, Any]
+"""Constants an effect takes from its training takes: plain JSON-able data."""
+Side = Literal["sensor", "reference"]
+Decoy = Literal["reversed in time", "rolled in time", "context of other takes", "dealt wearings", "none"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of the effect that is learned and shown to the user."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    prior: str
+    """What is known before any measurement, in words."""
+
+
+@dataclass(frozen=True)
+class Signals:
+    """What effects may look at in one take: N frames of L lanes."""
+
+    time_s: np.ndarray
+    """(N,), seconds, increasing."""
+    own: np.ndarray
+    """(N, L), degrees: each joint's own signal, measured (forward) or predicted without effects (inverse)."""
+    others: Mapping[str, np.ndarray] = field(default_factory=dict)
+    """Other signals (N,) by name: neighbouring sensors or joints, in standard deviations."""
+    context: Mapping[str, np.ndarray] = field(default_factory=dict)
+    """Context columns (N,) by name; NaN where unknown."""
+    wearing: str = ""
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+
+class Effect(ABC):
+    """One physical cause. Stateless: settings and shape are handed in, so that a model can store them."""
+
+    name: ClassVar[str]
+    explanation: ClassVar[str]
+    """One sentence for somebody who wears the glove."""
+    source: ClassVar[str]
+    side: ClassVar[Side] = "sensor"
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+    """The shape, in the order of its last axis."""
+    context: ClassVar[tuple[str, ...]] = ()
+    """Context columns it needs, all of them."""
+    decoy: ClassVar[Decoy] = "reversed in time"
+    """The twin with the same freedom that cannot be right."""
+    has_memory: ClassVar[bool] = False
+
+    def missing(self, takes: Sequence[Signals]) -> str | None:
+        """Why these takes cannot show the effect, as the end of "cannot be judged: ..."; None if they can."""
+        for name in self.context:
+            known = [
+                take.context[name][np.isfinite(take.context[name])] for take in takes if name in take.context
+            ]
+            if not known or not sum(map(len, known)):
+                return f"no context column c.{name} was recorded"
+            values = np.concatenate(known)
+            if np.ptp(values) <= 1e-9 * max(1.0, float(np.abs(values).max())):
+                return f"the context column c.{name} never changes ({values[0]:g})"
+        return None
+
+    def settle(self, takes: Sequence[Signals]) -> Settings:
+        """Constants from the training takes; the same settings are used wherever the effect is applied."""
+        return {}
+
+    @abstractmethod
+    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
+        """Shapes to try, (G, L, P); P is ``len(parameters)``, G at least 1."""
+
+    @abstractmethod
+    def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        """(N, L, C), degrees for a weight of one; ``shape`` is (L, P). Zero weight changes nothing."""
+
+    @abstractmethod
+    def stream(self, settings: Settings, shape: np.ndarray) -> Stream:
+        """The same columns, frame by frame."""
+
+    @abstractmethod
+    def weight_names(self, settings: Settings) -> tuple[str, ...]:
+        """What each of the C weights multiplies, with its unit, such as "per kelvin (deg/K)"."""
+
+    def described(self, settings: Settings, shape: np.ndarray, weights: np.ndarray) -> dict[str, float]:
+        """Numbers with units in their names for one lane's shape (P,) and weights (C,)."""
+        values = {
+            f"{item.name}_{item.unit}": float(v) for item, v in zip(self.parameters, shape, strict=True)
+        }
+        return values | dict(zip(self.weight_names(settings), map(float, weights), strict=True))
+
+
+class Stream(ABC):
+    """An effect's state between frames of one glove."""
+
+    @abstractmethod
+    def columns(self, frame: Signals) -> np.ndarray:
+        """(1, L, C) for the next frame, given as signals of length 1."""
+
+    @abstractmethod
+    def reset(self) -> None:
+        """Forget: a new wearing, or frames were missing."""
+
+
+class InstantEffect(Effect):
+    """An effect without memory: each frame's columns depend on that frame alone."""
+
+    def stream(self, settings: Settings, shape: np.ndarray) -> Stream:
+        return _InstantStream(self, settings, shape)
+
+
+class _InstantStream(Stream):
+    def __init__(self, effect: InstantEffect, settings: Settings, shape: np.ndarray) -> None:
+        self._effect, self._settings, self._shape = effect, settings, shape
+
+    def columns(self, frame: Signals) -> np.ndarray:
+        return self._effect.columns(frame, self._settings, self._shape)
+
+    def reset(self) -> None:
+        """There is nothing to forget."""

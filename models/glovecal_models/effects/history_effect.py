@@ -1,0 +1,71 @@
+"""Effects with a memory: a recursion over frames, the same for a whole take and for a live stream."""
+
+from __future__ import annotations
+
+import itertools
+from abc import abstractmethod
+from typing import Any, ClassVar
+
+import numpy as np
+
+from glovecal_models.effects.effect import Effect, Settings, Signals, Stream
+
+LONGEST_GAP_S = 1.0
+"""After a longer pause the state is forgotten: the hand may have done anything meanwhile."""
+
+
+class HistoryEffect(Effect):
+    """Implement ``start`` and ``step``; batch and stream follow, equal to the last bit and causal."""
+
+    has_memory: ClassVar[bool] = True
+
+    @abstractmethod
+    def start(self, own: np.ndarray, settings: Settings, shape: np.ndarray) -> Any:
+        """The state in which a hand that rested at ``own`` (L,) degrees would be."""
+
+    @abstractmethod
+    def step(
+        self, state: Any, elapsed_s: float, own: np.ndarray, settings: Settings, shape: np.ndarray
+    ) -> np.ndarray:
+        """Columns (L, C) of the next frame; changes ``state`` in place."""
+
+    def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        return np.concatenate(
+            [self._run(take.time_s[part], take.own[part], settings, shape) for part in _unbroken(take.time_s)]
+        )
+
+    def stream(self, settings: Settings, shape: np.ndarray) -> Stream:
+        return _HistoryStream(self, settings, shape)
+
+    def _run(self, time_s: np.ndarray, own: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        state = self.start(own[0], settings, shape)
+        first = self.step(state, 0.0, own[0], settings, shape)
+        result = np.empty((len(own), *first.shape))
+        result[0] = first
+        for frame, elapsed in enumerate(np.diff(time_s).tolist(), start=1):
+            result[frame] = self.step(state, elapsed, own[frame], settings, shape)
+        return result
+
+
+def _unbroken(time_s: np.ndarray) -> list[slice]:
+    breaks = np.flatnonzero(np.diff(time_s) > LONGEST_GAP_S) + 1
+    edges = [0, *breaks.tolist(), len(time_s)]
+    return [slice(start, end) for start, end in itertools.pairwise(edges)]
+
+
+class _HistoryStream(Stream):
+    def __init__(self, effect: HistoryEffect, settings: Settings, shape: np.ndarray) -> None:
+        self._effect, self._settings, self._shape = effect, settings, shape
+        self._state: Any = None
+        self._last_s = 0.0
+
+    def columns(self, frame: Signals) -> np.ndarray:
+        time, own = float(frame.time_s[0]), frame.own[0]
+        elapsed = time - self._last_s
+        if self._state is None or elapsed > LONGEST_GAP_S:
+            self._state, elapsed = self._effect.start(own, self._settings, self._shape), 0.0
+        self._last_s = time
+        return self._effect.step(self._state, elapsed, own, self._settings, self._shape)[None]
+
+    def reset(self) -> None:
+        self._state = None

@@ -1,0 +1,62 @@
+"""Hysteresis: the sensor reads differently on the way up than on the way down.
+
+Several plays (Prandtl-Ishlinskii): the play of half-width r follows the joint only after it has moved 2 r
+back. The inverse of such a sum is again one (Kuhnen 2003), so the same columns undo it. The columns are play
+minus joint, which are bounded by r and zero for a width of zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from glovecal_models.effects.effect import Parameter, Settings, Signals
+from glovecal_models.effects.history_effect import HistoryEffect
+
+WIDTHS = (0.2, 0.5, 1.0)
+"""Of the widest play."""
+WIDEST_SHARES = (0.12, 0.25, 0.5)
+"""Half-width of the widest play, in standard deviations of the motion. Wider ones imitate creep."""
+
+
+class Hysteresis(HistoryEffect):
+    name = "hysteresis"
+    explanation = (
+        "The sensor sticks: at the same angle it reads differently on the way up and on the way down."
+    )
+    source = "Prandtl-Ishlinskii: Kuhnen 2003, European Journal of Control 9(4) 407; size: Mattmann 2008"
+    parameters: ClassVar = (Parameter("widest_play", "deg", 0.2, 30.0, "1 to 7 deg in bend sensors"),)
+
+    def missing(self, takes: Sequence[Signals]) -> str | None:
+        return None if any(_turns(take) >= 4 for take in takes) else "no joint goes to and fro in these takes"
+
+    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
+        spread = np.sqrt(np.mean([take.own.var(axis=0) for take in takes], axis=0))
+        return np.array(WIDEST_SHARES)[:, None, None] * spread[None, :, None]
+
+    def start(self, own: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        return np.repeat(own[:, None], len(WIDTHS), axis=1)
+
+    def step(
+        self, state: np.ndarray, elapsed_s: float, own: np.ndarray, settings: Settings, shape: np.ndarray
+    ) -> np.ndarray:
+        width = shape * WIDTHS
+        joint = own[:, None]
+        np.minimum(joint + width, state, out=state)
+        np.maximum(joint - width, state, out=state)
+        return state - joint
+
+    def weight_names(self, settings: Settings) -> tuple[str, ...]:
+        return tuple(f"play_{width:g}_of_widest" for width in WIDTHS)
+
+
+def _turns(take: Signals) -> int:
+    """Reversals of the liveliest joint, counted where it has moved by half its standard deviation."""
+    most = 0
+    for own in take.own.T:
+        steps = np.round((own - own.mean()) / max(float(own.std()), 1e-9))
+        moves = np.sign(np.diff(steps[np.flatnonzero(np.diff(steps, prepend=np.inf))]))
+        most = max(most, int(np.count_nonzero(np.diff(moves))))
+    return most

@@ -1,0 +1,24 @@
+"""Joints in their own standard deviations, so that gains of all joints are of one size."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from glovecal_models.effects.effect import Settings, Signals
+
+
+def settle_joint_units(takes: Sequence[Signals]) -> Settings:
+    """Centre and scale of each lane, degrees, to be stored with an effect's settings."""
+    return {
+        "own_centre_deg": np.mean([take.own.mean(axis=0) for take in takes], axis=0).tolist(),
+        "own_scale_deg": np.sqrt(np.mean([take.own.var(axis=0) for take in takes], axis=0)).tolist(),
+    }
+
+
+def in_joint_units(own: np.ndarray, settings: Settings) -> np.ndarray:
+    """(N, L) standard deviations from the centre; lanes may be the settled ones several times over."""
+    times = own.shape[1] // len(settings["own_scale_deg"])
+    scale = np.tile(settings["own_scale_deg"], times)
+    return (own - np.tile(settings["own_centre_deg"], times)) / np.maximum(scale, 1e-6)

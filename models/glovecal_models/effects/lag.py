@@ -1,0 +1,53 @@
+"""Lag: the sensor follows the joint late, as through a low pass of 5 to 150 ms.
+
+The column is the joint minus its low-passed self: with weight -1 forward it makes the lag; inverse, a
+weight of tau_true / tau leads the reading back (a lead compensator: the derivative, smoothed by tau).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from glovecal_models.effects.effect import Parameter, Settings, Signals
+from glovecal_models.effects.history_effect import HistoryEffect
+
+TAU_S = (0.02, 0.03, 0.045, 0.065, 0.1, 0.15)
+FAST_SHARE = 1.0
+"""Per second: a joint is moved fast when its speed reaches so many of its own standard deviations."""
+
+
+class Lag(HistoryEffect):
+    name = "lag"
+    explanation = "The sensor follows the joint late: fast movements come out smaller and delayed."
+    source = "first-order low pass, 5 to 150 ms (facts: rate-dependent flex sensors)"
+    parameters: ClassVar = (Parameter("tau", "s", 0.005, 0.15, "5 to 150 ms"),)
+
+    def missing(self, takes: Sequence[Signals]) -> str | None:
+        fastest = max((_speed(take) for take in takes), default=0.0)
+        return None if fastest >= FAST_SHARE else "no fast motion was recorded"
+
+    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
+        return np.repeat(np.array(TAU_S)[:, None, None], takes[0].own.shape[1], axis=1)
+
+    def start(self, own: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        return own[:, None].copy()
+
+    def step(
+        self, state: np.ndarray, elapsed_s: float, own: np.ndarray, settings: Settings, shape: np.ndarray
+    ) -> np.ndarray:
+        state += -np.expm1(-elapsed_s / shape) * (own[:, None] - state)
+        return own[:, None] - state
+
+    def weight_names(self, settings: Settings) -> tuple[str, ...]:
+        return ("lead",)
+
+
+def _speed(take: Signals) -> float:
+    """95th percentile of the speed of the liveliest joint, in its standard deviations per second."""
+    if len(take) < 10:
+        return 0.0
+    speed = np.abs(np.diff(take.own, axis=0)) / np.diff(take.time_s)[:, None]
+    return float(np.max(np.percentile(speed, 95, axis=0) / np.maximum(take.own.std(axis=0), 1e-9)))

@@ -1,0 +1,31 @@
+"""Warm-up: offset and gain change while glove and electronics become warm."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from glovecal_models.effects.context_effect import ContextEffect
+from glovecal_models.effects.effect import Parameter, Settings, Signals
+
+TAU_S = (45.0, 75.0, 120.0, 200.0, 330.0, 550.0, 900.0)
+
+
+class WarmupDrift(ContextEffect):
+    name = "warmup_drift"
+    explanation = "The reading drifts during the first minutes after the glove is switched on."
+    source = "exponential approach to the warm state, 1 to 15 min"
+    parameters: ClassVar = (Parameter("tau", "s", 30.0, 1200.0, "1 to 15 min"),)
+    context: ClassVar = ("power_on_s",)
+
+    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
+        return np.repeat(np.array(TAU_S)[:, None, None], takes[0].own.shape[1], axis=1)
+
+    def functions(self, value: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        cold = np.exp(-(value[:, None] - settings["low"]) / shape[None, :, 0])
+        return cold[:, :, None]
+
+    def weight_names(self, settings: Settings) -> tuple[str, ...]:
+        return ("cold_offset_deg", "cold_gain_deg_per_sd")
