@@ -109,6 +109,13 @@ def _deals(owners: np.ndarray, counts: tuple[int, ...], generator: np.random.Gen
     return list(found.values())[:MOST_PARTITIONS]
 
 
+def other_deals(owners: np.ndarray, most: int, generator: np.random.Generator) -> list[np.ndarray]:
+    """Up to ``most`` other ways to deal takes to wearings of the same sizes, each at most once."""
+    counts = tuple(np.bincount(owners).tolist())
+    deals = _deals(owners, counts, generator)
+    return [deals[i] for i in generator.permutation(len(deals))[:most]]
+
+
 def _canonical(owners: np.ndarray) -> tuple[int, ...]:
     """The same for partitions that differ only in the groups' names."""
     names: dict[int, int] = {}

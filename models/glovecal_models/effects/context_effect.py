@@ -10,6 +10,8 @@ import numpy as np
 from glovecal_models.effects.effect import Decoy, InstantEffect, Settings, Signals
 from glovecal_models.effects.joint_units import in_joint_units, settle_joint_units
 
+PRIOR_DEG = 4.0
+
 
 class ContextEffect(InstantEffect):
     """Columns h and h x joint, h a function of one context column, zero at that column's usual value.
@@ -37,19 +39,25 @@ class ContextEffect(InstantEffect):
         return np.zeros((1, takes[0].own.shape[1], 0))
 
     def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        offsets = self.functions(self.clipped(take, settings), settings, shape)
+        joint = in_joint_units(take.own, settings)[:, :, None]
+        return np.concatenate([offsets, offsets * joint], axis=2)
+
+    def clipped(self, take: Signals, settings: Settings) -> np.ndarray:
+        """The context column (N,), its usual value where unknown, held within what training saw."""
         value = take.context.get(self.column)
         value = np.full(len(take), settings["usual"]) if value is None else value
         value = np.where(np.isfinite(value), value, settings["usual"])
-        value = np.clip(value, settings["low"], settings["high"])
-        offsets = self.functions(value, settings, shape)
-        joint = in_joint_units(take.own, settings)[:, :, None]
-        return np.concatenate([offsets, offsets * joint], axis=2)
+        return np.clip(value, settings["low"], settings["high"])
 
     def functions(self, value: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
         """(N, L, F) of the clipped context column (N,): by default its distance from the usual value."""
         span = max(settings["high"] - settings["low"], 1e-9)
         distance = (value - settings["usual"]) / span
         return np.repeat(distance[:, None, None], len(shape), axis=1)
+
+    def prior_sd(self, settings: Settings) -> np.ndarray:
+        return np.full(len(self.weight_names(settings)), PRIOR_DEG)
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         span = max(settings["high"] - settings["low"], 1e-9)

@@ -14,6 +14,8 @@ import numpy as np
 from glovecal_models.effects.effect import Decoy, InstantEffect, Settings, Signals
 from glovecal_models.effects.joint_units import in_joint_units, settle_joint_units
 
+PRIOR_DEG = 3.0
+
 
 class CrossCoupling(InstantEffect):
     name = "cross_coupling"
@@ -40,6 +42,9 @@ class CrossCoupling(InstantEffect):
         others = np.column_stack([take.others[name] for name in settings["neighbours"]])[:, None, :]
         others = np.repeat(others, lanes, axis=1)
         return np.concatenate([others, others * joint], axis=2)
+
+    def prior_sd(self, settings: Settings) -> np.ndarray:
+        return np.full(2 * len(settings["neighbours"]), PRIOR_DEG)
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         names = settings["neighbours"]

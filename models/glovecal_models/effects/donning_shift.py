@@ -14,6 +14,8 @@ import numpy as np
 from glovecal_models.effects.effect import Decoy, InstantEffect, Settings, Signals
 from glovecal_models.effects.joint_units import in_joint_units, settle_joint_units
 
+PRIOR_DEG = 3.5
+
 
 class DonningShift(InstantEffect):
     name = "donning_shift"
@@ -43,6 +45,9 @@ class DonningShift(InstantEffect):
             result[:, :, at] = 1.0
             result[:, :, len(wearings) + at] = in_joint_units(take.own, settings)
         return result
+
+    def prior_sd(self, settings: Settings) -> np.ndarray:
+        return np.full(2 * len(settings["wearings"]), PRIOR_DEG)
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         wearings = settings["wearings"]

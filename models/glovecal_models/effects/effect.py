@@ -50,6 +50,8 @@ class Signals:
     context: Mapping[str, np.ndarray] = field(default_factory=dict)
     """Context columns (N,) by name; NaN where unknown."""
     wearing: str = ""
+    zero_deg: np.ndarray | None = None
+    """(L,): where on the scale of ``own`` a raw reading of zero lies, by a straight line; None if unknown."""
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -103,6 +105,10 @@ class Effect(ABC):
     @abstractmethod
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         """What each of the C weights multiplies, with its unit, such as "per kelvin (deg/K)"."""
+
+    def prior_sd(self, settings: Settings) -> np.ndarray:
+        """How large each of the C weights may be expected to be, as a standard deviation."""
+        return np.ones(len(self.weight_names(settings)))
 
     def described(self, settings: Settings, shape: np.ndarray, weights: np.ndarray) -> dict[str, float]:
         """Numbers with units in their names for one lane's shape (P,) and weights (C,)."""

@@ -1,4 +1,4 @@
-"""Supply sag: the readings scale with the battery's voltage."""
+"""Supply sag: the readings scale with the battery's voltage, all about a reading of zero."""
 
 from __future__ import annotations
 
@@ -9,23 +9,38 @@ import numpy as np
 
 from glovecal_models.effects.context_effect import ContextEffect
 from glovecal_models.effects.effect import Parameter, Settings, Signals
+from glovecal_models.effects.joint_units import in_joint_units
 
 EXPONENTS = (1.0,)
+OWN_PRIOR_DEG = 0.15
+"""How far a joint may depart from the common scaling, for the whole fall of the voltage."""
 
 
 class SupplySag(ContextEffect):
+    """Columns: the common scaling, then each joint's own departure from it in offset and gain."""
+
     name = "supply_sag"
     explanation = "All readings shrink together as the supply voltage falls."
-    source = "reading x (V / V0)^n; offset and gain of each joint follow"
+    source = "reading x (V / V0)^n, n about 1; small departures for each joint"
     parameters: ClassVar = (Parameter("exponent", "1", 0.3, 3.0, "about 1"),)
     context: ClassVar = ("supply_v",)
 
     def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
         return np.repeat(np.array(EXPONENTS)[:, None, None], takes[0].own.shape[1], axis=1)
 
-    def functions(self, value: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
-        ratio = np.maximum(value, 1e-6) / max(settings["usual"], 1e-6)
-        return (ratio[:, None] ** -shape[None, :, 0] - 1.0)[:, :, None]
+    def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        volts = self.clipped(take, settings)
+        loss = (volts[:, None] / max(settings["usual"], 1e-6)) ** -shape[None, :, 0] - 1.0
+        if take.zero_deg is None:
+            common = np.zeros_like(take.own)
+        else:
+            common = (take.own - take.zero_deg) * loss
+        own = (volts / max(settings["high"] - settings["low"], 1e-9))[:, None] * np.ones_like(take.own)
+        own = own - settings["usual"] / max(settings["high"] - settings["low"], 1e-9)
+        return np.stack([common, own, own * in_joint_units(take.own, settings)], axis=2)
+
+    def prior_sd(self, settings: Settings) -> np.ndarray:
+        return np.array([1.0, OWN_PRIOR_DEG, OWN_PRIOR_DEG])
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
-        return ("offset_deg", "gain_deg_per_sd")
+        return ("share_of_common_scaling", "own_offset_deg", "own_gain_deg_per_sd")

@@ -1,0 +1,114 @@
+"""How much one effect explains, joint by joint, beside its decoy, and whether that can be chance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import wilcoxon
+
+LEAST_CONTRAST = 0.04
+"""Share of the squared error a cause must save beyond its decoy."""
+JOINT_PROBABILITY = 0.002
+POOLED_PROBABILITY = 0.001
+FEWEST_BLOCKS = 16
+
+
+@dataclass(frozen=True)
+class JointErrors:
+    """Squared errors of one joint in each block of time, on takes left out of the fit."""
+
+    base: np.ndarray
+    """(B,), degrees squared, without the effect."""
+    added: np.ndarray
+    """(B,), with it."""
+    decoy: np.ndarray
+    """(B,), with its decoy."""
+    rows: int
+
+    @property
+    def saved(self) -> float:
+        return float(1 - self.added.sum() / self.base.sum())
+
+    @property
+    def decoy_saved(self) -> float:
+        return float(1 - self.decoy.sum() / self.base.sum())
+
+    @property
+    def contrast(self) -> float:
+        """Share of the squared error saved beyond what the decoy saves."""
+        return self.saved - max(self.decoy_saved, 0.0)
+
+    @property
+    def beyond_decoy(self) -> np.ndarray:
+        """(B,): what each block saves against the better of base and decoy."""
+        return (self.base if self.decoy_saved <= 0 else self.decoy) - self.added
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """One effect on all joints."""
+
+    effect: str
+    joints: tuple[str, ...]
+    errors: tuple[JointErrors, ...]
+    shapes: tuple[np.ndarray, ...]
+    """(P,) best shape of each joint."""
+    weights: tuple[np.ndarray, ...]
+    """(C,) of each joint."""
+    probability: float | None = None
+    """Of a session effect, from takes dealt in other ways; None: judged block by block."""
+
+    @property
+    def touched(self) -> tuple[int, ...]:
+        """Joints on which the effect saves error beyond chance."""
+        if self.probability is not None and self.probability > SESSION_PROBABILITY:
+            return ()
+        if self.probability is not None:
+            return tuple(i for i, item in enumerate(self.errors) if item.contrast >= LEAST_CONTRAST)
+        some = {
+            i
+            for i, item in enumerate(self.errors)
+            if item.contrast >= LEAST_CONTRAST
+            and signed_rank(item.beyond_decoy) <= JOINT_PROBABILITY / max(1, len(self.errors) / 5)
+        }
+        together = [i for i, item in enumerate(self.errors) if item.contrast >= 0.5 * LEAST_CONTRAST]
+        if len(together) > 1:
+            pooled = pooled_errors([self.errors[i] for i in range(len(self.errors))])
+            if pooled.contrast >= LEAST_CONTRAST and signed_rank(pooled.beyond_decoy) <= POOLED_PROBABILITY:
+                some.update(together)
+        return tuple(sorted(some))
+
+    @property
+    def saved_square(self) -> float:
+        """Squared degrees that the effect saves on the joints it touches, per row, summed over joints."""
+        return float(
+            sum(
+                (self.errors[i].base.sum() - self.errors[i].added.sum()) / self.errors[i].rows
+                for i in self.touched
+            )
+        )
+
+
+SESSION_PROBABILITY = 0.03
+
+
+def signed_rank(values: np.ndarray) -> float:
+    """One-sided Wilcoxon: the probability that values symmetric about zero are so positive."""
+    if len(values) < FEWEST_BLOCKS or not np.any(values):
+        return 1.0
+    return float(wilcoxon(values, alternative="greater", method="approx").pvalue)
+
+
+def pooled_errors(errors: Sequence[JointErrors]) -> JointErrors:
+    """All joints together, each block in units of its joint's mean."""
+    length = min(len(item.base) for item in errors)
+    scale = [item.base.sum() for item in errors]
+    return JointErrors(
+        *(
+            np.sum([getattr(item, part)[:length] / s for item, s in zip(errors, scale, strict=True)], axis=0)
+            for part in ("base", "added", "decoy")
+        ),
+        rows=sum(item.rows for item in errors),
+    )

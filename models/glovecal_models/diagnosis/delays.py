@@ -1,0 +1,126 @@
+"""Lag or clock offset: how long a sensor's answer comes after the angle, and how much it is spread out.
+
+A lag delays and smooths; clocks that disagree only delay, or advance. In the direction sensor-from-angle a
+grid of (pure delay d) x (low pass tau) is tried on all joints; negative tau is the low pass run backwards in
+time, which no sensor can do: the decoy. The base bends with the angle: a delayed angle enters by the base's
+slope. All cells are compared at once by projecting them off the base.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+
+from glovecal_models.diagnosis.directions import Direction
+from glovecal_models.diagnosis.evened import RATE_HZ
+
+STEP_S = 0.005
+LARGEST_DELAY_S = 0.2
+TAU_S = (0.005, 0.01, 0.015, 0.02, 0.025, 0.03, 0.035, 0.04, 0.05, 0.06, 0.07, 0.08, 0.1, 0.12, 0.15, 0.2)
+BOTH_TAU_S = (0.02, 0.04, 0.07, 0.12)
+BOTH_STEP_S = 0.02
+SMOOTHING = 13
+"""Even times: without it a low pass gains by taking noise from the reference."""
+
+
+@dataclass(frozen=True)
+class DelayErrors:
+    """Squared errors of one joint for each pair of delay and low pass."""
+
+    cells: np.ndarray
+    """(K, 2): delay (s), tau (s); a negative tau runs backwards in time."""
+    blocks: np.ndarray
+    """(B, K), degrees squared, summed over the rows of each block."""
+    unmoved: np.ndarray
+    """(B,), without delay and low pass."""
+
+    @property
+    def clock(self) -> np.ndarray:
+        """Cells of a mere delay."""
+        return np.flatnonzero(self.cells[:, 1] == 0)
+
+    @property
+    def lag(self) -> np.ndarray:
+        return np.flatnonzero((self.cells[:, 0] == 0) & (self.cells[:, 1] >= 0))
+
+    @property
+    def reversed_lag(self) -> np.ndarray:
+        return np.flatnonzero((self.cells[:, 0] == 0) & (self.cells[:, 1] <= 0))
+
+
+def delay_errors(direction: Direction, block_rows: int) -> tuple[DelayErrors, ...]:
+    """One for each joint of a forward direction made of smoothed takes."""
+    cells = _cells()
+    return tuple(_joint(direction, joint, cells, block_rows) for joint in range(len(direction.rotations)))
+
+
+def _cells() -> np.ndarray:
+    steps = round(LARGEST_DELAY_S / STEP_S)
+    cells = [(STEP_S * k, 0.0) for k in range(-steps, steps + 1)]
+    cells += [(0.0, sign * tau) for tau in TAU_S for sign in (1, -1)]
+    coarse = round(0.1 / BOTH_STEP_S)
+    cells += [(BOTH_STEP_S * k, tau) for k in range(-coarse, coarse + 1) if k for tau in BOTH_TAU_S]
+    return np.array(cells)
+
+
+def _joint(direction: Direction, joint: int, cells: np.ndarray, block_rows: int) -> DelayErrors:
+    products = direction.products[joint]
+    base = np.concatenate([unit.base for unit in products.units])
+    orthogonal, _ = np.linalg.qr(base)
+    target = np.concatenate([unit.target for unit in products.units])
+    used = list(zip(direction.signals, direction.used[joint], strict=True))
+    moved = np.concatenate([_moved(take.time_s, take.own[:, joint], rows, cells) for take, rows in used])
+    own = np.concatenate([take.own[rows, joint] for take, rows in used])
+    moved *= _slope(base, products.whole, own)[:, None]
+    left = target - orthogonal @ (orthogonal.T @ target)
+    moved -= orthogonal @ (orthogonal.T @ moved)
+    np.subtract(left[:, None], moved, out=moved)
+    starts = block_starts([len(rows) for _, rows in used], block_rows)
+    return DelayErrors(
+        cells, np.add.reduceat(moved * moved, starts, axis=0), np.add.reduceat(left * left, starts)
+    )
+
+
+def block_starts(lengths: Sequence[int], block_rows: int) -> np.ndarray:
+    """First row of each block when every take is cut into blocks of about ``block_rows``."""
+    starts, first = [], 0
+    for length in lengths:
+        parts = max(1, round(length / block_rows))
+        starts.extend(first + np.arange(parts) * length // parts)
+        first += length
+    return np.array(starts)
+
+
+def _slope(base: np.ndarray, coefficients: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Of the base along the own angle, (N,): by a smooth curve through its values."""
+    x = (own - own.mean()) / max(float(own.std()), 1e-9)
+    curve = np.polynomial.polynomial.polyfit(x, base @ coefficients, 3)
+    slope = np.polynomial.polynomial.polyval(x, np.polynomial.polynomial.polyder(curve))
+    return slope / max(float(own.std()), 1e-9)
+
+
+def _moved(time: np.ndarray, own: np.ndarray, rows: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """(rows, K): delayed and low-passed angle minus the angle itself."""
+    result = np.empty((len(rows), len(cells)))
+    factor = round(1.0 / (RATE_HZ * STEP_S))
+    fine_time = time[0] + STEP_S * np.arange((len(time) - 1) * factor + 1)
+    fine = np.interp(fine_time, time, own)
+    at = np.searchsorted(fine_time, time[rows] - 1e-6)
+    shifts = np.round(cells[:, 0] / STEP_S).astype(int)
+    for tau in np.unique(cells[:, 1]):
+        passed = fine if tau == 0 else _low_pass(fine, tau) if tau > 0 else _low_pass(fine[::-1], -tau)[::-1]
+        some = np.flatnonzero(cells[:, 1] == tau)
+        index = np.clip(at[:, None] - shifts[None, some], 0, len(fine) - 1)
+        result[:, some] = passed[index] - own[rows, None]
+    return result
+
+
+def _low_pass(signal: np.ndarray, tau: float) -> np.ndarray:
+    """First order, exact for straight lines between the samples; starts at rest."""
+    h = STEP_S / tau
+    e = np.exp(-h)
+    gain = (1 - e) / h
+    return lfilter([1 - gain, gain - e], [1, -e], signal - signal[0]) + signal[0]

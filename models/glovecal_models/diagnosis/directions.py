@@ -1,0 +1,156 @@
+"""The two directions of a diagnosis: angle from sensors (inverse), sensor from angles (forward).
+
+They lie in opposite ways about lag and clock: regressing a sensor on a noisy reference rewards any low pass,
+regressing an angle on noisy sensors punishes its inverse. Neither is trusted alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from glovecal_models.diagnosis.base_features import BaseFeatures
+from glovecal_models.diagnosis.evened import EvenTake
+from glovecal_models.diagnosis.held_out import BaseProducts, Rows
+from glovecal_models.effects.effect import Signals
+from glovecal_models.layout import Layout
+
+DirectionName = Literal["inverse", "forward"]
+EVERY = 2
+"""Of the even times: neighbours say nearly the same."""
+
+
+@dataclass(frozen=True)
+class Direction:
+    """All joints in one direction."""
+
+    name: DirectionName
+    rotations: tuple[str, ...]
+    signals: tuple[Signals, ...]
+    """One for each take, own (N, R)."""
+    known: tuple[frozenset[str], ...]
+    """Names among ``others`` that the base of each joint reads already."""
+    used: tuple[tuple[np.ndarray, ...], ...]
+    """For each joint and take: indices of the rows that are fitted."""
+    products: tuple[BaseProducts, ...]
+    """For each joint."""
+
+    def rows(self, joint: int, columns: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """``columns``: for each take (N, ...); the fitted rows of those."""
+        return [part[index] for part, index in zip(columns, self.used[joint], strict=True)]
+
+
+def inverse(
+    takes: Sequence[EvenTake], layout: Layout, rotations: Sequence[str], *, linear: bool
+) -> Direction:
+    """Angle from sensors; a joint's own signal is what its base predicts."""
+    sensors = list(layout.sensors)
+    owns, zeros, known, used, products = [], [], [], [], []
+    for column, rotation in enumerate(rotations):
+        item = layout.correspondence(rotation)
+        inputs = [item.input_columns(take.readings, sensors) for take in takes]
+        if linear:
+            inputs = [part[:, :1] for part in inputs]
+        features = BaseFeatures.settle(inputs, linear=linear)
+        base = [features.columns(part) for part in inputs]
+        index = [np.flatnonzero(np.isfinite(take.reference[:, column]))[::EVERY] for take in takes]
+        units = [
+            Rows(part[rows], take.reference[rows, column])
+            for part, take, rows in zip(base, takes, index, strict=True)
+        ]
+        fit = BaseProducts(units)
+        owns.append([fit.fitted(part) for part in base])
+        zeros.append(_at_zero([part[:, 0] for part in inputs], owns[-1]))
+        known.append(frozenset(item.sensors[:1] if linear else item.sensors))
+        used.append(tuple(index))
+        products.append(fit)
+    spread = np.std(np.concatenate([take.readings for take in takes]), axis=0)
+    centre = np.mean(np.concatenate([take.readings for take in takes]), axis=0)
+    signals = tuple(
+        Signals(
+            take.time_s,
+            np.column_stack([own[number] for own in owns]),
+            {
+                name: (take.readings[:, i] - centre[i]) / max(spread[i], 1e-9)
+                for i, name in enumerate(sensors)
+            },
+            take.context,
+            take.wearing,
+            np.array(zeros),
+        )
+        for number, take in enumerate(takes)
+    )
+    return Direction("inverse", tuple(rotations), signals, tuple(known), tuple(used), tuple(products))
+
+
+def forward(
+    takes: Sequence[EvenTake], layout: Layout, rotations: Sequence[str], *, linear: bool
+) -> Direction:
+    """Own sensor, scaled to degrees, from the measured angles."""
+    sensors = list(layout.sensors)
+    filled = [_filled(take.reference) for take in takes]
+    names = list(rotations)
+    zeros, known, used, products = [], [], [], []
+    for column, rotation in enumerate(rotations):
+        item = layout.correspondence(rotation)
+        neighbours = [] if linear else [name for name in item.sensors if name in names and name != rotation]
+        columns = [column, *(names.index(name) for name in neighbours)]
+        inputs = [part[:, columns] for part in filled]
+        features = BaseFeatures.settle(inputs, linear=linear)
+        index = [np.flatnonzero(np.isfinite(take.reference[:, column]))[::EVERY] for take in takes]
+        own = [item.input_columns(take.readings, sensors)[:, 0] for take in takes]
+        scale, centre = _degrees(own, takes, index, column)
+        units = [
+            Rows(features.columns(part[rows]), scale * (values[rows] - centre))
+            for part, values, rows in zip(inputs, own, index, strict=True)
+        ]
+        zeros.append(-scale * centre)
+        known.append(frozenset({rotation, *neighbours}))
+        used.append(tuple(index))
+        products.append(BaseProducts(units))
+    everything = np.concatenate(filled)
+    spread, centre = everything.std(axis=0), everything.mean(axis=0)
+    signals = tuple(
+        Signals(
+            take.time_s,
+            angles,
+            {name: (angles[:, i] - centre[i]) / max(spread[i], 1e-9) for i, name in enumerate(names)},
+            take.context,
+            take.wearing,
+            np.array(zeros),
+        )
+        for take, angles in zip(takes, filled, strict=True)
+    )
+    return Direction("forward", tuple(rotations), signals, tuple(known), tuple(used), tuple(products))
+
+
+def _degrees(
+    own: Sequence[np.ndarray], takes: Sequence[EvenTake], index: Sequence[np.ndarray], column: int
+) -> tuple[float, float]:
+    """Degrees per count and the count of the mean, by a straight line."""
+    x = np.concatenate([values[rows] for values, rows in zip(own, index, strict=True)])
+    y = np.concatenate([take.reference[rows, column] for take, rows in zip(takes, index, strict=True)])
+    variance = float(np.var(x))
+    slope = float(np.mean((x - x.mean()) * (y - y.mean()))) / variance if variance > 0 else 0.0
+    return slope, float(x.mean())
+
+
+def _at_zero(readings: Sequence[np.ndarray], own: Sequence[np.ndarray]) -> float:
+    """The joint's signal at a reading of zero, by a straight line."""
+    x, y = np.concatenate(readings), np.concatenate(own)
+    variance = float(np.var(x))
+    slope = float(np.mean((x - x.mean()) * (y - y.mean()))) / variance if variance > 0 else 0.0
+    return float(y.mean() - slope * x.mean())
+
+
+def _filled(reference: np.ndarray) -> np.ndarray:
+    """Straight lines across rows that were not measured; only the operators' states pass through them."""
+    result = reference.copy()
+    rows = np.arange(len(reference))
+    for column in range(reference.shape[1]):
+        known = np.isfinite(reference[:, column])
+        result[:, column] = np.interp(rows, rows[known], reference[known, column]) if known.any() else 0.0
+    return result

@@ -1,0 +1,100 @@
+"""Takes on even times, readings and reference smoothed alike.
+
+Which effect is missing is decided on signals that went through the same symmetric window: unsmoothed, every
+operator that averages (a small play, a low pass) gains merely by removing noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from glovecal_models.takes.take import Take
+
+RATE_HZ = 50.0
+WINDOW_S = 0.05
+LONGEST_BRIDGED_S = 0.1
+
+
+@dataclass(frozen=True)
+class EvenTake:
+    """N even times of one take."""
+
+    name: str
+    wearing: str
+    time_s: np.ndarray
+    """(N,), seconds on the frames' clock."""
+    readings: np.ndarray
+    """(N, S), raw counts, in the order asked for."""
+    reference: np.ndarray
+    """(N, R), degrees, NaN where not measured."""
+    context: dict[str, np.ndarray]
+    """(N,) each, NaN where unknown."""
+
+
+def evened(take: Take, sensors: Sequence[str], rotations: Sequence[str], shift_s: float = 0.0) -> EvenTake:
+    """``shift_s``: the reference is read so much later than its time column says."""
+    count = max(int(take.duration_s * RATE_HZ) + 1, 1)
+    time = take.time_s[0] + np.arange(count) / RATE_HZ
+    index = [take.sensors.index(name) for name in sensors]
+    readings = _windowed(time, take.time_s, take.readings[:, index])
+    reference = np.full((count, len(rotations)), np.nan)
+    for column, rotation in enumerate(rotations):
+        if rotation in take.rotations:
+            values = take.reference[:, take.rotations.index(rotation)]
+            known = np.isfinite(values)
+            if known.sum() > 1:
+                at = take.reference_time_s[known] - shift_s
+                reference[:, column] = _windowed(time, at, values[known, None])[:, 0]
+    context = {name: _carried(time, take.time_s, values) for name, values in take.context.items()}
+    read = np.isfinite(readings).all(axis=1)
+    return EvenTake(
+        take.name, take.wearing, time[read], readings[read], reference[read],
+        {name: values[read] for name, values in context.items()},
+    )  # fmt: skip
+
+
+def smoothed(take: EvenTake, width: int) -> EvenTake:
+    """Readings and reference both through a Hann window of ``width`` (odd) even times."""
+    window = np.hanning(width + 2)[1:-1]
+    return replace(
+        take,
+        readings=_through(take.readings, window / window.sum()),
+        reference=_through(take.reference, window / window.sum()),
+    )
+
+
+def _through(values: np.ndarray, window: np.ndarray) -> np.ndarray:
+    half = len(window) // 2
+    padded = np.pad(values, ((half, half), (0, 0)), mode="edge")
+    return np.column_stack([np.convolve(column, window, "valid") for column in padded.T])
+
+
+def _windowed(at: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Means of ``values`` within half a window of each time; straight lines where none lie there.
+
+    A straight line through the window's times would do the same to a line, so no delay comes in.
+    NaN outside the recording and within longer gaps.
+    """
+    low = np.searchsorted(time, at - 0.5 * WINDOW_S - 1e-9)
+    high = np.searchsorted(time, at + 0.5 * WINDOW_S + 1e-9)
+    sums = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
+    times = np.concatenate([[0.0], np.cumsum(time)])
+    count = np.maximum(high - low, 1)
+    centre = np.where(high > low, (times[high] - times[low]) / count, at)
+    means = (sums[high] - sums[low]) / count[:, None]
+    after = np.clip(np.searchsorted(time, at), 1, len(time) - 1)
+    span = time[after] - time[after - 1]
+    slope = (values[after] - values[after - 1]) / span[:, None]
+    straight = values[after - 1] + slope * (at - time[after - 1])[:, None]
+    result = np.where((high - low >= 2)[:, None], means + slope * (at - centre)[:, None], straight)
+    outside = (at < time[0] - 1e-9) | (at > time[-1] + 1e-9) | (span > LONGEST_BRIDGED_S)
+    result[outside] = np.nan
+    return result
+
+
+def _carried(at: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    known = np.isfinite(values)
+    return np.interp(at, time[known], values[known]) if known.any() else np.full(len(at), np.nan)

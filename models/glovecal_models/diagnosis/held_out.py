@@ -1,0 +1,127 @@
+"""What columns save on takes left out of the fit, for a whole grid of shapes at once.
+
+Sums of squares and products are formed once for each unit (a take, or a stretch of one); every fold is then
+the total without one unit, solved in closed form. The shape is chosen inside each fold by its training error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+BASE_RIDGE = 1e-6
+ALIKE_ROWS = 100.0
+"""Rows that count for one: errors of neighbouring times are alike."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """One unit's rows for one joint."""
+
+    base: np.ndarray
+    """(N, P)."""
+    target: np.ndarray
+    """(N,), degrees."""
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Squared errors on units left out."""
+
+    base: np.ndarray
+    """(U,) sum of squared errors without the columns."""
+    added: np.ndarray
+    """(U,) with them."""
+    count: np.ndarray
+    """(U,) rows."""
+    shape: int
+    """Index of the shape that fits all units best."""
+    weights: np.ndarray
+    """(C,) at that shape, from all units."""
+    fitted: float
+    """Sum of squared errors over all units at that shape, nothing left out."""
+    residual: tuple[np.ndarray, ...]
+    """For each unit (N,): held-out error without the columns, degrees."""
+    residual_added: tuple[np.ndarray, ...]
+
+    @property
+    def saved(self) -> float:
+        """Share of the held-out squared error that the columns save; negative when they harm."""
+        return float(1.0 - self.added.sum() / self.base.sum())
+
+
+class BaseProducts:
+    """The part that all candidates share."""
+
+    def __init__(self, units: Sequence[Rows]) -> None:
+        self.units = units
+        self.gram = np.array([rows.base.T @ rows.base for rows in units])
+        self.right = np.array([rows.base.T @ rows.target for rows in units])
+        self.square = np.array([rows.target @ rows.target for rows in units])
+        self.count = np.array([len(rows.target) for rows in units])
+        total, ridge = self.gram.sum(axis=0), BASE_RIDGE * np.trace(self.gram.sum(axis=0))
+        self.ridge = ridge / len(total) * np.eye(len(total))
+        left = total - self.gram + self.ridge
+        self.coefficients = np.linalg.solve(left, (self.right.sum(axis=0) - self.right)[:, :, None])[:, :, 0]
+        self.residual = tuple(
+            rows.target - rows.base @ beta for rows, beta in zip(units, self.coefficients, strict=True)
+        )
+        self.error = np.array([r @ r for r in self.residual])
+        self.whole = np.linalg.solve(total + self.ridge, self.right.sum(axis=0))
+
+    def fitted(self, base: np.ndarray) -> np.ndarray:
+        """The map of all units, (N,) degrees."""
+        return base @ self.whole
+
+
+def held_out(products: BaseProducts, columns: Sequence[np.ndarray], prior_sd: np.ndarray) -> HeldOut:
+    """``columns``: for each unit (N, G, C); ``prior_sd`` (C,) of their weights."""
+    size = products.gram.shape[1]
+    shapes, added = columns[0].shape[1:]
+    joint = np.zeros((len(columns), shapes, size + added, size + added))
+    right = np.zeros((len(columns), shapes, size + added))
+    for unit, (rows, extra) in enumerate(zip(products.units, columns, strict=True)):
+        joint[unit, :, :size, :size] = products.gram[unit]
+        right[unit, :, :size] = products.right[unit]
+        for g in range(shapes):
+            own = extra[:, g, :]
+            joint[unit, g, size:, :size] = own.T @ rows.base
+            joint[unit, g, :size, size:] = joint[unit, g, size:, :size].T
+            joint[unit, g, size:, size:] = own.T @ own
+            right[unit, g, size:] = own.T @ rows.target
+    total, total_right = joint.sum(axis=0), right.sum(axis=0)
+    ridge = np.zeros((shapes, size + added, size + added))
+    ridge[:, :size, :size] = products.ridge
+    diagonal = np.arange(size, size + added)
+    variance = products.error.sum() / products.count.sum()
+    ridge[:, diagonal, diagonal] = ALIKE_ROWS * variance / prior_sd**2
+    beta = np.linalg.solve(total - joint + ridge, (total_right - right)[..., None])[..., 0]
+    training = (products.square.sum() - products.square)[:, None] + _quadratic(
+        total - joint, total_right - right, beta
+    )
+    best = np.argmin(training, axis=1)
+    chosen = beta[np.arange(len(columns)), best]
+    residual = tuple(
+        rows.target - rows.base @ b[:size] - extra[:, g, :] @ b[size:]
+        for rows, extra, g, b in zip(products.units, columns, best, chosen, strict=True)
+    )
+    whole = np.linalg.solve(total + ridge, total_right[..., None])[..., 0]
+    fit = products.square.sum() + _quadratic(total, total_right, whole)
+    shape = int(np.argmin(fit))
+    return HeldOut(
+        base=products.error,
+        added=np.array([r @ r for r in residual]),
+        count=products.count,
+        shape=shape,
+        weights=whole[shape, size:],
+        fitted=float(fit[shape]),
+        residual=products.residual,
+        residual_added=residual,
+    )
+
+
+def _quadratic(gram: np.ndarray, right: np.ndarray, beta: np.ndarray) -> np.ndarray:
+    """Squared error of ``beta`` without the target's own square."""
+    return np.einsum("...i,...ij,...j->...", beta, gram, beta) - 2 * np.einsum("...i,...i->...", beta, right)

@@ -1,0 +1,42 @@
+"""From assessments to a name: the cause that explains most, and those it cannot be told from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from glovecal_models.diagnosis.assessment import Assessment
+
+BEATEN = 2.5
+"""Standard errors by which a rival must be worse to leave the confidence set."""
+
+
+@dataclass(frozen=True)
+class Naming:
+    """The ranked causes; empty when nothing is to be named."""
+
+    ranked: tuple[Assessment, ...]
+    """Every cause beyond chance, the one that saves most first."""
+    confidence_set: tuple[str, ...]
+    """The first, and all that these takes cannot tell from it."""
+
+
+def named(assessments: Sequence[Assessment]) -> Naming:
+    """Rank what passed its decoy and chance."""
+    passing = sorted((item for item in assessments if item.touched), key=lambda item: -item.saved_square)
+    if not passing:
+        return Naming((), ())
+    best = passing[0]
+    rivals = [item.effect for item in passing[1:] if not _beaten(item, best)]
+    return Naming(tuple(passing), (best.effect, *rivals))
+
+
+def _beaten(item: Assessment, best: Assessment) -> bool:
+    """Whether ``item`` leaves clearly more error than ``best`` on the joints that either touches."""
+    joints = sorted({*best.touched, *item.touched})
+    worse = np.sum(
+        [(item.errors[j].added - best.errors[j].added) / best.errors[j].base.sum() for j in joints], axis=0
+    )
+    return bool(worse.mean() > BEATEN * worse.std(ddof=1) / np.sqrt(len(worse)))

@@ -1,0 +1,107 @@
+"""Could a cause that changes from take to take explain so much by chance? Takes are dealt in other ways.
+
+Blocks of one take share its context, so they are no independent witnesses: only the takes are. The context of
+each take (or its wearing) is given to another one, and the same columns are fitted; base and rows stay.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from glovecal_models.comparison.wearings import other_deals
+from glovecal_models.diagnosis.directions import Direction
+from glovecal_models.effects.decoy import with_context
+from glovecal_models.effects.effect import Effect, Signals
+
+DEALS = 199
+ROWS_PER_TAKE = 80
+
+
+def session_probability(
+    direction: Direction, effect: Effect, joints: Sequence[int], generator: np.random.Generator
+) -> float | None:
+    """Share of deals that explain as much of these joints together; None when there are fewer than 20."""
+    deals = _deals(direction, effect, generator)
+    if deals is None:
+        return None
+    settings = effect.settle(direction.signals)
+    grid = effect.grid(direction.signals, settings)
+    rows = [_thinned(len(take)) for take in direction.signals]
+    thin = [_some(take, some) for take, some in zip(direction.signals, rows, strict=True)]
+    bases, targets = zip(*(_projected(direction, joint, rows) for joint in joints), strict=True)
+    prior = effect.prior_sd(settings)
+
+    def explained(takes: Sequence[Signals]) -> float:
+        total = 0.0
+        each = [np.concatenate([effect.columns(take, settings, shape) for take in takes]) for shape in grid]
+        for base, (target, used), joint in zip(bases, targets, joints, strict=True):
+            total += max(_explained(columns[used, joint], base, target, prior) for columns in each)
+        return total
+
+    true = explained(thin)
+    others = [explained(_dealt(thin, deal, effect)) for deal in deals]
+    return (1 + sum(value >= true * (1 - 1e-9) for value in others)) / (1 + len(others))
+
+
+def _deals(direction: Direction, effect: Effect, generator: np.random.Generator) -> list[np.ndarray] | None:
+    count = len(direction.signals)
+    if effect.decoy == "dealt wearings":
+        names = [take.wearing for take in direction.signals]
+        order = list(dict.fromkeys(names))
+        deals = other_deals(np.array([order.index(name) for name in names]), DEALS, generator)
+        return deals if len(deals) >= 19 else None
+    if count < 5:
+        return None
+    return [generator.permutation(count) for _ in range(DEALS)]
+
+
+def _dealt(takes: Sequence[Signals], deal: np.ndarray, effect: Effect) -> list[Signals]:
+    if effect.decoy == "dealt wearings":
+        order = list(dict.fromkeys(take.wearing for take in takes))
+        return [replace(take, wearing=order[int(to)]) for take, to in zip(takes, deal, strict=True)]
+    return [with_context(take, takes[int(to)]) for take, to in zip(takes, deal, strict=True)]
+
+
+def _thinned(length: int) -> np.ndarray:
+    return np.unique(np.linspace(0, length - 1, min(ROWS_PER_TAKE, length)).astype(int))
+
+
+def _some(take: Signals, rows: np.ndarray) -> Signals:
+    return replace(
+        take,
+        time_s=take.time_s[rows],
+        own=take.own[rows],
+        others={name: values[rows] for name, values in take.others.items()},
+        context={name: values[rows] for name, values in take.context.items()},
+    )
+
+
+def _projected(
+    direction: Direction, joint: int, rows: Sequence[np.ndarray]
+) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+    """An orthonormal base, what it leaves of the target, and which of the thinned rows were measured."""
+    base, target, used, offset = [], [], [], 0
+    products = direction.products[joint]
+    for unit, some, fitted in zip(products.units, rows, direction.used[joint], strict=True):
+        at = np.searchsorted(fitted, some)
+        at = np.clip(at, 0, max(len(fitted) - 1, 0))
+        near = (np.abs(fitted[at] - some) <= 2) if len(fitted) else np.zeros(len(some), bool)
+        base.append(unit.base[at[near]] if len(fitted) else unit.base[:0])
+        target.append(unit.target[at[near]] if len(fitted) else unit.target[:0])
+        used.append(offset + np.flatnonzero(near))
+        offset += len(some)
+    orthogonal, _ = np.linalg.qr(np.concatenate(base))
+    values = np.concatenate(target)
+    return orthogonal, (values - orthogonal @ (orthogonal.T @ values), np.concatenate(used))
+
+
+def _explained(columns: np.ndarray, base: np.ndarray, target: np.ndarray, prior: np.ndarray) -> float:
+    """Share of the target's square that columns save beside the base, weights held by their prior."""
+    left = columns - base @ (base.T @ columns)
+    square = float(target @ target)
+    gram = left.T @ left + np.diag(square / len(target) / prior**2 * 4.0)
+    right = left.T @ target
+    return float(right @ np.linalg.solve(gram, right)) / square
