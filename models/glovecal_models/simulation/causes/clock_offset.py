@@ -1,0 +1,77 @@
+"""Clock offset: glove and reference stamp the same moment differently.
+
+Here the reference is moved: a row stamped t shows the hand at t minus the offset, so that a positive offset
+is a reference that comes late. Optical systems have 6 to 25 ms of latency (Qualisys; Santos, NIME 2021);
+recordings started by hand differ by up to a second from take to take.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glovecal_models.simulation.causes.draws import Draws
+from glovecal_models.simulation.causes.form import Form, Stage
+from glovecal_models.simulation.resampling import at_times
+from glovecal_models.simulation.scene import Scene
+
+SIZES_S = (0.002, 1.2)
+LARGEST_S = 2.4
+
+
+def constant(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """One offset of ``size`` seconds for the whole session."""
+    return _late(signal, scene, np.full(scene.session_s.shape, draws.sign() * size[0]))
+
+
+def per_take(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Another offset in every take, around a common one."""
+    common = draws.sign() * draws.one("common_share", 0.3, 1.0)
+    own = np.array([draws.stream("take", start.key).standard_normal() for start in scene.starts])
+    offset = np.clip(size[0] * (common + 0.7 * own), -LARGEST_S, LARGEST_S)
+    return _late(signal, scene, np.broadcast_to(offset[:, None], scene.session_s.shape))
+
+
+def constant_and_drift(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """An offset that grows as one crystal runs faster than the other (20 to 100 parts per million)."""
+    share = draws.sign() * draws.one("share_at_start", 0.2, 0.8)
+    per_hour = draws.sign("drift_sign") * draws.one("drift_per_hour", 1.0, 2.5)
+    offset = size[0] * (share + per_hour * scene.session_s / 3600)
+    return _late(signal, scene, np.clip(offset, -LARGEST_S, LARGEST_S))
+
+
+def _late(signal: np.ndarray, scene: Scene, offset_s: np.ndarray) -> np.ndarray:
+    return np.stack(
+        [
+            at_times(scene.time_s, values, scene.time_s - offset)
+            for values, offset in zip(signal, offset_s, strict=True)
+        ]
+    )
+
+
+FORMS = (
+    Form(
+        "constant",
+        "One time difference for the whole session (latency of an optical system; Santos, NIME 2021).",
+        constant,
+        Stage.CLOCK,
+        sizes=SIZES_S,
+        shared=True,
+    ),
+    Form(
+        "per_take",
+        "Another time difference in every take (recordings started one after the other by hand).",
+        per_take,
+        Stage.CLOCK,
+        sizes=SIZES_S,
+        shared=True,
+    ),
+    Form(
+        "constant_and_drift",
+        "A time difference that grows over the session (crystals that differ by parts per million).",
+        constant_and_drift,
+        Stage.CLOCK,
+        set_aside=True,
+        sizes=SIZES_S,
+        shared=True,
+    ),
+)

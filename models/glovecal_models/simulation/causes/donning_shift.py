@@ -1,0 +1,64 @@
+"""Donning shift: put on again, the glove sits differently.
+
+With the same protocol on other days the same hand reads 3.5 degrees differently (Gracia-Ibanez et al. 2016,
+PMC8178967); Carmel et al. 2014 found 3 degrees per sensor.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glovecal_models.simulation.causes.draws import Draws
+from glovecal_models.simulation.causes.form import Form, Stage
+from glovecal_models.simulation.scene import Scene
+
+
+def offset(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Each sensor is shifted by some degrees in each wearing."""
+    return signal + size * _per_wearing("offset", scene, draws)
+
+
+def offset_and_gain(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Shifted, and stretched more or less."""
+    bent = (signal - scene.low) / scene.span - 0.4
+    stretch = _per_wearing("gain", scene, draws) * draws.one("gain_share", 0.8, 2.5)
+    return signal + size * (_per_wearing("offset", scene, draws) + stretch * bent)
+
+
+def posture_dependent(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A sensor that sits off the joint's axis: the shift grows along the bend, in another curve each time."""
+    bent = np.clip((signal - scene.low) / scene.span, -0.2, 1.2)
+    centre = 0.5 + 0.25 * _per_wearing("centre", scene, draws)
+    hump = np.exp(-(((bent - centre) / 0.3) ** 2))
+    away = np.sqrt(np.abs(bent)) * _per_wearing("root", scene, draws)
+    return signal + size * (_per_wearing("hump", scene, draws) * hump + away)
+
+
+def _per_wearing(name: str, scene: Scene, draws: Draws) -> np.ndarray:
+    """Shape (T, 1, S), standard normal, the same in all takes of a wearing."""
+    count = len(scene.sensors)
+    drawn = [draws.stream(name, start.wearing).standard_normal(count) for start in scene.starts]
+    return np.clip(np.array(drawn), -2.2, 2.2)[:, None, :]
+
+
+FORMS = (
+    Form(
+        "offset",
+        "Each sensor shifted by some degrees per wearing (Gracia-Ibanez et al. 2016).",
+        offset,
+        Stage.WEARING,
+    ),
+    Form(
+        "offset_and_gain",
+        "Each sensor shifted and stretched per wearing (a sensor further along the finger bends more).",
+        offset_and_gain,
+        Stage.WEARING,
+    ),
+    Form(
+        "posture_dependent",
+        "Each sensor off its joint's axis per wearing, so that the shift changes along the bend.",
+        posture_dependent,
+        Stage.WEARING,
+        set_aside=True,
+    ),
+)

@@ -1,0 +1,73 @@
+"""Saturation: part of the bend no longer changes the reading, and no calibration brings it back.
+
+Amplifiers end at their supply, resistive films flatten, a loosely fixed sensor does not bend at first
+(Ninapro DB9 reports sensors that do not reach small hands' joints). The size is the share of the range lost.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glovecal_models.simulation.causes.draws import Draws
+from glovecal_models.simulation.causes.form import Form, Stage
+from glovecal_models.simulation.scene import Scene
+
+SIZES = (0.01, 0.9)
+
+
+def hard_clip(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """An end of the converter's range is reached: readings stay at it."""
+    at_high_end = draws.signs("end") > 0
+    highest = np.where(at_high_end, scene.high - size * scene.span, np.inf)
+    lowest = np.where(at_high_end, -np.inf, scene.low + size * scene.span)
+    return np.clip(signal, lowest, highest)
+
+
+def soft_tanh(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Readings flatten towards the high end."""
+    knee = 1 - size
+    bent = (signal - scene.low) / scene.span
+    room = draws.each("room_share", 0.03, 0.08)
+    flattened = knee + room * np.tanh(np.maximum(bent - knee, 0.0) / room)
+    return scene.low + scene.span * np.where(bent > knee, flattened, bent)
+
+
+def dead_zone(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Nothing happens before the sensor touches the finger, and little at first."""
+    bent = (signal - scene.low) / scene.span
+    corner = draws.each("corner_share", 0.005, 0.02)
+    beyond = (bent - size) / corner
+    touched = corner * (np.maximum(beyond, 0) + np.log1p(np.exp(-np.abs(beyond))))
+    return scene.low + scene.span * (size + touched)
+
+
+FORMS = (
+    Form(
+        "hard_clip",
+        "Readings stop at one end (an amplifier at its supply).",
+        hard_clip,
+        Stage.CONVERTER,
+        judged_by="lost_angle",
+        sizes=SIZES,
+        touches="two",
+    ),
+    Form(
+        "soft_tanh",
+        "Readings flatten towards the high end (a resistive film that is stretched out).",
+        soft_tanh,
+        Stage.COUNTS,
+        judged_by="lost_angle",
+        sizes=SIZES,
+        touches="two",
+    ),
+    Form(
+        "dead_zone",
+        "Readings begin to change only after some bend (a sensor loose in its pocket; Ninapro DB9).",
+        dead_zone,
+        Stage.COUNTS,
+        set_aside=True,
+        judged_by="lost_angle",
+        sizes=SIZES,
+        touches="two",
+    ),
+)

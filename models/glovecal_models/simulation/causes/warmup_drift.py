@@ -1,0 +1,61 @@
+"""Warm-up drift: readings move while the electronics warms, minutes after power-on, and then rest.
+
+Times of 1 to 15 minutes are typical of strain-gauge amplifiers; data sheets ask for as much warm-up.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glovecal_models.simulation.causes.draws import Draws
+from glovecal_models.simulation.causes.form import Form, Stage
+from glovecal_models.simulation.scene import Scene
+
+
+def one_exponential(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Zero points move towards their end with one time."""
+    time_s = draws.one("time_s", 60.0, 400.0)
+    return signal - size * draws.signs() * np.exp(-_on(scene) / time_s)[:, :, None]
+
+
+def offset_and_gain(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Zero points and gains move, with a fast and a slow time."""
+    fast = np.exp(-_on(scene) / draws.one("fast_s", 40.0, 120.0))[:, :, None]
+    slow = np.exp(-_on(scene) / draws.one("slow_s", 300.0, 900.0))[:, :, None]
+    share = draws.each("fast_share", 0.3, 0.7)
+    gain = draws.each("gain_share", -1.0, 1.0) * (signal - scene.low) / scene.span
+    cold = share * fast + (1 - share) * slow
+    return signal - size * draws.signs() * cold * (1 + gain)
+
+
+def logarithm(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Zero points move with the logarithm of the time since power-on and never quite end."""
+    start_s = draws.one("start_s", 15.0, 90.0)
+    return signal + size * draws.signs() * np.log1p(_on(scene) / start_s)[:, :, None]
+
+
+def _on(scene: Scene) -> np.ndarray:
+    return np.maximum(scene.power_on_s, 0.0)
+
+
+FORMS = (
+    Form(
+        "one_exponential",
+        "Zero points settle with one time after power-on (first-order thermal model of an amplifier).",
+        one_exponential,
+        Stage.ELECTRICAL,
+    ),
+    Form(
+        "offset_and_gain",
+        "Zero points and gains settle with a fast and a slow time (chip and housing warm separately).",
+        offset_and_gain,
+        Stage.ELECTRICAL,
+    ),
+    Form(
+        "logarithm",
+        "Zero points move with the logarithm of the time since power-on (ageing law of resistive films).",
+        logarithm,
+        Stage.ELECTRICAL,
+        set_aside=True,
+    ),
+)

@@ -1,0 +1,152 @@
+"""A cause at work in one glove: its form, its sensors and its sizes, set to the strength asked for."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+
+from glovecal_models.errors import BadInput
+from glovecal_models.simulation.causes.catalogue import forms
+from glovecal_models.simulation.causes.cause import Cause, HiddenCause
+from glovecal_models.simulation.causes.draws import Draws
+from glovecal_models.simulation.causes.form import Form, Stage
+from glovecal_models.simulation.causes.strength import Unexplained, lost_angle_rms, sizes_for
+from glovecal_models.simulation.scene import Scene
+from glovecal_models.simulation.session_glove import SessionGlove
+
+STRENGTH_LOG_SD = 0.35
+"""Sensors of one glove differ in how much a cause moves them."""
+PALM_NEIGHBOURS = ("P_MCP", "R_MCP", "T_TMC", "TI_ABD", "RP_ABD")
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """A cause with its sizes."""
+
+    form: Form
+    draws: Draws
+    affected: np.ndarray
+    """Shape (S,), which sensors."""
+    size: np.ndarray
+    """Shape (S,)."""
+    record: HiddenCause
+
+    def apply(self, signal: np.ndarray, scene: Scene) -> np.ndarray:
+        """The signal with the cause, shape (T, N, S); a clock's takes any number of channels."""
+        changed = self.form.effect(signal, scene, self.size, self.draws)
+        return changed if self.form.shared else np.where(self.affected, changed, signal)
+
+    def column(self, scene: Scene) -> tuple[str, np.ndarray]:
+        """The context column that records the cause: name and values (T, N)."""
+        assert self.form.column is not None
+        return self.form.column(scene, self.draws)
+
+
+def hide(cause: Cause, place: int, glove: SessionGlove, scene: Scene) -> Hidden:
+    """Choose form, sensors and sizes. ``place`` tells equal causes of one session apart."""
+    label = f"{cause.name}/{place}"
+    random = np.random.default_rng([glove.plan.seed, 52, zlib.crc32(label.encode())])
+    form = _form(cause, random)
+    affected = _affected(cause, form, glove.plan.sensors, random)
+    if form.shared:
+        affected[:] = True
+    draws = Draws(glove.plan.seed, f"{label}/{form.name}", len(affected))
+    spread = np.where(form.shared, 1.0, np.exp(STRENGTH_LOG_SD * random.standard_normal(len(affected))))
+    spread /= np.sqrt(np.mean(spread[affected] ** 2))
+    measure = _Measure(form, draws, affected, glove, scene)
+    targets = cause.strength_deg * spread[affected]
+    if form.sizes is not None:
+        size = sizes_for(measure, targets, form.sizes, shared=form.shared)
+    else:
+        size = np.ones(len(targets))
+        for _ in range(2):  # the sensors' curves bend, so that proportion is only nearly right
+            reached = measure(size)
+            if form.shared:
+                reached = np.sqrt(np.mean(reached**2))
+            size = size * targets / np.maximum(reached, 1e-6)
+    reached = measure(size)
+    everywhere = np.full(len(affected), size[0] if form.shared else 0.0)
+    everywhere[affected] = size
+    channels = tuple(np.array(glove.plan.sensors)[affected].tolist())
+    record = HiddenCause(
+        name=cause.name,
+        form=form.name,
+        description=form.description,
+        stage=form.stage.name.lower(),
+        channels=channels,
+        strength_deg=cause.strength_deg,
+        reached_deg=dict(zip(channels, map(float, reached), strict=True)),
+        sizes=dict(zip(channels, map(float, size), strict=True)),
+        parameters=dict(draws.values),
+        column=form.column(scene, draws)[0] if form.column else None,
+    )
+    return Hidden(form, draws, affected, everywhere, record)
+
+
+class _Measure:
+    """The strength of a form by itself on the healthy glove, as a function of its sizes."""
+
+    def __init__(
+        self, form: Form, draws: Draws, affected: np.ndarray, glove: SessionGlove, scene: Scene
+    ) -> None:
+        self._form, self._draws, self._affected = form, draws, affected
+        self._glove, self._scene = glove, scene
+        strain = glove.strain(scene)
+        self._before = {Stage.MECHANICAL: strain, Stage.CLOCK: scene.own}.get(form.stage)
+        if self._before is None:
+            self._before = glove.curve(strain)
+        self._clean = self._output(self._before)
+        self._own = self._frames(scene.own)
+        terms = {"straight_line": {"terms": 2}}.get(form.judged_by, {})
+        self._unexplained = Unexplained(self._own, **terms)
+
+    def __call__(self, size: np.ndarray) -> np.ndarray:
+        everywhere = np.full(len(self._affected), size[0])
+        everywhere[self._affected] = size
+        assert self._before is not None
+        changed = self._output(self._form.effect(self._before, self._scene, everywhere, self._draws))
+        if self._form.judged_by == "lost_angle":
+            return lost_angle_rms(self._own, self._clean, changed)
+        return self._unexplained.rms(changed - self._clean)
+
+    def _output(self, signal: np.ndarray) -> np.ndarray:
+        return self._frames(self._glove.curve(signal) if self._form.stage is Stage.MECHANICAL else signal)
+
+    def _frames(self, signal: np.ndarray) -> np.ndarray:
+        chosen = signal[:, self._scene.recorded][:, :, self._affected]
+        return chosen.reshape(-1, int(self._affected.sum()))
+
+
+def _form(cause: Cause, random: np.random.Generator) -> Form:
+    known = forms(cause.name)
+    if cause.form is None:
+        open_forms = [form for form in known if not form.set_aside] or list(known)
+        return open_forms[int(random.integers(len(open_forms)))]
+    for form in known:
+        if form.name == cause.form:
+            return form
+    raise BadInput(
+        f"{cause.name} has no form {cause.form!r}; it has {', '.join(form.name for form in known)}"
+    )
+
+
+def _affected(cause: Cause, form: Form, sensors: tuple[str, ...], random: np.random.Generator) -> np.ndarray:
+    order = random.permutation(len(sensors))
+    affected = np.zeros(len(sensors), bool)
+    if cause.channels is not None:
+        missing = set(cause.channels) - set(sensors)
+        if missing or not cause.channels:
+            raise BadInput(f"{cause.name}: no sensors {sorted(missing)} in this session")
+        affected[[sensors.index(name) for name in cause.channels]] = True
+        return affected
+    palm = [place for place, name in enumerate(sensors) if name in PALM_NEIGHBOURS]
+    count = {"two": 2, "one": 1, "one_or_all": 1 if random.random() < 0.5 else len(sensors)}
+    if form.touches == "palm" and palm:
+        affected[palm] = True
+    elif form.touches == "palm":
+        affected[-1] = True
+    else:
+        affected[order[: count.get(form.touches, len(sensors))]] = True
+    return affected
