@@ -10,6 +10,8 @@ from scipy.stats import wilcoxon
 
 LEAST_CONTRAST = 0.04
 """Share of the squared error a cause must save beyond its decoy."""
+LEAST_SESSION_CONTRAST = 0.08
+"""The same for causes that change from take to take: there are few takes."""
 JOINT_PROBABILITY = 0.002
 POOLED_PROBABILITY = 0.001
 FEWEST_BLOCKS = 16
@@ -66,7 +68,7 @@ class Assessment:
         if self.probability is not None and self.probability > SESSION_PROBABILITY:
             return ()
         if self.probability is not None:
-            return tuple(i for i, item in enumerate(self.errors) if item.contrast >= LEAST_CONTRAST)
+            return tuple(i for i, item in enumerate(self.errors) if item.contrast >= LEAST_SESSION_CONTRAST)
         some = {
             i
             for i, item in enumerate(self.errors)
@@ -91,7 +93,7 @@ class Assessment:
         )
 
 
-SESSION_PROBABILITY = 0.03
+SESSION_PROBABILITY = 0.01
 
 
 def signed_rank(values: np.ndarray) -> float:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glovecal_models.diagnosis.assessment import LEAST_CONTRAST, Assessment, JointErrors
-from glovecal_models.diagnosis.delays import DelayErrors, block_starts, delay_errors
+from glovecal_models.diagnosis.assessment import LEAST_SESSION_CONTRAST, Assessment, JointErrors
+from glovecal_models.diagnosis.delays import block_starts, delay_errors
+from glovecal_models.diagnosis.delay_verdict import clock_choice
 from glovecal_models.diagnosis.directions import Direction
 from glovecal_models.diagnosis.held_out import HeldOut
 from glovecal_models.diagnosis.screening import Evidence, screen
@@ -55,10 +56,10 @@ def _assessed(direction: Direction, effect: Effect, generator: np.random.Generat
     errors = tuple(_joint_errors(item) for item in evidence)
     probability = None
     if effect.decoy in SESSION_DECOYS:
-        some = [i for i, item in enumerate(errors) if item.contrast >= LEAST_CONTRAST]
+        some = [i for i, item in enumerate(errors) if item.contrast >= LEAST_SESSION_CONTRAST]
         probability = 1.0
         if some:
-            found = session_probability(direction, effect, some, generator)
+            found = session_probability(direction, effect, generator)
             probability = 1.0 if found is None else found
     return Assessment(
         effect.name,
@@ -86,47 +87,34 @@ def _blocks(residual: Sequence[np.ndarray], starts: np.ndarray) -> np.ndarray:
 
 
 def _delays(direction: Direction) -> list[Assessment]:
-    """Lag, each joint its own; clock offset, one for all."""
+    """Clock offset, one for all joints (and, where that pays, for each take its own); lag, each joint its own."""
     grids = delay_errors(direction, BLOCK_ROWS)
-    clock = grids[0].clock
-    each = np.array([grid.blocks[:, clock].sum(axis=0) / grid.unmoved.sum() for grid in grids])
-    shift = int(np.argmin(each.sum(axis=0)))
-    mirrored = len(clock) - 1 - shift
-    offsets, lags = [], []
-    for joint, grid in enumerate(grids):
-        base = _held_out_blocks(direction, joint)
-        offsets.append(_moved(grid, base, clock[shift], clock[mirrored], direction, joint))
-        best, worst = (
+    base = [_held_out_blocks(direction, joint) for joint in range(len(grids))]
+    rows = [int(products.count.sum()) for products in direction.products]
+    clock = clock_choice(grids)
+    offsets = [
+        JointErrors(b, b - grid.unmoved + moved, b - grid.unmoved + mirrored, n)
+        for b, grid, moved, mirrored, n in zip(base, grids, *clock.errors(grids), rows, strict=True)
+    ]
+    lags, taus = [], []
+    for b, grid, n in zip(base, grids, rows, strict=True):
+        true, decoy = (
             cells[np.argmin(grid.blocks[:, cells].sum(axis=0))] for cells in (grid.lag, grid.reversed_lag)
         )
-        lags.append(_moved(grid, base, best, worst, direction, joint))
-    delay = grids[0].cells[clock[shift], 0]
-    taus = [grid.cells[grid.lag[np.argmin(grid.blocks[:, grid.lag].sum(axis=0))], 1] for grid in grids]
+        lags.append(
+            JointErrors(
+                b, b - grid.unmoved + grid.blocks[:, true], b - grid.unmoved + grid.blocks[:, decoy], n
+            )
+        )
+        taus.append(np.array([grid.cells[true, 1]]))
     nothing = tuple(np.empty(0) for _ in grids)
+    shifts = tuple(clock.offset_s for _ in grids)
     return [
-        Assessment(
-            "clock_offset",
-            direction.rotations,
-            tuple(offsets),
-            tuple(np.array([delay]) for _ in grids),
-            nothing,
-        ),
-        Assessment("lag", direction.rotations, tuple(lags), tuple(np.array([tau]) for tau in taus), nothing),
+        Assessment("clock_offset", direction.rotations, tuple(offsets), shifts, nothing),
+        Assessment("lag", direction.rotations, tuple(lags), tuple(taus), nothing),
     ]
 
 
 def _held_out_blocks(direction: Direction, joint: int) -> np.ndarray:
     residual = direction.products[joint].residual
     return _blocks(residual, block_starts([len(part) for part in residual], BLOCK_ROWS))
-
-
-def _moved(
-    grid: DelayErrors, base: np.ndarray, cell: int, decoy: int, direction: Direction, joint: int
-) -> JointErrors:
-    """What a delay saves in the fit, taken from the held-out error: it has one number, no flexibility."""
-    return JointErrors(
-        base,
-        base - grid.unmoved + grid.blocks[:, cell],
-        base - grid.unmoved + grid.blocks[:, decoy],
-        int(direction.products[joint].count.sum()),
-    )

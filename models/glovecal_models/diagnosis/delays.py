@@ -36,6 +36,8 @@ class DelayErrors:
     """(B, K), degrees squared, summed over the rows of each block."""
     unmoved: np.ndarray
     """(B,), without delay and low pass."""
+    take: np.ndarray
+    """(B,), the take each block lies in."""
 
     @property
     def clock(self) -> np.ndarray:
@@ -78,9 +80,14 @@ def _joint(direction: Direction, joint: int, cells: np.ndarray, block_rows: int)
     left = target - orthogonal @ (orthogonal.T @ target)
     moved -= orthogonal @ (orthogonal.T @ moved)
     np.subtract(left[:, None], moved, out=moved)
-    starts = block_starts([len(rows) for _, rows in used], block_rows)
+    lengths = [len(rows) for _, rows in used]
+    starts = block_starts(lengths, block_rows)
+    ends = np.cumsum(lengths)
     return DelayErrors(
-        cells, np.add.reduceat(moved * moved, starts, axis=0), np.add.reduceat(left * left, starts)
+        cells,
+        np.add.reduceat(moved * moved, starts, axis=0),
+        np.add.reduceat(left * left, starts),
+        np.searchsorted(ends, starts, side="right"),
     )
 
 

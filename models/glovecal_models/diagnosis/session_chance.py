@@ -16,14 +16,16 @@ from glovecal_models.diagnosis.directions import Direction
 from glovecal_models.effects.decoy import with_context
 from glovecal_models.effects.effect import Effect, Signals
 
-DEALS = 199
+DEALS = 299
 ROWS_PER_TAKE = 80
 
 
-def session_probability(
-    direction: Direction, effect: Effect, joints: Sequence[int], generator: np.random.Generator
-) -> float | None:
-    """Share of deals that explain as much of these joints together; None when there are fewer than 20."""
+def session_probability(direction: Direction, effect: Effect, generator: np.random.Generator) -> float | None:
+    """Share of deals that explain as much, of all joints together or of one; None when there are too few.
+
+    The smaller of the two shares counts twice.
+    """
+    joints = range(len(direction.rotations))
     deals = _deals(direction, effect, generator)
     if deals is None:
         return None
@@ -34,16 +36,20 @@ def session_probability(
     bases, targets = zip(*(_projected(direction, joint, rows) for joint in joints), strict=True)
     prior = effect.prior_sd(settings)
 
-    def explained(takes: Sequence[Signals]) -> float:
-        total = 0.0
+    def explained(takes: Sequence[Signals]) -> np.ndarray:
         each = [np.concatenate([effect.columns(take, settings, shape) for take in takes]) for shape in grid]
-        for base, (target, used), joint in zip(bases, targets, joints, strict=True):
-            total += max(_explained(columns[used, joint], base, target, prior) for columns in each)
-        return total
+        return np.array(
+            [
+                max(_explained(columns[used, joint], base, target, prior) for columns in each)
+                for base, (target, used), joint in zip(bases, targets, joints, strict=True)
+            ]
+        )
 
     true = explained(thin)
-    others = [explained(_dealt(thin, deal, effect)) for deal in deals]
-    return (1 + sum(value >= true * (1 - 1e-9) for value in others)) / (1 + len(others))
+    others = np.array([explained(_dealt(thin, deal, effect)) for deal in deals])
+    together = np.mean([*(others.sum(axis=1) >= true.sum() * (1 - 1e-9)), True])
+    single = np.mean([*(others.max(axis=1) >= true.max() * (1 - 1e-9)), True])
+    return float(min(1.0, 2 * min(together, single)))
 
 
 def _deals(direction: Direction, effect: Effect, generator: np.random.Generator) -> list[np.ndarray] | None:
