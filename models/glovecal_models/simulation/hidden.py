@@ -18,6 +18,8 @@ from glovecal_models.simulation.session_glove import SessionGlove
 
 STRENGTH_LOG_SD = 0.35
 """Sensors of one glove differ in how much a cause moves them."""
+LEAST_REACHED_DEG = 1e-4
+"""A form of size 1 that moves a sensor less than this is not seen on this motion, and is left out."""
 PALM_NEIGHBOURS = ("P_MCP", "R_MCP", "T_TMC", "TI_ABD", "RP_ABD")
 
 
@@ -65,7 +67,7 @@ def hide(cause: Cause, place: int, glove: SessionGlove, scene: Scene) -> Hidden:
             reached = measure(size)
             if form.shared:
                 reached = np.sqrt(np.mean(reached**2))
-            size = size * targets / np.maximum(reached, 1e-6)
+            size = np.where(reached > LEAST_REACHED_DEG, size * targets / np.maximum(reached, 1e-12), 0.0)
     reached = measure(size)
     everywhere = np.full(len(affected), size[0] if form.shared else 0.0)
     everywhere[affected] = size

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from glovecal_models.simulation.performance import BRIDGE_S, Performance
 from glovecal_models.simulation.protocol import Segment
 from glovecal_models.simulation.session_motion import joints, rest_segment, take_segment
 from glovecal_models.simulation.session_plan import SessionPlan
-from glovecal_models.simulation.session_schedule import Air, TakeStart
+from glovecal_models.simulation.session_schedule import VOLTS_PER_HOUR, Air, TakeStart
 from glovecal_models.simulation.simulated_hand import ROTATIONS, SimulatedHand
 from glovecal_models.simulation.stretch import bent_share
 
@@ -58,6 +59,8 @@ class Scene:
     supply_v: np.ndarray
     temperature_c: np.ndarray
     humidity_pct: np.ndarray
+    usual_air: tuple[float, float]
+    """Temperature and humidity about which this session's air moves."""
 
     @property
     def span(self) -> np.ndarray:
@@ -72,7 +75,7 @@ class Scene:
         """The same as a share 0..1 of its range."""
         return bent_share(name, self.rotation(name))
 
-    @property
+    @cached_property
     def closing(self) -> np.ndarray:
         """How far the hand is closed, 0..1, shape (T, N): the mean bend of eight finger joints."""
         names = [f"{finger}_{joint}" for finger in "IMRP" for joint in ("MCP", "PIP")]
@@ -93,7 +96,7 @@ def play_scene(plan: SessionPlan, starts: Sequence[TakeStart], counts_zero_deg: 
     low, high = np.array([ACTIVE_RANGE_DEG[played_by[place]] for place in own]).T
     now = np.array([start.session_s for start in starts])[:, None] + time
     donned = np.array([start.since_donned_s for start in starts])[:, None] + time
-    supply = np.array([start.supply_v for start in starts])[:, None] - 0.45 * time / 3600
+    supply = np.array([start.supply_v for start in starts])[:, None] - VOLTS_PER_HOUR * time / 3600
     air = Air(plan)
     return Scene(
         starts=tuple(starts),
@@ -114,6 +117,7 @@ def play_scene(plan: SessionPlan, starts: Sequence[TakeStart], counts_zero_deg: 
         supply_v=supply,
         temperature_c=air.temperature_c(now, donned),
         humidity_pct=air.humidity_pct(now, donned),
+        usual_air=air.usual,
     )
 
 

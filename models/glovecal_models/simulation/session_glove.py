@@ -2,7 +2,7 @@
 
 Every sensor has its own mild monotone curve (a bow, an S, an exponential or a voltage divider) between
 degrees and the voltage's scale, which still reads in degrees, and a converter whose range the joint's range
-fills by 60 to 75 per cent. What is left unmodelled is what no calibration can remove.
+fills by 55 to 70 per cent. What is left unmodelled is what no calibration can remove.
 """
 
 from __future__ import annotations
@@ -10,18 +10,19 @@ from __future__ import annotations
 import numpy as np
 
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
+from glovecal_models.simulation.free_motion import random_posture
 from glovecal_models.simulation.scene import Scene
 from glovecal_models.simulation.sensor_stages import Cloth
 from glovecal_models.simulation.session_motion import joints
 from glovecal_models.simulation.session_plan import SessionPlan
-from glovecal_models.simulation.simulated_hand import ROTATIONS
+from glovecal_models.simulation.simulated_hand import DRIVEN, ROTATIONS, SimulatedHand
 from glovecal_models.simulation.slow_noise import lasting_noise
-from glovecal_models.simulation.stretch import stretches
 
 SLIP_LASTS_S = 25.0
 POSTURE_NUISANCE_LASTS_S = 40.0
 REFERENCE_NOISE_LASTS_S = 0.3
-FILLED_SHARE = (0.6, 0.75)
+FILLED_SHARE = (0.55, 0.7)
+TRIED_POSTURES = 400
 FALLING = ("IM_ABD", "MR_ABD", "RP_ABD")
 """Counts of sensors between fingers fall as the fingers spread."""
 
@@ -39,15 +40,14 @@ class SessionGlove:
         self._form = random.integers(0, 4, count)
         self._bend = random.uniform(0.4, 1.0, count) * random.choice([-1.0, 1.0], count)
         self._cloth = Cloth(played_by, ROTATIONS) if plan.cloth else None
-        pulled = {stretch.sensor for stretch in stretches()} if plan.cloth else set()
-        room = np.array([3.2 if name in pulled else 1.0 for name in played_by])
         self.lowest_count, self.highest_count = 1.0, 2.0**plan.bits - 1
-        filled = random.uniform(*FILLED_SHARE, count) * (self.highest_count - self.lowest_count) / room
+        lowest, highest = self._strained(plan.seed)
+        room = self.highest_count - self.lowest_count
         sign = np.where([name in FALLING for name in played_by], -1.0, 1.0)
-        self.gain = sign * filled / self._span
+        self.gain = sign * random.uniform(*FILLED_SHARE, count) * room / (highest - lowest)
         """Counts per degree, shape (S,)."""
-        middle = (self.lowest_count + self.highest_count) / 2 + random.uniform(-0.08, 0.08, count) * filled
-        self.zero = middle - self.gain * (self._low + self._span / 2)
+        middle = (self.lowest_count + self.highest_count) / 2 + random.uniform(-0.05, 0.05, count) * room
+        self.zero = middle - self.gain * (lowest + highest) / 2
         """Counts at 0 degrees, shape (S,)."""
 
     def strain(self, scene: Scene) -> np.ndarray:
@@ -125,6 +125,17 @@ class SessionGlove:
             self.plan.rotations[place]: float(np.sqrt(sensor[sensor_place] + reference))
             for sensor_place, place in enumerate(self.plan.own_rotations)
         }
+
+    def _strained(self, seed: int) -> tuple[np.ndarray, np.ndarray]:
+        """How far each sensor is bent at least and at most, shape (S,) each, degrees."""
+        low, high = self._low, self._low + self._span
+        if self._cloth is None:
+            return low, high
+        random = np.random.default_rng(53)  # the same postures try out every glove
+        postures = np.array([random_posture(random) for _ in range(TRIED_POSTURES)])
+        hand = SimulatedHand(seed).complete(dict(zip(DRIVEN, postures.T, strict=True)))
+        strain = self._cloth.strain(hand)
+        return np.minimum(low, strain.min(axis=0)), np.maximum(high, strain.max(axis=0))
 
     def _random(self, stream: int, key: int) -> np.random.Generator:
         return np.random.default_rng([self.plan.seed, stream, key])

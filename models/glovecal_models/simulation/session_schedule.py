@@ -19,7 +19,7 @@ from glovecal_models.simulation.session_plan import (
 )
 
 FULL_BATTERY_V = (4.02, 4.15)
-VOLTS_PER_HOUR = 0.45
+VOLTS_PER_HOUR = 0.7
 SUPPLY_JUMP_V = 0.015
 GAP_S = (30.0, 240.0)
 DONNING_S = (60.0, 180.0)
@@ -140,6 +140,14 @@ class Air:
     def humidity_pct(self, session_s: np.ndarray, since_donned_s: np.ndarray) -> np.ndarray:
         """Relative humidity in per cent; any shape."""
         return self._at(1, session_s, since_donned_s)
+
+    @property
+    def usual(self) -> tuple[float, float]:
+        """The mean temperature and humidity of forty minutes in a glove."""
+        session_s = np.linspace(0.0, 2400.0, 241)
+        worn_s = np.full(241, 400.0)
+        temperature, humidity = (self._at(which, session_s, worn_s) for which in range(2))
+        return float(temperature.mean()), float(humidity.mean())
 
     def _at(self, which: int, session_s: np.ndarray, since_donned_s: np.ndarray) -> np.ndarray:
         if self._confounded:

@@ -11,16 +11,21 @@ from glovecal_models.simulation.causes.draws import Draws
 from glovecal_models.simulation.causes.form import Form, Stage
 from glovecal_models.simulation.scene import Scene
 
+USUAL_BEND = 0.4
+"""Pulls count from here, so that they need not push a reading out of the converter's range."""
+
 
 def linear_neighbours(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Two other joints pull in proportion to their bend."""
-    return signal + size * (_bent(scene) @ _pulls(scene, draws))
+    return signal + size * ((_bent(scene) - USUAL_BEND) @ _pulls(scene, draws))
 
 
 def bilinear(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The pull of the others grows as the sensor's own joint bends."""
     own = _bent(scene)
-    return signal + size * (own @ _pulls(scene, draws)) * (draws.each("unbent_share", 0.2, 0.6) + own)
+    return signal + size * ((own - USUAL_BEND) @ _pulls(scene, draws)) * (
+        draws.each("unbent_share", 0.2, 0.6) + own
+    )
 
 
 def one_sided(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:

@@ -30,7 +30,7 @@ def offset_and_gain(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: D
 
 def regulator_dropout(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Nothing happens until the battery is too low for the regulator; from there counts fall with it."""
-    limit = draws.one("limit_v", 3.95, 4.0)
+    limit = draws.one("limit_v", 3.98, 4.05)
     return _scaled(signal, scene, 1 - size[0] * np.maximum(limit - scene.supply_v, 0.0) / limit)
 
 

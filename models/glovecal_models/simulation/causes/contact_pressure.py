@@ -1,0 +1,85 @@
+"""Contact pressure: what the hand grips presses on the sensors; here it is recorded as ``contact_n``.
+
+Thin films answer to normal force as well as to bending (Tang 2020, Sensors 20(23) 6863, for contact
+surfaces). Grips come and go with forces up to some 20 newtons, mostly while the hand is closed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glovecal_models.simulation.causes.draws import Draws
+from glovecal_models.simulation.causes.form import Form, Stage
+from glovecal_models.simulation.scene import Scene
+
+RISE_S = 0.12
+
+
+def additive(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """So many degrees per newton."""
+    return signal + size * draws.sign() * draws.each("per_n", 0.5, 1.5) * _pressure(scene, draws)
+
+
+def times_bend(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """More, the more the joint is bent: the cloth is tight there."""
+    bent = draws.each("unbent_share", 0.1, 0.4) + (signal - scene.low) / scene.span
+    return signal + size * draws.sign() * bent * _pressure(scene, draws)
+
+
+def levels_off(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The first newtons count most: the padding is soon pressed flat."""
+    flat_n = draws.each("flat_n", 2.0, 5.0)
+    return signal - size * draws.signs() * np.expm1(-_pressure(scene, draws) / flat_n)
+
+
+def contact_column(scene: Scene, draws: Draws) -> tuple[str, np.ndarray]:
+    """The measured pressure, newtons, shape (T, N)."""
+    pressure = _pressure(scene, draws)[:, :, 0]
+    noise = 0.08 * draws.stream("column noise", scene.starts[0].key).standard_normal(pressure.shape)
+    return "contact_n", np.round(np.maximum(pressure + noise, 0.0), 3)
+
+
+def _pressure(scene: Scene, draws: Draws) -> np.ndarray:
+    """Newtons, shape (T, N, 1): grips that begin when the hand is rather closed."""
+    rows = []
+    for row, start in enumerate(scene.starts):
+        random = draws.stream("grips", start.key)
+        force = np.zeros(len(scene.time_s))
+        now = 0
+        while now < len(force):
+            now += int(random.uniform(0.5, 3.0) * scene.rate_hz)
+            length = int(random.uniform(0.6, 4.0) * scene.rate_hz)
+            newtons = random.gamma(2.5, 3.0)
+            if now < len(force) and scene.closing[row, now] + random.uniform(-0.25, 0.25) > 0.35:
+                force[now : now + length] = min(newtons, 25.0)
+                now += length
+        width = max(int(RISE_S * 2 * scene.rate_hz), 1)
+        window = np.hanning(width + 2)[1:-1]
+        rows.append(np.convolve(force, window / window.sum(), mode="same"))
+    return np.stack(rows)[:, :, None]
+
+
+FORMS = (
+    Form(
+        "additive",
+        "Degrees per newton, whatever the bend (normal force on a film).",
+        additive,
+        Stage.MECHANICAL,
+        column=contact_column,
+    ),
+    Form(
+        "times_bend",
+        "Degrees per newton that grow with the bend (tight cloth presses harder).",
+        times_bend,
+        Stage.MECHANICAL,
+        column=contact_column,
+    ),
+    Form(
+        "levels_off",
+        "The first newtons count most, then it levels off (padding pressed flat).",
+        levels_off,
+        Stage.MECHANICAL,
+        set_aside=True,
+        column=contact_column,
+    ),
+)

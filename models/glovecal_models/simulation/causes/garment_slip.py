@@ -1,0 +1,75 @@
+"""Garment slip: within one wearing the glove creeps over the hand, and nothing brings it back.
+
+Carmel et al. 2014 find 3 degrees between wearings; moving hands shift cloth by a good part of that within
+one (Gentner & Classen 2009: repeatability 1.6 degrees SD).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glovecal_models.simulation.causes.draws import Draws
+from glovecal_models.simulation.causes.form import Form, Stage
+from glovecal_models.simulation.scene import Scene
+
+
+def random_walk(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Steps to and fro at every moment: the way grows with the square root of the time worn."""
+    count = len(scene.sensors)
+    slipped = np.empty_like(signal)
+    for row, start in enumerate(scene.starts):
+        random = draws.stream("walk", start.key)
+        before = np.sqrt(np.clip(start.since_donned_s, 1.0, 240.0)) * random.standard_normal(count)
+        steps = random.standard_normal((len(scene.time_s), count)) / np.sqrt(scene.rate_hz)
+        slipped[row] = before + np.cumsum(steps, axis=0)
+    return signal + size * slipped
+
+
+def steps_when_fast(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The cloth sticks, and jumps now and then when a joint moves fast."""
+    speed = np.abs(np.diff(scene.own, axis=1, prepend=scene.own[:, :1])) * scene.rate_hz
+    limit = np.maximum(np.quantile(speed, 0.93, axis=(0, 1)), 10.0)
+    chance = draws.one("jumps_per_s_of_fast_moves", 1.0, 3.0) / scene.rate_hz
+    slipped = np.empty_like(signal)
+    for row, start in enumerate(scene.starts):
+        random = draws.stream("jump", start.key)
+        jumps = (speed[row] > limit) & (random.random(signal.shape[1:]) < chance)
+        before = 1.5 * random.standard_normal(signal.shape[2])
+        slipped[row] = before + np.cumsum(jumps * random.standard_normal(signal.shape[1:]), axis=0)
+    return signal + size * slipped
+
+
+def to_one_side(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The cuff works its way down the wrist: fast after donning, ever more slowly, always one way."""
+    worn = np.maximum(scene.since_donned_s, 0.0)
+    way = np.stack(
+        [
+            -np.expm1(-worn[row] / draws.stream("time", start.wearing).uniform(100.0, 400.0))
+            * draws.stream("far", start.wearing).uniform(0.5, 1.5)
+            for row, start in enumerate(scene.starts)
+        ]
+    )
+    return signal + size * draws.signs() * way[:, :, None]
+
+
+FORMS = (
+    Form(
+        "random_walk",
+        "Small shifts at every moment that add up (random walk; zero-velocity literature's model of slip).",
+        random_walk,
+        Stage.WEARING,
+    ),
+    Form(
+        "steps_when_fast",
+        "Jumps when a joint moves fast, rest in between (stick and slip of cloth on skin).",
+        steps_when_fast,
+        Stage.WEARING,
+    ),
+    Form(
+        "to_one_side",
+        "A shift that always goes one way and settles within minutes of donning (a cuff working down).",
+        to_one_side,
+        Stage.WEARING,
+        set_aside=True,
+    ),
+)

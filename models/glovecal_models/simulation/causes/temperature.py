@@ -1,0 +1,76 @@
+"""Temperature: readings follow the warmth at the sensor.
+
+Resistive films change by parts per thousand per kelvin; the VPL DataGlove was specified for 15 to 40 degrees
+Celsius only; skin warmth shifts thin-film sensors (Tang 2020, Sensors 20(23) 6863).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.signal import lfilter
+
+from glovecal_models.simulation.causes.draws import Draws
+from glovecal_models.simulation.causes.form import Form, Stage
+from glovecal_models.simulation.scene import Scene
+
+
+def offset(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """So many degrees per kelvin, all at once."""
+    return signal + size * draws.each("per_kelvin", 0.5, 1.5) * draws.sign() * _warmer(scene)
+
+
+def offset_and_gain(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Zero point and gain both change with the warmth."""
+    bent = (signal - scene.low) / scene.span
+    slope = draws.each("zero", -1.0, 1.0) + draws.signs() * draws.each("gain", 1.0, 2.5) * bent
+    return signal + size * slope * _warmer(scene)
+
+
+def quadratic(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A compensated bridge: right at one temperature, off on both sides of it."""
+    off = _warmer(scene) - draws.one("right_at", -1.0, 1.5)
+    return signal + size * draws.signs() * off**2
+
+
+def late(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The sensor in the cloth follows the thermometer in the cuff minutes later."""
+    time_s = draws.one("late_s", 60.0, 240.0)
+    keep = np.exp(-1 / (time_s * scene.rate_hz))
+    warmer = _warmer(scene)[:, :, 0]
+    rising = (warmer[:, 1:2] - warmer[:, :1]) * scene.rate_hz
+    settled = warmer[:, :1] - time_s * rising  # where a steady rise before the scene had left it
+    followed = lfilter([1 - keep], [1, -keep], warmer, axis=1, zi=keep * settled)[0]
+    return signal + size * draws.signs() * followed[:, :, None]
+
+
+def _warmer(scene: Scene) -> np.ndarray:
+    return (scene.temperature_c - scene.usual_air[0])[:, :, None]
+
+
+FORMS = (
+    Form(
+        "offset",
+        "Zero points move in proportion to the temperature (temperature coefficient of resistance).",
+        offset,
+        Stage.ELECTRICAL,
+    ),
+    Form(
+        "offset_and_gain",
+        "Zero points and gains move with the temperature (film and its polymer carrier).",
+        offset_and_gain,
+        Stage.ELECTRICAL,
+    ),
+    Form(
+        "quadratic",
+        "Right at one temperature, off above and below (a bridge compensated at room temperature).",
+        quadratic,
+        Stage.ELECTRICAL,
+    ),
+    Form(
+        "late",
+        "Zero points follow the thermometer one to four minutes later (cloth warms slowly).",
+        late,
+        Stage.ELECTRICAL,
+        set_aside=True,
+    ),
+)
