@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.diagnosis.assessment import LEAST_SESSION_CONTRAST, Assessment, JointErrors
-from glovecal_models.diagnosis.delays import block_starts, delay_errors
 from glovecal_models.diagnosis.delay_verdict import clock_choice
+from glovecal_models.diagnosis.delays import block_starts, delay_errors
 from glovecal_models.diagnosis.directions import Direction
-from glovecal_models.diagnosis.held_out import HeldOut
 from glovecal_models.diagnosis.screening import Evidence, screen
 from glovecal_models.diagnosis.session_chance import session_probability
 from glovecal_models.effects.effect import Effect

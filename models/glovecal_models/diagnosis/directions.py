@@ -15,6 +15,7 @@ import numpy as np
 from glovecal_models.diagnosis.base_features import BaseFeatures
 from glovecal_models.diagnosis.evened import EvenTake
 from glovecal_models.diagnosis.held_out import BaseProducts, Rows
+from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.effects.effect import Signals
 from glovecal_models.layout import Layout
 
@@ -87,30 +88,17 @@ def inverse(
 
 
 def forward(
-    takes: Sequence[EvenTake], layout: Layout, rotations: Sequence[str], *, linear: bool
+    takes: Sequence[EvenTake],
+    layout: Layout,
+    rotations: Sequence[str],
+    *,
+    linear: bool,
+    known: Sequence[KnownEffect] = (),
 ) -> Direction:
-    """Own sensor, scaled to degrees, from the measured angles."""
-    sensors = list(layout.sensors)
-    filled = [_filled(take.reference) for take in takes]
+    """Own sensor, scaled to degrees, from the measured angles; ``known`` effects belong to the base."""
     names = list(rotations)
-    zeros, known, used, products = [], [], [], []
-    for column, rotation in enumerate(rotations):
-        item = layout.correspondence(rotation)
-        neighbours = [] if linear else [name for name in item.sensors if name in names and name != rotation]
-        columns = [column, *(names.index(name) for name in neighbours)]
-        inputs = [part[:, columns] for part in filled]
-        features = BaseFeatures.settle(inputs, linear=linear)
-        index = [np.flatnonzero(np.isfinite(take.reference[:, column]))[::EVERY] for take in takes]
-        own = [item.input_columns(take.readings, sensors)[:, 0] for take in takes]
-        scale, centre = _degrees(own, takes, index, column)
-        units = [
-            Rows(features.columns(part[rows]), scale * (values[rows] - centre))
-            for part, values, rows in zip(inputs, own, index, strict=True)
-        ]
-        zeros.append(-scale * centre)
-        known.append(frozenset({rotation, *neighbours}))
-        used.append(tuple(index))
-        products.append(BaseProducts(units))
+    filled = [_filled(take.reference) for take in takes]
+    sensor = [_own_sensor(takes, layout, rotation, column) for column, rotation in enumerate(rotations)]
     everything = np.concatenate(filled)
     spread, centre = everything.std(axis=0), everything.mean(axis=0)
     signals = tuple(
@@ -120,22 +108,54 @@ def forward(
             {name: (angles[:, i] - centre[i]) / max(spread[i], 1e-9) for i, name in enumerate(names)},
             take.context,
             take.wearing,
-            np.array(zeros),
+            np.array([item.zero_deg for item in sensor]),
         )
         for take, angles in zip(takes, filled, strict=True)
     )
-    return Direction("forward", tuple(rotations), signals, tuple(known), tuple(used), tuple(products))
+    read, used, products = [], [], []
+    for column, rotation in enumerate(rotations):
+        item = layout.correspondence(rotation)
+        neighbours = [] if linear else [name for name in item.sensors if name in names and name != rotation]
+        columns = [column, *(names.index(name) for name in neighbours)]
+        features = BaseFeatures.settle([part[:, columns] for part in filled], linear=linear)
+        index = [np.flatnonzero(np.isfinite(take.reference[:, column]))[::EVERY] for take in takes]
+        units = []
+        for take, part, values, rows in zip(signals, filled, sensor[column].values, index, strict=True):
+            extra = [found for each in known if (found := each.columns(take, column, rotation)) is not None]
+            base = np.column_stack([features.columns(part[:, columns]), *extra])
+            units.append(Rows(base[rows], values[rows]))
+        read.append(frozenset({rotation, *neighbours}))
+        used.append(tuple(index))
+        products.append(BaseProducts(units))
+    return Direction("forward", tuple(rotations), signals, tuple(read), tuple(used), tuple(products))
 
 
-def _degrees(
-    own: Sequence[np.ndarray], takes: Sequence[EvenTake], index: Sequence[np.ndarray], column: int
-) -> tuple[float, float]:
-    """Degrees per count and the count of the mean, by a straight line."""
-    x = np.concatenate([values[rows] for values, rows in zip(own, index, strict=True)])
+@dataclass(frozen=True)
+class _OwnSensor:
+    """The sensor of one joint in degrees."""
+
+    values: list[np.ndarray]
+    """For each take (N,)."""
+    zero_deg: float
+    """Where a reading of zero lies."""
+
+
+def _own_sensor(takes: Sequence[EvenTake], layout: Layout, rotation: str, column: int) -> _OwnSensor:
+    """The measuring sensor by a straight line; without one of its own, what all inputs together predict."""
+    item = layout.correspondence(rotation)
+    inputs = [item.input_columns(take.readings, list(layout.sensors)) for take in takes]
+    index = [np.flatnonzero(np.isfinite(take.reference[:, column])) for take in takes]
+    several = len(item.inputs) > 1 and item.inputs[0] != rotation
+    x = np.concatenate([part[rows] for part, rows in zip(inputs, index, strict=True)])
     y = np.concatenate([take.reference[rows, column] for take, rows in zip(takes, index, strict=True)])
-    variance = float(np.var(x))
-    slope = float(np.mean((x - x.mean()) * (y - y.mean()))) / variance if variance > 0 else 0.0
-    return slope, float(x.mean())
+    if not several:
+        x, inputs = x[:, :1], [part[:, :1] for part in inputs]
+    scale = np.maximum(x.std(axis=0), 1e-9)
+    z = (x - x.mean(axis=0)) / scale
+    gram = z.T @ z + 1e-4 * len(z) * np.eye(z.shape[1])
+    slope = np.linalg.solve(gram, z.T @ (y - y.mean())) / scale
+    values = [(part - x.mean(axis=0)) @ slope for part in inputs]
+    return _OwnSensor(values, float(-x.mean(axis=0) @ slope))
 
 
 def _at_zero(readings: Sequence[np.ndarray], own: Sequence[np.ndarray]) -> float:
