@@ -150,10 +150,8 @@ def _sentence(
     if abs(bias) >= MOSTLY * rmse:
         start += f", mostly by a constant {bias:+.1f}"
     if not structure:
-        start += "; no recorded column explains it"
-        return (
-            f"{start}." if slow is None else f"{start}, {100 * slow.share:.0f} % of it is slower than 1 Hz."
-        )
+        slowly = "" if slow is None else f", and {100 * slow.share:.0f} % of its variance is slower than 1 Hz"
+        return f"{start}; no recorded column explains it{slowly}."
     first = structure[0]
     low, high = float(np.min(first.mean_deg)), float(np.max(first.mean_deg))
     rest = len(structure) - 1

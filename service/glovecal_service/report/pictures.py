@@ -37,20 +37,20 @@ def errors_and_floors(where: WhereItFails) -> str:
 
 def heat_map(where: WhereItFails) -> str:
     """Rotations by columns: what share of the error each column explains; a dot where it is no noise."""
+    cells = {item.rotation: _cells(item) for item in where.rotations}
     sizes: dict[str, float] = {}
-    for item in where.rotations:
-        for one in item.dependences:
-            sizes[one.covariate] = max(sizes.get(one.covariate, 0.0), one.explained_deg)
+    for of_rotation in cells.values():
+        for name, (explained, _) in of_rotation.items():
+            sizes[name] = max(sizes.get(name, 0.0), explained)
     columns = sorted(sizes, key=lambda name: -sizes[name])[:MOST_COLUMNS]
     values = np.full((len(where.rotations), len(columns)), np.nan)
     dots = []
     for row, item in enumerate(where.rotations):
-        for one in item.dependences:
-            if one.covariate in columns:
-                column = columns.index(one.covariate)
-                values[row, column] = one.explained_deg / max(item.rmse_deg, 1e-12)
-                if is_structure(one, item.rmse_deg):
-                    dots.append((column, row))
+        for column, name in enumerate(columns):
+            explained, is_no_noise = cells[item.rotation].get(name, (np.nan, False))
+            values[row, column] = explained / max(item.rmse_deg, 1e-12)
+            if is_no_noise:
+                dots.append((column, row))
 
     def draw(axes: Axes) -> None:
         image = axes.imshow(values, cmap="Blues", aspect="auto", vmin=0, vmax=1)
@@ -61,6 +61,14 @@ def heat_map(where: WhereItFails) -> str:
         axes.figure.colorbar(image, ax=axes, label="share of the rotation's RMSE", shrink=0.8)
 
     return svg(draw, 2.5 + 0.32 * len(columns), 2.2 + 0.24 * len(where.rotations))
+
+
+def _cells(item: RotationFindings) -> dict[str, tuple[float, bool]]:
+    """For each column of the heat map: degrees explained, and whether that is no noise."""
+    cells = {one.covariate: (one.explained_deg, is_structure(one, item.rmse_deg)) for one in item.dependences}
+    if item.wearings is not None:
+        cells["wearing"] = (item.wearings.spread_deg, item.wearings.is_no_noise)
+    return cells
 
 
 def over_time(found: Residuals, rotation: str) -> tuple[str, str]:
