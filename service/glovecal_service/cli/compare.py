@@ -25,16 +25,15 @@ COLUMNS = {
     "baseline_deg": "spread",
     "count": "frames",
 }
+FLOOR = "95 % interval of the noise floor, how small the RMSE can get on these takes (> for a lower bound)"
 LEGEND = (
-    "Degrees. floor: 95 % interval of the noise floor, how small the RMSE can get on these takes (> when that "
-    "is a lower bound); mean: of |error|; 95 %: of the frames are below; in sd: share of errors within the "
-    "claimed standard deviation, 0.68 is truthful; NLPD: mean negative log predictive density in nats, "
+    f"Degrees. floor: {FLOOR}; mean: of |error|; 95 %: of frames are below; in sd: share of errors within "
+    "the claimed standard deviation, 0.68 is truthful; NLPD: mean negative log predictive density in nats, "
     "ln(RMSE) + 1.42 for a truthful standard deviation of constant size; spread: the error of always "
     "answering the mean angle."
 )
 BESIDE_LEGEND = (
-    "floor: the smallest noise floor of these models, 95 % interval (> when that is a lower bound); spread: the "
-    "error of always answering the mean angle."
+    f"floor: {FLOOR}, the smallest of these models; spread: the error of always answering the mean angle."
 )
 POSES = {"pose": "pose", "mean_deg": "mean |error|", "sd_deg": "sd", "count": "angles"}
 

@@ -24,8 +24,8 @@ FLOORS = {
     "slow": "slow",
 }
 FLOORS_LEGEND = (
-    "Degrees; the leftmost estimate of a row counts; >: a lower bound. Intervals are in --json. slow: percent "
-    "of the error's variance below 1 Hz."
+    "Degrees; the leftmost estimate of a row counts; >: a lower bound; --json has the intervals. slow: "
+    "percent of the error's variance below 1 Hz."
 )
 STRETCHES = {
     "take": "take",

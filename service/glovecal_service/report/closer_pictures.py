@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from glovecal_models.comparison.error_spectrum import SLOW_HZ, ErrorSpectrum
 from glovecal_models.comparison.residuals import Residuals
@@ -36,7 +37,7 @@ def measured_against_predicted(found: Residuals, rotation: str) -> tuple[str, st
 
     low_off, high_off = line - ends
     sentence = (
-        f"Between {low:.0f} and {high:.0f} degrees (95 % of the frames) the line through the predictions is "
+        f"From {round(low)} to {round(high)} degrees (95 % of the frames) the line through the predictions is "
         f"off by {low_off:+.1f} degrees at the low end and {high_off:+.1f} at the high end; they scatter "
         f"around it by {scatter:.1f}."
     )
@@ -61,6 +62,10 @@ def spectrum_of(spectrum: ErrorSpectrum, rotation: str) -> tuple[str, str]:
                 spectrum.plateau_density, color=FLOOR, linestyle="--", label="plateau of white noise"
             )
         axes.set(xscale="log", yscale="log", xlabel="hertz", ylabel="error, degrees² / hertz")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            axis.set_minor_formatter(NullFormatter())
         axes.legend(frameon=False, fontsize=8, loc="upper right")
 
     sentence = (

@@ -32,7 +32,7 @@ h1 { font-size: 1.5rem } h2 { font-size: 1.15rem; margin-top: 2.2rem }
 svg { max-width: 100%; height: auto } figure { margin: 1rem 0 } figcaption { color: #444 }
 table { border-collapse: collapse } .note { background: #fdf3e3; padding: .6rem 1rem }
 th, td { text-align: right; padding: .15rem .7rem; border-bottom: 1px solid #ddd }
-th:first-child, td:first-child { text-align: left }
+th:first-child, td:first-child { text-align: left } td { white-space: nowrap }
 .side { display: flex; flex-wrap: wrap; gap: 1rem } .side figure { flex: 1 1 24rem }
 """
 ERRORS = (
@@ -148,14 +148,18 @@ def _floor(floor: NoiseFloor | None) -> str:
     if floor is None:
         return "unknown"
     least = "at least " if floor.is_lower_bound else ""
-    return f"{least}{floor.floor_deg:.2f} ({floor.low_deg:.2f} to {floor.high_deg:.2f})"
+    return f"{least}{_with_interval(floor)}"
+
+
+def _with_interval(floor: NoiseFloor) -> str:
+    return f"{floor.floor_deg:.2f} ({floor.low_deg:.2f}-{floor.high_deg:.2f})"
 
 
 def _floors(where: WhereItFails) -> str:
     rows = []
     for item in where.rotations:
         every = (item.floor, *item.other_floors) if item.floor is not None else ()
-        cells = {one.how: f"{one.floor_deg:.2f} ({one.low_deg:.2f} to {one.high_deg:.2f})" for one in every}
+        cells = {one.how: _with_interval(one) for one in every}
         rows.append((item.rotation, *(cells.get(how, "-") for how in ORDER)))
     return f"{_rows(('rotation', *ORDER), rows)}<p>{escape(FLOORS)}</p>"
 

@@ -7,12 +7,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
+from glovecal_models.comparison.stretches import windows
 from glovecal_models.comparison.structure import Dependence
 from glovecal_models.comparison.where_it_fails import RotationFindings, WhereItFails, is_structure
 from glovecal_service.report.drawing import FLOOR, MEASURED, MODEL, QUIET, figure_svg, svg
 
 MOST_POINTS = 1500
-MOST_COLUMNS = 24
+MOST_COLUMNS = 32
+LEADING = ("angle", "speed", "direction", "time in take", "time since power-on", "wearing")
+"""Columns that every heat map starts with; context and sensors follow."""
 SHOWN_S = 12.0
 
 
@@ -42,7 +45,7 @@ def heat_map(where: WhereItFails) -> str:
     for of_rotation in cells.values():
         for name, (explained, _) in of_rotation.items():
             sizes[name] = max(sizes.get(name, 0.0), explained)
-    columns = sorted(sizes, key=lambda name: -sizes[name])[:MOST_COLUMNS]
+    columns = sorted(sizes, key=lambda name: (*_place(name), -sizes[name]))[:MOST_COLUMNS]
     values = np.full((len(where.rotations), len(columns)), np.nan)
     dots = []
     for row, item in enumerate(where.rotations):
@@ -61,6 +64,11 @@ def heat_map(where: WhereItFails) -> str:
         axes.figure.colorbar(image, ax=axes, label="share of the rotation's RMSE", shrink=0.8)
 
     return svg(draw, 2.5 + 0.32 * len(columns), 2.2 + 0.24 * len(where.rotations))
+
+
+def _place(name: str) -> tuple[int, bool]:
+    """Where a column stands in the heat map."""
+    return (LEADING.index(name) if name in LEADING else len(LEADING), not name.startswith("context "))
 
 
 def _cells(item: RotationFindings) -> dict[str, tuple[float, bool]]:
@@ -128,8 +136,7 @@ def _worst_window(found: Residuals, column: int) -> tuple[TakeResiduals, np.ndar
     best: tuple[float, TakeResiduals, slice] | None = None
     for item in found.takes:
         time, squared = item.take.time_s, item.error[:, column] ** 2
-        for begin in np.arange(time[0], time[-1], 0.5 * SHOWN_S) if len(time) > 1 else []:
-            rows = slice(*np.searchsorted(time, [begin, begin + SHOWN_S]))
+        for rows in windows(time, SHOWN_S):
             known = squared[rows][np.isfinite(squared[rows])]
             if len(known) > 1 and (best is None or known.mean() > best[0]):
                 best = (float(known.mean()), item, rows)
