@@ -13,6 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.fft import dct, idct
+from scipy.signal import detrend
 
 from glovecal_models.comparison.floor_estimate import RESAMPLES, NoiseFloor, pooled
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
@@ -48,10 +50,10 @@ def error_spectrum(found: Residuals, rotation: str, generator: np.random.Generat
     """None when fewer than ``FEWEST_BLOCKS`` blocks were measured without a gap."""
     column = found.column(rotation)
     mean = float(np.nanmean(found.stacked("error")[:, column]))
-    blocks = [block for item in found.takes for block in _blocks(item, column)]
+    blocks = [block for item in found.takes for block in _blocks(item, column, mean)]
     if len(blocks) < FEWEST_BLOCKS:
         return None
-    shares = np.array([_slow_and_all(block.error - mean, block.rate_hz) for block in blocks])
+    shares = np.array([(np.mean(block.slow**2), np.mean(block.error**2)) for block in blocks])
     slow, low, high = _share(shares, generator)
     squares = np.array([_plateau(block.error) for block in blocks])
     jitter = float(np.sqrt(np.mean([_plateau(block.predicted) for block in blocks])))
@@ -70,11 +72,14 @@ def error_spectrum(found: Residuals, rotation: str, generator: np.random.Generat
 class _Block:
     rate_hz: float
     error: np.ndarray
+    """About the mean of the rotation's errors."""
+    slow: np.ndarray
+    """The part of it below ``SLOW_HZ``."""
     predicted: np.ndarray
 
 
-def _blocks(item: TakeResiduals, column: int) -> list[_Block]:
-    time, error = item.take.time_s, item.error[:, column]
+def _blocks(item: TakeResiduals, column: int, mean: float) -> list[_Block]:
+    time, error = item.take.time_s, item.error[:, column] - mean
     if len(time) < SHORTEST_BLOCK:
         return []
     step = float(np.median(np.diff(time)))
@@ -85,25 +90,21 @@ def _blocks(item: TakeResiduals, column: int) -> list[_Block]:
     breaks = np.flatnonzero((np.diff(known) > 1) | (np.diff(time[known]) > GAP * step)) + 1
     found = []
     for run in np.split(known, breaks):
+        slow = _slow_part(error[run], 1.0 / step)
         for start in range(0, len(run) - length + 1, length):
-            rows = run[start : start + length]
-            found.append(_Block(1.0 / step, error[rows], item.predicted[rows, column]))
+            part = slice(start, start + length)
+            rows = run[part]
+            found.append(_Block(1.0 / step, error[rows], slow[part], item.predicted[rows, column]))
     return found
 
 
-def _without_line(values: np.ndarray) -> tuple[np.ndarray, float]:
-    """What is left around the straight line, and the line's mean square."""
-    time = np.arange(len(values)) - 0.5 * (len(values) - 1)
-    line = values.mean() + float(time @ values) / float(time @ time) * time
-    return values - line, float(np.mean(line**2))
-
-
-def _slow_and_all(values: np.ndarray, rate_hz: float) -> tuple[float, float]:
-    """Mean square below ``SLOW_HZ`` (the straight line is slow), and in all."""
-    rest, line = _without_line(values)
-    power = np.abs(np.fft.rfft(rest)) ** 2 / len(rest) ** 2
-    frequency = np.fft.rfftfreq(len(rest), 1.0 / rate_hz)
-    return line + 2.0 * float(power[(frequency > 0) & (frequency < SLOW_HZ)].sum()), float(np.mean(values**2))
+def _slow_part(values: np.ndarray, rate_hz: float) -> np.ndarray:
+    """By the cosine transform: it mirrors the series at its ends, so that they do not look fast."""
+    if not len(values):
+        return values
+    frequency = 0.5 * rate_hz * np.arange(len(values)) / len(values)
+    coefficients = np.asarray(dct(values, norm="ortho"))
+    return np.asarray(idct(np.where(frequency < SLOW_HZ, coefficients, 0.0), norm="ortho"))
 
 
 def _share(shares: np.ndarray, generator: np.random.Generator) -> tuple[float, float, float]:
@@ -117,9 +118,8 @@ def _share(shares: np.ndarray, generator: np.random.Generator) -> tuple[float, f
 
 def _periodogram(values: np.ndarray) -> np.ndarray:
     """Of white noise its variance, at every frequency; tapered, so that what is slow stays slow."""
-    rest, _ = _without_line(values)
-    taper = np.hanning(len(rest))
-    return np.abs(np.fft.rfft(rest * taper)) ** 2 / float(taper @ taper)
+    taper = np.hanning(len(values))
+    return np.abs(np.fft.rfft(detrend(values) * taper)) ** 2 / float(taper @ taper)
 
 
 def _plateau(values: np.ndarray) -> float:

@@ -81,7 +81,7 @@ class WhereItFails:
                 document[name] = list(document[name])
             for held, given in zip(document["dependences"], item.dependences, strict=True):
                 held["is_structure"] = is_structure(given, item.rmse_deg)
-                for name in ("edges", "mean_deg", "count"):
+                for name in ("edges", "mean_deg", "count", "chance_deg"):
                     held[name] = getattr(given, name).tolist()
             rotations.append(document)
         return {"rotations": rotations, "stretches": [asdict(item) for item in self.stretches]}

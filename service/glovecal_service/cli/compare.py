@@ -104,7 +104,9 @@ def _print_side_by_side(documents: dict[str, dict[str, Any]], results: dict[str,
     for name in dict.fromkeys(name for of_model in measured.values() for name in of_model):
         errors = {model: of_model[name] for model, of_model in measured.items() if name in of_model}
         floors = [row["floor"] for row in errors.values() if row["floor"] is not None]
-        floor = _interval(min(floors, key=lambda one: one["floor_deg"], default=None))
+        floor = _interval(
+            min(floors, key=lambda one: (one["is_lower_bound"], one["floor_deg"]), default=None)
+        )
         spread = next(iter(errors.values()))["baseline_deg"]
         rmse = {model: row["rmse_deg"] for model, row in errors.items()}
         rows.append({"rotation": name, **rmse, "floor": floor, "spread": spread})

@@ -37,7 +37,7 @@ def measured_against_predicted(found: Residuals, rotation: str) -> tuple[str, st
 
     low_off, high_off = line - ends
     sentence = (
-        f"From {round(low)} to {round(high)} degrees (95 % of the frames) the line through the predictions is "
+        f"From {round(low)} to {round(high)} degrees (95 % of frames) the line through the predictions is "
         f"off by {low_off:+.1f} degrees at the low end and {high_off:+.1f} at the high end; they scatter "
         f"around it by {scatter:.1f}."
     )

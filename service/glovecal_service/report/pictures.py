@@ -115,8 +115,11 @@ def error_against(item: RotationFindings, one: Dependence) -> tuple[str, str]:
     unit = f", {one.unit}" if one.unit else ""
 
     def draw(axes: Axes) -> None:
+        band = (item.bias_deg - one.chance_deg, item.bias_deg + one.chance_deg)
+        axes.fill_between(middles, *band, color=QUIET, alpha=0.5, linewidth=0, label="95 % of chance")
         axes.axhline(0, color=QUIET)
         axes.plot(middles, one.mean_deg, "o-", color=MODEL)
+        axes.legend(frameon=False, fontsize=8)
         axes.set(xlabel=f"{one.covariate}{unit}", ylabel=f"mean error of {item.rotation}, degrees")
 
     verdict = (

@@ -47,10 +47,10 @@ def side_by_side(models: Mapping[str, Comparison]) -> tuple[str, str]:
 
 
 def smallest_floor(models: Mapping[str, Comparison], rotation: str) -> NoiseFloor | None:
-    """Of the models' own floors: a model that jitters more has a higher one."""
+    """Of the models' own floors, since a model that jitters more has a higher one; lower bounds come last."""
     every = (_errors(one, rotation) for one in models.values())
     floors = [one.floor for one in every if one is not None and one.floor is not None]
-    return min(floors, key=lambda floor: floor.floor_deg, default=None)
+    return min(floors, key=lambda floor: (floor.is_lower_bound, floor.floor_deg), default=None)
 
 
 def _errors(comparison: Comparison, rotation: str) -> RotationErrors | None:

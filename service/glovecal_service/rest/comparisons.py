@@ -96,6 +96,9 @@ class DependenceView(BaseModel):
     edges: list[float | None]
     mean_deg: list[float | None] = Field(description="Mean error in each bin.")
     count: list[int]
+    chance_deg: list[float | None] = Field(
+        description="How far 95 % of the time shifts take a bin's mean from the mean of all."
+    )
     explained_deg: float | None
     probability: float | None = Field(description="Share of time shifts that explain as much.")
     is_structure: bool = Field(description="No noise, and large enough to matter.")
