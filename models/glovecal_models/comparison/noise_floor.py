@@ -10,7 +10,8 @@ that holds the least a better model could still take away:
   and how exactly the pose was taken; recordings of one frame a pose have nothing better.
 * spectrum: the plateau of the error's spectrum at high frequencies, a lower bound: noise with a memory is
   not in it.
-* frame to frame: second differences, a lower bound likewise, from the shortest recordings.
+* frame to frame: second differences, a lower bound likewise, from the shortest recordings. A table of single
+  poses without their names has none of these: its floor is unknown.
 
 The floor is that of this model: one that follows its sensors too closely magnifies their noise. How much of
 the floor is the prediction's own jitter is told beside it.
@@ -29,12 +30,14 @@ from glovecal_models.comparison.repeated_poses import from_repeated_poses
 from glovecal_models.comparison.residuals import Residuals
 
 FEWEST_HOLDS = 4
+NEIGHBOURS_S = 0.25
+"""Frames further apart than this are no neighbours: the hand may be anywhere else."""
 CHI_SQUARED_MEDIAN = 0.4549
 """With one degree of freedom."""
 
 
 def noise_floor(found: Residuals, rotation: str, generator: np.random.Generator) -> NoiseFloor | None:
-    """The best estimate; None when the rotation was measured in fewer than three frames."""
+    """The best estimate; None when the rotation was measured in fewer than three frames in a row."""
     return next(iter(noise_floors(found, rotation, generator)), None)
 
 
@@ -71,16 +74,21 @@ def _from_holds(held: Sequence[Hold], how: How, generator: np.random.Generator) 
 
 def _from_differences(found: Residuals, column: int, generator: np.random.Generator) -> NoiseFloor | None:
     """From second differences, which motion hardly enters; their variance is six times that of the noise."""
-    variances = _white_variances([np.diff(item.error[:, column], 2) for item in found.takes])
+    takes = [item for item in found.takes if _has_neighbours(item.take.time_s)]
+    variances = _white_variances([np.diff(item.error[:, column], 2) for item in takes])
     if not len(variances):
         return None
-    jitter = np.mean(_white_variances([np.diff(item.predicted[:, column], 2) for item in found.takes]))
+    jitter = np.mean(_white_variances([np.diff(item.predicted[:, column], 2) for item in takes]))
     return pooled(variances, np.ones(len(variances)), float(np.sqrt(jitter)), "frame to frame", generator)
+
+
+def _has_neighbours(time: np.ndarray) -> bool:
+    return len(time) > 2 and float(np.median(np.diff(time))) <= NEIGHBOURS_S
 
 
 def _white_variances(second: Sequence[np.ndarray]) -> np.ndarray:
     """Variance of the white noise in each of some 40 blocks of second differences, by their medians."""
-    joined = np.concatenate(second)
+    joined = np.concatenate([*second, np.zeros(0)])
     values = joined[np.isfinite(joined)] ** 2
     blocks = np.array_split(values, min(40, len(values))) if len(values) else []
     return np.array([np.median(block) for block in blocks]) / CHI_SQUARED_MEDIAN / 6.0

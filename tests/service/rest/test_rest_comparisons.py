@@ -119,8 +119,12 @@ def test_models_stand_side_by_side_in_one_report(
     outline.feed(page)
     assert outline.count["svg"] == outline.count["figcaption"] == 7
     assert "Side by side" in page
-    assert f"linear {model[:6]} has the smallest error" in page
-    assert f"for raw {raw[:6]}" in page
+    rmse = {f"raw {raw[:6]}": 0.0, f"linear {model[:6]}": 0.0}
+    for name, id in zip(rmse, (raw, model), strict=True):
+        rmse[name] = client.post(f"/models/{id}/compare", {"takes": takes[1:]})["over_all"]["rmse_deg"]
+    best, other = sorted(rmse, key=lambda name: rmse[name])
+    assert f"{best} has the smallest error, {rmse[best]:.2f} degrees" in page
+    assert f"({rmse[other]:.2f} for {other})" in page
     with pytest.raises(Refused, match="beside"):
         client.page(f"/models/{model}/report", asked | {"beside": ["no model"]})
     with pytest.raises(Refused, match="000000"):
