@@ -9,7 +9,12 @@ from matplotlib.figure import Figure
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 from glovecal_models.comparison.stretches import windows
 from glovecal_models.comparison.structure import Dependence
-from glovecal_models.comparison.where_it_fails import RotationFindings, WhereItFails, is_structure
+from glovecal_models.comparison.where_it_fails import (
+    STRUCTURE_PROBABILITY,
+    RotationFindings,
+    WhereItFails,
+    is_structure,
+)
 from glovecal_service.report.drawing import FLOOR, MEASURED, MODEL, QUIET, figure_svg, svg
 
 MOST_POINTS = 1500
@@ -122,16 +127,20 @@ def error_against(item: RotationFindings, one: Dependence) -> tuple[str, str]:
         axes.legend(frameon=False, fontsize=8)
         axes.set(xlabel=f"{one.covariate}{unit}", ylabel=f"mean error of {item.rotation}, degrees")
 
-    verdict = (
-        f"no more than {one.probability:.3f} by chance"
-        if is_structure(one, item.rmse_deg)
-        else "too little to tell from noise"
-    )
     sentence = (
         f"Against {one.phrase} the mean error of {item.rotation} goes from {np.min(one.mean_deg):+.1f} to "
-        f"{np.max(one.mean_deg):+.1f} degrees, {one.explained_deg:.1f} degrees in all: {verdict}."
+        f"{np.max(one.mean_deg):+.1f} degrees, {one.explained_deg:.1f} degrees in all; chance goes as far in "
+        f"{100 * one.probability:.1f} % of trials: {_verdict(item, one)}."
     )
     return svg(draw, 4.4, 3), sentence
+
+
+def _verdict(item: RotationFindings, one: Dependence) -> str:
+    if is_structure(one, item.rmse_deg):
+        return "this is structure"
+    if one.probability <= STRUCTURE_PROBABILITY:
+        return f"structure, but little of {item.rmse_deg:.1f} degrees"
+    return "it may be noise"
 
 
 def _worst_window(found: Residuals, column: int) -> tuple[TakeResiduals, np.ndarray]:

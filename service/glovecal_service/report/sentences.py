@@ -16,7 +16,7 @@ def in_one_sentence(numbers: Comparison, where: WhereItFails) -> str:
     over_all, worst = numbers.over_all, where.rotations[0]
     floor = over_all.floor
     least = "at least " if floor is not None and floor.is_lower_bound else ""
-    floor_of_all = f"the noise floor is {least}{floor.floor_deg:.2f}, " if floor is not None else ""
+    floor_of_all = f"the noise floor is {least}{floor.floor_deg:.2f}, and " if floor is not None else ""
     return (
         f"Over {counted(len(numbers.rotations), 'rotation')} the error is {over_all.rmse_deg:.2f} degrees "
         f"(RMSE); {floor_of_all}always answering the mean angle would be off by {over_all.baseline_deg:.1f}. "

@@ -69,7 +69,7 @@ def _sentence(models: Mapping[str, Comparison], rotations: list[str]) -> str:
     floor = smallest_floor(models, ALL)
     rest = ", ".join(f"{models[name].over_all.rmse_deg:.2f} for {name}" for name in others)
     least = "at least " if floor is not None and floor.is_lower_bound else ""
-    beside = f"; the noise floor is {least}{floor.floor_deg:.2f}" if floor is not None else ""
+    beside = f"; their smallest noise floor is {least}{floor.floor_deg:.2f}" if floor is not None else ""
     return (
         f"{first} has the smallest error, {models[first].over_all.rmse_deg:.2f} degrees over all rotations "
         f"({rest}){beside}. It is the best in {bests.count(first)} of {len(rotations)} rotations."

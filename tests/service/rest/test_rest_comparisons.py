@@ -95,6 +95,7 @@ def test_the_report_is_one_whole_page(glove: tuple[RestClient, str, list[str]]) 
     assert "script" not in outline.count
     assert outline.count["svg"] == outline.count["figure"] == outline.count["figcaption"] == 6
     assert "the reading of sensor B" in page
+    assert "chance goes as far in 0.1 % of trials: this is structure" in page
     assert "trained on 1 of these takes" in page
     assert "simulated" not in page
 
