@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.comparison.floor_estimate import NoiseFloor, joined
 from glovecal_models.comparison.residuals import Residuals, residuals
+from glovecal_models.comparison.rotation_noise import RotationNoise, rotation_noise
 from glovecal_models.takes.take import Take
 
 WITHIN_ONE_SD = 0.6827
@@ -28,8 +30,16 @@ class RotationErrors:
     """95 % of the absolute errors are at or below this."""
     coverage: float
     """Share of measurements within one claimed standard deviation; 0.68 is truthful."""
+    nlpd: float | None
+    """Mean negative log predictive density, nats: the mean of ln(sd sqrt(2 pi)) + 1/2 (error / sd)^2.
+
+    Smaller is better. A constant standard deviation that is as large as the RMSE has ln(RMSE) + 1.42; always
+    answering the mean angle has ln(baseline) + 1.42. None where a claimed standard deviation is 0 or missing.
+    """
     baseline_deg: float
     """Standard deviation of the measured angle: the error of always answering its mean."""
+    floor: NoiseFloor | None
+    """How small the RMSE can get on these measurements."""
 
 
 @dataclass(frozen=True)
@@ -64,16 +74,17 @@ def compare(model: CalibrationModel, takes: Sequence[Take]) -> Comparison:
     return summed_up(residuals(model, takes))
 
 
-def summed_up(found: Residuals) -> Comparison:
-    """Residuals as numbers: over all, for each rotation, for each pose."""
+def summed_up(found: Residuals, noise: Mapping[str, RotationNoise] | None = None) -> Comparison:
+    """Residuals as numbers: over all, for each rotation, for each pose. ``noise`` spares its time."""
+    noise = rotation_noise(found) if noise is None else noise
     error, spread, reference = (found.stacked(name) for name in ("error", "sd", "measured"))
     measured = found.measured_rotations
     columns = {name: [found.column(name)] for name in measured}
     in_takes = {name for item in found.takes for name in item.take.rotations}
     return Comparison(
-        over_all=_errors(error, spread, reference),
+        over_all=_errors(error, spread, reference, _floor_of_all(found, noise)),
         rotations={
-            name: _errors(error[:, column], spread[:, column], reference[:, column])
+            name: _errors(error[:, column], spread[:, column], reference[:, column], noise[name].floor)
             for name, column in columns.items()
         },
         poses=_pose_errors(error, np.concatenate([_poses(item.take) for item in found.takes])),
@@ -86,9 +97,19 @@ def _poses(take: Take) -> np.ndarray:
     return np.array(take.poses if take.poses is not None else [""] * len(take.time_s), dtype=object)
 
 
-def _errors(error: np.ndarray, spread: np.ndarray, reference: np.ndarray) -> RotationErrors:
+def _floor_of_all(found: Residuals, noise: Mapping[str, RotationNoise]) -> NoiseFloor | None:
+    """None when that of some rotation is unknown."""
+    counts = np.isfinite(found.stacked("error")).sum(axis=0)
+    pairs = [(noise[name].floor, counts[found.column(name)]) for name in found.measured_rotations]
+    known = [(floor, count) for floor, count in pairs if floor is not None]
+    return joined(*zip(*known, strict=True)) if known and len(known) == len(pairs) else None
+
+
+def _errors(
+    error: np.ndarray, spread: np.ndarray, reference: np.ndarray, floor: NoiseFloor | None
+) -> RotationErrors:
     usable = np.isfinite(error)
-    values = error[usable]
+    values, claimed = error[usable], spread[usable]
     counts = np.maximum(usable.sum(axis=0), 1)
     centred = reference - np.where(usable, reference, 0.0).sum(axis=0) / counts
     return RotationErrors(
@@ -97,9 +118,17 @@ def _errors(error: np.ndarray, spread: np.ndarray, reference: np.ndarray) -> Rot
         mae_deg=float(np.mean(np.abs(values))),
         bias_deg=float(np.mean(values)),
         percentile_95_deg=float(np.percentile(np.abs(values), 95)),
-        coverage=float(np.mean(np.abs(values) <= spread[usable])),
+        coverage=float(np.mean(np.abs(values) <= claimed)),
+        nlpd=_nlpd(values, claimed),
         baseline_deg=float(np.sqrt(np.mean(centred[usable] ** 2))),
+        floor=floor,
     )
+
+
+def _nlpd(values: np.ndarray, claimed: np.ndarray) -> float | None:
+    if not (np.isfinite(claimed) & (claimed > 0)).all():
+        return None
+    return float(np.mean(np.log(claimed * np.sqrt(2 * np.pi)) + 0.5 * (values / claimed) ** 2))
 
 
 def _pose_errors(error: np.ndarray, poses: np.ndarray) -> tuple[PoseErrors, ...]:

@@ -9,6 +9,10 @@ import numpy as np
 
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 
+POWER_ON = "power_on_s"
+"""The context column of seconds since the glove was switched on."""
+UNITS = {"v": "V", "c": "°C", "pct": "%", "s": "s", "n": "N", "g": "g"}
+"""What the end of a context column's name says of its unit: ``supply_v`` is in volts."""
 WINDOW_S = 0.1
 """Angle and speed are taken over about this long: shorter, they show the noise of the reference."""
 
@@ -18,7 +22,7 @@ class Covariate:
     """One column over all takes of a comparison, for one rotation."""
 
     name: str
-    """Such as "angle", "speed", "sensor I_PIP", "context temperature_c"."""
+    """Such as "angle", "speed", "sensor I_PIP", "time since power-on", "context temperature_c"."""
     unit: str
     phrase: str
     """How a sentence names it: "the angle itself"."""
@@ -41,7 +45,20 @@ def covariates(found: Residuals, rotation: str) -> Iterator[Covariate]:
         yield Covariate(f"sensor {sensor}", "counts", f"the reading of sensor {sensor}", readings)
     for name in dict.fromkeys(name for item in found.takes for name in item.take.context):
         values = tuple(_context(item, name) for item in found.takes)
-        yield Covariate(f"context {name}", "", f"the context column {name}", values)
+        yield _of_context(name, values)
+
+
+def context_unit(name: str) -> str:
+    """The unit of a context column by the end of its name; "" when that says nothing."""
+    before, _, ending = name.rpartition("_")
+    return UNITS.get(ending.lower(), "") if before else ""
+
+
+def _of_context(name: str, values: tuple[np.ndarray, ...]) -> Covariate:
+    unit = context_unit(name)
+    if name == POWER_ON:
+        return Covariate("time since power-on", unit, "how long the glove has been on", values)
+    return Covariate(f"context {name}", unit, f"the context column {name}", values)
 
 
 def _half_window(time: np.ndarray) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,14 +45,22 @@ def worst_stretches(found: Residuals, most: int = MOST) -> tuple[Stretch, ...]:
     return tuple(chosen)
 
 
+def windows(time: np.ndarray, length_s: float) -> Iterator[slice]:
+    """Frames of windows that overlap by half; the last one ends with the recording, so that none is short."""
+    if not len(time):
+        return
+    last = max(float(time[-1]) - length_s, float(time[0]))
+    for begin in (*np.arange(time[0], last, 0.5 * length_s), last):
+        first, end = np.searchsorted(time, [begin, begin + length_s])
+        if end > first:
+            yield slice(int(first), int(end))
+
+
 def _stretches(item: TakeResiduals, rotations: tuple[str, ...]) -> list[Stretch]:
     """Stretches that overlap by half."""
     time, squared = item.take.time_s, item.error**2
     found = []
-    begin = time[0] if len(time) else 0.0
-    while len(time) and begin < time[-1]:
-        rows = slice(*np.searchsorted(time, [begin, begin + STRETCH_S]))
-        begin += 0.5 * STRETCH_S
+    for rows in windows(time, STRETCH_S):
         part = squared[rows]
         counted = np.isfinite(part)
         if not counted.any():

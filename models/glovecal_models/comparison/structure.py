@@ -36,6 +36,8 @@ class Dependence:
     """Mean error in each bin, (B,)."""
     count: np.ndarray
     """Frames in each bin, (B,)."""
+    chance_deg: np.ndarray
+    """How far 95 % of the shifts take a bin's mean from the mean of all, (B,); NaN: not tested."""
     explained_deg: float
     """Root mean square of the bin means' deviation from their mean: what this column explains, degrees."""
     probability: float
@@ -60,10 +62,10 @@ def dependence(
     mean = np.bincount(where, error, minlength=bins) / np.maximum(count, 1)
     spread = float(np.sqrt(np.average((mean - error.mean()) ** 2, weights=count)))
     series = [_thinned(e - error.mean(), _bin(v, edges)) for e, v in pairs]
+    chance, probability = _against_shifts(series, bins, generator)
     return Dependence(
-        covariate.name, covariate.unit, covariate.phrase, edges, mean, count, spread,
-        _probability(series, bins, generator),
-    )  # fmt: skip
+        covariate.name, covariate.unit, covariate.phrase, edges, mean, count, chance, spread, probability
+    )
 
 
 def _bin(value: np.ndarray, edges: np.ndarray) -> np.ndarray:
@@ -77,20 +79,21 @@ def _thinned(error: np.ndarray, where: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return error[:length].reshape(-1, step).mean(axis=1), where[step // 2 : length : step]
 
 
-def _probability(
+def _against_shifts(
     series: list[tuple[np.ndarray, np.ndarray]], bins: int, generator: np.random.Generator
-) -> float:
-    """Share of the random shifts whose bin sums are spread as widely as the unshifted ones."""
+) -> tuple[np.ndarray, float]:
+    """What the shifts make of each bin's mean, and the share of them that spread the means as widely."""
     tested = [item for item in series if len(item[0]) >= FEWEST_STEPS]
     if not tested:
-        return 1.0
+        return np.full(bins, np.nan), 1.0
     sums, counts = np.zeros((SHIFTS + 1, bins)), np.zeros(bins)
     for error, where in tested:
         shifts = np.append(0, _random_shifts(len(error), generator))
         sums += _shifted_sums(error, where, bins)[:, shifts].T
         counts += np.bincount(where, minlength=bins)
     spread = np.sum(sums**2 / np.maximum(counts, 1), axis=1)
-    return float((1 + np.count_nonzero(spread[1:] >= spread[0])) / (SHIFTS + 1))
+    chance = np.percentile(np.abs(sums[1:] / np.maximum(counts, 1)), 95, axis=0)
+    return chance, float((1 + np.count_nonzero(spread[1:] >= spread[0])) / (SHIFTS + 1))
 
 
 def _random_shifts(length: int, generator: np.random.Generator) -> np.ndarray:

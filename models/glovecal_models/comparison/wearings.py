@@ -14,6 +14,8 @@ MOST_PARTITIONS = 2000
 FEWEST_PARTITIONS = 20
 """With fewer ways to share out the takes no answer can be better than one in twenty."""
 
+SELDOM = 0.05
+
 
 @dataclass(frozen=True)
 class WearingErrors:
@@ -28,6 +30,11 @@ class WearingErrors:
     probability: float | None
     """Share of other ways to deal the takes to wearings that spread as widely; None: too few takes to say."""
     sentence: str
+
+    @property
+    def is_no_noise(self) -> bool:
+        """Whether the error changes with the wearing by more than from take to take."""
+        return self.probability is not None and self.probability <= SELDOM
 
 
 def wearing_errors(found: Residuals, rotation: str, generator: np.random.Generator) -> WearingErrors | None:
@@ -57,7 +64,7 @@ def _sentence(names: tuple[str, ...], each: tuple[float, ...], probability: floa
     ends = f"from {each[low]:+.1f} degrees in wearing {names[low]} to {each[high]:+.1f} in {names[high]}"
     if probability is None:
         return f"The mean error goes {ends}; these are too few takes to say whether that is the wearing."
-    if probability <= 0.05:
+    if probability <= SELDOM:
         return f"The mean error changes with the wearing, {ends}."
     return f"The mean error goes {ends}, no more than it changes from take to take."
 

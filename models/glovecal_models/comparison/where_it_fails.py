@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from glovecal_models.comparison.covariates import covariates
-from glovecal_models.comparison.noise_floor import NoiseFloor, noise_floor
+from glovecal_models.comparison.error_spectrum import ErrorSpectrum
+from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.residuals import Residuals
+from glovecal_models.comparison.rotation_noise import RotationNoise, rotation_noise
 from glovecal_models.comparison.stretches import Stretch, worst_stretches
 from glovecal_models.comparison.structure import Dependence, dependence
 from glovecal_models.comparison.wearings import WearingErrors, wearing_errors
@@ -26,6 +29,15 @@ AT_FLOOR = 1.15
 
 
 @dataclass(frozen=True)
+class SlowShare:
+    """Share of an error's variance below 1 Hz, with its 95 % interval."""
+
+    share: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
 class RotationFindings:
     """One rotation: how far from its floor, and what its error depends on."""
 
@@ -33,6 +45,10 @@ class RotationFindings:
     rmse_deg: float
     bias_deg: float
     floor: NoiseFloor | None
+    other_floors: tuple[NoiseFloor, ...]
+    """Less good estimates of the floor."""
+    slow: SlowShare | None
+    """None: too little was measured without a gap."""
     dependences: tuple[Dependence, ...]
     """Every column tested, the one that explains most first."""
     wearings: WearingErrors | None
@@ -61,10 +77,11 @@ class WhereItFails:
         rotations = []
         for item in self.rotations:
             document = asdict(item)
-            document["dependences"] = list(document["dependences"])
+            for name in ("dependences", "other_floors"):
+                document[name] = list(document[name])
             for held, given in zip(document["dependences"], item.dependences, strict=True):
                 held["is_structure"] = is_structure(given, item.rmse_deg)
-                for name in ("edges", "mean_deg", "count"):
+                for name in ("edges", "mean_deg", "count", "chance_deg"):
                     held[name] = getattr(given, name).tolist()
             rotations.append(document)
         return {"rotations": rotations, "stretches": [asdict(item) for item in self.stretches]}
@@ -76,26 +93,38 @@ def is_structure(item: Dependence, rmse_deg: float) -> bool:
     return item.probability <= STRUCTURE_PROBABILITY and matters
 
 
-def where_it_fails(found: Residuals, *, seed: int = 0) -> WhereItFails:
-    """Every measured rotation against every column; same seed, same answer."""
+def where_it_fails(
+    found: Residuals, *, seed: int = 0, noise: Mapping[str, RotationNoise] | None = None
+) -> WhereItFails:
+    """Every measured rotation against every column; same seed, same answer. ``noise`` spares its time."""
     generator = np.random.default_rng(seed)
-    findings = [_findings(found, name, generator) for name in found.measured_rotations]
+    noise = rotation_noise(found, seed=seed) if noise is None else noise
+    findings = [_findings(found, name, noise[name], generator) for name in found.measured_rotations]
     findings.sort(key=lambda item: -_above_floor(item))
     return WhereItFails(tuple(findings), worst_stretches(found))
 
 
-def _findings(found: Residuals, rotation: str, generator: np.random.Generator) -> RotationFindings:
+def _findings(
+    found: Residuals, rotation: str, noise: RotationNoise, generator: np.random.Generator
+) -> RotationFindings:
     column = found.column(rotation)
     errors = tuple(item.error[:, column] for item in found.takes)
     tested = [dependence(errors, covariate, generator) for covariate in covariates(found, rotation)]
     ranked = sorted((item for item in tested if item is not None), key=lambda item: -item.explained_deg)
     every = np.concatenate(errors)
     rmse, bias = float(np.sqrt(np.nanmean(every**2))), float(np.nanmean(every))
-    floor = noise_floor(found, rotation, generator)
+    floor, slow = noise.floor, _slow_share(noise.spectrum)
     wearings = wearing_errors(found, rotation, generator)
+    sentence = _sentence(rotation, rmse, bias, floor, ranked, slow)
     return RotationFindings(
-        rotation, rmse, bias, floor, tuple(ranked), wearings, _sentence(rotation, rmse, bias, floor, ranked)
+        rotation, rmse, bias, floor, noise.floors[1:], slow, tuple(ranked), wearings, sentence
     )
+
+
+def _slow_share(spectrum: ErrorSpectrum | None) -> SlowShare | None:
+    if spectrum is None:
+        return None
+    return SlowShare(spectrum.slow_share, spectrum.slow_low, spectrum.slow_high)
 
 
 def _above_floor(item: RotationFindings) -> float:
@@ -104,7 +133,12 @@ def _above_floor(item: RotationFindings) -> float:
 
 
 def _sentence(
-    rotation: str, rmse: float, bias: float, floor: NoiseFloor | None, ranked: list[Dependence]
+    rotation: str,
+    rmse: float,
+    bias: float,
+    floor: NoiseFloor | None,
+    ranked: list[Dependence],
+    slow: SlowShare | None,
 ) -> str:
     structure = [item for item in ranked if is_structure(item, rmse)]
     start = f"{rotation} is off by {rmse:.1f} degrees"
@@ -116,7 +150,8 @@ def _sentence(
     if abs(bias) >= MOSTLY * rmse:
         start += f", mostly by a constant {bias:+.1f}"
     if not structure:
-        return f"{start}; no recorded column explains it."
+        slowly = "" if slow is None else f", and {100 * slow.share:.0f} % of its variance is slower than 1 Hz"
+        return f"{start}; no recorded column explains it{slowly}."
     first = structure[0]
     low, high = float(np.min(first.mean_deg)), float(np.max(first.mean_deg))
     rest = len(structure) - 1

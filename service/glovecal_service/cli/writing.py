@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
 
 from glovecal_service.cli.printing import out
 from glovecal_service.cli.refusal import Refusal
@@ -26,7 +27,7 @@ def require_place(*files: Path, overwrite: bool) -> None:
             raise Refusal(f"{file} exists already; name another file, or replace it with --overwrite")
 
 
-def write_whole(contents: Mapping[Path, bytes]) -> None:
+def write_whole(contents: Mapping[Path, bytes], *, tell: Console = out) -> None:
     """Write files beside their places and move them there, so that a full disk leaves no half of one."""
     for file, content in contents.items():
         unfinished = file.with_name(f".{file.name}.{os.getpid()}.part")
@@ -35,4 +36,4 @@ def write_whole(contents: Mapping[Path, bytes]) -> None:
             unfinished.replace(file)
         finally:
             unfinished.unlink(missing_ok=True)
-        out.print(f"Wrote {file}.")
+        tell.print(f"Wrote {file}.")

@@ -7,12 +7,20 @@ from html import escape
 from importlib.metadata import version
 
 from glovecal_models.calibration.comparison import Comparison, summed_up
-from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.comparison.residuals import residuals
+from glovecal_models.comparison.floor_estimate import ORDER, NoiseFloor
+from glovecal_models.comparison.residuals import Residuals, residuals
+from glovecal_models.comparison.rotation_noise import RotationNoise, rotation_noise
 from glovecal_models.comparison.where_it_fails import RotationFindings, WhereItFails, where_it_fails
 from glovecal_models.takes.take import Take
+from glovecal_service.report.closer_pictures import (
+    error_by_wearing,
+    measured_against_predicted,
+    spectrum_of,
+)
 from glovecal_service.report.pictures import error_against, errors_and_floors, heat_map, over_time
+from glovecal_service.report.reported_model import ReportedModel
 from glovecal_service.report.sentences import counted, floors_sentence, heat_sentence, in_one_sentence
+from glovecal_service.report.side_by_side import side_by_side
 
 LOOKED_AT_CLOSELY = 3
 """Rotations, those farthest above their floor."""
@@ -24,25 +32,34 @@ h1 { font-size: 1.5rem } h2 { font-size: 1.15rem; margin-top: 2.2rem }
 svg { max-width: 100%; height: auto } figure { margin: 1rem 0 } figcaption { color: #444 }
 table { border-collapse: collapse } .note { background: #fdf3e3; padding: .6rem 1rem }
 th, td { text-align: right; padding: .15rem .7rem; border-bottom: 1px solid #ddd }
-th:first-child, td:first-child { text-align: left }
+th:first-child, td:first-child { text-align: left } td { white-space: nowrap }
 .side { display: flex; flex-wrap: wrap; gap: 1rem } .side figure { flex: 1 1 24rem }
 """
 ERRORS = (
-    *("rotation", "RMSE", "mean |error|", "bias", "95 % below"),
-    *("within 1 sd", "noise floor", "its own spread"),
+    *("rotation", "RMSE", "noise floor", "mean |error|", "bias", "95 % below"),
+    *("within 1 sd", "NLPD", "its own spread"),
+)
+SCALES = (
+    "Degrees; noise floors with their 95 % intervals. Within 1 sd: 68 % is truthful. NLPD: mean negative log "
+    "predictive density in nats; a truthful standard deviation of constant size has ln(RMSE) + 1.42. Its own "
+    "spread: the error of always answering the mean angle."
+)
+FLOORS = (
+    "Every estimate that these takes allow, in degrees with 95 % intervals; the first one of a row counts. "
+    "Spectrum and frame to frame are lower bounds: noise with a memory is not in them."
 )
 
 
-def report_page(
-    model_id: str, model: CalibrationModel, takes: Sequence[Take], trained_on: Sequence[str]
-) -> str:
-    """HTML. Raises LayoutMismatch, and BadInput when nothing was measured."""
-    found = residuals(model, takes)
-    numbers, where = summed_up(found), where_it_fails(found)
+def report_page(main: ReportedModel, takes: Sequence[Take], beside: Sequence[ReportedModel] = ()) -> str:
+    """HTML, ``main`` looked at closely. Raises LayoutMismatch, and BadInput when nothing was measured."""
+    found = residuals(main.model, takes)
+    noise = rotation_noise(found)
+    numbers, where = summed_up(found, noise), where_it_fails(found, noise=noise)
     parts = [
-        f"<h1>Model {escape(model_id[:12])} against {counted(len(takes), 'take')}</h1>",
-        _what(model, takes, trained_on),
+        f"<h1>Model {escape(main.id[:12])} against {counted(len(takes), 'take')}</h1>",
+        _what(main, takes),
         f"<p><strong>{escape(in_one_sentence(numbers, where))}</strong></p>",
+        *_beside(main, numbers, takes, beside),
         "<h2>How far off, and how far it could be</h2>",
         _figure(errors_and_floors(where), floors_sentence(where)),
         _table(numbers, where),
@@ -50,16 +67,9 @@ def report_page(
         _figure(heat_map(where), heat_sentence(where)),
     ]
     for item in where.rotations[:LOOKED_AT_CLOSELY]:
-        parts += [f"<h2>{escape(item.rotation)}</h2>", f"<p>{escape(item.sentence)}</p>"]
-        parts.append(_figure(*over_time(found, item.rotation)))
-        close = (item.structure or item.dependences)[:2]
-        parts.append(
-            '<div class="side">' + "".join(_figure(*error_against(item, one)) for one in close) + "</div>"
-        )
-        if item.wearings is not None:
-            parts.append(f"<p>{escape(item.wearings.sentence)}</p>")
-    parts += ["<h2>The worst seconds</h2>", _stretches(where)]
-    title = f"Glovecal: model {escape(model_id[:12])}"
+        parts += _closely(item, found, noise[item.rotation])
+    parts += ["<h2>The worst seconds</h2>", _stretches(where), "<h2>Noise floors</h2>", _floors(where)]
+    title = f"Glovecal: model {escape(main.id[:12])}"
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
         f"<style>{STYLE}</style></head><body>{''.join(parts)}"
@@ -67,11 +77,39 @@ def report_page(
     )
 
 
+def _beside(
+    main: ReportedModel, numbers: Comparison, takes: Sequence[Take], beside: Sequence[ReportedModel]
+) -> list[str]:
+    """The part with several models, nothing for one."""
+    if not beside:
+        return []
+    models = {main.name: numbers}
+    models |= {other.name: summed_up(residuals(other.model, takes)) for other in beside}
+    notes = [_trained_on(other) for other in beside]
+    return ["<h2>Side by side</h2>", *notes, _figure(*side_by_side(models))]
+
+
+def _closely(item: RotationFindings, found: Residuals, noise: RotationNoise) -> list[str]:
+    """One rotation with its pictures."""
+    figures = [measured_against_predicted(found, item.rotation)]
+    if noise.spectrum is not None:
+        figures.append(spectrum_of(noise.spectrum, item.rotation))
+    figures += [error_against(item, one) for one in (item.structure or item.dependences)[:2]]
+    if item.wearings is not None:
+        figures.append(error_by_wearing(item.wearings))
+    return [
+        f"<h2>{escape(item.rotation)}</h2><p>{escape(item.sentence)}</p>",
+        _figure(*over_time(found, item.rotation)),
+        '<div class="side">' + "".join(_figure(*one) for one in figures) + "</div>",
+    ]
+
+
 def _figure(picture: str, sentence: str) -> str:
     return f"<figure>{picture}<figcaption>{escape(sentence)}</figcaption></figure>"
 
 
-def _what(model: CalibrationModel, takes: Sequence[Take], trained_on: Sequence[str]) -> str:
+def _what(main: ReportedModel, takes: Sequence[Take]) -> str:
+    model = main.model
     frames = sum(len(take.time_s) for take in takes)
     names = ", ".join(escape(take.name) for take in takes[:12]) + (" ..." if len(takes) > 12 else "")
     text = (
@@ -80,30 +118,50 @@ def _what(model: CalibrationModel, takes: Sequence[Take], trained_on: Sequence[s
     )
     if any(take.simulated for take in takes):
         text += '<p class="note">At least one of these takes comes from a <b>simulated</b> glove.</p>'
-    if trained_on:
-        text += (
-            f'<p class="note">The model was trained on {len(trained_on)} of these takes: such errors are '
-            "smaller than on takes it has not seen.</p>"
-        )
-    return text
+    return text + _trained_on(main)
+
+
+def _trained_on(one: ReportedModel) -> str:
+    if not one.trained_on:
+        return ""
+    return (
+        f'<p class="note">Model {escape(one.name)} was trained on {len(one.trained_on)} of these takes: such '
+        "errors are smaller than on takes it has not seen.</p>"
+    )
 
 
 def _table(numbers: Comparison, where: WhereItFails) -> str:
+    named = [("all", numbers.over_all)]
+    named += [(item.rotation, numbers.rotations[item.rotation]) for item in where.rotations]
+    rows = [
+        (
+            name, f"{one.rmse_deg:.2f}", _floor(one.floor), f"{one.mae_deg:.2f}", f"{one.bias_deg:+.2f}",
+            f"{one.percentile_95_deg:.2f}", f"{100 * one.coverage:.0f} %",
+            "-" if one.nlpd is None else f"{one.nlpd:.2f}", f"{one.baseline_deg:.1f}",
+        )
+        for name, one in named
+    ]  # fmt: skip
+    return f"{_rows(ERRORS, rows)}<p>{escape(SCALES)}</p>"
+
+
+def _floor(floor: NoiseFloor | None) -> str:
+    if floor is None:
+        return "unknown"
+    least = "at least " if floor.is_lower_bound else ""
+    return f"{least}{_with_interval(floor)}"
+
+
+def _with_interval(floor: NoiseFloor) -> str:
+    return f"{floor.floor_deg:.2f} ({floor.low_deg:.2f}-{floor.high_deg:.2f})"
+
+
+def _floors(where: WhereItFails) -> str:
     rows = []
     for item in where.rotations:
-        errors = numbers.rotations[item.rotation]
-        rows.append((
-            item.rotation, f"{errors.rmse_deg:.2f}", f"{errors.mae_deg:.2f}", f"{errors.bias_deg:+.2f}",
-            f"{errors.percentile_95_deg:.2f}", f"{100 * errors.coverage:.0f} %", _floor(item),
-            f"{errors.baseline_deg:.1f}",
-        ))  # fmt: skip
-    return f"{_rows(ERRORS, rows)}<p>Degrees.</p>"
-
-
-def _floor(item: RotationFindings) -> str:
-    if item.floor is None:
-        return "unknown"
-    return f"{'at least ' if item.floor.is_lower_bound else ''}{item.floor.floor_deg:.2f}"
+        every = (item.floor, *item.other_floors) if item.floor is not None else ()
+        cells = {one.how: _with_interval(one) for one in every}
+        rows.append((item.rotation, *(cells.get(how, "-") for how in ORDER)))
+    return f"{_rows(('rotation', *ORDER), rows)}<p>{escape(FLOORS)}</p>"
 
 
 def _stretches(where: WhereItFails) -> str:

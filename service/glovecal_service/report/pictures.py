@@ -7,12 +7,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
+from glovecal_models.comparison.stretches import windows
 from glovecal_models.comparison.structure import Dependence
-from glovecal_models.comparison.where_it_fails import RotationFindings, WhereItFails, is_structure
+from glovecal_models.comparison.where_it_fails import (
+    STRUCTURE_PROBABILITY,
+    RotationFindings,
+    WhereItFails,
+    is_structure,
+)
 from glovecal_service.report.drawing import FLOOR, MEASURED, MODEL, QUIET, figure_svg, svg
 
 MOST_POINTS = 1500
-MOST_COLUMNS = 24
+MOST_COLUMNS = 32
+LEADING = ("angle", "speed", "direction", "time in take", "time since power-on", "wearing")
+"""Columns that every heat map starts with; context and sensors follow."""
 SHOWN_S = 12.0
 
 
@@ -37,20 +45,20 @@ def errors_and_floors(where: WhereItFails) -> str:
 
 def heat_map(where: WhereItFails) -> str:
     """Rotations by columns: what share of the error each column explains; a dot where it is no noise."""
+    cells = {item.rotation: _cells(item) for item in where.rotations}
     sizes: dict[str, float] = {}
-    for item in where.rotations:
-        for one in item.dependences:
-            sizes[one.covariate] = max(sizes.get(one.covariate, 0.0), one.explained_deg)
-    columns = sorted(sizes, key=lambda name: -sizes[name])[:MOST_COLUMNS]
+    for of_rotation in cells.values():
+        for name, (explained, _) in of_rotation.items():
+            sizes[name] = max(sizes.get(name, 0.0), explained)
+    columns = sorted(sizes, key=lambda name: (*_place(name), -sizes[name]))[:MOST_COLUMNS]
     values = np.full((len(where.rotations), len(columns)), np.nan)
     dots = []
     for row, item in enumerate(where.rotations):
-        for one in item.dependences:
-            if one.covariate in columns:
-                column = columns.index(one.covariate)
-                values[row, column] = one.explained_deg / max(item.rmse_deg, 1e-12)
-                if is_structure(one, item.rmse_deg):
-                    dots.append((column, row))
+        for column, name in enumerate(columns):
+            explained, is_no_noise = cells[item.rotation].get(name, (np.nan, False))
+            values[row, column] = explained / max(item.rmse_deg, 1e-12)
+            if is_no_noise:
+                dots.append((column, row))
 
     def draw(axes: Axes) -> None:
         image = axes.imshow(values, cmap="Blues", aspect="auto", vmin=0, vmax=1)
@@ -61,6 +69,19 @@ def heat_map(where: WhereItFails) -> str:
         axes.figure.colorbar(image, ax=axes, label="share of the rotation's RMSE", shrink=0.8)
 
     return svg(draw, 2.5 + 0.32 * len(columns), 2.2 + 0.24 * len(where.rotations))
+
+
+def _place(name: str) -> tuple[int, bool]:
+    """Where a column stands in the heat map."""
+    return (LEADING.index(name) if name in LEADING else len(LEADING), not name.startswith("context "))
+
+
+def _cells(item: RotationFindings) -> dict[str, tuple[float, bool]]:
+    """For each column of the heat map: degrees explained, and whether that is no noise."""
+    cells = {one.covariate: (one.explained_deg, is_structure(one, item.rmse_deg)) for one in item.dependences}
+    if item.wearings is not None:
+        cells["wearing"] = (item.wearings.spread_deg, item.wearings.is_no_noise)
+    return cells
 
 
 def over_time(found: Residuals, rotation: str) -> tuple[str, str]:
@@ -99,20 +120,27 @@ def error_against(item: RotationFindings, one: Dependence) -> tuple[str, str]:
     unit = f", {one.unit}" if one.unit else ""
 
     def draw(axes: Axes) -> None:
+        band = (item.bias_deg - one.chance_deg, item.bias_deg + one.chance_deg)
+        axes.fill_between(middles, *band, color=QUIET, alpha=0.5, linewidth=0, label="95 % of chance")
         axes.axhline(0, color=QUIET)
         axes.plot(middles, one.mean_deg, "o-", color=MODEL)
+        axes.legend(frameon=False, fontsize=8)
         axes.set(xlabel=f"{one.covariate}{unit}", ylabel=f"mean error of {item.rotation}, degrees")
 
-    verdict = (
-        f"no more than {one.probability:.3f} by chance"
-        if is_structure(one, item.rmse_deg)
-        else "too little to tell from noise"
-    )
     sentence = (
         f"Against {one.phrase} the mean error of {item.rotation} goes from {np.min(one.mean_deg):+.1f} to "
-        f"{np.max(one.mean_deg):+.1f} degrees, {one.explained_deg:.1f} degrees in all: {verdict}."
+        f"{np.max(one.mean_deg):+.1f} degrees, {one.explained_deg:.1f} degrees in all; chance goes as far in "
+        f"{100 * one.probability:.1f} % of trials: {_verdict(item, one)}."
     )
     return svg(draw, 4.4, 3), sentence
+
+
+def _verdict(item: RotationFindings, one: Dependence) -> str:
+    if is_structure(one, item.rmse_deg):
+        return "this is structure"
+    if one.probability <= STRUCTURE_PROBABILITY:
+        return f"structure, but little of {item.rmse_deg:.1f} degrees"
+    return "it may be noise"
 
 
 def _worst_window(found: Residuals, column: int) -> tuple[TakeResiduals, np.ndarray]:
@@ -120,8 +148,7 @@ def _worst_window(found: Residuals, column: int) -> tuple[TakeResiduals, np.ndar
     best: tuple[float, TakeResiduals, slice] | None = None
     for item in found.takes:
         time, squared = item.take.time_s, item.error[:, column] ** 2
-        for begin in np.arange(time[0], time[-1], 0.5 * SHOWN_S) if len(time) > 1 else []:
-            rows = slice(*np.searchsorted(time, [begin, begin + SHOWN_S]))
+        for rows in windows(time, SHOWN_S):
             known = squared[rows][np.isfinite(squared[rows])]
             if len(known) > 1 and (best is None or known.mean() > best[0]):
                 best = (float(known.mean()), item, rows)

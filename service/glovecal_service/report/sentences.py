@@ -14,9 +14,12 @@ def counted(count: int, noun: str) -> str:
 def in_one_sentence(numbers: Comparison, where: WhereItFails) -> str:
     """Error with its scale, truthfulness, and where to look."""
     over_all, worst = numbers.over_all, where.rotations[0]
+    floor = over_all.floor
+    least = "at least " if floor is not None and floor.is_lower_bound else ""
+    floor_of_all = f"the noise floor is {least}{floor.floor_deg:.2f}, and " if floor is not None else ""
     return (
         f"Over {counted(len(numbers.rotations), 'rotation')} the error is {over_all.rmse_deg:.2f} degrees "
-        f"(RMSE); always answering the mean angle would be off by {over_all.baseline_deg:.1f}. "
+        f"(RMSE); {floor_of_all}always answering the mean angle would be off by {over_all.baseline_deg:.1f}. "
         f"{100 * over_all.coverage:.0f} % of the errors lie within one claimed standard deviation; 68 % "
         f"would be truthful. Most is to gain at {worst.rotation}."
     )
@@ -31,7 +34,7 @@ def floors_sentence(where: WhereItFails) -> str:
 
 
 def heat_sentence(where: WhereItFails) -> str:
-    """The darkest dot of the heat map."""
+    """The largest of what is no noise."""
     marked = [(item, one) for item in where.rotations for one in item.structure]
     if not marked:
         return "No recorded column explains more of any error than chance does."

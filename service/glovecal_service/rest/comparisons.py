@@ -12,9 +12,10 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.comparison.where_it_fails import where_it_fails
 from glovecal_service.report.page import report_page
+from glovecal_service.report.reported_model import ReportedModel
 from glovecal_service.rest.answers import change_problems
 from glovecal_service.rest.dependencies import Parts, PartsNeeded
-from glovecal_service.rest.names import Id, ModelInPath
+from glovecal_service.rest.names import Id, ModelInPath, ModelReference
 from glovecal_service.rest.plain import plain
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.records import ModelRecord
@@ -23,10 +24,35 @@ from glovecal_service.store.store import Store
 router = APIRouter(prefix="/models", tags=["models"])
 
 MOST_TAKES = 1000
+MOST_BESIDE = 7
 
 
 class Against(StrictBody):
     takes: Annotated[list[Id], Field(min_length=1, max_length=MOST_TAKES)]
+
+
+class AgainstBeside(Against):
+    beside: Annotated[list[ModelReference], Field(max_length=MOST_BESIDE)] = Field(
+        default=[], description="Other models, held against the same takes and shown beside this one."
+    )
+
+
+class Floor(BaseModel):
+    floor_deg: float | None = Field(description="How small an error can get on these measurements.")
+    low_deg: float | None = Field(description="95 % interval, from resampled pieces.")
+    high_deg: float | None
+    prediction_deg: float | None = Field(description="What of it is the prediction's own jitter.")
+    how: str = Field(
+        description="still hand, still joint, repeated poses, spectrum or frame to frame; the best first."
+    )
+    pieces: int = Field(description="Holds, repeats or blocks of time that it was pooled from.")
+    is_lower_bound: bool = Field(description="Noise with a memory is not in it.")
+
+
+class SlowShareView(BaseModel):
+    share: float | None = Field(description="Share of the error's variance below 1 Hz.")
+    low: float | None = Field(description="95 % interval, from resampled blocks of time.")
+    high: float | None
 
 
 class Errors(BaseModel):
@@ -38,7 +64,12 @@ class Errors(BaseModel):
     coverage: float | None = Field(
         description="Errors within one claimed standard deviation; 0.68 is truthful."
     )
+    nlpd: float | None = Field(
+        description="Mean negative log predictive density, nats; a truthful constant standard deviation has "
+        "ln(RMSE) + 1.42. Null where a claimed standard deviation is 0."
+    )
     baseline_deg: float | None = Field(description="Error of always answering the mean of the measurements.")
+    floor: Floor | None = Field(description="How small the RMSE can get; null: too little was measured.")
 
 
 class PoseErrors(BaseModel):
@@ -58,15 +89,6 @@ class ComparisonView(BaseModel):
     trained_on: list[str] = Field(description="Takes among those given that the model was trained on.")
 
 
-class Floor(BaseModel):
-    floor_deg: float | None = Field(description="How small an error can get on these measurements.")
-    low_deg: float | None
-    high_deg: float | None
-    prediction_deg: float | None = Field(description="What of it is the prediction's own jitter.")
-    how: str = Field(description='"frame to frame" is a lower bound.')
-    holds: int
-
-
 class DependenceView(BaseModel):
     covariate: str
     unit: str
@@ -74,6 +96,9 @@ class DependenceView(BaseModel):
     edges: list[float | None]
     mean_deg: list[float | None] = Field(description="Mean error in each bin.")
     count: list[int]
+    chance_deg: list[float | None] = Field(
+        description="How far 95 % of the time shifts take a bin's mean from the mean of all."
+    )
     explained_deg: float | None
     probability: float | None = Field(description="Share of time shifts that explain as much.")
     is_structure: bool = Field(description="No noise, and large enough to matter.")
@@ -94,6 +119,8 @@ class Findings(BaseModel):
     rmse_deg: float | None
     bias_deg: float | None
     floor: Floor | None
+    other_floors: list[Floor] = Field(description="Less good estimates of the floor.")
+    slow: SlowShareView | None
     dependences: list[DependenceView]
     wearings: WearingsView | None
     sentence: str
@@ -155,11 +182,16 @@ def where_model_fails(id: ModelInPath, body: Against, parts: PartsNeeded) -> dic
         }
     },
 )
-def report_on_model(id: ModelInPath, body: Against, parts: PartsNeeded) -> Response:
+def report_on_model(id: ModelInPath, body: AgainstBeside, parts: PartsNeeded) -> Response:
     """Errors, where they are, what they depend on; each picture with a sentence that says what it shows."""
     record, model, wanted, seen = _chosen(id, body, parts)
     takes = [parts.store.takes.load(take) for take in wanted]
-    page = report_page(record.id, model, takes, seen)
+    others = {}
+    for reference in body.beside:
+        other, loaded, _, also_seen = _chosen(reference, body, parts)
+        if other.id != record.id:
+            others[other.id] = ReportedModel(other.id, loaded, also_seen)
+    page = report_page(ReportedModel(record.id, model, seen), takes, list(others.values()))
     return Response(page, media_type="text/html; charset=utf-8")
 
 

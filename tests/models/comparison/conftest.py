@@ -32,13 +32,13 @@ def take_residuals() -> Callable[..., TakeResiduals]:
 
     def make(
         angle: np.ndarray, error: np.ndarray, other: np.ndarray, name: str = "one", wearing: str = "monday",
-        context: dict[str, np.ndarray] | None = None,
+        context: dict[str, np.ndarray] | None = None, poses: tuple[str, ...] | None = None,
     ) -> TakeResiduals:  # fmt: skip
         time = np.arange(len(angle)) / RATE_HZ
         readings = np.column_stack([100 + np.nan_to_num(angle), 100 + other])
         take = Take(
             name=name, wearing=wearing, sensors=("A", "B"), time_s=time, readings=readings, rotations=("A",),
-            reference_time_s=time, reference=angle[:, None], context=context or {},
+            reference_time_s=time, reference=angle[:, None], context=context or {}, poses=poses,
         )  # fmt: skip
         return TakeResiduals(take, (angle + error)[:, None], np.ones((len(angle), 1)), angle[:, None])
 

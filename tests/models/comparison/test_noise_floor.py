@@ -16,7 +16,7 @@ def test_still_holds_give_the_noise_whatever_the_error_between_them(take_residua
     floor = noise_floor(together(take_residuals(angle, error, angle)), "A", generator)
     assert floor is not None
     assert (floor.how, floor.is_lower_bound) == ("still hand", False)
-    assert floor.holds >= 8
+    assert floor.pieces >= 8
     assert floor.low_deg <= noise * 1.03
     assert floor.high_deg >= noise * 0.97
     assert floor.floor_deg == pytest.approx(noise, rel=0.1)

@@ -45,6 +45,7 @@ def test_a_planted_bend_is_found_with_its_size(slow):
     assert result.mean_deg[0] > 0.5 < result.mean_deg[-1]
     assert result.mean_deg[len(result.mean_deg) // 2] < 0
     assert result.count.sum() == 6000
+    assert result.mean_deg[0] > result.chance_deg[0]
 
 
 def test_columns_that_cannot_tell():

@@ -62,6 +62,7 @@ def test_the_worst_second_is_found_with_take_and_time(take_residuals, together):
     assert (first.take, first.rotation, first.rotation_rmse_deg) == ("two", "A", pytest.approx(9.0))
     assert first.start_s == pytest.approx(10.0)
     assert len(rest) == 4
+    assert all(one.end_s - one.start_s > 0.9 for one in rest)
     assert all(other.take != "two" or other.end_s <= 10 or other.start_s >= 10.9 for other in rest)
 
 

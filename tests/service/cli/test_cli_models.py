@@ -62,12 +62,29 @@ def test_models_are_compared_side_by_side_on_takes_they_have_not_seen(walked):
     everywhere = next(line.split() for line in beside.out.splitlines() if line.startswith("all"))
     assert everywhere[1:3] == [f"{raw:.2f}", f"{linear:.2f}"]
     assert "Careful" not in beside.err
+    floors = [results[id]["over_all"]["floor"] for id in ids]
+    floor = min(floors, key=lambda one: (one["is_lower_bound"], one["floor_deg"]))
+    interval = f"{floor['low_deg']:.2f}-{floor['high_deg']:.2f}"
+    assert everywhere[3] == (f">{floor['floor_deg']:.2f}" if floor["is_lower_bound"] else interval)
     one = run("compare", ids[1], "--poses", "--take", "second")
     assert "fist" in one.out
+    assert one.out.splitlines()[1].split()[:4] == ["rotation", "RMSE", "floor", "mean"]
+    assert "NLPD" in one.out
     assert max(map(len, one.out.splitlines())) <= 80
     seen = run("compare", ids[1], "-t", "poses", "-t", "second", "-t", "poses")
     assert seen.out.startswith("Against poses, second:\n")
     assert f"Careful: model {ids[1][:12]} was trained on take poses" in seen.err
+
+
+def test_a_page_with_both_models_is_written_beside_the_json(walked, tmp_path):
+    run, _, _ = walked
+    models = by_method(run)
+    page = tmp_path / "both.html"
+    answer = run("compare", *(models[m]["id"] for m in ("linear", "raw")), "--report", page, "--json")
+    assert list(answer.json) == [models[m]["id"] for m in ("linear", "raw")]
+    assert f"Wrote {page}" in answer.err
+    assert "Side by side" in page.read_text()
+    assert "exists already" in run("compare", models["raw"]["id"], "--report", page).said
 
 
 def test_comparing_agrees_with_the_exported_model(walked, tables, tmp_path):

@@ -34,6 +34,10 @@ def test_sentences_for_people_with_the_worst_rotation_first(trained: tuple[Run, 
     assert answer.out.index("is off by 1") < answer.out.index("is off by 2.")
     assert "noise floor" in answer.out
     assert "The worst seconds:" in answer.out
+    assert "Noise floors:" not in answer.out
+    floors = run("where", model[:8], "--floors").out
+    assert "repeated poses" in floors
+    assert "frame to frame" in floors
 
 
 def test_json_for_programs_and_a_page_for_everybody(trained: tuple[Run, str], tmp_path: Path) -> None:

@@ -79,6 +79,9 @@ def test_the_neighbour_is_named(glove: tuple[RestClient, str, list[str]]) -> Non
     assert "the reading of sensor B" in rotation["sentence"]
     assert len(found["stretches"]) == 5
     assert found["trained_on"] == []
+    floors = [rotation["floor"], *rotation["other_floors"]]
+    assert {"spectrum", "frame to frame"} <= {floor["how"] for floor in floors}
+    assert rotation["slow"]["low"] < rotation["slow"]["share"] < rotation["slow"]["high"]
     assert client.post(f"/models/{model}/where", {"takes": takes})["trained_on"] == takes[:1]
 
 
@@ -90,10 +93,43 @@ def test_the_report_is_one_whole_page(glove: tuple[RestClient, str, list[str]]) 
     assert outline.open == []
     assert outline.outside == []
     assert "script" not in outline.count
-    assert outline.count["svg"] == outline.count["figure"] == outline.count["figcaption"] == 4
+    assert outline.count["svg"] == outline.count["figure"] == outline.count["figcaption"] == 6
     assert "the reading of sensor B" in page
+    assert "chance goes as far in 0.1 % of trials: this is structure" in page
     assert "trained on 1 of these takes" in page
     assert "simulated" not in page
+
+
+def test_numbers_come_with_their_scales(glove: tuple[RestClient, str, list[str]]) -> None:
+    client, model, takes = glove
+    errors = client.post(f"/models/{model}/compare", {"takes": takes[1:]})["rotations"]["A"]
+    assert errors["floor"]["floor_deg"] < errors["rmse_deg"] < errors["baseline_deg"]
+    assert errors["floor"]["how"] == "still joint"
+    assert errors["nlpd"] > np.log(errors["rmse_deg"]) + 1.41  # it claims to know better than it does
+
+
+def test_models_stand_side_by_side_in_one_report(
+    tmp_path: Path, glove: tuple[RestClient, str, list[str]]
+) -> None:
+    client, model, takes = glove
+    body = {"subject": "anna", "layout": "two", "method": "raw", "takes": takes[:1], "folds": 0}
+    raw = client.wait_for_job(client.post("/models/train", body)["id"])["result"]["model"]
+    asked = {"takes": takes[1:], "beside": [raw[:8], model]}
+    page = client.page(f"/models/{model}/report", asked)
+    outline = Outline()
+    outline.feed(page)
+    assert outline.count["svg"] == outline.count["figcaption"] == 7
+    assert "Side by side" in page
+    rmse = {f"raw {raw[:6]}": 0.0, f"linear {model[:6]}": 0.0}
+    for name, id in zip(rmse, (raw, model), strict=True):
+        rmse[name] = client.post(f"/models/{id}/compare", {"takes": takes[1:]})["over_all"]["rmse_deg"]
+    best, other = sorted(rmse, key=lambda name: rmse[name])
+    assert f"{best} has the smallest error, {rmse[best]:.2f} degrees" in page
+    assert f"({rmse[other]:.2f} for {other})" in page
+    with pytest.raises(Refused, match="beside"):
+        client.page(f"/models/{model}/report", asked | {"beside": ["no model"]})
+    with pytest.raises(Refused, match="000000"):
+        client.page(f"/models/{model}/report", asked | {"beside": ["000000"]})
 
 
 def test_names_cannot_become_markup(tmp_path: Path, glove: tuple[RestClient, str, list[str]]) -> None:

@@ -1,0 +1,63 @@
+"""One estimate of a noise floor, with the interval that its own pieces give it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+How = Literal["still hand", "still joint", "repeated poses", "spectrum", "frame to frame"]
+ORDER: tuple[How, ...] = ("still hand", "still joint", "repeated poses", "spectrum", "frame to frame")
+"""The best first; ``noise_floor.py`` says why."""
+LOWER_BOUNDS: tuple[How, ...] = ("spectrum", "frame to frame")
+RESAMPLES = 500
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """The floor of one rotation with its 95 % interval, degrees."""
+
+    floor_deg: float
+    low_deg: float
+    high_deg: float
+    prediction_deg: float
+    """What the prediction alone jitters by; the reference is the rest."""
+    how: How
+    pieces: int
+    """Holds, repeats or blocks of time that it was pooled from, and resampled for the interval."""
+    is_lower_bound: bool = field(init=False)
+    """Noise with a memory is not in it."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "is_lower_bound", self.how in LOWER_BOUNDS)
+
+
+def pooled(
+    squares: np.ndarray, freedom: np.ndarray, jitter_deg: float, how: How, generator: np.random.Generator
+) -> NoiseFloor:
+    """Root of the sum of ``squares`` over the sum of ``freedom``, whole pieces resampled for the interval."""
+    drawn = generator.integers(0, len(squares), (RESAMPLES, len(squares)))
+    resampled = np.sqrt(squares[drawn].sum(axis=1) / freedom[drawn].sum(axis=1))
+    low, high = np.percentile(resampled, [2.5, 97.5])
+    floor = float(np.sqrt(squares.sum() / freedom.sum()))
+    return NoiseFloor(floor, float(low), float(high), jitter_deg, how, len(squares))
+
+
+def joined(floors: Sequence[NoiseFloor], weights: Sequence[float]) -> NoiseFloor:
+    """The floor of several rotations taken together, each weighted by its frames.
+
+    The rotations of one take share their holds, so their estimates may all be off the same way: the interval
+    joins the low ends, and the high ends. It is as good as the weakest way among them.
+    """
+    shares = np.array(weights, dtype=float) / np.sum(weights)
+
+    def root(name: str) -> float:
+        return float(np.sqrt(shares @ np.array([getattr(one, name) for one in floors]) ** 2))
+
+    how = ORDER[max(ORDER.index(one.how) for one in floors)]
+    pieces = min(one.pieces for one in floors)
+    return NoiseFloor(
+        root("floor_deg"), root("low_deg"), root("high_deg"), root("prediction_deg"), how, pieces
+    )

@@ -1,0 +1,86 @@
+"""The stretches of a take in which a joint is held still."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from glovecal_models.comparison.residuals import TakeResiduals
+
+STILL_DEG_PER_S = 6.0
+"""A joint that moves less than this over a hold is still."""
+STILL_SHARE = 0.1
+"""A sensor that changes by less than this share of its standard deviation is still."""
+SHORTEST_HOLD_S = 0.5
+SETTLED_S = 0.2
+"""The beginning of a hold is left out: lag and creep are no noise."""
+FEWEST_FRAMES = 5
+
+
+@dataclass(frozen=True)
+class Hold:
+    """The error of a joint that is held, without the beginning of the hold."""
+
+    frames: np.ndarray
+    """Rows of the take."""
+    time_s: np.ndarray
+    error: np.ndarray
+    predicted: np.ndarray
+    hand_is_still: bool
+
+    @property
+    def freedom(self) -> int:
+        return len(self.error) - 2
+
+    def square(self, values: np.ndarray) -> float:
+        """Sum of squares of ``values`` around their straight line: drift and creep are no noise."""
+        time, values = self.time_s - self.time_s.mean(), values - values.mean()
+        slope = float(time @ values) / float(time @ time)
+        return float(np.sum((values - slope * time) ** 2))
+
+
+def holds(item: TakeResiduals, column: int) -> list[Hold]:
+    """Where the joint of ``column`` is still, in the order of time."""
+    frames = np.flatnonzero(np.isfinite(item.measured[:, column]) & np.isfinite(item.error[:, column]))
+    time, angle, error = item.take.time_s[frames], item.measured[frames, column], item.error[frames, column]
+    predicted, readings = item.predicted[frames, column], item.take.readings[frames]
+    spread = readings.std(axis=0) if len(readings) else np.zeros(0)
+    found = []
+    start = 0
+    while start < len(time):
+        end = _end_of_hold(time, angle, start)
+        if time[end - 1] - time[start] >= SHORTEST_HOLD_S:
+            settled = int(np.searchsorted(time, time[start] + SETTLED_S))
+            if end - settled >= FEWEST_FRAMES:
+                rows = slice(settled, end)
+                still = _is_still(readings[rows], spread)
+                found.append(Hold(frames[rows], time[rows], error[rows], predicted[rows], still))
+            start = end
+        else:
+            start += max(1, (end - start) // 2)
+    return found
+
+
+def _is_still(readings: np.ndarray, spread: np.ndarray) -> bool:
+    """Whether no sensor changes over a hold by more than a small share of what it does in the take."""
+    thirds = np.array_split(readings, 3)
+    moved = np.ptp([part.mean(axis=0) for part in thirds], axis=0)
+    return bool((moved <= STILL_SHARE * spread).all())
+
+
+def _end_of_hold(time: np.ndarray, angle: np.ndarray, start: int) -> int:
+    """One past the last frame up to which the angle stays on a slope too small for motion.
+
+    Judged on means of neighbouring frames, so that the reference's own noise is not taken for motion.
+    """
+    step = max(1, int(np.searchsorted(time, time[start] + 0.1)) - start)
+    end = min(start + step, len(time))
+    before = angle[start:end].mean()
+    while end < len(time):
+        following = min(end + step, len(time))
+        after = angle[end:following].mean()
+        if abs(after - before) > STILL_DEG_PER_S * 0.1 or time[following - 1] - time[end - 1] > 0.5:
+            break
+        end, before = following, after
+    return end
