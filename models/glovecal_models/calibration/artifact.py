@@ -16,6 +16,7 @@ import numpy as np
 import safetensors
 import safetensors.numpy
 
+from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.calibration.regressor_kinds import restore_regressor
 from glovecal_models.errors import BadInput, DamagedArtifact
@@ -49,6 +50,13 @@ def dump(model: CalibrationModel) -> bytes:
                 "samples": item.samples,
             }
         )
+    for number, added in enumerate(model.effects):
+        tensors[f"effect{number}:shape"] = np.ascontiguousarray(added.shape, dtype=np.float64)
+        tensors[f"effect{number}:weights"] = np.ascontiguousarray(added.weights, dtype=np.float64)
+        tensors[f"effect{number}:zero_deg"] = np.ascontiguousarray(added.zero_deg, dtype=np.float64)
+    if model.sensor_centre is not None and model.sensor_scale is not None:
+        tensors["sensors:centre"] = np.ascontiguousarray(model.sensor_centre, dtype=np.float64)
+        tensors["sensors:scale"] = np.ascontiguousarray(model.sensor_scale, dtype=np.float64)
     manifest = {
         "format": FORMAT,
         "software": f"glovecal-models {version('glovecal-models')}",
@@ -61,6 +69,16 @@ def dump(model: CalibrationModel) -> bytes:
         "simulated": model.simulated,
         "rotations": rotations,
     }
+    if model.effects:
+        manifest["effects"] = [
+            {
+                "name": added.name,
+                "rotations": list(added.rotations),
+                "settings": added.settings,
+                "evidence": dict(added.evidence),
+            }
+            for added in model.effects
+        ]
     text = json.dumps(manifest, sort_keys=True, allow_nan=False)
     return safetensors.numpy.save(tensors, metadata={"manifest": text})
 
@@ -104,6 +122,11 @@ def _restore(manifest: Mapping[str, Any], tensors: Mapping[str, np.ndarray], nam
         subject=str(manifest["subject"]),
         method=str(manifest["method"]),
         rotations=tuple(_restore_rotation(item, tensors) for item in manifest["rotations"]),
+        effects=tuple(
+            _restore_effect(number, item, tensors) for number, item in enumerate(manifest.get("effects", []))
+        ),
+        sensor_centre=tensors.get("sensors:centre"),
+        sensor_scale=tensors.get("sensors:scale"),
         takes=tuple(str(item) for item in manifest["takes"]),
         parent=manifest["parent"],
         error_estimate=manifest["error_estimate"],
@@ -123,6 +146,18 @@ def _restore_rotation(item: Mapping[str, Any], tensors: Mapping[str, np.ndarray]
         uncertain_above_deg=float(item["uncertain_above_deg"]),
         held_out_rmse_deg=None if held_out is None else float(held_out),
         samples=int(item["samples"]),
+    )
+
+
+def _restore_effect(number: int, item: Mapping[str, Any], tensors: Mapping[str, np.ndarray]) -> AddedEffect:
+    return AddedEffect(
+        name=str(item["name"]),
+        rotations=tuple(str(name) for name in item["rotations"]),
+        settings=dict(item["settings"]),
+        shape=tensors[f"effect{number}:shape"],
+        weights=tensors[f"effect{number}:weights"],
+        zero_deg=tensors[f"effect{number}:zero_deg"],
+        evidence=dict(item["evidence"]),
     )
 
 

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from glovecal_models.calibration.added_effect import AddedEffect
+from glovecal_models.calibration.effect_correction import EffectCorrection, SignalScale
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.regression.regressor import Regressor
@@ -52,9 +54,19 @@ class CalibrationModel:
     """How the held-out error was estimated, and its value over all rotations."""
     simulated: bool = False
     """True when any training take came from a simulated glove."""
+    effects: tuple[AddedEffect, ...] = ()
+    """Named physical causes on top of the regressors, in the order in which they were added."""
+    sensor_centre: np.ndarray | None = None
+    """Mean reading of each sensor in training, (S,) raw counts; only where effects need it."""
+    sensor_scale: np.ndarray | None = None
+    """Standard deviation of each sensor's readings in training, (S,) raw counts."""
 
     def __post_init__(self) -> None:
         names = [item.rotation for item in self.rotations]
+        for added in self.effects:
+            unknown = set(added.rotations) - set(names)
+            if unknown:
+                raise BadInput(f"effect {added.name!r} is on {sorted(unknown)[0]}, which is not in the model")
         if len(set(names)) != len(names):
             raise BadInput(f"a calibration model must not hold a rotation twice: {names}")
         for item in self.rotations:
@@ -65,6 +77,14 @@ class CalibrationModel:
                     raise BadInput(
                         f"rule for {item.rotation} needs {sorted(missing)[0]}, which is not in the model"
                     )
+
+    def correction(self) -> EffectCorrection:
+        """What the effects add to the base's prediction; with a state of its own for a stream."""
+        sensors = self.layout.sensors
+        nothing = np.zeros(len(sensors))
+        centre = nothing if self.sensor_centre is None else self.sensor_centre
+        spread = nothing + 1 if self.sensor_scale is None else self.sensor_scale
+        return EffectCorrection(self.effects, self.rotation_names, SignalScale(sensors, centre, spread))
 
     @property
     def rotation_names(self) -> tuple[str, ...]:

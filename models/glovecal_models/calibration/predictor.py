@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from glovecal_models.calibration.effect_correction import EffectCorrection
 from glovecal_models.calibration.fused_processes import FusedProcesses, grouped_by_nodes, is_fusible
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.errors import BadInput
@@ -35,6 +36,7 @@ class GloveAngles:
 class GlovePredictor:
     """Predicts one frame or many with a calibration model.
 
+    ``predict`` is the regressors alone; ``predict_take`` and ``with_effects`` add the model's effects.
     Keeps work arrays between calls, so each thread needs a predictor of its own.
     """
 
@@ -48,6 +50,8 @@ class GlovePredictor:
         ]
         self._groups, self._others = _split(model, measured)
         self._rules = _ordered_rules(model)
+        self._model = model
+        self.has_effects = not model.correction().is_empty
         items = model.rotations
         self._noise = np.array([[item.regressor.noise_variance] for item in items])
         limits = [[item.uncertain_above_deg**2] for item in items]
@@ -83,6 +87,30 @@ class GlovePredictor:
             np.concatenate([block.sd for block in blocks]),
             np.concatenate([block.flags for block in blocks]),
         )
+
+    def predict_take(
+        self, time_s: np.ndarray, readings: np.ndarray, context: Mapping[str, np.ndarray], wearing: str
+    ) -> GloveAngles:
+        """Angles of a whole take (N frames), effects with a memory started at its first frame.
+
+        ``context`` holds columns (N,), NaN where unknown. Raises BadInput as ``predict`` does.
+        """
+        angles = self.predict(readings)
+        if not self.has_effects or not len(angles.mean):
+            return angles
+        correction = self._model.correction().of_take(time_s, angles.mean, readings, context, wearing)
+        return self.corrected(angles, correction)
+
+    def corrected(self, angles: GloveAngles, correction: np.ndarray) -> GloveAngles:
+        """``angles`` with the effects' ``correction`` (N, R) added; rules follow the rotations they read."""
+        mean = angles.mean + correction
+        for row, sources, weights in self._rules:
+            mean[:, row] = mean[:, sources] @ weights
+        return GloveAngles(mean, angles.sd, angles.flags)
+
+    def stream(self) -> EffectCorrection:
+        """The effects' state for one glove's frames, to be used with ``corrected``."""
+        return self._model.correction()
 
     def _predict_block(self, readings: np.ndarray) -> GloveAngles:
         columns = readings.T

@@ -9,6 +9,7 @@ import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
+from glovecal_models.calibration.realigned import realigned
 from glovecal_models.calibration.samples import require_layout
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.take import Take
@@ -62,7 +63,8 @@ def residuals(model: CalibrationModel, takes: Sequence[Take]) -> Residuals:
     for take in takes:
         require_layout(take, model.layout)
         index = [take.sensors.index(name) for name in model.layout.sensors]
-        angles = predictor.predict(take.readings[:, index])
+        angles = predictor.predict_take(take.time_s, take.readings[:, index], take.context, take.wearing)
+        take = realigned(model, take, angles.mean)
         found.append(TakeResiduals(take, angles.mean, angles.sd, take.reference_at_frames(names)))
     result = Residuals(names, tuple(found))
     if not found or not result.measured_rotations:

@@ -1,0 +1,83 @@
+"""What a model's effects add to its base's prediction: for a whole take, or frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from glovecal_models.calibration.added_effect import AddedEffect
+from glovecal_models.effects.effect import Signals
+
+
+class SignalScale:
+    """Sensors in standard deviations, as effects see their neighbours; the same in training and serving."""
+
+    def __init__(self, sensors: Sequence[str], centre: np.ndarray, scale: np.ndarray) -> None:
+        self.sensors, self.centre, self.scale = tuple(sensors), centre, np.maximum(scale, 1e-9)
+
+    def others(self, readings: np.ndarray) -> dict[str, np.ndarray]:
+        """Each sensor (N,), from ``readings`` (N, S) raw counts."""
+        return dict(zip(self.sensors, ((readings - self.centre) / self.scale).T, strict=True))
+
+
+class EffectCorrection:
+    """All effects of one model together."""
+
+    def __init__(
+        self, effects: Sequence[AddedEffect], rotations: Sequence[str], scale: SignalScale
+    ) -> None:
+        """``rotations``: the columns of the base's prediction."""
+        self._lanes = [
+            (item, np.array([list(rotations).index(name) for name in item.rotations]))
+            for item in effects
+            if item.weights.shape[1]
+        ]
+        self._scale = scale
+        self._streams = [item.effect.stream(item.settings, item.shape) for item, _ in self._lanes]
+
+    @property
+    def is_empty(self) -> bool:
+        return not self._lanes
+
+    def of_take(
+        self,
+        time_s: np.ndarray,
+        base: np.ndarray,
+        readings: np.ndarray,
+        context: Mapping[str, np.ndarray],
+        wearing: str,
+    ) -> np.ndarray:
+        """(N, R) degrees to add to ``base`` (N, R); ``readings`` (N, S) raw counts."""
+        total = np.zeros_like(base)
+        others = self._scale.others(readings) if self._lanes else {}
+        for item, lanes in self._lanes:
+            take = Signals(time_s, base[:, lanes], others, context, wearing, item.zero_deg)
+            columns = item.effect.columns(take, item.settings, item.shape)
+            total[:, lanes] += np.einsum("nlc,lc->nl", columns, item.weights)
+        return total
+
+    def of_frame(
+        self,
+        time_s: float,
+        base: np.ndarray,
+        readings: np.ndarray,
+        context: Mapping[str, float],
+        wearing: str,
+    ) -> np.ndarray:
+        """(R,) degrees to add to ``base`` (R,), the next frame of a stream; the same as in a take."""
+        total = np.zeros_like(base)
+        if not self._lanes:
+            return total
+        others = self._scale.others(readings[None, :])
+        time = np.array([time_s])
+        now = {name: np.array([value]) for name, value in context.items()}
+        for (item, lanes), stream in zip(self._lanes, self._streams, strict=True):
+            frame = Signals(time, base[None, lanes], others, now, wearing, item.zero_deg)
+            total[lanes] += np.einsum("lc,lc->l", stream.columns(frame)[0], item.weights)
+        return total
+
+    def reset(self) -> None:
+        """A new wearing, or frames were lost: effects with a memory start anew."""
+        for stream in self._streams:
+            stream.reset()
