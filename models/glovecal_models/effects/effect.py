@@ -50,6 +50,8 @@ class Signals:
     context: Mapping[str, np.ndarray] = field(default_factory=dict)
     """Context columns (N,) by name; NaN where unknown."""
     wearing: str = ""
+    take: str = ""
+    """Name of the take; it may tell which motion was done."""
 
     def __len__(self) -> int:
         return len(self.time_s)

@@ -1,6 +1,6 @@
-"""Clock offset: the reference system's clock and the glove's do not agree.
+"""Where the reference clock lies against the glove's, by scanning offsets take by take.
 
-A reference-side effect: it is repaired in the measurement, not predicted. Each take may have an offset of its
+The estimator of the effect ``clock_offset``. Each take may have an offset of its
 own (recorders are often started by hand). For each take the reference is read at shifted times, and the shift
 is wanted at which the sensors explain it best, by a linear map; then the takes of a wearing share one map and
 each offset is polished against it. Sensors played backwards get the same freedom: they show how small the
