@@ -55,7 +55,7 @@ class ClockOffset:
 
 
 @dataclass(frozen=True)
-class _Grid:
+class Grid:
     """One take on even times: readings there, and the reference as a function of the offset."""
 
     take: Take
@@ -64,9 +64,8 @@ class _Grid:
     columns: tuple[int, ...]
     """Reference columns that move."""
 
-    def reference(self, offset_s: float) -> np.ndarray:
-        """(N, R) at the times plus the offset, NaN outside the recording."""
-        at = self.time_s + offset_s
+    def reference(self, at: np.ndarray) -> np.ndarray:
+        """(N, R) at reference times (N,), NaN outside the recording."""
         known = [
             np.interp(at, self.take.reference_time_s, self.take.reference[:, column], np.nan, np.nan)
             for column in self.columns
@@ -76,7 +75,7 @@ class _Grid:
 
 def clock_offsets(takes: Sequence[Take]) -> tuple[ClockOffset, ...]:
     """One answer per take, in their order; takes of one wearing are judged together."""
-    grids = [_on_grid(take) for take in takes]
+    grids = [on_grid(take) for take in takes]
     scans = [None if grid is None else _scan(grid, grid.readings) for grid in grids]
     polished = _polished(takes, grids, [None if scan is None else _least(scan) for scan in scans])
     return tuple(
@@ -90,7 +89,7 @@ def aligned(take: Take, offset_s: float) -> Take:
     return replace(take, reference_time_s=take.reference_time_s - offset_s)
 
 
-def _on_grid(take: Take) -> _Grid | None:
+def on_grid(take: Take) -> Grid | None:
     """None when the take is too short, nothing was measured, or nothing moves."""
     if take.duration_s < SHORTEST_S or len(take.reference_time_s) < 10:
         return None
@@ -101,7 +100,7 @@ def _on_grid(take: Take) -> _Grid | None:
     count = int(take.duration_s * GRID_HZ) + 1
     time = take.time_s[0] + np.arange(count) / GRID_HZ
     readings = np.column_stack([np.interp(time, take.time_s, column) for column in take.readings.T])
-    return _Grid(take, time, readings, tuple(np.flatnonzero(moves).tolist()))
+    return Grid(take, time, readings, tuple(np.flatnonzero(moves).tolist()))
 
 
 def _offsets(width_s: float, step_s: float, centre_s: float = 0.0) -> np.ndarray:
@@ -112,9 +111,10 @@ def _offsets(width_s: float, step_s: float, centre_s: float = 0.0) -> np.ndarray
 _COARSE = _offsets(RANGE_S, COARSE_S)
 
 
-def _unexplained(grid: _Grid, readings: np.ndarray, offset_s: float) -> float:
-    """Share of the reference's variance that a ridge-linear map of ``readings`` leaves; NaN: no overlap."""
-    reference = grid.reference(offset_s)
+def unexplained(grid: Grid, readings: np.ndarray, at: np.ndarray) -> float:
+    """Share of the variance of the reference at times ``at`` (N,) that a ridge-linear map of ``readings``
+    leaves; NaN: no overlap."""
+    reference = grid.reference(at)
     known = np.isfinite(reference[:, 0])
     if known.mean() < LEAST_OVERLAP:
         return np.nan
@@ -127,9 +127,9 @@ def _unexplained(grid: _Grid, readings: np.ndarray, offset_s: float) -> float:
     return float(left / max(np.sum(y * y), 1e-12))
 
 
-def _scan(grid: _Grid, readings: np.ndarray) -> np.ndarray:
+def _scan(grid: Grid, readings: np.ndarray) -> np.ndarray:
     """The unexplained share at each of ``_COARSE``."""
-    return np.array([_unexplained(grid, readings, offset) for offset in _COARSE])
+    return np.array([unexplained(grid, readings, grid.time_s + offset) for offset in _COARSE])
 
 
 def _least(scan: np.ndarray) -> float:
@@ -137,7 +137,7 @@ def _least(scan: np.ndarray) -> float:
 
 
 def _polished(
-    takes: Sequence[Take], grids: Sequence[_Grid | None], coarse: Sequence[float | None]
+    takes: Sequence[Take], grids: Sequence[Grid | None], coarse: Sequence[float | None]
 ) -> list[float | None]:
     """Each offset against a map that the takes of a wearing share, in turns."""
     offsets = list(coarse)
@@ -152,7 +152,7 @@ def _polished(
     return offsets
 
 
-def _rows(grid: _Grid | None, offset_s: float | None) -> tuple[np.ndarray, np.ndarray]:
+def _rows(grid: Grid | None, offset_s: float | None) -> tuple[np.ndarray, np.ndarray]:
     """Readings with a one beside them, and every rotation's reference, where both are known."""
     assert grid is not None
     reference = _all_rotations(grid, offset_s or 0.0)
@@ -160,7 +160,7 @@ def _rows(grid: _Grid | None, offset_s: float | None) -> tuple[np.ndarray, np.nd
     return np.column_stack([np.ones(known.sum()), grid.readings[known]]), reference[known]
 
 
-def _all_rotations(grid: _Grid, offset_s: float) -> np.ndarray:
+def _all_rotations(grid: Grid, offset_s: float) -> np.ndarray:
     at, take = grid.time_s + offset_s, grid.take
     columns = [np.interp(at, take.reference_time_s, values, np.nan, np.nan) for values in take.reference.T]
     return np.column_stack(columns)
@@ -176,7 +176,7 @@ def _map(rows: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndar
 
 
 def _best_for_map(
-    grid: _Grid | None, centre_s: float | None, slope: np.ndarray, scale: np.ndarray
+    grid: Grid | None, centre_s: float | None, slope: np.ndarray, scale: np.ndarray
 ) -> float | None:
     assert grid is not None
     predicted = np.column_stack([np.ones(len(grid.readings)), grid.readings]) / scale @ slope
@@ -185,12 +185,12 @@ def _best_for_map(
     return float(offsets[int(np.argmin(left))])
 
 
-def _judged(take: Take, grid: _Grid | None, scan: np.ndarray | None, offset_s: float | None) -> ClockOffset:
+def _judged(take: Take, grid: Grid | None, scan: np.ndarray | None, offset_s: float | None) -> ClockOffset:
     if grid is None or scan is None or offset_s is None:
         sentence = f"Take {take.name}: the clocks cannot be judged; too short, or the reference never moves."
         return ClockOffset(take.name, "not judgeable", 0.0, -RANGE_S, RANGE_S, 1.0, 1.0, 1.0, sentence)
-    before = _unexplained(grid, grid.readings, 0.0)
-    after = _unexplained(grid, grid.readings, offset_s)
+    before = unexplained(grid, grid.readings, grid.time_s)
+    after = unexplained(grid, grid.readings, grid.time_s + offset_s)
     least = float(np.nanmin(_scan(grid, grid.readings[::-1])))
     near = _COARSE[scan <= 2.0 * after]
     low, high = (float(near.min()), float(near.max())) if len(near) else (offset_s, offset_s)
