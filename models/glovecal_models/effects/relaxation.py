@@ -26,8 +26,9 @@ def relax(state: np.ndarray, elapsed_s: np.ndarray, target: np.ndarray, tau_s: n
     shares = -np.expm1(-extended / tau_s)
     states = np.empty((len(elapsed_s), *state.shape))
     before = state
-    for share, aim, after in zip(which.tolist(), target, states, strict=True):
-        np.subtract(aim, before, out=after)
+    for frame, share in enumerate(which.tolist()):
+        after = states[frame, ...]
+        np.subtract(target[frame], before, out=after)
         np.multiply(shares[share], after, out=after)
         np.add(before, after, out=after)
         before = after

@@ -42,7 +42,9 @@ class SensorFault(SignatureEffect):
         errors: Sequence[np.ndarray] | None = None,
     ) -> tuple[Finding, ...]:
         check_signature_input(takes, sensor_of, errors)
-        rotation_of = {sensor: rotation for rotation, sensor in reversed(sensor_of.items())}
+        rotation_of: dict[str, str] = {}
+        for rotation, sensor in sensor_of.items():
+            rotation_of.setdefault(sensor, rotation)
         found: list[Finding] = []
         for sensor, rotation in rotation_of.items():
             found += _faults(takes, sensor, rotation)
