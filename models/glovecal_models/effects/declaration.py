@@ -21,7 +21,7 @@ from glovecal_models.names import check_channel_name, check_identifier
 LONGEST_TEXT = 2000
 MOST_PARAMETERS = 2
 MOST_COLUMNS = 8
-RESERVED = ("own", "own_deg", "t")
+RESERVED: tuple[str, ...] = ("own", "own_deg", "t")
 """The joint's signal in its standard deviations and in degrees, and the seconds since the take began."""
 _UNIT = re.compile(r"[A-Za-z0-9/%^_-]{1,20}\Z")
 _KEYS = ("name", "columns", "unit", "parameters", "ranges", "decoy", "explanation")

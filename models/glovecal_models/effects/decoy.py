@@ -102,11 +102,11 @@ def _dealt(takes: Sequence[Signals], generator: np.random.Generator) -> list[Sig
     raise BadInput("these takes can be dealt to wearings in one way only; record two takes in a wearing")
 
 
-def _permuted(wearings: Sequence[str], motions: Sequence[str], generator: np.random.Generator) -> list[str]:
-    dealt = list(wearings)
+def _permuted(wearings: list[str], motions: list[str], generator: np.random.Generator) -> list[str]:
+    dealt = wearings.copy()
     for motion in dict.fromkeys(motions):
         members = [index for index, other in enumerate(motions) if other == motion]
-        for index, source in zip(members, generator.permutation(members).tolist(), strict=True):
+        for index, source in zip(members, map(int, generator.permutation(members)), strict=True):
             dealt[index] = wearings[source]
     return dealt
 

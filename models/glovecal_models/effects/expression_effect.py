@@ -32,7 +32,7 @@ class ExpressionEffect(Effect):
         self.declaration = declaration
         shown = declaration.explanation or f"Declared by the user: {declaration.columns_text}."
         # Every other effect has these as attributes of its class; here each object has its own.
-        self.__dict__.update(
+        vars(self).update(
             name=declaration.name,
             explanation=shown,
             parameters=declaration.parameters,
@@ -99,7 +99,7 @@ class ExpressionEffect(Effect):
 
     def undefined_frames(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
         """(N,) True for frames in which some column of some lane has no value."""
-        return ~np.isfinite(self._evaluated(take, settings, shape)[0]).all(axis=(1, 2))
+        return np.isnan(self._evaluated(take, settings, shape)[0]).any(axis=(1, 2)).astype(bool)
 
     def stream(self, settings: Settings, shape: np.ndarray) -> ExpressionStream:
         return ExpressionStream(self, settings, shape)
@@ -125,7 +125,7 @@ class ExpressionEffect(Effect):
     ) -> dict[str, np.ndarray]:
         rest = np.zeros(len(take))
         values = [in_joint_units(take.own, settings), take.own, (take.time_s - start_s)[:, None]]
-        names = dict(zip(RESERVED, values, strict=True))
+        names: dict[str, np.ndarray] = dict(zip(RESERVED, values, strict=True))
         for column, item in enumerate(self.parameters):
             names[item.name] = shape[None, :, column]
         for name in self.declaration.signals:

@@ -119,7 +119,9 @@ def _problem(kind: str, operands: list[float]) -> str:
     if kind == "/":
         return "division by zero" if operands[1] == 0 else f"{operands[0]:g} / {operands[1]:g} is too large"
     if kind == "^":
-        return f"{operands[0]:g} ^ {operands[1]:g} has no real value"
+        wrong = "is too large" if operands[0] > 0 or operands[1] > 0 else "has no value"
+        wrong = "has no real value" if operands[0] < 0 and operands[1] % 1 else wrong
+        return f"{operands[0]:g} ^ {operands[1]:g} {wrong}"
     if kind == "lowpass":
         return f"low pass with a time constant of {operands[1]:g} s that is not positive and fixed"
     if kind in ("log", "sqrt"):

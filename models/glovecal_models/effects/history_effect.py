@@ -32,12 +32,14 @@ class HistoryEffect(Effect):
         """Columns (L, C) of the next frame; changes ``state`` in place."""
 
     def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
-        elapsed = elapsed_s(take.time_s)
-        parts = [
-            self._unbroken_columns(elapsed[part], take.own[part], settings, shape)
-            for part in unbroken(take.time_s)
-        ]
-        return np.concatenate(parts)
+        elapsed, frames = elapsed_s(take.time_s), len(take)
+        result = np.empty((frames, take.own.shape[1], len(self.weight_names(settings))))
+        for part in unbroken(take.time_s):
+            state = self.start(take.own[part.start], settings, shape)
+            for first in range(part.start, part.stop, BLOCK_FRAMES):
+                block = slice(first, min(first + BLOCK_FRAMES, part.stop))
+                result[block] = self.run(state, elapsed[block], take.own[block], settings, shape)
+        return result
 
     def stream(self, settings: Settings, shape: np.ndarray) -> Stream:
         return _HistoryStream(self, settings, shape)
@@ -51,15 +53,6 @@ class HistoryEffect(Effect):
         """
         each = zip(elapsed_s.tolist(), own, strict=True)
         return np.stack([self.step(state, elapsed, joint, settings, shape) for elapsed, joint in each])
-
-    def _unbroken_columns(
-        self, elapsed_s: np.ndarray, own: np.ndarray, settings: Settings, shape: np.ndarray
-    ) -> np.ndarray:
-        state = self.start(own[0], settings, shape)
-        blocks = [slice(first, first + BLOCK_FRAMES) for first in range(0, len(own), BLOCK_FRAMES)]
-        return np.concatenate(
-            [self.run(state, elapsed_s[block], own[block], settings, shape) for block in blocks]
-        )
 
 
 def elapsed_s(time_s: np.ndarray) -> np.ndarray:
