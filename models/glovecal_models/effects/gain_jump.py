@@ -2,7 +2,8 @@
 
 The reading is fitted by a line in the reference. One line for the whole take, one line on each side of the
 best moment, and one line that changes steadily with time: a jump is named only when two lines leave far less
-than both others, and when the error changes right there and not over seconds.
+than both others, and when the error steps right there within a few frames, as it does nowhere else. Postures
+that are held one after another also look like different lines, but no hand changes posture in a frame.
 """
 
 from __future__ import annotations
@@ -11,14 +12,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-SHORTEST_SIDE_S = 3.0
-LOCAL_S = 1.5
+SHORTEST_SIDE_S = 4.0
+SIDE_FRAMES = 2
+"""Frames on each side of a step that are averaged: few, for no hand changes posture so quickly."""
+SEARCHED_FRAMES = 12
+"""The best moment for two lines may be so far from the step."""
 LEAST_DEG = 3.0
 BETTER_THAN_ONE = 0.5
 """Share of the squared error of one line that two may leave."""
 BETTER_THAN_DRIFT = 0.7
-LOCAL_SHARE = 0.4
-"""Of the jump, to be seen within ``LOCAL_S`` on both sides of it."""
+STEP_SHARE = 0.5
+"""Of the change between the two lines at that angle."""
+TYPICAL_SHARE = 0.7
+"""Of the RMS of that change over the take, which the change at the step must reach."""
+STEP_OVER_OTHERS = 1.3
+"""The step over the largest ones elsewhere in the take (99.5 %)."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +61,8 @@ def gain_jump(time_s: np.ndarray, readings: np.ndarray, angles: np.ndarray) -> G
     change = base @ (after - before)
     # The slope across a jump mixes both sides; that of each side alone is the sensor's.
     slope = max(slope, 0.5 * (abs(before[1]) + abs(after[1])) / spread)
-    size = float(np.sqrt(np.mean(change**2))) / slope
-    if size < LEAST_DEG or not _is_local(time, y - base @ before, change, cut):
+    size = float(np.sqrt(np.mean(change**2)) / slope)
+    if size < LEAST_DEG or not _is_abrupt(y - base @ before, change, cut):
         return None
     return GainJump(float(time[cut]), size, two / max(one, 1e-300))
 
@@ -91,12 +99,15 @@ def _line_left(sums: np.ndarray) -> np.ndarray:
     return np.maximum(syy - np.where(sxx > 1e-9, sxy**2 / np.maximum(sxx, 1e-9), 0.0), 0.0)
 
 
-def _is_local(time: np.ndarray, error: np.ndarray, change: np.ndarray, cut: int) -> bool:
-    """Whether the error against the first line follows the change within ``LOCAL_S`` after the cut."""
-    near_before = (time < time[cut]) & (time >= time[cut] - LOCAL_S)
-    near_after = (time >= time[cut]) & (time <= time[cut] + LOCAL_S)
-    expected = float(np.sum(change[near_after] ** 2))
-    if expected <= 0 or not near_before.any():
-        return False
-    centred = error[near_after] - error[near_before].mean()
-    return float(np.sum(centred * change[near_after])) >= LOCAL_SHARE * expected
+def _is_abrupt(error: np.ndarray, change: np.ndarray, cut: int) -> bool:
+    """Whether the error against the first line steps near the cut by what the lines differ there."""
+    sums = np.cumsum(np.concatenate([[0.0], error]))
+    means = (sums[SIDE_FRAMES:] - sums[:-SIDE_FRAMES]) / SIDE_FRAMES
+    steps = np.zeros(len(error))
+    steps[SIDE_FRAMES : len(error) - SIDE_FRAMES + 1] = means[SIDE_FRAMES:] - means[:-SIDE_FRAMES]
+    near = np.abs(np.arange(len(error)) - cut) <= SEARCHED_FRAMES
+    here = float(np.abs(steps[near]).max())
+    # Where the two lines cross, no step could be seen, and none is believed.
+    expected = max(float(np.abs(change[near]).max()), TYPICAL_SHARE * float(np.sqrt(np.mean(change**2))))
+    elsewhere = float(np.percentile(np.abs(steps[~near]), 99.5))
+    return here >= STEP_SHARE * expected and here >= STEP_OVER_OTHERS * elsewhere

@@ -22,6 +22,9 @@ BAND = 0.04
 PILED_UP = 3.0
 SPREAD = 2.0
 LEAST_FRAMES = 30
+LEAST_VISITS = 4
+MOVES_SHARE = 0.25
+"""Of the reference's spread in the band, to be seen within visits to it: else the hand only rested there."""
 LEAST_EXTRA_DEG = 1.0
 """A smaller loss is not worth a word."""
 
@@ -122,7 +125,8 @@ def _end_band(
     if piled_up <= PILED_UP or spread <= SPREAD * usual:
         return None
     extra = float(np.sqrt(spread**2 - usual**2))
-    if extra < LEAST_EXTRA_DEG:
+    visits = np.cumsum(np.diff(end, prepend=False) != 0)[end]
+    if extra < LEAST_EXTRA_DEG or _moves_within(visits, angles[end]) < MOVES_SHARE * spread:
         return None
     towards = 1 if np.median(angles[end]) >= np.median(angles[beside]) else -1
     edges = sorted((sign * (top - width), sign * max(float(value.max()), float(top))))
@@ -130,6 +134,16 @@ def _end_band(
         sensor, rotation, float(edges[0]), float(edges[1]), "high" if sign > 0 else "low", towards, extra,
         float(piled_up), spread / max(usual, 1e-9), int(end.sum()),
     )  # fmt: skip
+
+
+def _moves_within(visits: np.ndarray, angles: np.ndarray) -> float:
+    """Spread of angles (M,) about the mean of each of the numbered visits (M,); 0 for too few visits."""
+    _, number = np.unique(visits, return_inverse=True)
+    frames = np.bincount(number)
+    if len(frames) < LEAST_VISITS:
+        return 0.0
+    means = np.bincount(number, angles) / frames
+    return float(np.sqrt(np.mean((angles - means[number]) ** 2)))
 
 
 def _finding(band: SaturatedBand) -> Finding:

@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from glovecal_models.effects.gain_jump import gain_jump
-from glovecal_models.effects.reading_faults import dropouts, spikes, stuck
+from glovecal_models.effects.reading_faults import GRADUAL_SHARE, dropouts, spikes, stuck
 from glovecal_models.effects.signature_effect import (
     Finding,
     SignatureEffect,
@@ -68,7 +68,10 @@ def _faults(takes: Sequence[Take], sensor: str, rotation: str) -> list[Finding]:
         for kind, mask in masks.items():
             stretches[kind] += stretches_of(take, mask)
             frames[kind] += int(mask.sum())
-        broken = masks["stuck"] | masks["dropouts"] | masks["spikes"]
+        margin = GRADUAL_SHARE * (high - low)
+        # Where a sensor may be saturated, a line through its readings means nothing.
+        at_an_end = (readings < low + margin) | (readings > high - margin)
+        broken = masks["stuck"] | masks["dropouts"] | masks["spikes"] | at_an_end
         jump = gain_jump(take.time_s, readings, np.where(broken, np.nan, angles))
         if jump is not None:
             jumps.append(jump)
