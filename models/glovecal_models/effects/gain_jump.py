@@ -2,8 +2,8 @@
 
 The reading is fitted by a line in the reference. One line for the whole take, one line on each side of the
 best moment, and one line that changes steadily with time: a jump is named only when two lines leave far less
-than both others, and when the error steps right there within a few frames, as it does nowhere else. Postures
-that are held one after another also look like different lines, but no hand changes posture in a frame.
+than both others, and when the error steps right there from one frame to the next, as it does nowhere else.
+Postures that are held one after another also look like two lines, but no hand changes posture in a frame.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glovecal_models.takes.examination import GAP_INTERVALS
+
 SHORTEST_SIDE_S = 4.0
-SIDE_FRAMES = 2
-"""Frames on each side of a step that are averaged: few, for no hand changes posture so quickly."""
 SEARCHED_FRAMES = 12
 """The best moment for two lines may be so far from the step."""
 LEAST_DEG = 3.0
@@ -27,6 +27,9 @@ TYPICAL_SHARE = 0.7
 """Of the RMS of that change over the take, which the change at the step must reach."""
 STEP_OVER_OTHERS = 1.3
 """The step over the largest ones elsewhere in the take (99.5 %)."""
+AROUND_FRAMES = 6
+STEP_OVER_AROUND = 2.0
+"""The step over any other within so many frames: a quick movement takes several."""
 
 
 @dataclass(frozen=True)
@@ -40,9 +43,14 @@ class GainJump:
     """Squared error with two lines over squared error with one."""
 
 
-def gain_jump(time_s: np.ndarray, readings: np.ndarray, angles: np.ndarray) -> GainJump | None:
-    """The largest jump of (N,) readings against (N,) reference degrees (NaN: not measured), or None."""
-    known = np.isfinite(angles)
+def gain_jump(
+    time_s: np.ndarray, readings: np.ndarray, angles: np.ndarray, in_line: np.ndarray
+) -> GainJump | None:
+    """The largest jump of (N,) readings against (N,) reference degrees (NaN: not to be used), or None.
+
+    ``in_line`` (N,) is False where a sensor may be saturated: such frames may show the step, but no line.
+    """
+    known = np.isfinite(angles) & in_line
     time, y, angle = time_s[known], readings[known], angles[known]
     if len(time) < 50 or time[-1] - time[0] < 2 * SHORTEST_SIDE_S or np.ptp(angle) < LEAST_DEG:
         return None
@@ -62,7 +70,12 @@ def gain_jump(time_s: np.ndarray, readings: np.ndarray, angles: np.ndarray) -> G
     # The slope across a jump mixes both sides; that of each side alone is the sensor's.
     slope = max(slope, 0.5 * (abs(before[1]) + abs(after[1])) / spread)
     size = float(np.sqrt(np.mean(change**2)) / slope)
-    if size < LEAST_DEG or not _is_abrupt(y - base @ before, change, cut):
+    if size < LEAST_DEG:
+        return None
+    shown = np.isfinite(angles)
+    every = np.column_stack([np.ones(shown.sum()), (angles[shown] - angle.mean()) / spread])
+    error, change = readings[shown] - every @ before, every @ (after - before)
+    if not _is_abrupt(time_s[shown], error, change, int(np.searchsorted(time_s[shown], time[cut]))):
         return None
     return GainJump(float(time[cut]), size, two / max(one, 1e-300))
 
@@ -99,15 +112,21 @@ def _line_left(sums: np.ndarray) -> np.ndarray:
     return np.maximum(syy - np.where(sxx > 1e-9, sxy**2 / np.maximum(sxx, 1e-9), 0.0), 0.0)
 
 
-def _is_abrupt(error: np.ndarray, change: np.ndarray, cut: int) -> bool:
+def _is_abrupt(time: np.ndarray, error: np.ndarray, change: np.ndarray, cut: int) -> bool:
     """Whether the error against the first line steps near the cut by what the lines differ there."""
-    sums = np.cumsum(np.concatenate([[0.0], error]))
-    means = (sums[SIDE_FRAMES:] - sums[:-SIDE_FRAMES]) / SIDE_FRAMES
-    steps = np.zeros(len(error))
-    steps[SIDE_FRAMES : len(error) - SIDE_FRAMES + 1] = means[SIDE_FRAMES:] - means[:-SIDE_FRAMES]
+    elapsed = np.diff(time, prepend=time[:1])
+    # Across frames that were left out a movement looks like a step.
+    adjacent = elapsed <= GAP_INTERVALS * float(np.median(elapsed))
+    steps = np.where(adjacent, np.abs(np.diff(error, prepend=error[:1])), 0.0)
     near = np.abs(np.arange(len(error)) - cut) <= SEARCHED_FRAMES
-    here = float(np.abs(steps[near]).max())
+    at = int(np.argmax(np.where(near, steps, -1.0)))
     # Where the two lines cross, no step could be seen, and none is believed.
-    expected = max(float(np.abs(change[near]).max()), TYPICAL_SHARE * float(np.sqrt(np.mean(change**2))))
-    elsewhere = float(np.percentile(np.abs(steps[~near]), 99.5))
-    return here >= STEP_SHARE * expected and here >= STEP_OVER_OTHERS * elsewhere
+    typical = float(np.sqrt(np.mean(change**2)))
+    expected = max(float(np.abs(change[near]).max()), TYPICAL_SHARE * typical)
+    around = np.concatenate([steps[max(at - AROUND_FRAMES, 0) : at], steps[at + 1 : at + 1 + AROUND_FRAMES]])
+    limit = max(
+        STEP_SHARE * expected,
+        STEP_OVER_OTHERS * float(np.percentile(steps[~near], 99.5)),
+        STEP_OVER_AROUND * float(around.max()),
+    )
+    return bool(steps[at] >= limit)

@@ -69,10 +69,9 @@ def _faults(takes: Sequence[Take], sensor: str, rotation: str) -> list[Finding]:
             stretches[kind] += stretches_of(take, mask)
             frames[kind] += int(mask.sum())
         margin = GRADUAL_SHARE * (high - low)
-        # Where a sensor may be saturated, a line through its readings means nothing.
-        at_an_end = (readings < low + margin) | (readings > high - margin)
-        broken = masks["stuck"] | masks["dropouts"] | masks["spikes"] | at_an_end
-        jump = gain_jump(take.time_s, readings, np.where(broken, np.nan, angles))
+        inside = (readings >= low + margin) & (readings <= high - margin)
+        broken = masks["stuck"] | masks["dropouts"] | masks["spikes"]
+        jump = gain_jump(take.time_s, readings, np.where(broken, np.nan, angles), inside)
         if jump is not None:
             jumps.append(jump)
             frames["jump"] += int((take.time_s >= jump.at_s).sum())
