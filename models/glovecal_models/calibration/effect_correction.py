@@ -24,9 +24,7 @@ class SignalScale:
 class EffectCorrection:
     """All effects of one model together."""
 
-    def __init__(
-        self, effects: Sequence[AddedEffect], rotations: Sequence[str], scale: SignalScale
-    ) -> None:
+    def __init__(self, effects: Sequence[AddedEffect], rotations: Sequence[str], scale: SignalScale) -> None:
         """``rotations``: the columns of the base's prediction."""
         self._lanes = [
             (item, np.array([list(rotations).index(name) for name in item.rotations]))

@@ -36,9 +36,7 @@ def realigned(model: CalibrationModel, take: Take, predicted: np.ndarray) -> Tak
 
 def offset_of(take: Take, rotations: tuple[str, ...], predicted: np.ndarray, width_s: float) -> float:
     """The offset (s) at which the reference is nearest to ``predicted`` (N, R)."""
-    columns = [
-        (take.rotations.index(name), i) for i, name in enumerate(rotations) if name in take.rotations
-    ]
+    columns = [(take.rotations.index(name), i) for i, name in enumerate(rotations) if name in take.rotations]
     scale = np.maximum(np.nanstd(take.reference, axis=0), 1.0)
 
     def misfit(offset_s: float) -> float:

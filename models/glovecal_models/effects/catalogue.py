@@ -5,10 +5,13 @@ A package of one's own adds an effect by an entry point that names its class; no
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import entry_points
+from typing import Any
 
-from glovecal_models.effects.effect import Effect
+from glovecal_models.effects.effect import Effect, Settings
+from glovecal_models.effects.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
 
 GROUP = "glovecal.effects"
@@ -36,3 +39,21 @@ def effect(name: str) -> Effect:
     if name not in known:
         raise BadInput(f"no effect {name!r}; there are {', '.join(known)}")
     return known[name]
+
+
+def declared_effect(declaration: str | Mapping[str, Any]) -> ExpressionEffect:
+    """A user's new effect from its line of text or JSON document. Raises BadInput, also for a taken name."""
+    if isinstance(declaration, str):
+        declared = ExpressionEffect.parse(declaration)
+    else:
+        declared = ExpressionEffect.from_document(declaration)
+    if declared.name in catalogue():
+        raise BadInput(f"there is an effect {declared.name!r} already; give yours another name")
+    return declared
+
+
+def stored_effect(name: str, settings: Settings) -> Effect:
+    """The effect of a stored model, declared ones included. Raises BadInput."""
+    if "declaration" in settings:
+        return ExpressionEffect.from_document(settings["declaration"])
+    return effect(name)

@@ -26,7 +26,7 @@ class ContextEffect(InstantEffect):
         return self.context[0]
 
     def settle(self, takes: Sequence[Signals]) -> Settings:
-        values = np.concatenate([take.context[self.column] for take in takes])
+        values = np.concatenate([take.context[self.column] for take in takes if self.column in take.context])
         values = values[np.isfinite(values)]
         return {
             "low": float(values.min()),
@@ -61,4 +61,5 @@ class ContextEffect(InstantEffect):
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         span = max(settings["high"] - settings["low"], 1e-9)
-        return (f"offset_deg_per_{span:.3g}", f"gain_deg_per_{span:.3g}_and_sd")
+        per = f"{span:.3g}[c.{self.column}]"
+        return (f"offset_deg_per_{per}", f"gain_deg_per_{per}_and_sd")

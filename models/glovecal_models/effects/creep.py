@@ -14,6 +14,7 @@ import numpy as np
 
 from glovecal_models.effects.effect import Parameter, Settings, Signals
 from glovecal_models.effects.history_effect import HistoryEffect
+from glovecal_models.effects.relaxation import relax, relax_once
 
 LONG_TO_SHORT = 5.0
 SLOW_S = (4.0, 6.5, 10.0, 16.0, 25.0, 40.0)
@@ -46,8 +47,14 @@ class Creep(HistoryEffect):
     def step(
         self, state: np.ndarray, elapsed_s: float, own: np.ndarray, settings: Settings, shape: np.ndarray
     ) -> np.ndarray:
-        state += -np.expm1(-elapsed_s / shape) * (own[:, None] - state)
+        relax_once(state, elapsed_s, own[:, None], shape)
         return state - own[:, None]
 
+    def run(
+        self, state: np.ndarray, elapsed_s: np.ndarray, own: np.ndarray, settings: Settings, shape: np.ndarray
+    ) -> np.ndarray:
+        relaxed = relax(state, elapsed_s, own[:, :, None], shape)
+        return relaxed - own[:, :, None]
+
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
-        return ("fast_share", "slow_share")
+        return ("fast_share_deg_per_deg", "slow_share_deg_per_deg")

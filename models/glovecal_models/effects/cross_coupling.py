@@ -39,7 +39,8 @@ class CrossCoupling(InstantEffect):
     def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
         lanes = take.own.shape[1]
         joint = in_joint_units(take.own, settings)[:, :, None]
-        others = np.column_stack([take.others[name] for name in settings["neighbours"]])[:, None, :]
+        rest = np.zeros(len(take))
+        others = np.column_stack([take.others.get(name, rest) for name in settings["neighbours"]])[:, None, :]
         others = np.repeat(others, lanes, axis=1)
         return np.concatenate([others, others * joint], axis=2)
 

@@ -25,7 +25,11 @@ class DonningShift(InstantEffect):
 
     def missing(self, takes: Sequence[Signals]) -> str | None:
         wearings = len({take.wearing for take in takes})
-        return None if wearings > 1 else "all takes are of one wearing"
+        if wearings < 2:
+            return "all takes are of one wearing"
+        if wearings == len(takes):
+            return "every wearing has only one take; record two in one of them"
+        return None
 
     def settle(self, takes: Sequence[Signals]) -> Settings:
         return {

@@ -52,6 +52,8 @@ class Signals:
     wearing: str = ""
     zero_deg: np.ndarray | None = None
     """(L,): where on the scale of ``own`` a raw reading of zero lies, by a straight line; None if unknown."""
+    take: str = ""
+    """Name of the take; it may tell which motion was done."""
 
     def __len__(self) -> int:
         return len(self.time_s)

@@ -48,8 +48,24 @@ class Hysteresis(HistoryEffect):
         np.maximum(joint - width, state, out=state)
         return state - joint
 
+    def run(
+        self, state: np.ndarray, elapsed_s: np.ndarray, own: np.ndarray, settings: Settings, shape: np.ndarray
+    ) -> np.ndarray:
+        width = (shape * WIDTHS).ravel()
+        # One long axis: numpy is slow where it has to broadcast along a short last one.
+        joint = np.repeat(own, len(WIDTHS), axis=1)
+        highest, lowest = joint + width, joint - width
+        plays = np.empty_like(highest)
+        before = state.ravel()
+        for high, low, play in zip(highest, lowest, plays, strict=True):
+            np.minimum(high, before, out=play)
+            np.maximum(low, play, out=play)
+            before = play
+        state[...] = before.reshape(state.shape)
+        return np.subtract(plays, joint, out=plays).reshape(len(own), *state.shape)
+
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
-        return tuple(f"play_{width:g}_of_widest" for width in WIDTHS)
+        return tuple(f"play_{width:g}_of_widest_deg_per_deg" for width in WIDTHS)
 
 
 def _turns(take: Signals) -> int:

@@ -19,6 +19,11 @@ def settle_joint_units(takes: Sequence[Signals]) -> Settings:
 
 def in_joint_units(own: np.ndarray, settings: Settings) -> np.ndarray:
     """(N, L) standard deviations from the centre; lanes may be the settled ones several times over."""
-    times = own.shape[1] // len(settings["own_scale_deg"])
-    scale = np.tile(settings["own_scale_deg"], times)
-    return (own - np.tile(settings["own_centre_deg"], times)) / np.maximum(scale, 1e-6)
+    lanes = own.shape[1]
+    scale = on_lanes(settings["own_scale_deg"], lanes)
+    return (own - on_lanes(settings["own_centre_deg"], lanes)) / np.maximum(scale, 1e-6)
+
+
+def on_lanes(settled: Sequence[float], lanes: int) -> np.ndarray:
+    """(lanes,): the settled values, repeated as a whole while several shapes are tried at once."""
+    return np.tile(settled, lanes // len(settled))

@@ -13,6 +13,7 @@ import numpy as np
 
 from glovecal_models.effects.effect import Parameter, Settings, Signals
 from glovecal_models.effects.history_effect import HistoryEffect
+from glovecal_models.effects.relaxation import relax, relax_once
 
 TAU_S = (0.02, 0.03, 0.045, 0.065, 0.1, 0.15)
 FAST_SHARE = 1.0
@@ -38,11 +39,17 @@ class Lag(HistoryEffect):
     def step(
         self, state: np.ndarray, elapsed_s: float, own: np.ndarray, settings: Settings, shape: np.ndarray
     ) -> np.ndarray:
-        state += -np.expm1(-elapsed_s / shape) * (own[:, None] - state)
+        relax_once(state, elapsed_s, own[:, None], shape)
         return own[:, None] - state
 
+    def run(
+        self, state: np.ndarray, elapsed_s: np.ndarray, own: np.ndarray, settings: Settings, shape: np.ndarray
+    ) -> np.ndarray:
+        relaxed = relax(state, elapsed_s, own[:, :, None], shape)
+        return own[:, :, None] - relaxed
+
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
-        return ("lead",)
+        return ("lead_deg_per_deg",)
 
 
 def _speed(take: Signals) -> float:

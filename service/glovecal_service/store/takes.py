@@ -10,7 +10,7 @@ import numpy as np
 from sqlalchemy import Connection, Row, delete, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
-from glovecal_models.effects.clock_offset import aligned
+from glovecal_models.effects.clock_scan import aligned
 from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier
 from glovecal_models.takes.pose_names import poses_at_frames

@@ -1,0 +1,17 @@
+"""No effect: the calibration as it is, as an object that answers like every other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from glovecal_models.effects.columnless_effect import ColumnlessEffect
+from glovecal_models.effects.effect import Signals
+
+
+class NoEffect(ColumnlessEffect):
+    name = "no_effect"
+    explanation = "Nothing is missing: what remains is noise."
+    source = "the null hypothesis"
+
+    def missing(self, takes: Sequence[Signals]) -> str | None:
+        return None

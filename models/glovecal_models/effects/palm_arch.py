@@ -1,0 +1,55 @@
+"""Palm arch: hollowing the palm moves thumb and little finger, and pulls at their sensors.
+
+Linear terms of the palm-arch sensor and of the thumb's roll and abduction, as in Krnoul et al. 2016: the
+little finger's metacarpal follows the palm sensor (equation 2) and hands 75 % of it to its flexion (3), the
+thumb's abduction (4) gets a gain of the palm sensor added (5). Gains are learned here, 75 % included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from glovecal_models.effects.effect import Decoy, InstantEffect, Settings, Signals
+
+PALM = "PALM_ARCH"
+SIGNALS = (PALM, "T_TMC", "TI_ABD")
+
+
+class PalmArch(InstantEffect):
+    name = "palm_arch"
+    explanation = "Hollowing the palm pulls at this sensor, most of all at thumb and little finger."
+    source = "Krnoul, Kanis, Zelezny, Muller 2016, section 3.3.3, equations 2 to 5"
+    decoy: ClassVar[Decoy] = "rolled in time"
+
+    def missing(self, takes: Sequence[Signals]) -> str | None:
+        known = [take.others[PALM] for take in takes if PALM in take.others]
+        if not known:
+            return f"no palm arch sensor ({PALM}) is among the other signals"
+        if np.ptp(np.concatenate(known)) <= 1e-6:
+            return f"the palm arch sensor ({PALM}) never moves"
+        return None
+
+    def settle(self, takes: Sequence[Signals]) -> Settings:
+        ranges: dict[str, list[float]] = {}
+        for name in SIGNALS:
+            known = [take.others[name] for take in takes if name in take.others]
+            if known:
+                values = np.concatenate(known)
+                ranges[name] = [float(values.min()), float(values.max())]
+        return {"signals": ranges}
+
+    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
+        return np.zeros((1, takes[0].own.shape[1], 0))
+
+    def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        rest = np.zeros(len(take))
+        result = np.empty((len(take), take.own.shape[1], len(settings["signals"])))
+        for column, (name, (low, high)) in enumerate(settings["signals"].items()):
+            result[:, :, column] = np.clip(take.others.get(name, rest), low, high)[:, None]
+        return result
+
+    def weight_names(self, settings: Settings) -> tuple[str, ...]:
+        return tuple(f"deg_per_sd[{name}]" for name in settings["signals"])

@@ -1,0 +1,133 @@
+"""Repeated samples: a recorder that missed a frame wrote the one before again.
+
+A hand at rest repeats 8-bit frames too. Padding shows inside a movement: a sensor goes on in the same
+direction right before and right after a frame (or a run of frames) in which nothing at all has changed. The
+same is looked for in the rows of the reference, whose padding is usual when it is slower than its file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from glovecal_models.effects.effect import Side
+from glovecal_models.effects.signature_effect import (
+    Finding,
+    SignatureEffect,
+    check_signature_input,
+    named,
+    smallest_step,
+)
+from glovecal_models.takes.take import Take
+
+LEAST_SHARE = 0.02
+"""Of the moments inside a movement."""
+LEAST_COUNT = 10
+CLEAR_STEP = 2.0
+"""A sensor moves for certain when it steps by so many quanta in one frame."""
+NEAR_FRAMES = 5
+"""A repeat is dropped when something moves clearly within so many frames; a hand at rest keeps its own."""
+
+
+@dataclass(frozen=True)
+class Repeats:
+    """The repeats among N rows."""
+
+    rows: np.ndarray
+    """(N,) True for a row that repeats the one before it and stands in or near a movement."""
+    interrupted: int
+    """Repeats in the middle of a movement that goes on afterwards."""
+    moving: int
+    """Steps in the middle of a movement, for comparison."""
+
+    @property
+    def share(self) -> float:
+        return self.interrupted / max(self.interrupted + self.moving, 1)
+
+
+class RepeatedSamples(SignatureEffect):
+    name = "repeated_samples"
+    explanation = "Lost samples were filled with the one before: the recording halts and jumps."
+    source = "padded samples of recorders without synchronisation: docs.optitrack.com, Manus in Motive"
+    side: ClassVar[Side] = "reference"
+
+    def find(
+        self,
+        takes: Sequence[Take],
+        sensor_of: Mapping[str, str],
+        errors: Sequence[np.ndarray] | None = None,
+    ) -> tuple[Finding, ...]:
+        check_signature_input(takes, sensor_of, errors)
+        frames = [repeats(take.readings) for take in takes]
+        rows = [repeats(take.reference) for take in takes]
+        found = [_finding("frames", takes, frames), _finding("reference rows", takes, rows)]
+        return tuple(item for item in found if item is not None)
+
+    def repaired(self, takes: Sequence[Take]) -> tuple[Take, ...]:
+        """Without the repeated frames; repeated reference rows become unknown (NaN)."""
+        drop_frames = _is_found([repeats(take.readings) for take in takes])
+        drop_rows = _is_found([repeats(take.reference) for take in takes])
+        return tuple(_without(take, drop_frames, drop_rows) for take in takes)
+
+
+def repeats(values: np.ndarray) -> Repeats:
+    """Repeats among rows of (N, K) values; a value that is NaN in both rows counts as repeated."""
+    if len(values) < 3 or not values.size:
+        return Repeats(np.zeros(len(values), dtype=bool), 0, 0)
+    steps = np.diff(values, axis=0)
+    same = np.concatenate([[False], ((steps == 0) | (np.isnan(steps))).all(axis=1)])
+    same &= np.isfinite(values).any(axis=1)
+    fresh = np.flatnonzero(~same)
+    quantum = np.array([smallest_step(column) for column in values.T])
+    limit = np.where(quantum > 0, CLEAR_STEP * quantum, np.inf)
+    between = np.nan_to_num(np.diff(values[fresh], axis=0))
+    clear = np.where(np.abs(between) >= limit, np.sign(between), 0.0)
+    # Of each fresh row but first and last: some column steps clearly the same way before and after it.
+    goes_on = ((clear[1:] * clear[:-1]) > 0).any(axis=1)
+    padded = np.diff(fresh)[1:] > 1
+    moving = np.zeros(len(values), dtype=bool)
+    moving[fresh[1:]] = (clear != 0).any(axis=1)
+    near = np.convolve(moving, np.ones(2 * NEAR_FRAMES + 1), mode="same") > 0
+    return Repeats(same & near, int((goes_on & padded).sum()), int((goes_on & ~padded).sum()))
+
+
+def _is_found(found: Sequence[Repeats]) -> bool:
+    interrupted, moving = sum(item.interrupted for item in found), sum(item.moving for item in found)
+    return interrupted >= LEAST_COUNT and interrupted >= LEAST_SHARE * (interrupted + moving)
+
+
+def _finding(kind: str, takes: Sequence[Take], found: Sequence[Repeats]) -> Finding | None:
+    if not _is_found(found):
+        return None
+    concerned = [(take, item) for take, item in zip(takes, found, strict=True) if item.interrupted]
+    count = sum(int(item.rows.sum()) for _, item in concerned)
+    total = sum(len(item.rows) for item in found)
+    interrupted = sum(item.interrupted for item in found)
+    share = interrupted / (interrupted + sum(item.moving for item in found))
+    names = tuple(take.name for take, _ in concerned)
+    sentence = (
+        f"{count} of {total} {kind} repeat the one before in the middle of a movement "
+        f"({named(names)}); they were filled in and should be dropped."
+    )
+    evidence = {"repeated_share_of_moving_pct": 100.0 * share, "interrupted_movements_count": interrupted}
+    return Finding(RepeatedSamples.name, names, sentence, kind=kind, count=count, evidence=evidence)
+
+
+def _without(take: Take, drop_frames: bool, drop_rows: bool) -> Take:
+    if drop_rows and len(take.reference):
+        unknown = repeats(take.reference).rows[:, None]
+        take = replace(take, reference=np.where(unknown, np.nan, take.reference))
+    if drop_frames:
+        keep = ~repeats(take.readings).rows
+        poses = take.poses
+        take = replace(
+            take,
+            time_s=take.time_s[keep],
+            readings=take.readings[keep],
+            context={name: column[keep] for name, column in take.context.items()},
+            poses=None if poses is None else tuple(np.array(poses, dtype=object)[keep].tolist()),
+        )
+    return take

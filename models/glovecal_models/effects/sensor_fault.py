@@ -1,0 +1,105 @@
+"""Sensor fault: a broken wire, a loose plug. The stretches concerned should not train anything.
+
+Four signatures: *stuck* (one value while the reference moves), *spikes* (gone after a frame or two),
+*dropouts* (jumps to a constant and back) and a *jump* of gain or offset in the middle of a take.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from glovecal_models.effects.gain_jump import gain_jump
+from glovecal_models.effects.reading_faults import GRADUAL_SHARE, dropouts, spikes, stuck
+from glovecal_models.effects.signature_effect import (
+    Finding,
+    SignatureEffect,
+    Stretch,
+    check_signature_input,
+    named,
+    stretches_of,
+)
+from glovecal_models.takes.take import Take
+
+REFERENCE_MOVES_DEG = 10.0
+"""The reference must travel so far while a sensor stands still."""
+LEAST_SPIKES = 3
+LEAST_OF_RANGE = (0.5, 99.5)
+
+
+class SensorFault(SignatureEffect):
+    name = "sensor_fault"
+    explanation = "A wire or plug fails: the sensor stands still, spikes, drops out or jumps."
+    source = "signatures of readings against reference"
+    kinds: ClassVar[tuple[str, ...]] = ("stuck", "spikes", "dropouts", "jump")
+
+    def find(
+        self,
+        takes: Sequence[Take],
+        sensor_of: Mapping[str, str],
+        errors: Sequence[np.ndarray] | None = None,
+    ) -> tuple[Finding, ...]:
+        check_signature_input(takes, sensor_of, errors)
+        rotation_of: dict[str, str] = {}
+        for rotation, sensor in sensor_of.items():
+            rotation_of.setdefault(sensor, rotation)
+        found: list[Finding] = []
+        for sensor, rotation in rotation_of.items():
+            found += _faults(takes, sensor, rotation)
+        return tuple(sorted(found, key=lambda item: (-len(item.stretches), item.where)))
+
+
+def _faults(takes: Sequence[Take], sensor: str, rotation: str) -> list[Finding]:
+    columns = [take.readings[:, take.sensors.index(sensor)] for take in takes]
+    low, high = (float(v) for v in np.percentile(np.concatenate(columns), LEAST_OF_RANGE))
+    stretches: dict[str, list[Stretch]] = {kind: [] for kind in SensorFault.kinds}
+    frames = dict.fromkeys(SensorFault.kinds, 0)
+    jumps = []
+    for take, readings in zip(takes, columns, strict=True):
+        angles = take.reference_at_frames([rotation])[:, 0]
+        masks = {
+            "stuck": stuck(take.time_s, readings, low, high, angles / REFERENCE_MOVES_DEG),
+            "dropouts": dropouts(readings, high - low),
+        }
+        masks["dropouts"] &= ~masks["stuck"]
+        masks["spikes"] = spikes(readings, high - low) & ~masks["dropouts"]
+        for kind, mask in masks.items():
+            stretches[kind] += stretches_of(take, mask)
+            frames[kind] += int(mask.sum())
+        margin = GRADUAL_SHARE * (high - low)
+        inside = (readings >= low + margin) & (readings <= high - margin)
+        broken = masks["stuck"] | masks["dropouts"] | masks["spikes"]
+        jump = gain_jump(take.time_s, readings, np.where(broken, np.nan, angles), inside)
+        if jump is not None:
+            jumps.append(jump)
+            frames["jump"] += int((take.time_s >= jump.at_s).sum())
+            stretches["jump"].append(Stretch(take.name, jump.at_s, float(take.time_s[-1])))
+    least = {"stuck": 1, "dropouts": 1, "spikes": LEAST_SPIKES, "jump": 1}
+    size = max((jump.size_deg for jump in jumps), default=None)
+    return [
+        _finding(sensor, rotation, kind, stretches[kind], frames[kind], size if kind == "jump" else None)
+        for kind in SensorFault.kinds
+        if len(stretches[kind]) >= least[kind]
+    ]
+
+
+def _finding(
+    sensor: str, rotation: str, kind: str, stretches: Sequence[Stretch], frames: int, size: float | None
+) -> Finding:
+    seconds = sum(item.end_s - item.start_s for item in stretches)
+    names = named(list(dict.fromkeys(item.take for item in stretches)))
+    first = f"first at {stretches[0].start_s:.2f} s of take {stretches[0].take}"
+    many = len(stretches)
+    sentence = {
+        "stuck": f"{sensor} stands still for {seconds:.1f} s while {rotation} moves ({names}); {first}.",
+        "spikes": f"{sensor} has {many} spikes of a frame or two ({names}); {first}.",
+        "dropouts": f"{sensor} drops to a constant {many} times ({names}); {first}.",
+        "jump": f"{sensor} jumps in offset or gain by {size or 0.0:.1f} deg and stays so ({names}); {first}.",
+    }[kind]
+    evidence = {"stretches_count": float(many), "concerned_s": seconds, "concerned_frames": float(frames)}
+    return Finding(
+        SensorFault.name, (sensor,), sentence, kind=kind, size_deg=size, count=many,
+        evidence=evidence, stretches=tuple(stretches),
+    )  # fmt: skip

@@ -1,0 +1,300 @@
+"""What every effect promises, held against each effect of the catalogue and against declared ones."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+
+from glovecal_models.effects.catalogue import catalogue, stored_effect
+from glovecal_models.effects.columnless_effect import ColumnlessEffect
+from glovecal_models.effects.decoy import decoy_columns
+from glovecal_models.effects.effect import Decoy, Effect, Settings, Signals
+from glovecal_models.effects.expression_effect import ExpressionEffect
+
+DECLARED = [
+    ExpressionEffect.parse(
+        "name = strap; unit = deg; columns = c.contact_n * own, c.contact_n; range c.contact_n 0 50"
+    ),
+    ExpressionEffect.parse(
+        "name = glue; columns = lowpass(own_deg, tau) - own_deg, tanh(I_PIP) * own - previous(own);"
+        "parameter tau s 0.1 5 = 1; decoy = reversed in time"
+    ),
+    ExpressionEffect.parse(
+        "name = two-shapes; columns = exp(-t / rate) * abs(own_deg) ^ power;"
+        "parameter rate s 5 50; parameter power 1 0.5 2"
+    ),
+]
+EFFECTS = [*catalogue().values(), *DECLARED]
+WITH_COLUMNS = [item for item in EFFECTS if not isinstance(item, ColumnlessEffect)]
+FIXED_NAMES = [
+    "nonlinearity", "cross_coupling", "palm_arch", "hysteresis", "creep", "lag", "clock_offset",
+    "repeated_samples", "warmup_drift", "temperature", "humidity", "donning_shift", "garment_slip",
+    "supply_sag", "saturation", "contact_pressure", "sensor_fault",
+]  # fmt: skip
+UNIT = re.compile(r"_(deg|s|ppm|1)(?=$|[_\[])|_per_")
+
+
+@pytest.fixture(params=EFFECTS, ids=lambda effect: effect.name)
+def effect(request: pytest.FixtureRequest) -> Effect:
+    return request.param
+
+
+@pytest.fixture
+def settings(effect: Effect, signals: list[Signals]) -> Settings:
+    """Settings as a stored model holds them."""
+    return json.loads(json.dumps(effect.settle(signals)))
+
+
+def each_frame(take: Signals) -> list[Signals]:
+    return [
+        replace(
+            take,
+            time_s=take.time_s[at : at + 1],
+            own=take.own[at : at + 1],
+            others={name: values[at : at + 1] for name, values in take.others.items()},
+            context={name: values[at : at + 1] for name, values in take.context.items()},
+        )
+        for at in range(len(take))
+    ]
+
+
+def first_frames(take: Signals, count: int) -> Signals:
+    return joined(each_frame(take)[:count])
+
+
+def joined(pieces: Sequence[Signals]) -> Signals:
+    first = pieces[0]
+    return replace(
+        first,
+        time_s=np.concatenate([piece.time_s for piece in pieces]),
+        own=np.concatenate([piece.own for piece in pieces]),
+        others={name: np.concatenate([piece.others[name] for piece in pieces]) for name in first.others},
+        context={name: np.concatenate([piece.context[name] for piece in pieces]) for name in first.context},
+    )
+
+
+def one_lane(take: Signals, lane: int) -> Signals:
+    return replace(take, own=take.own[:, lane : lane + 1])
+
+
+def test_the_fixed_names_are_all_there() -> None:
+    assert set(FIXED_NAMES) | {"no_effect"} == set(catalogue())
+
+
+def test_it_says_what_it_is(effect: Effect) -> None:
+    assert re.match(r"[a-z][a-z0-9_-]+\Z", effect.name)
+    assert effect.explanation[0].isupper()
+    assert effect.explanation.endswith(".")
+    assert "\n" not in effect.explanation
+    assert effect.source
+    assert effect.decoy in get_args(Decoy)
+    assert effect.side in ("sensor", "reference")
+    for parameter in effect.parameters:
+        assert parameter.low < parameter.high
+        assert parameter.unit
+        assert parameter.prior
+
+
+def test_the_examples_can_be_judged(effect: Effect, signals: list[Signals]) -> None:
+    assert effect.missing(signals) is None
+
+
+def test_shapes_are_within_the_declared_ranges(effect: Effect, signals: list[Signals], settings: Any) -> None:
+    grid = effect.grid(signals, settings)
+    assert grid.ndim == 3
+    assert len(grid) >= 1
+    assert grid.shape[1:] == (signals[0].own.shape[1], len(effect.parameters))
+    for column, parameter in enumerate(effect.parameters):
+        assert (grid[:, :, column] >= parameter.low - 1e-12).all()
+        assert (grid[:, :, column] <= parameter.high + 1e-12).all()
+
+
+def test_columns_are_finite_repeatable_and_of_the_right_shape(
+    effect: Effect, signals: list[Signals], settings: Settings
+) -> None:
+    names = effect.weight_names(settings)
+    for shape in effect.grid(signals, settings):
+        for take in signals:
+            columns = effect.columns(take, settings, shape)
+            assert columns.shape == (len(take), take.own.shape[1], len(names))
+            assert np.isfinite(columns).all()
+            assert np.array_equal(columns, effect.columns(take, settings, shape))
+            assert not (columns @ np.zeros(len(names))).any()
+
+
+def test_settings_survive_being_stored(effect: Effect, signals: list[Signals], settings: Settings) -> None:
+    fresh = effect.settle(signals)
+    shape = effect.grid(signals, fresh)[-1]
+    expected = effect.columns(signals[0], fresh, shape)
+    again = stored_effect(effect.name, settings)
+    assert np.array_equal(again.columns(signals[0], settings, shape), expected)
+    assert again.weight_names(settings) == effect.weight_names(fresh)
+
+
+def test_lanes_do_not_know_each_other(effect: Effect, signals: list[Signals], settings: Settings) -> None:
+    shape = effect.grid(signals, settings)[-1]
+    together = effect.columns(signals[1], settings, shape)
+    for lane in range(signals[0].own.shape[1]):
+        alone = [one_lane(take, lane) for take in signals]
+        own_settings = effect.settle(alone)
+        own_shape = effect.grid(alone, own_settings)[-1]
+        np.testing.assert_allclose(own_shape, shape[lane : lane + 1], rtol=1e-12)
+        found = effect.columns(alone[1], own_settings, own_shape)[:, 0]
+        np.testing.assert_allclose(found, together[:, lane], rtol=1e-9, atol=1e-9)
+
+
+def test_several_shapes_at_once_are_lanes(effect: Effect, signals: list[Signals], settings: Settings) -> None:
+    take, grid = signals[0], effect.grid(signals, settings)[:3]
+    lanes = take.own.shape[1]
+    wide = replace(take, own=np.tile(take.own, (1, len(grid))))
+    together = effect.columns(wide, settings, np.concatenate(list(grid)))
+    for number, shape in enumerate(grid):
+        part = together[:, number * lanes : (number + 1) * lanes]
+        np.testing.assert_allclose(part, effect.columns(take, settings, shape), rtol=1e-12, atol=1e-12)
+
+
+def test_frame_by_frame_gives_the_same(effect: Effect, signals: list[Signals], settings: Settings) -> None:
+    """On uneven frame times, with a gap of 0.5 s that is bridged and one of 3 s that is not."""
+    take = first_frames(signals[0], 400)
+    time = take.time_s.copy()
+    time[150:] += 0.5
+    time[300:] += 3.0
+    take = replace(take, time_s=time)
+    shape = effect.grid(signals, settings)[0]
+    stream = effect.stream(settings, shape)
+    live = np.concatenate([stream.columns(frame) for frame in each_frame(take)])
+    np.testing.assert_allclose(live, effect.columns(take, settings, shape), rtol=0, atol=1e-9)
+    stream.reset()
+    again = np.concatenate([stream.columns(frame) for frame in each_frame(take)[:50]])
+    np.testing.assert_allclose(again, live[:50], rtol=0, atol=1e-12)
+
+
+def test_later_frames_change_nothing(effect: Effect, signals: list[Signals], settings: Settings) -> None:
+    take = signals[0]
+    shape = effect.grid(signals, settings)[0]
+    own = take.own.copy()
+    own[700:] += 25.0
+    others = {name: np.concatenate([values[:700], -values[700:]]) for name, values in take.others.items()}
+    changed = effect.columns(replace(take, own=own, others=others), settings, shape)
+    np.testing.assert_array_equal(changed[:700], effect.columns(take, settings, shape)[:700])
+
+
+@pytest.mark.parametrize("effect", [item for item in EFFECTS if item.has_memory], ids=lambda item: item.name)
+def test_after_a_long_gap_it_starts_afresh(
+    effect: Effect, signals: list[Signals], settings: Settings
+) -> None:
+    shape = effect.grid(signals, settings)[-1]
+    take = first_frames(signals[0], 600)
+    apart = replace(take, time_s=np.where(np.arange(600) >= 300, take.time_s + 1.5, take.time_s))
+    second = joined(each_frame(apart)[300:])
+    found = effect.columns(apart, settings, shape)[300:]
+    np.testing.assert_allclose(found, effect.columns(second, settings, shape), atol=1e-12)
+    assert np.abs(found - effect.columns(take, settings, shape)[300:]).max() > 1e-6
+
+
+@pytest.mark.parametrize("effect", WITH_COLUMNS, ids=lambda item: item.name)
+def test_planted_weights_and_shape_come_back(
+    effect: Effect, signals: list[Signals], settings: Settings
+) -> None:
+    """The own columns as truth, noise of 0.3 deg on top: least squares finds weights and shape again."""
+    names = effect.weight_names(settings)
+    generator = np.random.default_rng(7)
+    grid = effect.grid(signals, settings)
+    truth = len(grid) // 2
+    left, weights, errors = [], {}, {}
+    planted = np.concatenate([effect.columns(take, settings, grid[truth])[:, 0] for take in signals])
+    strength = generator.choice([-4.0, 4.0], len(names)) / planted.std(axis=0).clip(0.05)
+    target = planted @ strength + 0.3 * generator.normal(size=len(planted))
+    for number, shape in enumerate(grid):
+        x = np.concatenate([effect.columns(take, settings, shape)[:, 0] for take in signals])
+        weights[number] = np.linalg.lstsq(x, target, rcond=None)[0]
+        errors[number] = 0.3 * np.sqrt(np.diag(np.linalg.pinv(x.T @ x)))
+        left.append(float(np.mean((target - x @ weights[number]) ** 2)))
+    assert int(np.argmin(left)) == truth
+    assert np.sqrt(min(left)) == pytest.approx(0.3, rel=0.05)
+    assert (np.abs(weights[truth] - strength) < 5.0 * errors[truth]).all()
+
+
+def test_described_numbers_have_units(effect: Effect, signals: list[Signals], settings: Settings) -> None:
+    names = effect.weight_names(settings)
+    described = effect.described(settings, effect.grid(signals, settings)[0, 0], np.arange(float(len(names))))
+    assert len(described) == len(names) + len(effect.parameters)
+    for name, value in described.items():
+        assert isinstance(value, float)
+        assert UNIT.search(name), name
+
+
+def check_reason(reason: str | None) -> None:
+    """It ends "cannot be judged: ...": no capital, no full stop, one line."""
+    assert reason
+    assert reason[0].islower()
+    assert reason[-1] not in ".,;: \n"
+    assert "\n" not in reason
+    assert "None" not in reason
+
+
+def test_missing_context_is_said(effect: Effect, signals: list[Signals]) -> None:
+    for name in effect.context:
+        for value in (None, 3.0, np.nan):
+            changed = []
+            for take in signals:
+                context = {key: column for key, column in take.context.items() if key != name}
+                if value is not None:
+                    context[name] = np.full(len(take), value)
+                changed.append(replace(take, context=context))
+            reason = effect.missing(changed)
+            check_reason(reason)
+            assert f"c.{name}" in str(reason)
+
+
+def test_too_little_motion_is_said(signals: list[Signals]) -> None:
+    still = [
+        replace(take, own=np.full_like(take.own, 30.0), others={}, wearing="a", context={})
+        for take in signals
+    ]
+    brief = [first_frames(take, 30) for take in still]
+    for name in (
+        "nonlinearity",
+        "cross_coupling",
+        "palm_arch",
+        "hysteresis",
+        "lag",
+        "donning_shift",
+        "creep",
+    ):
+        check_reason(catalogue()[name].missing(brief))
+    rigid = [replace(take, others={"PALM_ARCH": np.zeros(len(take))}) for take in signals]
+    check_reason(catalogue()["palm_arch"].missing(rigid))
+    alone = [replace(take, wearing=take.take) for take in signals]
+    check_reason(catalogue()["donning_shift"].missing(alone))
+
+
+def test_the_twin_has_the_same_freedom_and_other_columns(
+    effect: Effect, signals: list[Signals], settings: Settings
+) -> None:
+    shape = effect.grid(signals, settings)[0]
+    true = [effect.columns(take, settings, shape) for take in signals]
+    twin = decoy_columns(effect, signals, settings, shape, np.random.default_rng(3))
+    assert [columns.shape for columns in twin] == [columns.shape for columns in true]
+    assert all(np.isfinite(columns).all() for columns in twin)
+    for column in range(true[0].shape[2]):
+        assert max(np.abs(a - b)[:, :, column].max() for a, b in zip(true, twin, strict=True)) > 1e-3
+
+
+def test_an_unknown_moment_does_not_spoil_the_rest(
+    effect: Effect, signals: list[Signals], settings: Settings
+) -> None:
+    """At serving, a column that is not sent or is unknown counts as usual: never NaN."""
+    shape = effect.grid(signals, settings)[0]
+    bare = replace(signals[0], context={}, others={})
+    unknown = replace(
+        signals[0], context={name: np.full(len(v), np.nan) for name, v in signals[0].context.items()}
+    )
+    for take in (bare, unknown):
+        assert np.isfinite(effect.columns(take, settings, shape)).all()
