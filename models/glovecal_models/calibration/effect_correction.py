@@ -50,7 +50,7 @@ class EffectCorrection:
         total = np.zeros_like(base)
         others = self._scale.others(readings) if self._lanes else {}
         for item, lanes in self._lanes:
-            take = Signals(time_s, base[:, lanes], others, context, wearing, item.zero_deg)
+            take = Signals(time_s, base[:, lanes], others, context, wearing, zero_deg=item.zero_deg)
             columns = item.effect.columns(take, item.settings, item.shape)
             total[:, lanes] += np.einsum("nlc,lc->nl", columns, item.weights)
         return total
@@ -71,7 +71,7 @@ class EffectCorrection:
         time = np.array([time_s])
         now = {name: np.array([value]) for name, value in context.items()}
         for (item, lanes), stream in zip(self._lanes, self._streams, strict=True):
-            frame = Signals(time, base[None, lanes], others, now, wearing, item.zero_deg)
+            frame = Signals(time, base[None, lanes], others, now, wearing, zero_deg=item.zero_deg)
             total[lanes] += np.einsum("lc,lc->l", stream.columns(frame)[0], item.weights)
         return total
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.stats import wilcoxon
@@ -100,7 +101,8 @@ def signed_rank(values: np.ndarray) -> float:
     """One-sided Wilcoxon: the probability that values symmetric about zero are so positive."""
     if len(values) < FEWEST_BLOCKS or not np.any(values):
         return 1.0
-    return float(wilcoxon(values, alternative="greater", method="approx").pvalue)
+    found: Any = wilcoxon(values, alternative="greater", method="approx")
+    return float(found.pvalue)
 
 
 def pooled_errors(errors: Sequence[JointErrors]) -> JointErrors:

@@ -80,6 +80,7 @@ def inverse(
             },
             take.context,
             take.wearing,
+            take.name,
             np.array(zeros),
         )
         for number, take in enumerate(takes)
@@ -108,6 +109,7 @@ def forward(
             {name: (angles[:, i] - centre[i]) / max(spread[i], 1e-9) for i, name in enumerate(names)},
             take.context,
             take.wearing,
+            take.name,
             np.array([item.zero_deg for item in sensor]),
         )
         for take, angles in zip(takes, filled, strict=True)

@@ -50,10 +50,10 @@ class Signals:
     context: Mapping[str, np.ndarray] = field(default_factory=dict)
     """Context columns (N,) by name; NaN where unknown."""
     wearing: str = ""
-    zero_deg: np.ndarray | None = None
-    """(L,): where on the scale of ``own`` a raw reading of zero lies, by a straight line; None if unknown."""
     take: str = ""
     """Name of the take; it may tell which motion was done."""
+    zero_deg: np.ndarray | None = None
+    """(L,): where on the scale of ``own`` a raw reading of zero lies, by a straight line; None if unknown."""
 
     def __len__(self) -> int:
         return len(self.time_s)

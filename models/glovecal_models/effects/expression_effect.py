@@ -207,4 +207,5 @@ def _piece(take: Signals, part: slice) -> Signals:
         {name: values[part] for name, values in take.context.items()},
         take.wearing,
         take.take,
+        take.zero_deg,
     )

@@ -31,10 +31,8 @@ class SupplySag(ContextEffect):
     def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
         volts = self.clipped(take, settings)
         loss = (volts[:, None] / max(settings["usual"], 1e-6)) ** -shape[None, :, 0] - 1.0
-        if take.zero_deg is None:
-            common = np.zeros_like(take.own)
-        else:
-            common = (take.own - take.zero_deg) * loss
+        zero = np.resize(0.0 if take.zero_deg is None else take.zero_deg, take.own.shape[1])
+        common = (take.own - zero) * loss
         own = (volts / max(settings["high"] - settings["low"], 1e-9))[:, None] * np.ones_like(take.own)
         own = own - settings["usual"] / max(settings["high"] - settings["low"], 1e-9)
         return np.stack([common, own, own * in_joint_units(take.own, settings)], axis=2)
