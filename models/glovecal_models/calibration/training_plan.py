@@ -86,19 +86,19 @@ def plan_training(
 
 
 def _tasks(correspondence: Correspondence, samples: Samples, settings: TrainingSettings) -> list[FitTask]:
-    tasks = [_task(correspondence, samples, None, settings)]
+    tasks = [task_for(correspondence, samples, None, settings)]
     for number, fold in enumerate(folds_over_takes(samples.take, settings.folds)):
         kept = samples.select(~fold.held_out)
         try:
             check_samples(kept.inputs, kept.target, correspondence.inputs)
         except NotTrainable:
             continue  # what is left of the fold cannot carry a model: it says nothing about the error
-        task = _task(correspondence, kept, number, settings, held_out=samples.select(fold.held_out))
+        task = task_for(correspondence, kept, number, settings, held_out=samples.select(fold.held_out))
         tasks.append(task)
     return tasks
 
 
-def _task(
+def task_for(
     correspondence: Correspondence,
     samples: Samples,
     fold: int | None,

@@ -1,0 +1,1 @@
+"""Adding an effect to a calibration: learned with the rest, verified on held-out takes, or undone."""

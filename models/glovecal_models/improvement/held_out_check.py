@@ -1,0 +1,122 @@
+"""The error of a calibration with effects, on takes that its fit never saw."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from glovecal_models.calibration.effect_correction import EffectCorrection
+from glovecal_models.calibration.folds import folds_over_takes
+from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.errors import NotTrainable
+from glovecal_models.improvement.effect_fit import (
+    EffectFit,
+    correspondence_for,
+    fit_with_effects,
+    own_signals,
+)
+from glovecal_models.improvement.prepared_takes import PreparedTakes
+from glovecal_models.improvement.wanted_effect import WantedEffect
+
+Report = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class HeldOutErrors:
+    """Squared errors of some rotations, summed over frames."""
+
+    square: dict[str, float]
+    """Degrees squared."""
+    count: dict[str, int]
+
+    def rmse_deg(self, rotation: str) -> float:
+        return float(np.sqrt(self.square[rotation] / max(self.count[rotation], 1)))
+
+    def with_those_of(self, other: HeldOutErrors) -> HeldOutErrors:
+        """These, replaced by the other's where it has any."""
+        return HeldOutErrors(self.square | other.square, self.count | other.count)
+
+    @property
+    def over_all_deg(self) -> float:
+        """RMSE over all rotations and frames."""
+        return float(np.sqrt(sum(self.square.values()) / max(sum(self.count.values()), 1)))
+
+
+def held_out_errors(
+    takes: PreparedTakes,
+    rotations: Sequence[str],
+    wanted: Sequence[WantedEffect],
+    settings: TrainingSettings,
+    *,
+    cancelled: Callable[[], bool] | None = None,
+    report: Report | None = None,
+) -> HeldOutErrors:
+    """Leave out whole takes in turn, ``settings.folds`` of them at least two. Raises NotTrainable, Cancelled.
+
+    With a single take it is left out in halves of time, since nothing else can be.
+    """
+    square, count = dict.fromkeys(rotations, 0.0), dict.fromkeys(rotations, 0)
+    parts = takes if len(takes.takes) > 1 else _halved(takes)
+    folds = folds_over_takes(np.arange(len(parts.takes)), max(settings.folds, 2))
+    for number, fold in enumerate(folds):
+        if report:
+            report(f"leaving out {fold.sentence}", number / len(folds))
+        kept = parts.some(np.flatnonzero(~fold.held_out).tolist())
+        left = parts.some(np.flatnonzero(fold.held_out).tolist())
+        try:
+            fit = fit_with_effects(kept, rotations, wanted, settings, cancelled=cancelled)
+        except NotTrainable:
+            continue  # what is left of this fold cannot carry a model: it says nothing about the error
+        for name, errors in errors_of(fit, left, rotations, settings).items():
+            square[name] += float(errors @ errors)
+            count[name] += len(errors)
+    return HeldOutErrors(square, count)
+
+
+def errors_of(
+    fit: EffectFit, takes: PreparedTakes, rotations: Sequence[str], settings: TrainingSettings
+) -> dict[str, np.ndarray]:
+    """For each rotation the errors (predicted minus measured) of all measured frames, degrees."""
+    base = {
+        name: own_signals(takes, correspondence_for(takes, name, settings), fit.regressor(name))[0]
+        for name in rotations
+    }
+    found: dict[str, list[np.ndarray]] = {name: [] for name in rotations}
+    correction = EffectCorrection(fit.effects, list(rotations), takes.scale)
+    targets = {name: takes.target(name) for name in rotations}
+    for number, take in enumerate(takes.takes):
+        mean = np.column_stack([base[name][number] for name in rotations])
+        mean = mean + correction.of_take(
+            take.time_s, mean, takes.readings[number], take.context, take.wearing
+        )
+        for column, name in enumerate(rotations):
+            error = mean[:, column] - targets[name][number]
+            found[name].append(error[np.isfinite(error)])
+    return {name: np.concatenate(parts) for name, parts in found.items()}
+
+
+def _halved(takes: PreparedTakes) -> PreparedTakes:
+    """The only take in four stretches of time, as takes of their own."""
+    from dataclasses import replace
+
+    take = takes.takes[0]
+    edges = np.linspace(0, len(take.time_s), 5).astype(int)
+    pieces = []
+    for number, (start, end) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+        rows = slice(int(start), int(end))
+        pieces.append(
+            replace(
+                take,
+                name=f"{take.name}, part {number + 1}",
+                time_s=take.time_s[rows],
+                readings=take.readings[rows],
+                rotations=takes.layout.rotations,
+                reference_time_s=take.time_s[rows],
+                reference=takes.reference[0][rows],
+                context={name: values[rows] for name, values in take.context.items()},
+                poses=None if take.poses is None else take.poses[rows],
+            )
+        )
+    return PreparedTakes.of(pieces, takes.layout)

@@ -1,0 +1,30 @@
+"""Which effects a calibration is to have, and where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from glovecal_models.effects.catalogue import effect
+from glovecal_models.effects.effect import Effect, Settings
+
+ONE_BY_ONE = ("cross_coupling", "palm_arch")
+"""Effects whose neighbours differ from joint to joint."""
+
+
+@dataclass(frozen=True)
+class WantedEffect:
+    """An effect and the rotations it is on."""
+
+    name: str
+    rotations: tuple[str, ...]
+    settings: Settings = field(default_factory=dict)
+    """What is known already: the clocks' offsets."""
+
+    @property
+    def effect(self) -> Effect:
+        return effect(self.name)
+
+    @property
+    def is_on_reference(self) -> bool:
+        """It repairs the measurement; nothing is predicted."""
+        return self.effect.side == "reference"
