@@ -1,7 +1,7 @@
 """Garment slip: within one wearing the glove creeps over the hand, and nothing brings it back.
 
-Carmel et al. 2014 find 3 degrees between wearings; moving hands shift cloth by a good part of that within
-one (Gentner & Classen 2009: repeatability 1.6 degrees SD).
+Carmel et al. 2014 find 3 degrees between wearings; within one wearing Gentner & Classen 2009
+find a repeatability of 1.6 degrees SD. The laws are ours.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def to_one_side(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws
 FORMS = (
     Form(
         "random_walk",
-        "Small shifts at every moment that add up (random walk; zero-velocity literature's model of slip).",
+        "Small shifts at every moment that add up (random walk; ours).",
         random_walk,
         Stage.WEARING,
     ),

@@ -1,7 +1,7 @@
 """Saturation: part of the bend no longer changes the reading, and no calibration brings it back.
 
-Amplifiers end at their supply, resistive films flatten, a loosely fixed sensor does not bend at first
-(Ninapro DB9 reports sensors that do not reach small hands' joints). Neighbours may bend a sensor beyond its
+Amplifiers end at their supply, resistive films flatten, a loosely fixed sensor does not bend at first (the
+Ninapro DB9 page calls sensors unreliable on small hands). The shapes are ours. Neighbours may bend a sensor beyond its
 own joint's range, so the size counts in ranges from ``BEYOND`` outside of it.
 """
 
@@ -65,7 +65,7 @@ FORMS = (
     ),
     Form(
         "dead_zone",
-        "Readings begin to change only after some bend (a sensor loose in its pocket; Ninapro DB9).",
+        "Readings begin to change only after some bend (a sensor loose in its pocket; ours).",
         dead_zone,
         Stage.COUNTS,
         set_aside=True,
