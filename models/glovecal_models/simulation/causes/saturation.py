@@ -1,8 +1,9 @@
 """Saturation: part of the bend no longer changes the reading, and no calibration brings it back.
 
 Amplifiers end at their supply, resistive films flatten, a loosely fixed sensor does not bend at first (the
-Ninapro DB9 page calls sensors unreliable on small hands). The shapes are ours. Neighbours may bend a sensor beyond its
-own joint's range, so the size counts in ranges from ``BEYOND`` outside of it.
+Ninapro DB9 page calls sensors unreliable on small hands). The shapes are ours.
+Neighbours may bend a sensor beyond its own joint's range, so the size counts in ranges from
+``BEYOND`` outside of it.
 """
 
 from __future__ import annotations
