@@ -100,7 +100,7 @@ class _Measure:
         if self._before is None:
             self._before = glove.curve(strain)
         self._clean = self._output(self._before)
-        self._own = self._frames(scene.own)
+        self._own = scene.own[:, scene.recorded][:, :, affected].reshape(-1, int(affected.sum()))
         terms = {"straight_line": {"terms": 2}}.get(form.judged_by, {})
         self._unexplained = Unexplained(self._own, **terms)
 
@@ -114,11 +114,10 @@ class _Measure:
         return self._unexplained.rms(changed - self._clean)
 
     def _output(self, signal: np.ndarray) -> np.ndarray:
-        return self._frames(self._glove.curve(signal) if self._form.stage is Stage.MECHANICAL else signal)
-
-    def _frames(self, signal: np.ndarray) -> np.ndarray:
-        chosen = signal[:, self._scene.recorded][:, :, self._affected]
-        return chosen.reshape(-1, int(self._affected.sum()))
+        signal = signal[:, self._scene.recorded]
+        if self._form.stage is Stage.MECHANICAL:
+            signal = self._glove.curve(signal)
+        return signal[:, :, self._affected].reshape(-1, int(self._affected.sum()))
 
 
 def _form(cause: Cause, random: np.random.Generator) -> Form:

@@ -56,7 +56,7 @@ class RecordedSession:
         """One more take after the session, of the same glove with the same causes.
 
         ``wearing`` counts from 0; one above the plan's is a new wearing. The same arguments give the same
-        take; another ``repeat`` gives another.
+        take; another ``repeat`` gives another. Raises BadInput.
         """
         starts = one_more(self.plan, motion, take_s, wearing, repeat)
         return _record(self.plan, SessionGlove(self.plan), starts, self._hidden)[0]

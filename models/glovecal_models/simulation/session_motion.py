@@ -1,8 +1,8 @@
 """How the hand moves in each take of a simulated session, and before it.
 
-Natural motion is that of free_motion.py at the pace of everyday use (near 40 degrees a second RMS, with
-holds). The others are takes made to tell causes apart: fast oscillation, ramps at two speeds with inner
-loops and holds, one finger at a time, repeated poses, a hand that lies still.
+Natural motion takes the postures of free_motion.py at the pace of everyday use (near 40 degrees a second
+RMS, with holds). The others are takes made to tell causes apart: fast oscillation, ramps at two speeds with
+inner loops and holds, one finger at a time, repeated poses, a hand that lies still.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
-from glovecal_models.simulation.free_motion import free_motion, random_posture
+from glovecal_models.simulation.free_motion import random_posture
 from glovecal_models.simulation.hand_motion import (
     HandMotion,
     PostureSequence,
@@ -27,32 +27,15 @@ from glovecal_models.simulation.protocol import Segment
 from glovecal_models.simulation.session_plan import TakeMotion
 from glovecal_models.simulation.simulated_hand import DRIVEN, FINGERS, ROTATIONS
 
-PACE = 0.33
-"""Free motion is made for short lively takes; at this pace it has the speed of long ones."""
+MOVE_S = (0.7, 1.6)
+HOLD_S = (0.0, 0.0, 0.3, 0.8, 1.6)
+"""Free motion (free_motion.py) is made for short lively takes; in long ones hands go slower and wait."""
 FAST_HZ = (2.0, 3.5)
 FAST_DEG = 25.0
 RAMP_SPEED_RATIO = 3.0
 _RAMP_CORNERS = (0.05, 0.95, 0.3, 0.75, 0.2, 0.95, 0.05)
 """Shares of the range between which ramps run: a full loop with two inner loops."""
 _STAND_INS = ("I_MCP", "M_PIP", "R_MCP", "P_PIP", "I_PIP", "M_MCP", "R_PIP", "P_MCP", "T_IP", "W_FLEX")
-
-
-@dataclass(frozen=True)
-class Slowed:
-    """Another motion at ``pace`` times its speed."""
-
-    motion: HandMotion
-    pace: float
-
-    @property
-    def duration_s(self) -> float:
-        return self.motion.duration_s / self.pace
-
-    def driven(self, time_s: np.ndarray) -> np.ndarray:
-        return self.motion.driven(time_s * self.pace)
-
-    def poses(self, time_s: np.ndarray) -> tuple[str, ...]:
-        return ("",) * len(time_s)
 
 
 @dataclass(frozen=True)
@@ -108,7 +91,16 @@ def _hold(posture: np.ndarray, duration_s: float, random: np.random.Generator) -
 
 
 def _natural(duration_s: float, random: np.random.Generator) -> HandMotion:
-    return Slowed(free_motion(duration_s * PACE, random), PACE)
+    rest = posture_vector(POSTURES["rest"])
+    postures, hold, move = [rest], [random.uniform(0.1, 0.6)], []
+    while sum(hold) + sum(move) + MOVE_S[1] + HOLD_S[-1] + 1.0 < duration_s:
+        postures.append(random_posture(random))
+        move.append(random.uniform(*MOVE_S))
+        hold.append(float(random.choice(HOLD_S)) * random.uniform(0.7, 1.3))
+    postures.append(rest)
+    move.append(1.0)
+    hold.append(max(duration_s - sum(hold) - sum(move), 0.0))
+    return PostureSequence(np.array(postures), [""] * len(postures), hold_s=hold, move_s=move, random=random)
 
 
 def _fast(duration_s: float, random: np.random.Generator) -> HandMotion:

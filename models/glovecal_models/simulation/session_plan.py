@@ -15,6 +15,7 @@ from glovecal_models.layout import Layout
 
 TakeMotion = Literal["natural", "fast", "ramps", "holds", "one_finger", "poses", "still"]
 TAKE_MOTIONS: tuple[TakeMotion, ...] = ("natural", "fast", "ramps", "holds", "one_finger", "poses", "still")
+SHORTEST_TAKE_S = 5.0
 FIVE_SENSORS = ("I_MCP", "I_PIP", "M_MCP", "M_PIP", "R_MCP")
 
 
@@ -59,7 +60,7 @@ class SessionPlan:
             object.__setattr__(self, "rotations", self.sensors)
         for name, value, lowest in (
             ("seed", self.seed, 0), ("wearings", self.wearings, 1),
-            ("takes_per_wearing", self.takes_per_wearing, 1), ("take_s", self.take_s, 5),
+            ("takes_per_wearing", self.takes_per_wearing, 1), ("take_s", self.take_s, SHORTEST_TAKE_S),
             ("rate_hz", self.rate_hz, 10), ("bits", self.bits, 6),
             ("frame_jitter_s", self.frame_jitter_s, 0),
         ):  # fmt: skip

@@ -10,7 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glovecal_models.errors import BadInput
 from glovecal_models.simulation.session_plan import (
+    SHORTEST_TAKE_S,
     TAKE_MOTIONS,
     SessionPlan,
     TakeMotion,
@@ -84,7 +86,11 @@ def schedule(plan: SessionPlan) -> tuple[TakeStart, ...]:
 def one_more(
     plan: SessionPlan, motion: TakeMotion, take_s: float, wearing: int, repeat: int
 ) -> tuple[TakeStart, ...]:
-    """The start of one take after the planned ones, as a schedule of one."""
+    """The start of one take after the planned ones, as a schedule of one. Raises BadInput."""
+    if motion not in TAKE_MOTIONS:
+        raise BadInput(f"no motion {motion!r}; there are {', '.join(TAKE_MOTIONS)}")
+    if take_s < SHORTEST_TAKE_S or wearing < 0 or repeat < 0:
+        raise BadInput(f"no take of {take_s:g} s in wearing {wearing}, repeat {repeat}: both count from 0")
     before = schedule(plan)
     last = before[-1]
     key = 100_000 + 1_000 * repeat + 10 * wearing + TAKE_MOTIONS.index(motion)

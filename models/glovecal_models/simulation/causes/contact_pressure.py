@@ -1,7 +1,8 @@
 """Contact pressure: what the hand grips presses on the sensors; here it is recorded as ``contact_n``.
 
-Thin films answer to normal force as well as to bending (Tang 2020, Sensors 20(23) 6863, for contact
-surfaces). Grips come and go with forces up to some 20 newtons, mostly while the hand is closed.
+Thin films answer to normal force as well as to bending (thin-film force sensors: Tang 2020, Sensors 20(23)
+6863). Sizes and laws are ours. Grips come and go with forces up to some 20
+newtons, mostly while the hand is closed.
 """
 
 from __future__ import annotations

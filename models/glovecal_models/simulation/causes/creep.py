@@ -89,7 +89,7 @@ FORMS = (
     ),
     Form(
         "logarithm",
-        "Growth with the logarithm of the time since each bend (Andrade's and Phillips' law for fibres).",
+        "Growth with the logarithm of the time since each bend (logarithmic creep of polymers).",
         logarithm,
         Stage.MECHANICAL,
     ),

@@ -1,6 +1,7 @@
 """Cross-coupling: bending one finger pulls the cloth over another one's sensor.
 
-Wang & Neff 2013, Table 1, and Kahlesz, Zachmann & Klein 2004 measured it, mostly not in straight lines.
+Wang & Neff 2013, Table 1, and Kahlesz, Zachmann & Klein 2004 measured it, the latter
+mostly not in straight lines.
 """
 
 from __future__ import annotations
@@ -62,14 +63,14 @@ FORMS = (
     ),
     Form(
         "bilinear",
-        "Neighbours pull more the more the own joint is bent (Kahlesz, Zachmann & Klein 2004).",
+        "Neighbours pull more the more the own joint is bent (a nonlinear coupling; the shape is ours).",
         bilinear,
         Stage.MECHANICAL,
         touches="two",
     ),
     Form(
         "one_sided",
-        "Neighbours pull only once the cloth's slack is used up.",
+        "Neighbours pull only once the cloth's slack is used up (ours).",
         one_sided,
         Stage.MECHANICAL,
         set_aside=True,

@@ -1,7 +1,6 @@
 """Humidity: damp cloth and sweat change readings.
 
-The VPL DataGlove was specified for 30 to 60 per cent relative humidity; sweat makes cloth longer and films
-more conductive.
+The VPL DataGlove was specified for 30 to 60 per cent relative humidity. The laws are ours.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Lag: the sensor's electronics or firmware smooths the signal, so that it comes late and flattened.
 
-Delays of 25 ms are measured for wireless sensors (Santos, NIME 2021); instrument amplifiers and firmware
-filters reach 5 to 150 ms. Every sensor has its own.
+Delays of 25 ms are measured for wireless sensors (Santos, NIME 2021); filters of amplifiers and firmware are
+set to 5 to 150 ms by choice. Every sensor has its own.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Nonlinearity: a sensor's answer to its own joint is no straight line.
 
 Its strength is what a straight line of the own angle leaves. Every form keeps the range's ends in place.
-Bend sensors' curves are published with bows, S-shapes and kinks (Simone & Kamper 2005; CyberGlove data sheets
-give 0.6 per cent of full scale at best).
+The four shapes are ours; that of a voltage divider follows from its circuit.
 """
 
 from __future__ import annotations
@@ -48,21 +47,21 @@ def _bent(signal: np.ndarray, scene: Scene) -> np.ndarray:
 FORMS = (
     Form(
         "sine_bow",
-        "A bow over the range (film-based bend sensors, Simone & Kamper 2005).",
+        "A bow over the range (ours).",
         sine_bow,
         Stage.ELECTRICAL,
         judged_by="straight_line",
     ),
     Form(
         "kink",
-        "Two straight parts with a corner (cloth that tightens).",
+        "Two straight parts with a corner, as of cloth that tightens (ours).",
         kink,
         Stage.ELECTRICAL,
         judged_by="straight_line",
     ),
     Form(
         "s_shape",
-        "Steep in the middle, flat at both ends (a sensor longer than its joint).",
+        "Steep in the middle, flat at both ends, as of a sensor longer than its joint (ours).",
         s_shape,
         Stage.ELECTRICAL,
         judged_by="straight_line",

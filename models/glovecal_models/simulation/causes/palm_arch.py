@@ -3,6 +3,7 @@
 Krnoul et al. 2016 had to add the palm sensor to the rotations of the little finger's and the thumb's
 metacarpal: R_ppx = a TRC_px + b (2), R_pmx = a TRC_pmx + b + 0.75 R_ppx (3), R_tma = a TRC_tma + b +
 a_tpx TRC_px + b_tpx (5). Here the arch's angle acts on the sensors over those bones.
+A person also cups the palm independently of the fingers, so that only a palm sensor tells all of it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,9 @@
 """Saturation: part of the bend no longer changes the reading, and no calibration brings it back.
 
-Amplifiers end at their supply, resistive films flatten, a loosely fixed sensor does not bend at first
-(Ninapro DB9 reports sensors that do not reach small hands' joints). The size is the share of the range lost.
+Amplifiers end at their supply, resistive films flatten, a loosely fixed sensor does not bend at first (the
+Ninapro DB9 page calls sensors unreliable on small hands). The shapes are ours.
+Neighbours may bend a sensor beyond its own joint's range, so the size counts in ranges from
+``BEYOND`` outside of it.
 """
 
 from __future__ import annotations
@@ -12,20 +14,21 @@ from glovecal_models.simulation.causes.draws import Draws
 from glovecal_models.simulation.causes.form import Form, Stage
 from glovecal_models.simulation.scene import Scene
 
-SIZES = (0.01, 0.9)
+SIZES = (0.02, 1.6)
+BEYOND = 0.5
 
 
 def hard_clip(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """An end of the converter's range is reached: readings stay at it."""
     at_high_end = draws.signs("end") > 0
-    highest = np.where(at_high_end, scene.high - size * scene.span, np.inf)
-    lowest = np.where(at_high_end, -np.inf, scene.low + size * scene.span)
+    highest = np.where(at_high_end, scene.high + (BEYOND - size) * scene.span, np.inf)
+    lowest = np.where(at_high_end, -np.inf, scene.low - (BEYOND - size) * scene.span)
     return np.clip(signal, lowest, highest)
 
 
 def soft_tanh(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Readings flatten towards the high end."""
-    knee = 1 - size
+    knee = 1 + BEYOND - size
     bent = (signal - scene.low) / scene.span
     room = draws.each("room_share", 0.03, 0.08)
     flattened = knee + room * np.tanh(np.maximum(bent - knee, 0.0) / room)
@@ -36,9 +39,10 @@ def dead_zone(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) 
     """Nothing happens before the sensor touches the finger, and little at first."""
     bent = (signal - scene.low) / scene.span
     corner = draws.each("corner_share", 0.005, 0.02)
-    beyond = (bent - size) / corner
+    begins = size - BEYOND
+    beyond = (bent - begins) / corner
     touched = corner * (np.maximum(beyond, 0) + np.log1p(np.exp(-np.abs(beyond))))
-    return scene.low + scene.span * (size + touched)
+    return scene.low + scene.span * (begins + touched)
 
 
 FORMS = (
@@ -62,7 +66,7 @@ FORMS = (
     ),
     Form(
         "dead_zone",
-        "Readings begin to change only after some bend (a sensor loose in its pocket; Ninapro DB9).",
+        "Readings begin to change only after some bend (a sensor loose in its pocket; ours).",
         dead_zone,
         Stage.COUNTS,
         set_aside=True,

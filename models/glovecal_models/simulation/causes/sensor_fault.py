@@ -1,6 +1,6 @@
 """Sensor fault: a channel that now and then, or from some time on, tells nothing or something else.
 
-Broken solder, cracked film, a plug that loses contact. Usually one sensor of a glove.
+Broken solder, cracked film, a plug that loses contact. Usually one sensor of a glove. The laws are ours.
 """
 
 from __future__ import annotations

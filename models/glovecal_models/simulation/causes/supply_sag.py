@@ -49,7 +49,7 @@ FORMS = (
     ),
     Form(
         "offset_and_gain",
-        "Zero points and gains change in a straight line with the supply voltage (data sheets' PSRR).",
+        "Zero points and gains change in a straight line with the supply voltage (finite supply rejection).",
         offset_and_gain,
         Stage.ELECTRICAL,
     ),

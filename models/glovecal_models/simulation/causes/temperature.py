@@ -1,7 +1,7 @@
 """Temperature: readings follow the warmth at the sensor.
 
-Resistive films change by parts per thousand per kelvin; the VPL DataGlove was specified for 15 to 40 degrees
-Celsius only; skin warmth shifts thin-film sensors (Tang 2020, Sensors 20(23) 6863).
+The VPL DataGlove was specified for 15 to 40 degrees Celsius only; surface temperature shifts thin-film force
+sensors (Tang 2020, Sensors 20(23) 6863). No published degrees per kelvin are known for bend gloves.
 """
 
 from __future__ import annotations

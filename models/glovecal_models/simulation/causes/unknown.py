@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from glovecal_models.simulation.causes.draws import Draws
-from glovecal_models.simulation.causes.form import Form, Stage, Touches
+from glovecal_models.simulation.causes.form import Column, Effect, Form, Stage, Touches
 from glovecal_models.simulation.scene import Scene
 from glovecal_models.simulation.slow_noise import lasting_noise
 
@@ -99,7 +99,13 @@ def _wander(scene: Scene, draws: Draws, lasts_s: float, channels: int) -> np.nda
     )
 
 
-def _form(name: str, sentence: str, effect, touches: Touches = "one_or_all", column=None) -> Form:
+def _form(
+    name: str,
+    sentence: str,
+    effect: Effect,
+    touches: Touches = "one_or_all",
+    column: Column | None = None,
+) -> Form:
     return Form(name, sentence, effect, Stage.WEARING, touches=touches, column=column)
 
 

@@ -1,6 +1,6 @@
 """Warm-up drift: readings move while the electronics warms, minutes after power-on, and then rest.
 
-Times of 1 to 15 minutes are typical of strain-gauge amplifiers; data sheets ask for as much warm-up.
+Times of 1 to 15 minutes are our choice of what small electronics in a cuff shows.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ FORMS = (
     ),
     Form(
         "logarithm",
-        "Zero points move with the logarithm of the time since power-on (ageing law of resistive films).",
+        "Zero points move with the logarithm of the time since power-on (no time of its own; ours).",
         logarithm,
         Stage.ELECTRICAL,
         set_aside=True,
