@@ -13,6 +13,7 @@ from glovecal_models.diagnosis.delays import block_starts, delay_errors
 from glovecal_models.diagnosis.directions import Direction
 from glovecal_models.diagnosis.screening import Evidence, screen
 from glovecal_models.diagnosis.session_chance import session_probability
+from glovecal_models.effects.columnless_effect import ColumnlessEffect
 from glovecal_models.effects.effect import Effect
 
 BLOCK_ROWS = 125
@@ -35,6 +36,7 @@ def assessed(
     report: Callable[[str, float], None] | None = None,
 ) -> tuple[list[Assessment], list[NotJudgeable]]:
     """Every judgeable effect, and why the others are not. ``lag`` brings ``clock_offset`` with it."""
+    effects = [effect for effect in effects if not isinstance(effect, ColumnlessEffect)]
     found: list[Assessment] = []
     impossible: list[NotJudgeable] = []
     for number, effect in enumerate(effects):

@@ -1,7 +1,8 @@
 """Lag: the sensor follows the joint late, as through a low pass of 5 to 150 ms.
 
-The column is the joint minus its low-passed self: with weight -1 forward it makes the lag; inverse, a
-weight of tau_true / tau leads the reading back (a lead compensator: the derivative, smoothed by tau).
+The columns are the joint minus low-passed selves of it, with tau, 2 tau and 4 tau. Forward, the first alone
+with weight -1 makes the lag. Inverse, they lead the reading back (a lead compensator: the derivative,
+smoothed); three of them find how much smoothing the noise wants, where one would double it.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from glovecal_models.effects.effect import Parameter, Settings, Signals
 from glovecal_models.effects.history_effect import HistoryEffect
 from glovecal_models.effects.relaxation import relax, relax_once
 
+MULTIPLES = np.array([1.0, 2.0, 4.0])
 TAU_S = (0.02, 0.03, 0.045, 0.065, 0.1, 0.15)
 FAST_SHARE = 1.0
 """Per second: a joint is moved fast when its speed reaches so many of its own standard deviations."""
@@ -34,22 +36,22 @@ class Lag(HistoryEffect):
         return np.repeat(np.array(TAU_S)[:, None, None], takes[0].own.shape[1], axis=1)
 
     def start(self, own: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
-        return own[:, None].copy()
+        return np.repeat(own[:, None], len(MULTIPLES), axis=1)
 
     def step(
         self, state: np.ndarray, elapsed_s: float, own: np.ndarray, settings: Settings, shape: np.ndarray
     ) -> np.ndarray:
-        relax_once(state, elapsed_s, own[:, None], shape)
+        relax_once(state, elapsed_s, own[:, None], shape * MULTIPLES)
         return own[:, None] - state
 
     def run(
         self, state: np.ndarray, elapsed_s: np.ndarray, own: np.ndarray, settings: Settings, shape: np.ndarray
     ) -> np.ndarray:
-        relaxed = relax(state, elapsed_s, own[:, :, None], shape)
+        relaxed = relax(state, elapsed_s, own[:, :, None], shape * MULTIPLES)
         return own[:, :, None] - relaxed
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
-        return ("lead_deg_per_deg",)
+        return tuple(f"lead_{multiple:g}_tau_deg_per_deg" for multiple in MULTIPLES)
 
 
 def _speed(take: Signals) -> float:

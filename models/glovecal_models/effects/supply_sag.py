@@ -11,7 +11,7 @@ from glovecal_models.effects.context_effect import ContextEffect
 from glovecal_models.effects.effect import Parameter, Settings, Signals
 from glovecal_models.effects.joint_units import in_joint_units
 
-EXPONENTS = (1.0,)
+EXPONENTS = (0.5, 1.0, 1.5, 2.0, 2.5)
 OWN_PRIOR_DEG = 0.15
 """How far a joint may depart from the common scaling, for the whole fall of the voltage."""
 
