@@ -171,8 +171,9 @@ def test_frame_by_frame_gives_the_same(effect: Effect, signals: list[Signals], s
     live = np.concatenate([stream.columns(frame) for frame in each_frame(take)])
     np.testing.assert_allclose(live, effect.columns(take, settings, shape), rtol=0, atol=1e-9)
     stream.reset()
-    again = np.concatenate([stream.columns(frame) for frame in each_frame(take)[:50]])
-    np.testing.assert_allclose(again, live[:50], rtol=0, atol=1e-12)
+    for _ in range(2):  # after a reset, and after the clock was set back
+        again = np.concatenate([stream.columns(frame) for frame in each_frame(take)[:50]])
+        np.testing.assert_allclose(again, live[:50], rtol=0, atol=1e-12)
 
 
 def test_later_frames_change_nothing(effect: Effect, signals: list[Signals], settings: Settings) -> None:

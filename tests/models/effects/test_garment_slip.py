@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from glovecal_models.effects.catalogue import catalogue
-from glovecal_models.effects.garment_slip import slip_of, slip_sd
+from glovecal_models.effects.garment_slip import GarmentSlip, slip_of, slip_sd
 
-SLIP = catalogue()["garment_slip"]
+SLIP = GarmentSlip()
 
 
 def every_glove(counts, generator):

@@ -85,9 +85,7 @@ def test_the_one_line_can_be_read() -> None:
 def test_what_is_no_effect_or_has_a_taken_name_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     group = catalogue_module.GROUP
     announce(monkeypatch, metadata.EntryPoint("odd", "collections:OrderedDict", group))
-    with pytest.raises(
-        BadInput, match="entry point collections:OrderedDict of glovecal.effects is not an effect"
-    ):
+    with pytest.raises(BadInput, match=r"collections:OrderedDict of glovecal\.effects is not an effect"):
         catalogue_module.catalogue()
     announce(monkeypatch, metadata.EntryPoint("lag", "glovecal_models.effects.lag:Lag", group))
     with pytest.raises(BadInput, match="two packages bring an effect of the name 'lag'"):

@@ -7,11 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.effects.repeated_samples import RepeatedSamples, repeats
 
-REPEATED = catalogue()["repeated_samples"]
-assert isinstance(REPEATED, RepeatedSamples)
+REPEATED = RepeatedSamples()
 
 
 def padded(values: np.ndarray, share: float) -> tuple[np.ndarray, np.ndarray]:

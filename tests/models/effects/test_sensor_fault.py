@@ -9,9 +9,10 @@ import pytest
 
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.effects.effect import Signals
+from glovecal_models.effects.sensor_fault import SensorFault
 from glovecal_models.effects.signature_effect import frames_inside
 
-FAULT = catalogue()["sensor_fault"]
+FAULT = SensorFault()
 
 
 def broken(glove, change):
