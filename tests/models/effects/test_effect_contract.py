@@ -16,6 +16,7 @@ from glovecal_models.effects.columnless_effect import ColumnlessEffect
 from glovecal_models.effects.decoy import decoy_columns
 from glovecal_models.effects.effect import Decoy, Effect, Settings, Signals
 from glovecal_models.effects.expression_effect import ExpressionEffect
+from glovecal_models.errors import BadInput
 
 DECLARED = [
     ExpressionEffect.parse(
@@ -157,6 +158,13 @@ def test_several_shapes_at_once_are_lanes(effect: Effect, signals: list[Signals]
     for number, shape in enumerate(grid):
         part = together[:, number * lanes : (number + 1) * lanes]
         np.testing.assert_allclose(part, effect.columns(take, settings, shape), rtol=1e-12, atol=1e-12)
+
+
+def test_settings_of_other_lanes_are_refused(signals: list[Signals]) -> None:
+    effect = catalogue()["nonlinearity"]
+    settings = effect.settle(signals)
+    with pytest.raises(BadInput, match="settings of 3 lanes were given signals of 1"):
+        effect.columns(one_lane(signals[0], 0), settings, np.zeros((1, 0)))
 
 
 def test_frame_by_frame_gives_the_same(effect: Effect, signals: list[Signals], settings: Settings) -> None:

@@ -60,6 +60,21 @@ def test_it_agrees_with_python(text):
     assert worth(text) == pytest.approx(by_python(ast.parse(text, mode="eval").body), rel=1e-12, abs=1e-12)
 
 
+@given(st.lists(st.sampled_from([*"+-*/^(),. 17e", "own", "c.x", "exp(", "lowpass(", "min("]), max_size=40))
+def test_any_text_is_read_or_refused(pieces):
+    text = "".join(pieces)
+    try:
+        nodes = parse_expressions(text)
+    except BadInput as refused:
+        assert str(refused).startswith("expression: ")  # noqa: PT017
+    else:
+        names = {name: np.array([[0.5]]) for node in nodes for name in node.names}
+        evaluation = Evaluation(names, np.zeros(1), 1, Memory())
+        values = [float(evaluation.value(node)[0, 0]) for node in nodes]
+        assert not any(np.isinf(values))
+        assert evaluation.undefined is not None or not any(np.isnan(values))
+
+
 def by_python(node: ast.AST) -> float:
     """The value of Python's own syntax tree."""
     if isinstance(node, ast.BinOp):
