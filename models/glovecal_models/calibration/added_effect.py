@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.effects.catalogue import effect
+from glovecal_models.effects.catalogue import stored_effect
 from glovecal_models.effects.effect import Effect, Settings
 from glovecal_models.errors import BadInput
 
@@ -40,7 +40,7 @@ class AddedEffect:
     @property
     def effect(self) -> Effect:
         """From the catalogue. Raises BadInput when this machine does not have it."""
-        return effect(self.name)
+        return stored_effect(self.name, self.settings)
 
     def described(self) -> dict[str, dict[str, float]]:
         """For each rotation the learned numbers, units in their names."""

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.declaration import RESERVED, Declaration
+from glovecal_models.effects.declaration import Declaration
 from glovecal_models.effects.effect import Effect, Settings, Signals, Stream
 from glovecal_models.effects.expression_value import Evaluation, Memory, Undefined
 from glovecal_models.effects.history_effect import LONGEST_GAP_S, elapsed_s, unbroken
@@ -30,6 +30,8 @@ class ExpressionEffect(Effect):
 
     def __init__(self, declaration: Declaration) -> None:
         self.declaration = declaration
+        self._signals = declaration.signals
+        self._reads_own = any("own" in node.names for node in declaration.columns)
         shown = declaration.explanation or f"Declared by the user: {declaration.columns_text}."
         # Every other effect has these as attributes of its class; here each object has its own.
         vars(self).update(
@@ -52,7 +54,7 @@ class ExpressionEffect(Effect):
         return cls(Declaration.from_document(document))
 
     def missing(self, takes: Sequence[Signals]) -> str | None:
-        for name in self.declaration.signals:
+        for name in self._signals:
             if not any(name in take.others for take in takes):
                 known = sorted({other for take in takes for other in take.others})
                 return f"no signal {name} was recorded (there are {', '.join(known) or 'none'})"
@@ -124,17 +126,22 @@ class ExpressionEffect(Effect):
         self, take: Signals, settings: Settings, shape: np.ndarray, start_s: float
     ) -> dict[str, np.ndarray]:
         rest = np.zeros(len(take))
-        values = [in_joint_units(take.own, settings), take.own, (take.time_s - start_s)[:, None]]
-        names: dict[str, np.ndarray] = dict(zip(RESERVED, values, strict=True))
+        names: dict[str, np.ndarray] = {"own_deg": take.own, "t": (take.time_s - start_s)[:, None]}
+        if self._reads_own:
+            names["own"] = in_joint_units(take.own, settings)
         for column, item in enumerate(self.parameters):
             names[item.name] = shape[None, :, column]
-        for name in self.declaration.signals:
+        for name in self._signals:
             names[name] = take.others.get(name, rest)[:, None]
         for name in self.context:
             known = settings["context"][name]
-            value = take.context.get(name, np.full(len(take), np.nan))
-            value = np.where(np.isfinite(value), value, known["usual"])
-            names[f"c.{name}"] = np.clip(value, known["low"], known["high"])[:, None]
+            value = take.context.get(name)
+            value = (
+                rest + known["usual"]
+                if value is None
+                else np.where(np.isfinite(value), value, known["usual"])
+            )
+            names[f"c.{name}"] = np.minimum(np.maximum(value, known["low"]), known["high"])[:, None]
         return names
 
     def _evaluated(
@@ -179,8 +186,9 @@ class ExpressionStream(Stream):
 
     def columns(self, frame: Signals) -> np.ndarray:
         time = float(frame.time_s[0])
-        if self._start_s is None:
-            self._start_s = self._last_s = time
+        if self._start_s is None or time < self._last_s:
+            # The first frame, or a clock that was set back: as little known as after a gap.
+            self._memory, self._start_s, self._last_s = Memory(), time, time
         elapsed = time - self._last_s
         self._last_s = time
         if elapsed > LONGEST_GAP_S:

@@ -25,7 +25,7 @@ EVERY_GLOVE_DEG = 0.6
 """Slow wandering of a healthy glove stays below this."""
 OVER_NOISE = 1.0
 """The slip must exceed the frame noise so many times."""
-OVER_STATIONARY = 4.0
+OVER_STATIONARY = 3.0
 """Variance of the 10 s means over what stationary errors would give."""
 FOLLOWS = 1.5
 """Von Neumann's ratio: 2 for means in no order, below 1 for a random walk."""

@@ -77,7 +77,8 @@ class _HistoryStream(Stream):
     def columns(self, frame: Signals) -> np.ndarray:
         time, own = float(frame.time_s[0]), frame.own[0]
         elapsed = time - self._last_s
-        if self._state is None or elapsed > LONGEST_GAP_S:
+        # A clock that was set back tells as little of what happened as a gap does.
+        if self._state is None or not 0.0 <= elapsed <= LONGEST_GAP_S:
             self._state, elapsed = self._effect.start(own, self._settings, self._shape), 0.0
         self._last_s = time
         return self._effect.step(self._state, elapsed, own, self._settings, self._shape)[None]

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from glovecal_models.effects.effect import Settings, Signals
+from glovecal_models.errors import BadInput
 
 
 def settle_joint_units(takes: Sequence[Signals]) -> Settings:
@@ -25,5 +26,10 @@ def in_joint_units(own: np.ndarray, settings: Settings) -> np.ndarray:
 
 
 def on_lanes(settled: Sequence[float], lanes: int) -> np.ndarray:
-    """(lanes,): the settled values, repeated as a whole while several shapes are tried at once."""
+    """(lanes,): the settled values, repeated as a whole while several shapes are tried at once.
+
+    Raises BadInput when ``lanes`` is not a multiple of what was settled.
+    """
+    if lanes % len(settled):
+        raise BadInput(f"settings of {len(settled)} lanes were given signals of {lanes}; settle them anew")
     return np.tile(settled, lanes // len(settled))

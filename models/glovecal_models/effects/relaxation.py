@@ -21,6 +21,9 @@ def relax(state: np.ndarray, elapsed_s: np.ndarray, target: np.ndarray, tau_s: n
 
     At an even rate the share gone in one interval is worked out once.
     """
+    if len(elapsed_s) == 1:
+        relax_once(state, elapsed_s[0], target[0], tau_s)
+        return state[None].copy()
     different, which = np.unique(elapsed_s, return_inverse=True)
     extended = different.reshape(-1, *(1 for _ in state.shape))
     shares = -np.expm1(-extended / tau_s)

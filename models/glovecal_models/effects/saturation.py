@@ -25,7 +25,7 @@ LEAST_FRAMES = 30
 LEAST_VISITS = 4
 MOVES_SHARE = 0.25
 """Of the reference's spread in the band, to be seen within visits to it: else the hand only rested there."""
-LEAST_EXTRA_DEG = 1.0
+LEAST_EXTRA_DEG = 2.0
 """A smaller loss is not worth a word."""
 
 

@@ -1,0 +1,65 @@
+"""Garment slip: a wandering error is found with its rate; the small wandering of every glove is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from glovecal_models.effects.garment_slip import GarmentSlip, slip_of, slip_sd
+
+SLIP = GarmentSlip()
+
+
+def every_glove(counts, generator):
+    """0.4 deg with a correlation of 25 s in each sensor."""
+    keep = np.exp(-1 / (60 * 25))
+    noise = 0.4 * generator.normal(size=counts.shape)
+    noise[1:] *= np.sqrt(1 - keep**2)
+    return counts + 2 * lfilter([1], [1, -keep], noise, axis=0)
+
+
+def slipping(rate_deg_per_sqrt_min):
+    def slip(counts, generator):
+        counts = every_glove(counts, generator)
+        steps = generator.normal(size=len(counts)) * rate_deg_per_sqrt_min / np.sqrt(3600)
+        counts[:, 1] += 2 * np.cumsum(steps)
+        return counts
+
+    return slip
+
+
+def test_a_slip_is_found_with_its_rate(glove):
+    takes = glove.takes(count=6, seconds=60, shape_counts=slipping(4.0))
+    [finding] = SLIP.find(takes, glove.sensor_of, glove.errors(takes))
+    assert finding.where == ("M_PIP",)
+    assert finding.evidence["rate_deg_per_sqrt_min"] == pytest.approx(4.0, rel=0.4)
+    assert "known pose" in finding.sentence
+
+
+@pytest.mark.parametrize("noise_deg", [0.1, 0.3, 1.0])
+def test_the_small_wandering_of_every_glove_is_not_named(glove, noise_deg):
+    takes = glove.takes(count=6, seconds=60, shape_counts=every_glove, noise_deg=noise_deg)
+    assert SLIP.find(takes, glove.sensor_of, glove.errors(takes)) == ()
+
+
+def test_a_slip_below_the_frame_noise_is_not_named(glove):
+    takes = glove.takes(count=6, seconds=60, shape_counts=slipping(2.0), noise_deg=2.0)
+    assert SLIP.find(takes, glove.sensor_of, glove.errors(takes)) == ()
+
+
+def test_a_curve_that_the_model_lacks_is_not_a_slip(glove):
+    takes = glove.takes(
+        count=6, shape_counts=lambda counts, generator: counts + 18 * np.sin(np.pi * (counts - 40) / 180)
+    )
+    assert SLIP.find(takes, glove.sensor_of, glove.errors(takes)) == ()
+
+
+def test_without_errors_or_with_short_takes_nothing_is_said(glove):
+    takes = glove.takes(count=2, seconds=15, shape_counts=slipping(4.0))
+    assert SLIP.find(takes, glove.sensor_of) == ()
+    assert slip_of(takes, [error[:, 1] for error in glove.errors(takes)], "M_PIP") is None
+
+
+def test_uncertainty_grows_from_the_last_known_pose():
+    np.testing.assert_allclose(slip_sd(2.0, np.array([-1.0, 0.0, 60.0, 240.0])), [0.0, 0.0, 2.0, 4.0])

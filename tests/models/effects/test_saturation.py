@@ -1,0 +1,87 @@
+"""Saturation: found where a sensor is cut off, not where the hand rests; the interval widens on one side."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from glovecal_models.effects.saturation import SaturatedBand, Saturation, saturated_bands
+from glovecal_models.errors import BadInput
+from glovecal_models.takes.take import Take
+
+SATURATION = Saturation()
+
+
+def cut_off(takes: list[Take], share: float, end: str = "high") -> list[Take]:
+    """The second sensor clipped so that ``share`` of its readings are at one end."""
+    every = np.concatenate([take.readings[:, 1] for take in takes])
+    limit = np.quantile(every, 1 - share if end == "high" else share)
+    clip = np.minimum if end == "high" else np.maximum
+    result = []
+    for take in takes:
+        readings = take.readings.copy()
+        readings[:, 1] = clip(readings[:, 1], limit)
+        result.append(replace(take, readings=readings))
+    return result
+
+
+@pytest.mark.parametrize("end", ["high", "low"])
+def test_a_sensor_that_is_cut_off_is_found(glove, end):
+    takes = cut_off(glove.takes(), 0.2, end)
+    [finding] = SATURATION.find(takes, glove.sensor_of)
+    assert (finding.effect, finding.where, finding.kind) == ("saturation", ("M_PIP",), end)
+    assert "sensor stops responding here" in finding.sentence
+    assert (finding.size_deg or 0.0) > 4
+    assert finding.evidence["density_over_next_bands_1"] > 3
+    assert finding.evidence["reference_spread_over_next_band_1"] > 2
+
+
+def test_inside_the_band_the_interval_is_wider_on_the_open_side(glove):
+    [band] = saturated_bands(cut_off(glove.takes(), 0.2), glove.sensor_of)
+    readings = np.array([100.0, band.high])
+    np.testing.assert_array_equal(band.extra_sd(readings), [0.0, band.extra_sd_deg])
+    low, high = band.censored_interval(readings, np.array([30.0, 70.0]), np.array([1.0, 1.0]), times=2)
+    np.testing.assert_allclose(low, [28.0, 68.0])
+    assert high[0] == 32.0
+    assert high[1] > 70 + 2 * band.extra_sd_deg
+    assert SaturatedBand(**band.to_settings()) == band
+
+
+def test_a_falling_sensor_opens_to_the_other_side(glove):
+    def falling(counts, generator):
+        return np.maximum(270 - counts, 120)
+
+    bands = saturated_bands(glove.takes(shape_counts=falling), glove.sensor_of)
+    assert {(band.end, band.towards) for band in bands} == {("low", 1)}
+
+
+def test_a_posture_at_the_end_is_no_saturation(glove):
+    """The hand rests fully bent for a quarter of the time: readings pile up, but so does the reference."""
+    takes = []
+    for take in glove.takes():
+        readings, reference = take.readings.copy(), take.reference.copy()
+        rest = slice(400, 400 + len(readings) // 4)
+        generator = np.random.default_rng(1)
+        readings[rest] = np.round(222 + 0.6 * generator.normal(size=readings[rest].shape))
+        reference[rest] = 91 + 0.3 * generator.normal(size=reference[rest].shape)
+        takes.append(replace(take, readings=readings, reference=reference))
+    assert SATURATION.find(takes, glove.sensor_of) == ()
+
+
+def test_a_healthy_glove_and_one_without_reference(glove):
+    takes = glove.takes()
+    assert SATURATION.find(takes, glove.sensor_of) == ()
+    blind = [replace(take, reference=np.full_like(take.reference, np.nan)) for take in cut_off(takes, 0.2)]
+    assert SATURATION.find(blind, glove.sensor_of) == ()
+
+
+def test_what_cannot_be_used_is_named(glove):
+    takes = glove.takes(count=1)
+    with pytest.raises(BadInput, match="no sensor 'X' for rotation I_PIP; it has I_PIP"):
+        SATURATION.find(takes, {"I_PIP": "X"})
+    with pytest.raises(BadInput, match="errors of 2 takes were given for 1 takes"):
+        SATURATION.find(takes, glove.sensor_of, [np.zeros(3), np.zeros(3)])
+    with pytest.raises(BadInput, match=r"errors have shape \(3,\), expected \(1800, 3\)"):
+        SATURATION.find(takes, glove.sensor_of, [np.zeros(3)])

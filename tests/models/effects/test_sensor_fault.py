@@ -1,0 +1,101 @@
+"""Sensor faults: each kind is found with its stretch, and a sound glove, however odd, has none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from glovecal_models.effects.catalogue import catalogue
+from glovecal_models.effects.effect import Signals
+from glovecal_models.effects.sensor_fault import SensorFault
+from glovecal_models.effects.signature_effect import frames_inside
+
+FAULT = SensorFault()
+
+
+def broken(glove, change):
+    """Takes in which the first sensor of the third take was changed in place."""
+    takes = glove.takes()
+    readings = takes[2].readings.copy()
+    change(readings[:, 0])
+    return [*takes[:2], replace(takes[2], readings=readings), takes[3]]
+
+
+def stuck(readings):
+    readings[600:900] = 130
+
+
+def spiked(readings):
+    readings[[100, 500, 501, 900, 1400, 1700]] += 90
+
+
+def dropped(readings):
+    readings[200:203] = 0
+    readings[700:730] = 0
+    readings[1300:1310] = 0
+
+
+def shifted(readings):
+    readings[900:] += 16
+
+
+def louder(readings):
+    readings[900:] = 40 + 1.25 * (readings[900:] - 40)
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "first_s", "frames"),
+    [
+        (stuck, "stuck", 10.0, 300),
+        (spiked, "spikes", 100 / 60, 6),
+        (dropped, "dropouts", 200 / 60, 43),
+        (shifted, "jump", 15.0, 900),
+        (louder, "jump", 15.0, 900),
+    ],
+)
+def test_a_fault_is_found_where_it_is(glove, change, kind, first_s, frames):
+    takes = broken(glove, change)
+    [finding] = FAULT.find(takes, glove.sensor_of)
+    assert (finding.where, finding.kind) == (("I_PIP",), kind)
+    assert {item.take for item in finding.stretches} == {"take2"}
+    assert finding.stretches[0].start_s == pytest.approx(first_s, abs=0.1)
+    assert frames_inside(takes[2], finding.stretches).sum() == pytest.approx(frames, abs=6)
+    assert not frames_inside(takes[1], finding.stretches).any()
+    assert "I_PIP" in finding.sentence
+    assert "take2" in finding.sentence
+    if kind == "jump":
+        assert finding.size_deg == pytest.approx(8 if change is shifted else 11, abs=2.5)
+
+
+def drift(counts, generator):
+    return counts + np.linspace(0, 20, len(counts))[:, None]
+
+
+def coupled(counts, generator):
+    return counts + 0.25 * np.roll(counts, 1, axis=1)
+
+
+def sticky(counts, generator):
+    time = np.arange(len(counts)) / 60
+    plays = catalogue()["hysteresis"].columns(Signals(time, counts / 2), {}, np.full((3, 1), 10.0))
+    return counts + 2 * plays @ np.array([0.3, 0.3, 0.4])
+
+
+def clipped(counts, generator):
+    return np.minimum(counts, 180)
+
+
+@pytest.mark.parametrize("distortion", [None, drift, coupled, sticky, clipped])
+def test_what_is_no_fault_is_not_called_one(glove, distortion):
+    assert FAULT.find(glove.takes(shape_counts=distortion), glove.sensor_of) == ()
+
+
+def test_a_sensor_that_stands_still_with_the_hand_is_sound(glove):
+    takes = []
+    for take in broken(glove, stuck):
+        reference = take.reference.copy()
+        reference[600:900] = 45.0
+        takes.append(replace(take, reference=reference))
+    assert [item.kind for item in FAULT.find(takes, glove.sensor_of)] == []
