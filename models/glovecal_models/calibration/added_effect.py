@@ -42,9 +42,19 @@ class AddedEffect:
         """From the catalogue. Raises BadInput when this machine does not have it."""
         return stored_effect(self.name, self.settings)
 
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Rotations on which it has weight."""
+        if not self.weights.shape[1]:
+            return self.rotations
+        return tuple(
+            name for name, some in zip(self.rotations, self.weights.any(axis=1), strict=True) if some
+        )
+
     def described(self) -> dict[str, dict[str, float]]:
         """For each rotation the learned numbers, units in their names."""
         return {
             name: self.effect.described(self.settings, shape, weights)
             for name, shape, weights in zip(self.rotations, self.shape, self.weights, strict=True)
+            if name in self.active
         }

@@ -16,7 +16,7 @@ from glovecal_models.effects.effect import Parameter, Settings, Signals
 from glovecal_models.effects.history_effect import HistoryEffect
 from glovecal_models.effects.relaxation import relax, relax_once
 
-MULTIPLES = np.array([1.0, 2.0, 4.0])
+MULTIPLES = np.array([0.5, 1.0, 2.0, 4.0, 8.0])
 TAU_S = (0.02, 0.03, 0.045, 0.065, 0.1, 0.15)
 FAST_SHARE = 1.0
 """Per second: a joint is moved fast when its speed reaches so many of its own standard deviations."""

@@ -11,8 +11,8 @@ from glovecal_models.effects.context_effect import ContextEffect
 from glovecal_models.effects.effect import Parameter, Settings, Signals
 from glovecal_models.effects.joint_units import in_joint_units
 
-EXPONENTS = (0.5, 1.0, 1.5, 2.0, 2.5)
-OWN_PRIOR_DEG = 0.15
+EXPONENTS = (1.0, 2.0)
+OWN_PRIOR_DEG = 1.0
 """How far a joint may depart from the common scaling, for the whole fall of the voltage."""
 
 
@@ -35,10 +35,16 @@ class SupplySag(ContextEffect):
         common = (take.own - zero) * loss
         own = (volts / max(settings["high"] - settings["low"], 1e-9))[:, None] * np.ones_like(take.own)
         own = own - settings["usual"] / max(settings["high"] - settings["low"], 1e-9)
-        return np.stack([common, own, own * in_joint_units(take.own, settings)], axis=2)
+        joint = in_joint_units(take.own, settings)
+        return np.stack([common, own, own * joint, own * joint**2], axis=2)
 
     def prior_sd(self, settings: Settings) -> np.ndarray:
-        return np.array([1.0, OWN_PRIOR_DEG, OWN_PRIOR_DEG])
+        return np.array([1.0, OWN_PRIOR_DEG, OWN_PRIOR_DEG, OWN_PRIOR_DEG])
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
-        return ("share_of_common_scaling", "own_offset_deg", "own_gain_deg_per_sd")
+        return (
+            "common_scaling_deg_per_deg",
+            "own_offset_deg",
+            "own_gain_deg_per_sd",
+            "own_bend_deg_per_sd2",
+        )

@@ -1,0 +1,208 @@
+"""Adding one effect to a calibration, with proof that it helps, or with the reason why it was undone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.training_settings import Report, TrainingSettings
+from glovecal_models.effects.catalogue import effect as known_effect
+from glovecal_models.effects.clock_scan import aligned
+from glovecal_models.effects.effect import Signals
+from glovecal_models.errors import BadInput
+from glovecal_models.improvement.child_model import child_model
+from glovecal_models.improvement.effect_fit import fit_with_effects
+from glovecal_models.improvement.held_out_check import HeldOutErrors, held_out_errors
+from glovecal_models.improvement.prepared_takes import PreparedTakes
+from glovecal_models.improvement.relearned import kept_lanes, reference_effects
+from glovecal_models.improvement.wanted_effect import WantedEffect
+from glovecal_models.regression.rule_regressor import RuleRegressor
+from glovecal_models.takes.take import Take
+
+LEAST_GAIN = 0.05
+"""Of the held-out RMSE of the touched rotations; with less an effect is undone."""
+
+
+@dataclass(frozen=True)
+class Addition:
+    """What became of an effect that was added."""
+
+    effect: str
+    rotations: tuple[str, ...]
+    added: bool
+    sentence: str
+    before: HeldOutErrors
+    after: HeldOutErrors
+    model: CalibrationModel
+    """The child; the parent itself when the effect was undone."""
+    wanted: tuple[WantedEffect, ...]
+    """All effects of ``model``."""
+    parameters: dict[str, dict[str, float]] = field(default_factory=dict)
+    """For each rotation, units in the names."""
+
+    def to_document(self) -> dict[str, Any]:
+        """Plain JSON-able data."""
+        return {
+            "effect": self.effect,
+            "where": list(self.rotations),
+            "added": self.added,
+            "sentence": self.sentence,
+            "before": _rmse(self.before, self.rotations),
+            "after": _rmse(self.after, self.rotations),
+            "parameters": self.parameters,
+        }
+
+
+def wanted_of(model: CalibrationModel) -> tuple[WantedEffect, ...]:
+    """The effects a model has, as they would be asked for again."""
+    merged: dict[str, WantedEffect] = {}
+    for item in model.effects:
+        before = merged.get(item.name)
+        rotations = item.active if before is None else (*before.rotations, *item.active)
+        settings = item.settings if item.effect.side == "reference" else {}
+        merged[item.name] = WantedEffect(item.name, tuple(dict.fromkeys(rotations)), settings)
+    return tuple(merged.values())
+
+
+def trained_rotations(model: CalibrationModel) -> tuple[str, ...]:
+    """Rotations with a regressor of their own, no rule."""
+    return tuple(item.rotation for item in model.rotations if not isinstance(item.regressor, RuleRegressor))
+
+
+def repaired_takes(takes: Sequence[Take], wanted: Sequence[WantedEffect]) -> list[Take]:
+    """The takes with what their reference needs: clocks on the frames' time."""
+    result = list(takes)
+    for item in wanted:
+        if item.name == "clock_offset":
+            offsets, common = item.settings["offset_s"], float(item.settings["common_s"])
+            result = [aligned(take, float(offsets.get(take.name, common))) for take in result]
+    return result
+
+
+def settings_of(model: CalibrationModel, settings: TrainingSettings | None) -> TrainingSettings:
+    """How the model was trained, as far as it tells."""
+    return settings or TrainingSettings(method=model.method)  # pyright: ignore[reportArgumentType]
+
+
+def add_effect(
+    model: CalibrationModel,
+    takes: Sequence[Take],
+    name: str,
+    *,
+    rotations: Sequence[str] | None = None,
+    clock: dict[str, Any] | None = None,
+    settings: TrainingSettings | None = None,
+    before: HeldOutErrors | None = None,
+    least_gain: float = LEAST_GAIN,
+    parent_id: str | None = None,
+    take_hashes: Sequence[str] = (),
+    cancelled: Callable[[], bool] | None = None,
+    report: Report | None = None,
+) -> Addition:
+    """Learn ``model`` anew with effect ``name`` on ``rotations`` (default: all measured ones).
+
+    ``takes`` are the training takes. ``clock`` is the setting of a clock offset. ``before`` saves measuring
+    the parent. Undone, with the reason, unless the touched rotations' held-out RMSE falls by ``least_gain``.
+    Raises BadInput for an unknown effect or rotation, or when the takes cannot carry it; Cancelled.
+    """
+    effect = known_effect(name)
+    settings = settings_of(model, settings)
+    has = wanted_of(model)
+    every = trained_rotations(model)
+    chosen = tuple(every if rotations is None or effect.side == "reference" else rotations)
+    unknown = [item for item in chosen if item not in every]
+    if unknown:
+        raise BadInput(f"no rotation {unknown[0]!r} is trained in this model; it has {', '.join(every)}")
+    fresh = WantedEffect(name, chosen, dict(clock or {}))
+    wanted = (*(item for item in has if item.name != name), _joined(has, fresh))
+    prepared = PreparedTakes.of(repaired_takes(takes, wanted), model.layout)
+    if not fresh.is_on_reference:
+        _require_judgeable(prepared, effect.missing(_all_signals(prepared)), name)
+    before = before or held_out_errors(
+        PreparedTakes.of(repaired_takes(takes, has), model.layout), chosen, has, settings,
+        cancelled=cancelled, report=_part(report, 0.0, 0.4, "measuring what there is"),
+    )  # fmt: skip
+    after = held_out_errors(
+        prepared,
+        chosen,
+        wanted,
+        settings,
+        cancelled=cancelled,
+        report=_part(report, 0.4, 0.8, f"with {name}"),
+    )
+    gain = 1.0 - _total(after, chosen) / max(_total(before, chosen), 1e-12)
+    sentence = _sentence(name, chosen, before, after, gain, least_gain)
+    if gain < least_gain:
+        return Addition(name, chosen, False, sentence, before, after, model, has)
+    if report:
+        report(f"learning {name} from all takes", 0.85)
+    fit = fit_with_effects(prepared, chosen, wanted, settings, cancelled=cancelled)
+    evidence = {"rmse_before_deg": _total(before, chosen), "rmse_after_deg": _total(after, chosen)}
+    fitted = [replace(item, evidence=evidence) if item.name == name else item for item in fit.effects]
+    effects = [*kept_lanes(model.effects, chosen), *fitted, *reference_effects(wanted, every)]
+    whole = before.with_those_of(after)
+    child = child_model(model, parent_id, prepared, fit, effects, whole, settings, take_hashes)
+    described = {
+        key: value for item in fitted if item.name == name for key, value in item.described().items()
+    }
+    return Addition(name, chosen, True, sentence, before, after, child, tuple(wanted), described)
+
+
+def _joined(has: Sequence[WantedEffect], fresh: WantedEffect) -> WantedEffect:
+    """The effect on the rotations that have it already, too."""
+    before = next((item for item in has if item.name == fresh.name), None)
+    if before is None:
+        return fresh
+    return WantedEffect(
+        fresh.name,
+        tuple(dict.fromkeys((*before.rotations, *fresh.rotations))),
+        fresh.settings or before.settings,
+    )
+
+
+def _require_judgeable(takes: PreparedTakes, why: str | None, name: str) -> None:
+    if why is not None:
+        raise BadInput(f"effect {name!r} cannot be learned from these {len(takes.takes)} takes: {why}")
+
+
+def _all_signals(takes: PreparedTakes) -> list[Signals]:
+    """Signals of all joints as measured, to ask whether an effect can be judged at all."""
+    own = [np.where(np.isfinite(part), part, 0.0) for part in takes.reference]
+    return takes.signals(own, np.zeros(own[0].shape[1]), frozenset())
+
+
+def _total(errors: HeldOutErrors, rotations: Sequence[str]) -> float:
+    square = sum(errors.square[name] for name in rotations)
+    return float(np.sqrt(square / max(sum(errors.count[name] for name in rotations), 1)))
+
+
+def _rmse(errors: HeldOutErrors, rotations: Sequence[str]) -> dict[str, float]:
+    return {name: errors.rmse_deg(name) for name in rotations}
+
+
+def _sentence(
+    name: str,
+    rotations: Sequence[str],
+    before: HeldOutErrors,
+    after: HeldOutErrors,
+    gain: float,
+    least: float,
+) -> str:
+    where = ", ".join(rotations) if len(rotations) <= 4 else f"{len(rotations)} rotations"
+    change = f"from {_total(before, rotations):.2f} to {_total(after, rotations):.2f} degrees"
+    if gain >= least:
+        return f"{name} on {where}: the error on takes left out falls {change} ({100 * gain:.0f} %)."
+    return (
+        f"{name} on {where} was undone: the error on takes left out goes {change}"
+        f" ({100 * gain:+.0f} % saved; {100 * least:.0f} % is asked for)."
+    )
+
+
+def _part(report: Report | None, low: float, high: float, what: str) -> Report | None:
+    if report is None:
+        return None
+    return lambda text, share: report(f"{what}: {text}", low + (high - low) * share)

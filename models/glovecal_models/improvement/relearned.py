@@ -1,0 +1,32 @@
+"""What stays of a model's effects when some of its rotations are learned anew."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from glovecal_models.calibration.added_effect import AddedEffect
+from glovecal_models.improvement.wanted_effect import WantedEffect
+
+
+def kept_lanes(effects: Sequence[AddedEffect], relearned: Sequence[str]) -> list[AddedEffect]:
+    """``effects`` without weight on the rotations learned anew; those left without any are dropped."""
+    kept = []
+    for item in effects:
+        stays = np.array([name not in relearned for name in item.rotations])
+        weights = np.where(stays[:, None], item.weights, 0.0)
+        if weights.any():
+            kept.append(replace(item, weights=weights))
+    return kept
+
+
+def reference_effects(wanted: Sequence[WantedEffect], rotations: Sequence[str]) -> list[AddedEffect]:
+    """The effects among ``wanted`` that repair the measurement: settings only, no columns."""
+    nothing = np.zeros((len(rotations), 0))
+    return [
+        AddedEffect(item.name, tuple(rotations), item.settings, nothing, nothing, np.zeros(len(rotations)))
+        for item in wanted
+        if item.is_on_reference
+    ]
