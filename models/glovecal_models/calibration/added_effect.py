@@ -48,7 +48,7 @@ class AddedEffect:
         if not self.weights.shape[1]:
             return self.rotations
         return tuple(
-            name for name, some in zip(self.rotations, self.weights.any(axis=1), strict=True) if some
+            name for name, weights in zip(self.rotations, self.weights, strict=True) if np.any(weights)
         )
 
     def described(self) -> dict[str, dict[str, float]]:

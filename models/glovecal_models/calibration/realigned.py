@@ -20,7 +20,7 @@ LEAST_OVERLAP = 0.6
 
 
 def realigned(model: CalibrationModel, take: Take, predicted: np.ndarray) -> Take:
-    """``predicted`` (N, R): the model's angles at the frames, degrees. The take itself without such an effect."""
+    """``predicted`` (N, R): the model's angles at the frames, degrees."""
     added = next((item for item in model.effects if item.name == CLOCK_OFFSET), None)
     if added is None or len(take.reference_time_s) < 2:
         return take

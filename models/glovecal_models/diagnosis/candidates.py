@@ -88,7 +88,7 @@ def _blocks(residual: Sequence[np.ndarray], starts: np.ndarray) -> np.ndarray:
 
 
 def _delays(direction: Direction) -> list[Assessment]:
-    """Clock offset, one for all joints (and, where that pays, for each take its own); lag, each joint its own."""
+    """Clock offset, one for all joints (where that pays, one a take); lag, each joint its own."""
     grids = delay_errors(direction, BLOCK_ROWS)
     base = [_held_out_blocks(direction, joint) for joint in range(len(grids))]
     rows = [int(products.count.sum()) for products in direction.products]

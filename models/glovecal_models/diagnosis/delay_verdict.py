@@ -52,7 +52,7 @@ class ClockChoice:
 
 
 def clock_choice(grids: Sequence[DelayErrors]) -> ClockChoice:
-    """One offset for all takes, unless offsets of their own save clearly more (each judged on other blocks)."""
+    """One offset for all takes, unless their own save clearly more (each judged on other blocks)."""
     clock, takes = grids[0].clock, int(max(grid.take.max() for grid in grids)) + 1
     share = [grid.blocks[:, clock] / grid.unmoved.sum() for grid in grids]
     each = np.array(

@@ -1,4 +1,4 @@
-"""Which physical effect is missing: the whole question, from takes to a name, a set, or silence with a reason."""
+"""Which physical effect is missing: from takes to a name, a set, or silence with a reason."""
 
 from __future__ import annotations
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -99,12 +100,10 @@ def errors_of(
 
 def _halved(takes: PreparedTakes) -> PreparedTakes:
     """The only take in four stretches of time, as takes of their own."""
-    from dataclasses import replace
-
     take = takes.takes[0]
     edges = np.linspace(0, len(take.time_s), 5).astype(int)
     pieces = []
-    for number, (start, end) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+    for number, (start, end) in enumerate(itertools.pairwise(edges)):
         rows = slice(int(start), int(end))
         pieces.append(
             replace(
