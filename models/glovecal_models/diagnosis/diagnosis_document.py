@@ -125,6 +125,7 @@ def _candidate(item: Assessment) -> dict[str, Any]:
         "probability": item.probability,
         "passes": bool(item.touched),
         "sentence": (
-            f"{item.effect}: {before:.2f} to {after:.2f} degrees (decoy {decoy:.2f}); most on {item.joints[worst]}."
+            f"{item.effect}: {before:.2f} to {after:.2f} degrees (decoy {decoy:.2f});"
+            f" most on {item.joints[worst]}."
         ),
     }

@@ -1,4 +1,4 @@
-"""The loop walked by itself: compare, diagnose, add, verify, again, until the floor or nothing more is known."""
+"""The loop walked by itself: diagnose, add, verify, until the floor is reached or nothing more is known."""
 
 from __future__ import annotations
 
