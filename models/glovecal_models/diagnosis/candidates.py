@@ -54,7 +54,7 @@ def assessed(
 
 def _assessed(direction: Direction, effect: Effect, generator: np.random.Generator) -> Assessment:
     evidence = screen(direction, effect, generator)
-    errors = tuple(_joint_errors(item) for item in evidence)
+    errors = tuple(_joint_errors(item, np.array(direction.unit_take)) for item in evidence)
     probability = None
     if effect.decoy in SESSION_DECOYS:
         some = [i for i, item in enumerate(errors) if item.contrast >= LEAST_SESSION_CONTRAST]
@@ -73,7 +73,7 @@ def _assessed(direction: Direction, effect: Effect, generator: np.random.Generat
     )
 
 
-def _joint_errors(evidence: Evidence) -> JointErrors:
+def _joint_errors(evidence: Evidence, take: np.ndarray) -> JointErrors:
     true, decoy = evidence.true, evidence.decoy
     starts = block_starts([len(part) for part in true.residual], BLOCK_ROWS)
     return JointErrors(
@@ -81,7 +81,7 @@ def _joint_errors(evidence: Evidence) -> JointErrors:
         _blocks(true.residual_added, starts),
         _blocks(decoy.residual_added, starts),
         int(true.count.sum()),
-        np.searchsorted(np.cumsum([len(part) for part in true.residual]), starts, side="right"),
+        take[np.searchsorted(np.cumsum([len(part) for part in true.residual]), starts, side="right")],
     )
 
 
