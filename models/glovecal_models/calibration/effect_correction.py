@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -32,11 +32,46 @@ class EffectCorrection:
             if item.weights.shape[1]
         ]
         self._scale = scale
-        self._streams = [item.effect.stream(item.settings, item.shape) for item, _ in self._lanes]
+        self._effects = [item.effect for item, _ in self._lanes]
+        self._streams = [
+            effect.stream(item.settings, item.shape)
+            for effect, (item, _) in zip(self._effects, self._lanes, strict=True)
+        ]
+        self.context = tuple(dict.fromkeys(name for effect in self._effects for name in effect.context))
+        """Context columns that the effects read."""
+        self.settling_s = max(
+            (
+                effect.settling_s(item.shape[item.weights.any(axis=1)])
+                for effect, (item, _) in zip(self._effects, self._lanes, strict=True)
+            ),
+            default=0.0,
+        )
+        """So long after a start the state still shows that it was started anew; 0: nothing is remembered."""
 
     @property
     def is_empty(self) -> bool:
         return not self._lanes
+
+    @property
+    def rows(self) -> np.ndarray:
+        """Indices of the rotations that are corrected."""
+        return np.unique(np.concatenate([lanes for _, lanes in self._lanes])) if self._lanes else np.empty(0, int)
+
+    @property
+    def needing_time(self) -> tuple[str, ...]:
+        """Names of the effects whose columns depend on when the frames were."""
+        return tuple(effect.name for effect in self._effects if effect.needs_time)
+
+    def silent(self, context: Collection[str], wearing: str) -> tuple[str, ...]:
+        """A sentence for each effect that corrects nothing for want of something it is not told.
+
+        ``context`` are the columns whose values are known.
+        """
+        said = [
+            (effect.lacks(item.settings, context, wearing), effect.name)
+            for effect, (item, _) in zip(self._effects, self._lanes, strict=True)
+        ]
+        return tuple(f"{lacking}: {name} is not corrected" for lacking, name in said if lacking)
 
     def of_take(
         self,

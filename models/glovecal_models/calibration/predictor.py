@@ -17,6 +17,8 @@ from glovecal_models.regression.rule_regressor import RuleRegressor
 EXTRAPOLATING, TOO_UNCERTAIN, BY_RULE = 1, 2, 4
 RANGE_MARGIN = 0.05
 """An input this share of its training range outside that range is extrapolating."""
+LARGEST_CORRECTION_DEG = 360.0
+"""No effect turns a joint by more than this; what is larger, or no number, is an effect gone wrong."""
 FLOATS_AT_ONCE = 2_000_000
 """Long recordings are predicted in blocks with work arrays of about this size."""
 
@@ -102,11 +104,20 @@ class GlovePredictor:
         return self.corrected(angles, correction)
 
     def corrected(self, angles: GloveAngles, correction: np.ndarray) -> GloveAngles:
-        """``angles`` with the effects' ``correction`` (N, R) added; rules follow the rotations they read."""
-        mean = angles.mean + correction
+        """``angles`` with the effects' ``correction`` (N, R) added; rules follow the rotations they read.
+
+        Where the correction is unusable the rotation stays as it was and is flagged too uncertain.
+        """
+        usable = usable_correction(correction)
+        is_usable = usable.all()
+        mean, flags = angles.mean + (correction if is_usable else np.where(usable, correction, 0.0)), angles.flags
+        if not is_usable:
+            flags = np.where(usable, flags, flags | TOO_UNCERTAIN).astype(np.uint8)
         for row, sources, weights in self._rules:
             mean[:, row] = mean[:, sources] @ weights
-        return GloveAngles(mean, angles.sd, angles.flags)
+            if not is_usable:
+                flags[:, row] |= np.bitwise_or.reduce(flags[:, sources] & TOO_UNCERTAIN, axis=1)
+        return GloveAngles(mean, angles.sd, flags)
 
     def stream(self) -> EffectCorrection:
         """The effects' state for one glove's frames, to be used with ``corrected``."""
@@ -128,6 +139,11 @@ class GlovePredictor:
             variance[row] = (weights * weights) @ variance[sources]
             flags[row] = np.bitwise_or.reduce(flags[sources], axis=0) | BY_RULE
         return GloveAngles(mean.T, np.sqrt(variance).T, flags.T)
+
+
+def usable_correction(correction: np.ndarray) -> np.ndarray:
+    """Where ``correction``, degrees of any shape, is a number that an effect may add."""
+    return np.abs(correction) <= LARGEST_CORRECTION_DEG
 
 
 class _Range:
