@@ -55,7 +55,11 @@ class EffectCorrection:
     @property
     def rows(self) -> np.ndarray:
         """Indices of the rotations that are corrected."""
-        return np.unique(np.concatenate([lanes for _, lanes in self._lanes])) if self._lanes else np.empty(0, int)
+        return (
+            np.unique(np.concatenate([lanes for _, lanes in self._lanes]))
+            if self._lanes
+            else np.empty(0, int)
+        )
 
     @property
     def needing_time(self) -> tuple[str, ...]:

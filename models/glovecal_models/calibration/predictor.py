@@ -110,7 +110,10 @@ class GlovePredictor:
         """
         usable = usable_correction(correction)
         is_usable = usable.all()
-        mean, flags = angles.mean + (correction if is_usable else np.where(usable, correction, 0.0)), angles.flags
+        mean, flags = (
+            angles.mean + (correction if is_usable else np.where(usable, correction, 0.0)),
+            angles.flags,
+        )
         if not is_usable:
             flags = np.where(usable, flags, flags | TOO_UNCERTAIN).astype(np.uint8)
         for row, sources, weights in self._rules:

@@ -22,7 +22,7 @@ import numpy as np
 Settings = dict[str, Any]
 """Constants an effect takes from its training takes: plain JSON-able data."""
 LEAST_SETTLING_S = 1.0
-"""An effect with a memory counts as settled after this, or after its longest time constant if that is longer."""
+"""An effect with a memory counts as settled after this or, if longer, its longest time constant."""
 Side = Literal["sensor", "reference"]
 Decoy = Literal["reversed in time", "rolled in time", "context of other takes", "dealt wearings", "none"]
 
