@@ -8,16 +8,19 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, urlsplit
 
+import numpy as np
+
 from glovecal_client.errors import BadName, ClientError, ServiceError
 
 if TYPE_CHECKING:
     import httpx
+    from numpy.typing import ArrayLike
 
 FINISHED = ("done", "failed", "cancelled")
 CSV, PARQUET = "text/csv", "application/vnd.apache.parquet"
@@ -132,6 +135,32 @@ class RestClient:
         query = {"clock": clock, "filename": file.name}
         return self._send_file("PUT", f"/takes/{quote(take, safe='')}/reference", file, query)
 
+    def predict(
+        self,
+        model: str,
+        readings: ArrayLike,
+        *,
+        sensors: Sequence[str] | None = None,
+        time_s: ArrayLike | None = None,
+        context: Mapping[str, ArrayLike] | None = None,
+        wearing: str | None = None,
+    ) -> dict[str, Any]:
+        """Rotations of ``readings`` (N, S), raw counts, as the service's ``predict`` answers.
+
+        A model whose effects have a memory needs ``time_s`` (N,), seconds, increasing: the frames are one
+        take then. ``context`` holds columns (N,), NaN where unknown.
+        """
+        body: dict[str, Any] = {"readings": np.asarray(readings, dtype=float).tolist()}
+        if sensors is not None:
+            body["sensors"] = list(sensors)
+        if time_s is not None:
+            body["time_s"] = np.asarray(time_s, dtype=float).tolist()
+        if context is not None:
+            body["context"] = {name: _or_none(column) for name, column in context.items()}
+        if wearing is not None:
+            body["wearing"] = wearing
+        return self.post(f"/models/{quote(model, safe='')}/predict", body)
+
     def wait_for_job(
         self,
         job: str,
@@ -230,3 +259,8 @@ def _import_httpx() -> Any:
             "the REST client needs httpx: pip install 'glovecal-client[rest]' (or httpx)"
         ) from error
     return httpx
+
+
+def _or_none(column: ArrayLike) -> list[float | None]:
+    """JSON has no NaN."""
+    return [None if np.isnan(value) else value for value in np.asarray(column, dtype=float).tolist()]

@@ -16,6 +16,7 @@ from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_service.realtime.frame_gate import TAKEOVER_AFTER_NS
 from glovecal_service.realtime.lane_effects import LaneEffects
 from glovecal_service.realtime.served_model import ServedModel
+from glovecal_models.errors import BadInput
 from glovecal_service.realtime.worn_gloves import WornGlove
 
 MODEL = model_with(HYSTERESIS, CREEP, LAG)
@@ -221,3 +222,10 @@ def test_an_effect_that_raises_does_not_stop_the_poses(monkeypatch: pytest.Monke
     more = [replace(frame, sequence=frame.sequence + 5) for frame in moving_frames(30, start_s=1000.2)]
     by_hand.send([("g1", frame) for frame in more])
     assert_published(by_hand.poses["g1"][5:], as_take(MODEL, more))
+
+
+def test_a_model_whose_effect_is_not_here_or_another_is_refused_before_it_is_served() -> None:
+    with pytest.raises(BadInput, match="no effect 'strap'"):
+        ServedModel.prepare("1" * 64, model_with(added("strap", (), (1.0,))))
+    with pytest.raises(BadInput, match="learned with 1 parameters and 2 weights, but here it has 1 and 3"):
+        ServedModel.prepare("1" * 64, model_with(added("hysteresis", (5.0,), (0.4, 0.3))))

@@ -7,7 +7,8 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect
-from glovecal_models.effects.effect import Signals
+from glovecal_models.effects.effect import Effect, Signals
+from glovecal_models.errors import BadInput
 
 
 class SignalScale:
@@ -25,14 +26,17 @@ class EffectCorrection:
     """All effects of one model together."""
 
     def __init__(self, effects: Sequence[AddedEffect], rotations: Sequence[str], scale: SignalScale) -> None:
-        """``rotations``: the columns of the base's prediction."""
+        """``rotations``: the columns of the base's prediction.
+
+        Raises BadInput for an effect that this machine does not have, or has in another version.
+        """
         self._lanes = [
             (item, np.array([list(rotations).index(name) for name in item.rotations]))
             for item in effects
-            if item.weights.shape[1]
+            if item.weights.any()
         ]
         self._scale = scale
-        self._effects = [item.effect for item, _ in self._lanes]
+        self._effects = [_fitting(item) for item, _ in self._lanes]
         self._streams = [
             effect.stream(item.settings, item.shape)
             for effect, (item, _) in zip(self._effects, self._lanes, strict=True)
@@ -51,6 +55,11 @@ class EffectCorrection:
     @property
     def is_empty(self) -> bool:
         return not self._lanes
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Effects that correct something, in their order."""
+        return tuple(item.name for item, _ in self._lanes)
 
     @property
     def rows(self) -> np.ndarray:
@@ -118,3 +127,16 @@ class EffectCorrection:
         """A new wearing, or frames were lost: effects with a memory start anew."""
         for stream in self._streams:
             stream.reset()
+
+
+def _fitting(added: AddedEffect) -> Effect:
+    """Its effect, if it still has the parameters and columns that the model learned."""
+    effect = added.effect
+    wanted = (len(effect.parameters), len(effect.weight_names(added.settings)))
+    learned = (added.shape.shape[1], added.weights.shape[1])
+    if learned != wanted:
+        raise BadInput(
+            f"effect {added.name!r} was learned with {learned[0]} parameters and {learned[1]} weights, "
+            f"but here it has {wanted[0]} and {wanted[1]}; install the version it was learned with"
+        )
+    return effect

@@ -57,7 +57,7 @@ class ServedModel:
             rotations=tuple(predictor.rotations),
             counts=model.layout.counts,
             predictor=predictor,
-            effects=tuple(item.name for item in model.effects if item.weights.any()),
+            effects=predictor.stream().names,
             pace=Pace(2 * seconds + BESIDES_PREDICTION_S),
         )
 
