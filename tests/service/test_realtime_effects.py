@@ -13,10 +13,11 @@ from glovecal_client.wire.frame import Frame
 from glovecal_client.wire.pose import Pose, RotationFlag
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
+from glovecal_models.effects.expression_effect import ExpressionEffect
+from glovecal_models.errors import BadInput
 from glovecal_service.realtime.frame_gate import TAKEOVER_AFTER_NS
 from glovecal_service.realtime.lane_effects import LaneEffects
 from glovecal_service.realtime.served_model import ServedModel
-from glovecal_models.errors import BadInput
 from glovecal_service.realtime.worn_gloves import WornGlove
 
 MODEL = model_with(HYSTERESIS, CREEP, LAG)
@@ -74,6 +75,16 @@ def test_two_gloves_on_one_model_have_states_of_their_own() -> None:
     by_hand.send([item for pair in zip(one, two, strict=True) for item in (("g1", pair[0]), ("g2", pair[1]))])
     assert_published(by_hand.poses["g1"], as_take(MODEL, one))
     assert_published(by_hand.poses["g2"], as_take(MODEL, two))
+
+
+def test_a_restarted_service_begins_anew() -> None:
+    frames = moving_frames(120)
+    for part in (frames[:70], frames[70:]):
+        by_hand = LoopByHand()
+        by_hand.serve("g1", MODEL)
+        by_hand.send([("g1", frame) for frame in part])
+        assert_published(by_hand.poses["g1"], as_take(MODEL, part))
+        assert [pose.sequence for pose in by_hand.poses["g1"] if pose.state_reset] == [part[0].sequence]
 
 
 def test_skipped_frames_are_a_hole_in_the_take() -> None:
@@ -184,8 +195,6 @@ def test_context_goes_with_the_frame_and_what_is_not_sent_is_said() -> None:
 
 @pytest.mark.parametrize("columns", ["1e300 * exp(t * 100)", "400 + 0 * own"])
 def test_an_absurd_correction_leaves_the_base_flagged_and_counted(columns: str) -> None:
-    from glovecal_models.effects.expression_effect import ExpressionEffect
-
     document = ExpressionEffect.parse(f"name = wild; columns = {columns}").declaration.to_document()
     wild = added("wild", (), (1.0,), ("I_PIP",), settings={"declaration": document, "context": {}, **UNITS})
     model, frames = model_with(HYSTERESIS, wild), moving_frames(50)

@@ -31,7 +31,7 @@ def test_a_models_effects_are_shown_with_units_and_evidence(tmp_path: Path) -> N
     first = next(line for line in lines if line.startswith("hysteresis"))
     assert "I_MCP" in first
     assert "widest_play_deg 5" in first
-    assert "rmse_before_deg 5.50, rmse_after_deg 1.25" in first
+    assert "rmse_after_deg 1.25, rmse_before_deg 5.50" in first
     assert sum("widest_play_deg 5" in line for line in lines) == 3
     assert sum("slow_tau_s 2.5" in line for line in lines) == 2
     document = run("model", "show", record.id[:8], "--json").json
