@@ -41,7 +41,7 @@ def cost_of_effects(base: CalibrationModel) -> dict[str, Any]:
         for number, row in enumerate(readings):
             angles = model.predict([row])
             frame = Frame(number, 1, number * 8_333_333, 0, row)
-            correction, _ = effects.correct(frame, worn, angles.mean[0])
+            correction = effects.correct(frame, worn, angles.mean[0]).degrees
             model.predictor.corrected(angles, correction[None])
 
     before, after = _milliseconds(without), _milliseconds(with_effects)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from effect_models import CREEP, HYSTERESIS, LAG, UNITS, LoopByHand, added, model_with, moving_frames
+from realtime_support import LAYOUT
 
-from glovecal_client.wire.frame import Frame
+from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_client.wire.pose import Pose, RotationFlag
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
@@ -17,6 +19,8 @@ from glovecal_models.effects.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
 from glovecal_service.realtime.frame_gate import TAKEOVER_AFTER_NS
 from glovecal_service.realtime.lane_effects import LaneEffects
+from glovecal_service.realtime.recording_file import RecordingFile
+from glovecal_service.realtime.recording_take import read_take
 from glovecal_service.realtime.served_model import ServedModel
 from glovecal_service.realtime.worn_gloves import WornGlove
 
@@ -62,7 +66,7 @@ def test_before_it_is_rounded_for_the_wire_it_agrees_to_1e_9() -> None:
     effects, found = LaneEffects(served), []
     for frame in frames:
         base = served.predict([frame.readings])
-        correction, _ = effects.correct(frame, WornGlove(), base.mean[0])
+        correction = effects.correct(frame, WornGlove(), base.mean[0]).degrees
         found.append(served.predictor.corrected(base, correction[None]).mean[0])
     np.testing.assert_allclose(found, as_take(MODEL, frames), rtol=0, atol=1e-9)
 
@@ -238,3 +242,44 @@ def test_a_model_whose_effect_is_not_here_or_another_is_refused_before_it_is_ser
         ServedModel.prepare("1" * 64, model_with(added("strap", (), (1.0,))))
     with pytest.raises(BadInput, match="learned with 1 parameters and 2 weights, but here it has 1 and 3"):
         ServedModel.prepare("1" * 64, model_with(added("hysteresis", (5.0,), (0.4, 0.3))))
+
+
+def test_a_declared_effect_without_a_value_is_left_out_and_flagged() -> None:
+    text = "name = strap; columns = 1 / c.strap_n, lowpass(own_deg, tau) - own_deg; parameter tau s 0.1 5 = 1"
+    declared = ExpressionEffect.parse(text).declaration.to_document()
+    span = {"strap_n": {"low": 0.0, "high": 9.0, "usual": 1.0}}
+    strap = added(
+        "strap", (1.0,), (1.0, 0.3), ("I_PIP",), settings={"declaration": declared, "context": span, **UNITS}
+    )
+    model, frames = model_with(HYSTERESIS, strap), moving_frames(60)
+    tension = np.where(np.arange(60) % 5 == 0, 0.0, 2.0).astype(np.float32)
+    by_hand = LoopByHand()
+    by_hand.serve("g1", model)
+    by_hand.say("g1", context=("strap_n",))
+    sent = [replace(frame, context=tension[at : at + 1]) for at, frame in enumerate(frames)]
+    by_hand.send([("g1", frame) for frame in sent])
+    time_s = np.array([frame.monotonic_ns for frame in frames]) / 1e9
+    readings = np.array([frame.readings for frame in frames], dtype=np.float64)
+    context = {"strap_n": tension.astype(np.float64)}
+    assert_published(
+        by_hand.poses["g1"], GlovePredictor(model).predict_take(time_s, readings, context, "w").mean
+    )
+    doubtful = [bool(pose.rotation_flags[1] & RotationFlag.TOO_UNCERTAIN) for pose in by_hand.poses["g1"]]
+    assert doubtful == (tension == 0).tolist()
+    assert by_hand.status("g1")["effects"]["unusable_corrections"] == 12
+
+
+def test_a_recording_read_back_gives_what_was_live(tmp_path: Path) -> None:
+    frames = moving_frames(200)
+    meta = {"capture": {"sensors": list(LAYOUT.sensors), "context": []}}
+    file = RecordingFile.create(tmp_path / "r.glog", meta)
+    for frame in frames:
+        file.add(frame, encode_frame(frame))
+    file.close()
+    take = read_take(tmp_path / "r.glog", name="r", wearing="w").take
+    by_hand = LoopByHand()
+    by_hand.serve("g1", MODEL)
+    by_hand.say("g1")
+    by_hand.send([("g1", frame) for frame in frames])
+    replayed = GlovePredictor(MODEL).predict_take(take.time_s, take.readings, take.context, take.wearing)
+    assert_published(by_hand.poses["g1"], replayed.mean)

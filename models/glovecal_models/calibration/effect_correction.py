@@ -41,6 +41,8 @@ class EffectCorrection:
             effect.stream(item.settings, item.shape)
             for effect, (item, _) in zip(self._effects, self._lanes, strict=True)
         ]
+        self.undefined: np.ndarray | None = None
+        """(R,) True for rotations that some effect could not correct in the last frame; None: no such."""
         self.context = tuple(dict.fromkeys(name for effect in self._effects for name in effect.context))
         """Context columns that the effects read."""
         self.settling_s = max(
@@ -112,7 +114,7 @@ class EffectCorrection:
         wearing: str,
     ) -> np.ndarray:
         """(R,) degrees to add to ``base`` (R,), the next frame of a stream; the same as in a take."""
-        total = np.zeros_like(base)
+        total, self.undefined = np.zeros_like(base), None
         if not self._lanes:
             return total
         others = self._scale.others(readings[None, :])
@@ -121,6 +123,10 @@ class EffectCorrection:
         for (item, lanes), stream in zip(self._lanes, self._streams, strict=True):
             frame = Signals(time, base[None, lanes], others, now, wearing, zero_deg=item.zero_deg)
             total[lanes] += np.einsum("lc,lc->l", stream.columns(frame)[0], item.weights)
+            if stream.undefined is not None:
+                if self.undefined is None:
+                    self.undefined = np.zeros(len(base), dtype=bool)
+                self.undefined[lanes] = True
         return total
 
     def reset(self) -> None:

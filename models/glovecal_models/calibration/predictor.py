@@ -103,22 +103,23 @@ class GlovePredictor:
         correction = self._model.correction().of_take(time_s, angles.mean, readings, context, wearing)
         return self.corrected(angles, correction)
 
-    def corrected(self, angles: GloveAngles, correction: np.ndarray) -> GloveAngles:
+    def corrected(
+        self, angles: GloveAngles, correction: np.ndarray, doubtful: np.ndarray | None = None
+    ) -> GloveAngles:
         """``angles`` with the effects' ``correction`` (N, R) added; rules follow the rotations they read.
 
-        Where the correction is unusable the rotation stays as it was and is flagged too uncertain.
+        Where the correction is unusable the rotation stays as it was. There, and where ``doubtful`` (N, R)
+        says so, it is flagged too uncertain.
         """
         usable = usable_correction(correction)
-        is_usable = usable.all()
-        mean, flags = (
-            angles.mean + (correction if is_usable else np.where(usable, correction, 0.0)),
-            angles.flags,
-        )
-        if not is_usable:
-            flags = np.where(usable, flags, flags | TOO_UNCERTAIN).astype(np.uint8)
+        mean, flags = angles.mean + np.where(usable, correction, 0.0), angles.flags
+        bad = ~usable if doubtful is None else ~usable | doubtful
+        any_bad = bool(bad.any())
+        if any_bad:
+            flags = np.where(bad, flags | TOO_UNCERTAIN, flags).astype(np.uint8)
         for row, sources, weights in self._rules:
             mean[:, row] = mean[:, sources] @ weights
-            if not is_usable:
+            if any_bad:
                 flags[:, row] |= np.bitwise_or.reduce(flags[:, sources] & TOO_UNCERTAIN, axis=1)
         return GloveAngles(mean, angles.sd, flags)
 

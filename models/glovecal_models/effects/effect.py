@@ -145,6 +145,9 @@ class Effect(ABC):
 class Stream(ABC):
     """An effect's state between frames of one glove."""
 
+    undefined: str | None = None
+    """Why the last frame's columns had no value and are zero; None when they had one."""
+
     @abstractmethod
     def columns(self, frame: Signals) -> np.ndarray:
         """(1, L, C) for the next frame, given as signals of length 1."""

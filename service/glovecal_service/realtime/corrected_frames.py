@@ -26,10 +26,14 @@ def corrected(
             lane.effects = None
         return angles, flags
     correction = np.zeros_like(angles.mean)
+    undefined = np.zeros(correction.shape, dtype=bool)
     finite: list[bool] = np.all(np.isfinite(angles.mean), axis=1).tolist()
     for row, (lane, frame, _) in enumerate(opened):
         # What is no number gets no pose, and must not get into a state either.
         if finite[row]:
             effects = lane.effects_of(model)
-            correction[row], flags[row] = effects.correct(frame, worn.of(lane.glove), angles.mean[row])
-    return model.predictor.corrected(angles, correction), flags
+            found = effects.correct(frame, worn.of(lane.glove), angles.mean[row])
+            correction[row], flags[row] = found.degrees, found.flags
+            if found.undefined is not None:
+                undefined[row] = found.undefined
+    return model.predictor.corrected(angles, correction, undefined), flags

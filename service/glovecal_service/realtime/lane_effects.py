@@ -33,6 +33,8 @@ class Correction(NamedTuple):
     """(R,), to be added to the base's prediction; may hold what is unusable."""
     flags: int
     """PoseFlag bits."""
+    undefined: np.ndarray | None = None
+    """(R,) True where an effect had no value and was left out; None: nowhere."""
 
 
 class LaneEffects:
@@ -43,7 +45,7 @@ class LaneEffects:
         self.starts = 0
         """How often an effect with a memory began anew."""
         self.unusable = 0
-        """Frames in which some correction was no number, or absurd; their rotations were not corrected."""
+        """Frames in which some correction had no value, was no number or absurd: flagged, and left out."""
         self._stream = model.predictor.stream()
         self._run_id: int | None = None
         self._wearing = ""
@@ -72,7 +74,9 @@ class LaneEffects:
         else:
             if not usable_correction(degrees).all():
                 self._give_up("a correction is no number, or more than a full turn")
-        return Correction(degrees, flags)
+            elif self._stream.undefined is not None:
+                self._count("an effect has no value for some readings")
+        return Correction(degrees, flags, self._stream.undefined)
 
     def status(self) -> dict[str, Any]:
         """For the status document: what is not corrected, and why."""
@@ -107,9 +111,12 @@ class LaneEffects:
         return (_RESET if is_start else 0) | (_SETTLING if self._settling else 0)
 
     def _give_up(self, problem: str) -> None:
-        """Count it, and start anew with the next frame: a state that is no number would stay so for ever."""
+        """Start anew with the next frame: a state that is no number would stay so for ever."""
+        self._count(problem)
+        self._run_id = None
+
+    def _count(self, problem: str) -> None:
         if not self.unusable:
             name = self.model.model_id[:12]
             _log.warning("model %s: its effects do not correct every frame: %s", name, problem)
         self.unusable += 1
-        self._run_id = None
