@@ -12,6 +12,7 @@ import numpy as np
 from glovecal_client.wire.frame import Frame
 from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.effects.catalogue import stored_effect
 from glovecal_service.realtime.lane_effects import LaneEffects
 from glovecal_service.realtime.served_model import ServedModel
 from glovecal_service.realtime.worn_gloves import WornGlove
@@ -24,13 +25,9 @@ def cost_of_effects(base: CalibrationModel) -> dict[str, Any]:
     """Milliseconds a frame without and with hysteresis and creep on all rotations of ``base``."""
     names = base.rotation_names
     lanes, sensors = len(names), len(base.layout.sensors)
-    zero = np.zeros(lanes)
-    hysteresis = AddedEffect(
-        "hysteresis", names, {}, np.full((lanes, 1), 4.0), np.full((lanes, 3), 0.2), zero
-    )
-    creep = AddedEffect("creep", names, {}, np.tile([2.0, 10.0], (lanes, 1)), np.full((lanes, 2), 0.1), zero)
-    model = ServedModel.prepare("1" * 64, replace(base, effects=(hysteresis, creep)))
-    effects, worn = LaneEffects(model), WornGlove()
+    effects = (_everywhere("hysteresis", names, [4.0]), _everywhere("creep", names, [2.0, 10.0]))
+    model = ServedModel.prepare("1" * 64, replace(base, effects=effects))
+    of_glove, worn = LaneEffects(model), WornGlove()
     readings = np.random.default_rng(1).uniform(60, 190, (FRAMES, sensors)).astype(np.float32)
 
     def without() -> None:
@@ -41,7 +38,7 @@ def cost_of_effects(base: CalibrationModel) -> dict[str, Any]:
         for number, row in enumerate(readings):
             angles = model.predict([row])
             frame = Frame(number, 1, number * 8_333_333, 0, row)
-            correction = effects.correct(frame, worn, angles.mean[0]).degrees
+            correction = of_glove.correct(frame, worn, angles.mean[0]).degrees
             model.predictor.corrected(angles, correction[None])
 
     before, after = _milliseconds(without), _milliseconds(with_effects)
@@ -60,6 +57,12 @@ def cost_of_effects(base: CalibrationModel) -> dict[str, Any]:
         ],
         "added_ms": after - before,
     }
+
+
+def _everywhere(name: str, rotations: tuple[str, ...], shape: list[float]) -> AddedEffect:
+    lanes, effect = len(rotations), stored_effect(name, {})
+    weights = np.full((lanes, len(effect.weight_names({}))), 0.1)
+    return AddedEffect(name, rotations, {}, np.tile(shape, (lanes, 1)), weights, np.zeros(lanes))
 
 
 def sentence(cost: dict[str, Any]) -> str:

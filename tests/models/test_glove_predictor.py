@@ -221,4 +221,5 @@ def test_an_unusable_correction_is_left_out_and_flagged_through_the_rules() -> N
         row for row in range(len(predictor.rotations))
         if ((corrected.flags & ~plain.flags)[:, row] & TOO_UNCERTAIN).any() and row != source
     ]  # fmt: skip
+    assert followers
     assert all((corrected.flags[:, row] & BY_RULE).all() for row in followers)

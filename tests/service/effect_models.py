@@ -16,6 +16,7 @@ from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_client.wire.pose import Pose, decode_pose
 from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.effects.catalogue import stored_effect
 from glovecal_service.realtime.arrivals import Arrival
 from glovecal_service.realtime.pose_loop import PoseLoop
 from glovecal_service.realtime.served_model import ServedModel, ServedModels
@@ -32,15 +33,18 @@ def added(
     rotations: tuple[str, ...] = LAYOUT.rotations,
     settings: dict[str, Any] | None = None,
 ) -> AddedEffect:
-    """The same shape and weights on each of ``rotations``."""
-    lanes = len(rotations)
-    rows = [np.tile(np.array(list(item), dtype=float), (lanes, 1)) for item in (shape, weights)]
-    return AddedEffect(name, rotations, settings or {}, rows[0], rows[1], np.zeros(lanes))
+    """The same shape and weights on each of ``rotations``; weights that are not given are zero."""
+    lanes, settings = len(rotations), settings or {}
+    learned = np.array(list(weights), dtype=float)
+    missing = len(stored_effect(name, settings).weight_names(settings)) - len(learned)
+    learned = np.pad(learned, (0, missing))
+    grid = np.tile(np.array(list(shape), dtype=float), (lanes, 1))
+    return AddedEffect(name, rotations, settings, grid, np.tile(learned, (lanes, 1)), np.zeros(lanes))
 
 
 HYSTERESIS = added("hysteresis", (5.0,), (0.4, 0.3, 0.2))
-CREEP = added("creep", (0.5, 2.5), (0.1, 0.15), ("I_MCP", "M_MCP"))
-LAG = added("lag", (0.05,), (0.2, 0.3, 0.1, 0.0, 0.0), ("I_PIP",))
+CREEP = added("creep", (0.5, 2.5), (0.1, 0.15, 0.05, 0.1), ("I_MCP", "M_MCP"), settings=UNITS)
+LAG = added("lag", (0.05,), (0.2, 0.3, 0.1), ("I_PIP",))
 
 
 def model_with(*effects: AddedEffect) -> CalibrationModel:

@@ -239,9 +239,10 @@ def test_an_effect_that_raises_does_not_stop_the_poses(monkeypatch: pytest.Monke
 
 def test_a_model_whose_effect_is_not_here_or_another_is_refused_before_it_is_served() -> None:
     with pytest.raises(BadInput, match="no effect 'strap'"):
-        ServedModel.prepare("1" * 64, model_with(added("strap", (), (1.0,))))
+        ServedModel.prepare("1" * 64, model_with(replace(HYSTERESIS, name="strap")))
+    older = replace(HYSTERESIS, weights=HYSTERESIS.weights[:, :2])
     with pytest.raises(BadInput, match="learned with 1 parameters and 2 weights, but here it has 1 and 3"):
-        ServedModel.prepare("1" * 64, model_with(added("hysteresis", (5.0,), (0.4, 0.3))))
+        ServedModel.prepare("1" * 64, model_with(older))
 
 
 def test_a_declared_effect_without_a_value_is_left_out_and_flagged() -> None:
