@@ -29,14 +29,16 @@ def list_models(subject: OnlySubject = None, layout: OnlyLayout = None, as_json:
     if as_json:
         print_json(rows)
         return
-    shown = [{**row, "short": row["id"][:12], "created_at": moment(row["created_at"])} for row in rows]
+    shown = [
+        {**row, "short": row["id"][:12], "method": _method(row), "created_at": moment(row["created_at"])}
+        for row in rows
+    ]
     columns = {
         "short": "model",
         "subject": "subject",
         "layout": "layout",
         "method": "method",
         "held_out_rmse_deg": "error (°)",
-        "effects": "effects",
         "active": "active",
         "created_at": "trained",
     }
@@ -67,6 +69,11 @@ def show(model: Model, as_json: AsJson = False) -> None:
     if document["effect_details"]:
         out.print()
         print_table(effect_rows(document["effect_details"]), EFFECT_COLUMNS, empty="")
+
+
+def _method(row: dict[str, Any]) -> str:
+    """The regressors and the effects on top of them."""
+    return " + ".join([row["method"], *([", ".join(row["effects"])] if row["effects"] else [])])
 
 
 def _facts(document: dict[str, Any], lineage: list[dict[str, Any]]) -> dict[str, Any]:
