@@ -51,6 +51,17 @@ class Diagnosis:
     next_take: NextTake | None
 
     @property
+    def signature(self) -> tuple[Finding, ...]:
+        """Findings of the effect that is to be named by its signature, before any ranking; mostly none."""
+        for name in ("repeated_samples", "sensor_fault"):
+            found = tuple(item for item in self.findings if item.effect == name)
+            if found:
+                return found
+        if self.naming.ranked:
+            return ()
+        return tuple(item for item in self.findings if item.effect == self.findings[0].effect)
+
+    @property
     def by_gain(self) -> list[Assessment]:
         """All assessments, those that pass first, then by how much they save."""
         return sorted(
