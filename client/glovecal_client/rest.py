@@ -14,9 +14,8 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, urlsplit
 
-import numpy as np
-
 from glovecal_client.errors import BadName, ClientError, ServiceError
+from glovecal_client.frames_to_predict import frames_to_predict
 
 if TYPE_CHECKING:
     import httpx
@@ -145,20 +144,10 @@ class RestClient:
         context: Mapping[str, ArrayLike] | None = None,
         wearing: str | None = None,
     ) -> dict[str, Any]:
-        """Rotations of ``readings`` (N, S), raw counts, as the service's ``predict`` answers.
+        """Rotations of ``readings`` (N, S). With effects that remember, ``time_s`` (N,) is needed: one take.
 
-        A model whose effects have a memory needs ``time_s`` (N,), seconds, increasing: the frames are one
-        take then. ``context`` holds columns (N,), NaN where unknown.
-        """
-        body: dict[str, Any] = {"readings": np.asarray(readings, dtype=float).tolist()}
-        if sensors is not None:
-            body["sensors"] = list(sensors)
-        if time_s is not None:
-            body["time_s"] = np.asarray(time_s, dtype=float).tolist()
-        if context is not None:
-            body["context"] = {name: _or_none(column) for name, column in context.items()}
-        if wearing is not None:
-            body["wearing"] = wearing
+        ``context`` holds columns (N,), NaN where unknown."""
+        body = frames_to_predict(readings, sensors, time_s, context, wearing)
         return self.post(f"/models/{quote(model, safe='')}/predict", body)
 
     def wait_for_job(
@@ -259,8 +248,3 @@ def _import_httpx() -> Any:
             "the REST client needs httpx: pip install 'glovecal-client[rest]' (or httpx)"
         ) from error
     return httpx
-
-
-def _or_none(column: ArrayLike) -> list[float | None]:
-    """JSON has no NaN."""
-    return [None if np.isnan(value) else value for value in np.asarray(column, dtype=float).tolist()]

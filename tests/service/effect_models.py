@@ -16,6 +16,7 @@ from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_client.wire.pose import Pose, decode_pose
 from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.effects.catalogue import stored_effect
 from glovecal_service.realtime.arrivals import Arrival
 from glovecal_service.realtime.pose_loop import PoseLoop
@@ -108,3 +109,19 @@ def moving_frames(count: int, *, seed: int = 0, run_id: int = 1, start_s: float 
         Frame(number, run_id, int(time_ns[number]), int(time_ns[number]), readings[number])
         for number in range(count)
     ]
+
+
+def as_take(model: CalibrationModel, frames: list[Frame], wearing: str = "w") -> np.ndarray:
+    """Degrees (N, R) of the frames predicted as a recorded take."""
+    time_s = np.array([frame.monotonic_ns for frame in frames]) / 1e9
+    readings = np.array([frame.readings for frame in frames], dtype=np.float64)
+    return GlovePredictor(model).predict_take(time_s, readings, {}, wearing).mean
+
+
+def degrees(poses: list[Pose]) -> np.ndarray:
+    return np.array([pose.degrees for pose in poses])
+
+
+def assert_published(poses: list[Pose], expected: np.ndarray) -> None:
+    """To the last bit but one of what a pose can hold."""
+    np.testing.assert_array_max_ulp(degrees(poses), expected.astype(np.float32), 1)

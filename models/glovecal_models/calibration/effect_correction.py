@@ -10,6 +10,14 @@ from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.effects.effect import Effect, Signals
 from glovecal_models.errors import BadInput
 
+LARGEST_CORRECTION_DEG = 360.0
+"""No effect turns a joint by more than this; what is larger, or no number, is an effect gone wrong."""
+
+
+def usable_correction(correction: np.ndarray) -> np.ndarray:
+    """Where ``correction``, degrees of any shape, is a number that an effect may add."""
+    return np.abs(correction) <= LARGEST_CORRECTION_DEG
+
 
 class SignalScale:
     """Sensors in standard deviations, as effects see their neighbours; the same in training and serving."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glovecal_models.calibration.effect_correction import EffectCorrection
+from glovecal_models.calibration.effect_correction import EffectCorrection, usable_correction
 from glovecal_models.calibration.fused_processes import FusedProcesses, grouped_by_nodes, is_fusible
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.effects.saturation import SaturatedBand
@@ -18,8 +18,6 @@ from glovecal_models.regression.rule_regressor import RuleRegressor
 EXTRAPOLATING, TOO_UNCERTAIN, BY_RULE = 1, 2, 4
 RANGE_MARGIN = 0.05
 """An input this share of its training range outside that range is extrapolating."""
-LARGEST_CORRECTION_DEG = 360.0
-"""No effect turns a joint by more than this; what is larger, or no number, is an effect gone wrong."""
 FLOATS_AT_ONCE = 2_000_000
 """Long recordings are predicted in blocks with work arrays of about this size."""
 
@@ -147,11 +145,6 @@ class GlovePredictor:
             variance[row] = (weights * weights) @ variance[sources]
             flags[row] = np.bitwise_or.reduce(flags[sources], axis=0) | BY_RULE
         return GloveAngles(mean.T, np.sqrt(variance).T, flags.T)
-
-
-def usable_correction(correction: np.ndarray) -> np.ndarray:
-    """Where ``correction``, degrees of any shape, is a number that an effect may add."""
-    return np.abs(correction) <= LARGEST_CORRECTION_DEG
 
 
 class _Range:

@@ -15,7 +15,7 @@ import numpy as np
 
 from glovecal_client.wire.frame import Frame
 from glovecal_client.wire.pose import PoseFlag
-from glovecal_models.calibration.predictor import usable_correction
+from glovecal_models.calibration.effect_correction import usable_correction
 from glovecal_models.effects.history_effect import LONGEST_GAP_S
 from glovecal_service.realtime.served_model import ServedModel
 from glovecal_service.realtime.worn_gloves import WornGlove
