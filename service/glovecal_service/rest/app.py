@@ -19,6 +19,7 @@ from glovecal_service.rest import (
     jobs,
     metrics_page,
     models,
+    predictions,
     recordings,
     subjects,
     takes,
@@ -43,7 +44,7 @@ JSON_LIMIT_BYTES = 8_000_000
 BODY_PATIENCE_S = 30.0
 ROUTERS = (
     *(subjects, gloves, clocks, takes, uploads, recordings),
-    *(training, models, comparisons, jobs, health, metrics_page),
+    *(training, models, predictions, comparisons, jobs, health, metrics_page),
 )
 
 

@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from fastapi import APIRouter, Response
-from pydantic import BaseModel, Field, FiniteFloat
+from pydantic import BaseModel, Field
 
-from glovecal_models.calibration.model import CalibrationModel, RotationModel
-from glovecal_models.errors import LayoutMismatch
+from glovecal_models.calibration.model import RotationModel
 from glovecal_service.rest.answers import change_problems, problems
 from glovecal_service.rest.dependencies import PartsNeeded, StoreNeeded
-from glovecal_service.rest.names import Channel, Identifier, LayoutFilter, ModelInPath, SubjectFilter
+from glovecal_service.rest.effect_view import EffectView, effect_view
+from glovecal_service.rest.names import Identifier, LayoutFilter, ModelInPath, SubjectFilter
 from glovecal_service.rest.plain import plain
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.records import Activation, ModelRecord
 
 router = APIRouter(prefix="/models", tags=["models"])
-
-MOST_FRAMES = 20_000
-MOST_SENSORS = 512
 
 
 class Model(BaseModel):
@@ -34,6 +31,7 @@ class Model(BaseModel):
         description="Whether live frames of the subject with the layout are predicted by it."
     )
     held_out_rmse_deg: float | None = Field(description="Error on takes left out of training, degrees.")
+    effects: list[str] = Field(description="Names of its effects, in the order in which they were added.")
     facts: dict[str, Any] = Field(description="Takes trained on, errors, how long it took ...")
     created_at: datetime
 
@@ -51,6 +49,7 @@ class Rotation(BaseModel):
 
 class ModelInFull(Model):
     rotations: list[Rotation]
+    effect_details: list[EffectView]
     simulated: bool = Field(description="Whether any training take came from a simulated glove.")
     error_estimate: dict[str, Any]
 
@@ -68,24 +67,6 @@ class ActivationView(BaseModel):
 class Which(StrictBody):
     subject: Identifier
     layout: Identifier
-
-
-class Readings(StrictBody):
-    readings: Annotated[
-        list[Annotated[list[FiniteFloat], Field(max_length=MOST_SENSORS)]],
-        Field(min_length=1, max_length=MOST_FRAMES, description="Frames of raw readings."),
-    ]
-    sensors: Annotated[list[Channel], Field(max_length=MOST_SENSORS)] | None = Field(
-        None, description="Order of the readings; None: that of the model's layout."
-    )
-
-
-class Angles(BaseModel):
-    model: str
-    rotations: list[str]
-    mean_deg: list[list[float | None]]
-    sd_deg: list[list[float | None]] = Field(description="Of the rotation with its measurement noise.")
-    flags: list[list[int]] = Field(description="Sum of 1 extrapolating, 2 too uncertain, 4 by rule.")
 
 
 @router.get("", response_model=list[Model], summary="Models, oldest first", responses=problems())
@@ -117,6 +98,8 @@ def get_model(id: ModelInPath, parts: PartsNeeded) -> dict[str, Any]:
     model, _ = parts.predictors.get(record.id)
     return _row(record, active is not None and active.id == record.id) | {
         "rotations": [_rotation(item) for item in model.rotations],
+        "effects": [item.name for item in model.effects],
+        "effect_details": [effect_view(item) for item in model.effects],
         "simulated": model.simulated,
         "error_estimate": plain(model.error_estimate),
         "held_out_rmse_deg": plain(model.error_estimate.get("rmse_deg")),
@@ -168,29 +151,9 @@ def export_model(id: ModelInPath, store: StoreNeeded) -> Response:
     )
 
 
-@router.post(
-    "/{id}/predict",
-    response_model=Angles,
-    summary="Rotations of given readings",
-    responses=change_problems(409),
-)
-def predict(id: ModelInPath, body: Readings, parts: PartsNeeded) -> dict[str, Any]:
-    """For trying a model out; the live stream goes over zenoh. 422 when the sensors are not the model's."""
-    record = parts.store.models.get(id)
-    model, predictor = parts.predictors.get(record.id)
-    angles = predictor.predict(_in_model_order(body, model))
-    parts.metrics.predicted_frames.inc(len(body.readings))
-    return {
-        "model": record.id,
-        "rotations": list(predictor.rotations),
-        "mean_deg": plain(angles.mean),
-        "sd_deg": plain(angles.sd),
-        "flags": angles.flags.tolist(),
-    }
-
-
 def _row(record: ModelRecord, active: bool) -> dict[str, Any]:
-    row = {**record.__dict__, "active": active, "facts": plain(record.facts)}
+    effects = list(record.facts.get("effects", ()))
+    row = {**record.__dict__, "active": active, "effects": effects, "facts": plain(record.facts)}
     return row | {"held_out_rmse_deg": plain(record.facts.get("held_out_rmse_deg"))}
 
 
@@ -205,18 +168,3 @@ def _rotation(item: RotationModel) -> dict[str, Any]:
         "uncertain_above_deg": item.uncertain_above_deg,
         "samples": item.samples,
     }
-
-
-def _in_model_order(body: Readings, model: CalibrationModel) -> np.ndarray:
-    wanted = model.layout.sensors
-    given = tuple(body.sensors) if body.sensors is not None else wanted
-    missing = [name for name in wanted if name not in given]
-    if missing:
-        raise LayoutMismatch(f"no readings of sensor {missing[0]!r}, which the model's layout needs")
-    for number, frame in enumerate(body.readings):
-        if len(frame) != len(given):
-            raise LayoutMismatch(
-                f"frame {number} has {len(frame)} readings, but there are {len(given)} sensors: "
-                f"{', '.join(given)}"
-            )
-    return np.array(body.readings, dtype=float)[:, [given.index(name) for name in wanted]]
