@@ -55,7 +55,7 @@ def held_out_errors(
     cancelled: Callable[[], bool] | None = None,
     report: Report | None = None,
 ) -> HeldOutErrors:
-    """Leave out whole takes in turn, in ``settings.folds`` folds, at least two. Raises NotTrainable, Cancelled.
+    """Leave out whole takes, in ``settings.folds`` folds, at least two. Raises NotTrainable, Cancelled.
 
     A single take, and short takes of one motion each, are left out in quarters of time.
     """
