@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,9 +33,14 @@ def assessed(
     direction: Direction,
     effects: Sequence[Effect],
     generator: np.random.Generator,
+    without: Set[str] = frozenset(),
     report: Callable[[str, float], None] | None = None,
 ) -> tuple[list[Assessment], list[NotJudgeable]]:
-    """Every judgeable effect, and why the others are not. ``lag`` brings ``clock_offset`` with it."""
+    """Every judgeable effect, and why the others are not.
+
+    ``lag`` brings ``clock_offset`` with it; ``without`` names effects that the model has already.
+    """
+    effects = [effect for effect in effects if effect.name not in without or effect.name == "lag"]
     effects = [effect for effect in effects if not isinstance(effect, ColumnlessEffect)]
     found: list[Assessment] = []
     impossible: list[NotJudgeable] = []
@@ -46,7 +51,7 @@ def assessed(
         if why is not None:
             impossible.append(NotJudgeable(effect.name, why))
         elif effect.name == "lag":
-            found.extend(_delays(direction))
+            found.extend(item for item in _delays(direction) if item.effect not in without)
         else:
             found.append(_assessed(direction, effect, generator))
     return found, impossible

@@ -17,7 +17,7 @@ from glovecal_models.diagnosis.evened import EvenTake
 from glovecal_models.diagnosis.held_out import BaseProducts, Rows
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.effects.effect import Signals
-from glovecal_models.layout import Layout
+from glovecal_models.layout import Correspondence, Layout
 
 DirectionName = Literal["inverse", "forward"]
 EVERY = 2
@@ -92,7 +92,7 @@ def forward(
     read, used, products = [], [], []
     for column, rotation in enumerate(rotations):
         item = layout.correspondence(rotation)
-        neighbours = [] if linear else [name for name in item.sensors if name in names and name != rotation]
+        neighbours = [] if linear else _read_beside(item, names, layout)
         columns = [column, *(names.index(name) for name in neighbours)]
         features = BaseFeatures.settle([part[:, columns] for part in filled], linear=linear)
         index = [
@@ -102,7 +102,7 @@ def forward(
                 np.flatnonzero(np.isfinite(take.reference[:, column]))[::EVERY], pieces
             )
         ]
-        without = [_without(take, frozenset({rotation, *neighbours})) for take in signals]
+        without = [_without(take, frozenset({rotation, *neighbours, *item.sensors})) for take in signals]
         extra = [found for each in known if (found := each.columns(without, column, rotation)) is not None]
         units = []
         bases = [
@@ -111,12 +111,21 @@ def forward(
         ]
         for take, rows in zip(unit_take, index, strict=True):
             units.append(Rows(bases[take][rows], sensor[column].values[take][rows]))
-        read.append(frozenset({rotation, *neighbours}))
+        read.append(frozenset({rotation, *neighbours, *item.sensors}))
         used.append(tuple(index))
         products.append(BaseProducts(units))
     return Direction(
         "forward", tuple(rotations), signals, tuple(read), unit_take, tuple(used), tuple(products)
     )
+
+
+def _read_beside(item: Correspondence, names: Sequence[str], layout: Layout) -> list[str]:
+    """Other joints that the base knows through its sensors: neighbours by name; without a sensor of its own,
+    all joints that share sensors with it."""
+    if item.rotation in item.sensors or len(item.inputs) == 1:
+        return [name for name in item.sensors if name in names and name != item.rotation]
+    shared = [name for name in names if set(layout.correspondence(name).sensors) & set(item.sensors)]
+    return [name for name in shared if name != item.rotation]
 
 
 def _standard(readings: Sequence[np.ndarray]) -> list[np.ndarray]:
