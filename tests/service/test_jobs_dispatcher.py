@@ -162,7 +162,7 @@ def test_a_result_that_went_with_its_process_is_not_waited_for_for_ever(
     store, dispatcher = dispatched
     monkeypatch.setattr(workers, "FETCH_WITHIN_S", 1.0)
     [task] = CountingJob().plan(store, create(store, ledger, [2])).tasks
-    future = dispatcher.workers.submit(task, tmp_path / "fits", tmp_path / "cancel")
+    future = dispatcher.workers.submit(task, tmp_path / "fits", tmp_path / "cancel", tmp_path / "progress")
     wait_for(future.done)
     cluster = dispatcher.workers._cluster
     cluster.scale(0)

@@ -14,10 +14,13 @@ from glovecal_service.jobs.dispatcher import Dispatcher
 from glovecal_service.rest import (
     clocks,
     comparisons,
+    diagnosis,
+    effects,
     gloves,
     health,
     jobs,
     metrics_page,
+    model_effects,
     models,
     recordings,
     subjects,
@@ -43,7 +46,7 @@ JSON_LIMIT_BYTES = 8_000_000
 BODY_PATIENCE_S = 30.0
 ROUTERS = (
     *(subjects, gloves, clocks, takes, uploads, recordings),
-    *(training, models, comparisons, jobs, health, metrics_page),
+    *(training, models, comparisons, diagnosis, model_effects, effects, jobs, health, metrics_page),
 )
 
 

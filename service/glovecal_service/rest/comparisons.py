@@ -11,12 +11,12 @@ from glovecal_models.calibration.comparison import compare
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.comparison.where_it_fails import where_it_fails
+from glovecal_service.plain import plain
 from glovecal_service.report.page import report_page
 from glovecal_service.report.reported_model import ReportedModel
 from glovecal_service.rest.answers import change_problems
 from glovecal_service.rest.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.names import Id, ModelInPath, ModelReference
-from glovecal_service.rest.plain import plain
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.records import ModelRecord
 from glovecal_service.store.store import Store

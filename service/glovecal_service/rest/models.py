@@ -9,12 +9,13 @@ import numpy as np
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field, FiniteFloat
 
+from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.errors import LayoutMismatch
+from glovecal_service.plain import plain
 from glovecal_service.rest.answers import change_problems, problems
 from glovecal_service.rest.dependencies import PartsNeeded, StoreNeeded
 from glovecal_service.rest.names import Channel, Identifier, LayoutFilter, ModelInPath, SubjectFilter
-from glovecal_service.rest.plain import plain
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.records import Activation, ModelRecord
 
@@ -49,8 +50,20 @@ class Rotation(BaseModel):
     samples: int
 
 
+class ModelEffect(BaseModel):
+    effect: str
+    explanation: str
+    where: list[str] = Field(description="Rotations that it corrects.")
+    parameters: dict[str, dict[str, float | None]] = Field(
+        description="For each rotation, units in the names."
+    )
+    evidence: dict[str, Any] = Field(description="What it saved when it was added.")
+    declaration: dict[str, Any] | None = Field(description="Of a user's own effect.")
+
+
 class ModelInFull(Model):
     rotations: list[Rotation]
+    effects: list[ModelEffect] = Field(description="In the order in which they were added.")
     simulated: bool = Field(description="Whether any training take came from a simulated glove.")
     error_estimate: dict[str, Any]
 
@@ -117,6 +130,7 @@ def get_model(id: ModelInPath, parts: PartsNeeded) -> dict[str, Any]:
     model, _ = parts.predictors.get(record.id)
     return _row(record, active is not None and active.id == record.id) | {
         "rotations": [_rotation(item) for item in model.rotations],
+        "effects": [_effect(item) for item in model.effects],
         "simulated": model.simulated,
         "error_estimate": plain(model.error_estimate),
         "held_out_rmse_deg": plain(model.error_estimate.get("rmse_deg")),
@@ -205,6 +219,19 @@ def _rotation(item: RotationModel) -> dict[str, Any]:
         "uncertain_above_deg": item.uncertain_above_deg,
         "samples": item.samples,
     }
+
+
+def _effect(item: AddedEffect) -> dict[str, Any]:
+    return plain(
+        {
+            "effect": item.name,
+            "explanation": item.effect.explanation,
+            "where": item.active,
+            "parameters": item.described() if item.weights.shape[1] else {},
+            "evidence": item.evidence,
+            "declaration": item.settings.get("declaration"),
+        }
+    )
 
 
 def _in_model_order(body: Readings, model: CalibrationModel) -> np.ndarray:
