@@ -29,6 +29,8 @@ class JointErrors:
     decoy: np.ndarray
     """(B,), with its decoy."""
     rows: int
+    take: np.ndarray | None = None
+    """(B,), the take each block lies in."""
 
     @property
     def saved(self) -> float:
@@ -62,6 +64,13 @@ class Assessment:
     """(C,) of each joint."""
     probability: float | None = None
     """Of a session effect, from takes dealt in other ways; None: judged block by block."""
+
+    numbers: tuple[str, ...] = ()
+    """Names of the shape's numbers, units included."""
+
+    def shape_described(self, joint: int) -> dict[str, float]:
+        """The shape of one joint by its numbers' names."""
+        return dict(zip(self.numbers, map(float, self.shapes[joint]), strict=False))
 
     @property
     def touched(self) -> tuple[int, ...]:

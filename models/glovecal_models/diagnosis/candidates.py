@@ -69,6 +69,7 @@ def _assessed(direction: Direction, effect: Effect, generator: np.random.Generat
         tuple(item.shape for item in evidence),
         tuple(item.true.weights for item in evidence),
         probability,
+        tuple(f"{item.name}_{item.unit}" for item in effect.parameters),
     )
 
 
@@ -80,6 +81,7 @@ def _joint_errors(evidence: Evidence) -> JointErrors:
         _blocks(true.residual_added, starts),
         _blocks(decoy.residual_added, starts),
         int(true.count.sum()),
+        np.searchsorted(np.cumsum([len(part) for part in true.residual]), starts, side="right"),
     )
 
 
@@ -111,8 +113,8 @@ def _delays(direction: Direction) -> list[Assessment]:
     nothing = tuple(np.empty(0) for _ in grids)
     shifts = tuple(clock.offset_s for _ in grids)
     return [
-        Assessment("clock_offset", direction.rotations, tuple(offsets), shifts, nothing),
-        Assessment("lag", direction.rotations, tuple(lags), tuple(taus), nothing),
+        Assessment("clock_offset", direction.rotations, tuple(offsets), shifts, nothing, None, ("offset_s",)),
+        Assessment("lag", direction.rotations, tuple(lags), tuple(taus), nothing, None, ("tau_s",)),
     ]
 
 

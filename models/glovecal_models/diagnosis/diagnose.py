@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -11,12 +12,18 @@ from glovecal_models.diagnosis.assessment import Assessment
 from glovecal_models.diagnosis.candidates import BLOCK_ROWS, NotJudgeable, assessed
 from glovecal_models.diagnosis.delay_verdict import MIDDLE, SHAPE_SMOOTHING, delay_kind
 from glovecal_models.diagnosis.delays import SMOOTHING, delay_errors
+from glovecal_models.diagnosis.diagnosis_document import document
 from glovecal_models.diagnosis.directions import Direction, forward
 from glovecal_models.diagnosis.evened import EvenTake, evened, smoothed
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.naming import Naming, named
+from glovecal_models.diagnosis.next_take import NextTake, next_take
+from glovecal_models.diagnosis.reference_problems import reference_problems
+from glovecal_models.diagnosis.signatures import signature_findings
+from glovecal_models.diagnosis.something_left import Left, something_left
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.effects.effect import Effect
+from glovecal_models.effects.signature_effect import Finding
 from glovecal_models.errors import BadInput, Cancelled
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
@@ -31,10 +38,28 @@ class Diagnosis:
     joints: tuple[str, ...]
     rmse_deg: dict[str, float]
     """Held-out error of each joint without any further effect, on smoothed signals."""
+    noise_floor_deg: dict[str, float]
     naming: Naming
     assessments: tuple[Assessment, ...]
     """Every effect that could be judged."""
     not_judgeable: tuple[NotJudgeable, ...]
+    reference_problems: tuple[str, ...]
+    findings: tuple[Finding, ...]
+    """What is known by a signature in the recording."""
+    left: Left
+    next_take: NextTake | None
+
+    @property
+    def by_gain(self) -> list[Assessment]:
+        """All assessments, those that pass first, then by how much they save."""
+        return sorted(
+            self.assessments,
+            key=lambda item: (not item.touched, -item.saved_square, -max(e.contrast for e in item.errors)),
+        )
+
+    def to_document(self) -> dict[str, Any]:
+        """Plain JSON-able data with sentences."""
+        return document(self)
 
 
 def diagnose(
@@ -44,6 +69,8 @@ def diagnose(
     linear: bool = False,
     known: Sequence[KnownEffect] = (),
     effects: Sequence[Effect] | None = None,
+    signatures: bool = True,
+    noise_floor_deg: Mapping[str, float] | None = None,
     seed: int = 0,
     cancelled: Callable[[], bool] | None = None,
     report: Callable[[str, float], None] | None = None,
@@ -59,19 +86,35 @@ def diagnose(
         if report:
             report(text, share)
 
-    said("evening out the takes", 0.0)
+    said("looking at the reference", 0.0)
+    problems = reference_problems(takes, layout)
     even = [evened(take, layout.sensors, joints) for take in takes]
     direction = _direction(even, SMOOTHING, layout, joints, linear, known)
-    generator = np.random.default_rng(seed)
-    candidates = list((catalogue() if effects is None else {e.name: e for e in effects}).values())
-    found, impossible = assessed(direction, candidates, generator, said)
+    has = {item.effect.name for item in known}
+    candidates = [e for e in (catalogue().values() if effects is None else effects) if e.name not in has]
+    found, impossible = assessed(direction, candidates, np.random.default_rng(seed), said)
     naming = _delay_told(named(found), even, direction, layout, joints, linear, known)
+    findings = tuple(signature_findings(takes, layout, joints, naming)) if signatures else ()
     errors = {
         name: float(np.sqrt(products.error.sum() / max(products.count.sum(), 1)))
         for name, products in zip(joints, direction.products, strict=True)
     }
+    floors = {name: float(value) for name, value in (noise_floor_deg or {}).items()}
+    left = something_left(direction, floors, seed)
     said("done", 1.0)
-    return Diagnosis(tuple(joints), errors, naming, tuple(found), tuple(impossible))
+    following = next_take(naming.confidence_set)
+    return Diagnosis(
+        tuple(joints),
+        errors,
+        floors,
+        naming,
+        tuple(found),
+        tuple(impossible),
+        problems,
+        findings,
+        left,
+        following,
+    )
 
 
 def measured_joints(takes: Sequence[Take], layout: Layout) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ regressing an angle on noisy sensors punishes its inverse. Neither is trusted al
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -102,17 +102,20 @@ def forward(
     sensor = [_own_sensor(takes, layout, rotation, column) for column, rotation in enumerate(rotations)]
     everything = np.concatenate(filled)
     spread, centre = everything.std(axis=0), everything.mean(axis=0)
+    spare = {name: i for i, name in enumerate(layout.sensors) if name not in names}
+    standard = _standard([take.readings for take in takes])
     signals = tuple(
         Signals(
             take.time_s,
             angles,
-            {name: (angles[:, i] - centre[i]) / max(spread[i], 1e-9) for i, name in enumerate(names)},
+            {name: (angles[:, i] - centre[i]) / max(spread[i], 1e-9) for i, name in enumerate(names)}
+            | {name: values[:, i] for name, i in spare.items()},
             take.context,
             take.wearing,
             take.name,
             np.array([item.zero_deg for item in sensor]),
         )
-        for take, angles in zip(takes, filled, strict=True)
+        for take, angles, values in zip(takes, filled, standard, strict=True)
     )
     read, used, products = [], [], []
     for column, rotation in enumerate(rotations):
@@ -121,15 +124,27 @@ def forward(
         columns = [column, *(names.index(name) for name in neighbours)]
         features = BaseFeatures.settle([part[:, columns] for part in filled], linear=linear)
         index = [np.flatnonzero(np.isfinite(take.reference[:, column]))[::EVERY] for take in takes]
+        without = [_without(take, frozenset({rotation, *neighbours})) for take in signals]
+        extra = [found for each in known if (found := each.columns(without, column, rotation)) is not None]
         units = []
-        for take, part, values, rows in zip(signals, filled, sensor[column].values, index, strict=True):
-            extra = [found for each in known if (found := each.columns(take, column, rotation)) is not None]
-            base = np.column_stack([features.columns(part[:, columns]), *extra])
+        for number, (part, values, rows) in enumerate(zip(filled, sensor[column].values, index, strict=True)):
+            base = np.column_stack([features.columns(part[:, columns]), *(found[number] for found in extra)])
             units.append(Rows(base[rows], values[rows]))
         read.append(frozenset({rotation, *neighbours}))
         used.append(tuple(index))
         products.append(BaseProducts(units))
     return Direction("forward", tuple(rotations), signals, tuple(read), tuple(used), tuple(products))
+
+
+def _standard(readings: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Each take's readings (N, S) in standard deviations over all takes."""
+    every = np.concatenate(readings)
+    centre, spread = every.mean(axis=0), np.maximum(every.std(axis=0), 1e-9)
+    return [(part - centre) / spread for part in readings]
+
+
+def _without(take: Signals, known: frozenset[str]) -> Signals:
+    return replace(take, others={name: v for name, v in take.others.items() if name not in known})
 
 
 @dataclass(frozen=True)

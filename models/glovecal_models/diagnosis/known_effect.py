@@ -2,33 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.effects.catalogue import effect
-from glovecal_models.effects.effect import Settings, Signals
+from glovecal_models.effects.effect import Effect, Signals
 
 
 @dataclass(frozen=True)
 class KnownEffect:
-    """An effect with its constants and shapes; its weights are fitted anew with the base."""
+    """An effect with its shapes; its constants are settled and its weights fitted anew with the base."""
 
-    name: str
+    effect: Effect
     joints: tuple[str, ...]
-    settings: tuple[Settings, ...]
-    """For each joint."""
     shapes: tuple[np.ndarray, ...]
     """For each joint (P,)."""
 
-    def columns(self, take: Signals, lane: int, joint: str) -> np.ndarray | None:
-        """(N, C) of one joint whose signal is a lane of ``take``; None when it is not concerned."""
+    def columns(self, takes: Sequence[Signals], lane: int, joint: str) -> list[np.ndarray] | None:
+        """For each take (N, C) of one joint, a lane of ``takes``; None when it is not concerned."""
         if joint not in self.joints:
             return None
-        at = self.joints.index(joint)
-        single = replace(
-            take,
-            own=take.own[:, [lane]],
-            zero_deg=None if take.zero_deg is None else take.zero_deg[[lane]],
-        )
-        return effect(self.name).columns(single, self.settings[at], self.shapes[at][None, :])[:, 0, :]
+        single = [one_lane(take, lane) for take in takes]
+        settings = self.effect.settle(single)
+        shape = self.shapes[self.joints.index(joint)][None, :]
+        return [self.effect.columns(take, settings, shape)[:, 0, :] for take in single]
+
+
+def one_lane(take: Signals, lane: int) -> Signals:
+    """The signals of one joint alone."""
+    zero = None if take.zero_deg is None else take.zero_deg[[lane]]
+    return replace(take, own=take.own[:, [lane]], zero_deg=zero)

@@ -34,9 +34,16 @@ def named(assessments: Sequence[Assessment]) -> Naming:
 
 
 def _beaten(item: Assessment, best: Assessment) -> bool:
-    """Whether ``item`` leaves clearly more error than ``best`` on the joints that either touches."""
+    """Whether ``item`` leaves clearly more error than ``best`` on the joints that either touches.
+
+    Causes that change from take to take are judged take by take: blocks of one take are no independent
+    witnesses of those.
+    """
     joints = sorted({*best.touched, *item.touched})
     worse = np.sum(
         [(item.errors[j].added - best.errors[j].added) / best.errors[j].base.sum() for j in joints], axis=0
     )
+    take = best.errors[0].take
+    if take is not None and item.probability is not None and best.probability is not None:
+        worse = np.bincount(take, worse)
     return bool(worse.mean() > BEATEN * worse.std(ddof=1) / np.sqrt(len(worse)))

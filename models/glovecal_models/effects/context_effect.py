@@ -11,6 +11,7 @@ from glovecal_models.effects.effect import Decoy, InstantEffect, Settings, Signa
 from glovecal_models.effects.joint_units import in_joint_units, settle_joint_units
 
 PRIOR_DEG = 4.0
+SQUARE_PRIOR_DEG = 2.0
 
 
 class ContextEffect(InstantEffect):
@@ -51,15 +52,22 @@ class ContextEffect(InstantEffect):
         return np.clip(value, settings["low"], settings["high"])
 
     def functions(self, value: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
-        """(N, L, F) of the clipped context column (N,): by default its distance from the usual value."""
+        """(N, L, F) of the clipped context column (N,): its distance from the usual value, and the square."""
         span = max(settings["high"] - settings["low"], 1e-9)
         distance = (value - settings["usual"]) / span
-        return np.repeat(distance[:, None, None], len(shape), axis=1)
+        return np.repeat(np.column_stack([distance, distance**2])[:, None, :], len(shape), axis=1)
 
     def prior_sd(self, settings: Settings) -> np.ndarray:
-        return np.full(len(self.weight_names(settings)), PRIOR_DEG)
+        each = np.array([PRIOR_DEG, SQUARE_PRIOR_DEG])
+        return np.concatenate([each, each])
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         span = max(settings["high"] - settings["low"], 1e-9)
         per = f"{span:.3g}[c.{self.column}]"
-        return (f"offset_deg_per_{per}", f"gain_deg_per_{per}_and_sd")
+        square = f"square_of_{per}"
+        return (
+            f"offset_deg_per_{per}",
+            f"offset_deg_per_{square}",
+            f"gain_deg_per_{per}_and_sd",
+            f"gain_deg_per_{square}_and_sd",
+        )

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.context_effect import ContextEffect
+from glovecal_models.effects.context_effect import PRIOR_DEG, ContextEffect
 from glovecal_models.effects.effect import Parameter, Settings, Signals
 
 TAU_S = (45.0, 75.0, 120.0, 200.0, 330.0, 550.0, 900.0)
@@ -26,6 +26,9 @@ class WarmupDrift(ContextEffect):
     def functions(self, value: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
         cold = np.exp(-(value[:, None] - settings["low"]) / shape[None, :, 0])
         return cold[:, :, None]
+
+    def prior_sd(self, settings: Settings) -> np.ndarray:
+        return np.full(2, PRIOR_DEG)
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         return ("cold_offset_deg", "cold_gain_deg_per_sd")

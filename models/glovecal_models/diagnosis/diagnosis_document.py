@@ -1,0 +1,130 @@
+"""A diagnosis in words and as plain data."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from glovecal_models.diagnosis.assessment import Assessment
+
+if TYPE_CHECKING:
+    from glovecal_models.diagnosis.diagnose import Diagnosis
+
+
+def document(diagnosis: Diagnosis) -> dict[str, Any]:
+    """JSON-able; every error in degrees, on takes left out, with readings and reference smoothed alike."""
+    named = diagnosis.naming.ranked[0] if diagnosis.naming.ranked else None
+    return {
+        "rotations": {
+            name: {"rmse_deg": value, "noise_floor_deg": diagnosis.noise_floor_deg.get(name)}
+            for name, value in diagnosis.rmse_deg.items()
+        },
+        "named": None if named is None else _named(diagnosis, named),
+        "candidates": [_candidate(item) for item in diagnosis.by_gain],
+        "not_judgeable": [{"effect": item.effect, "why": item.why} for item in diagnosis.not_judgeable],
+        "findings": [
+            {
+                "effect": item.effect,
+                "kind": item.kind,
+                "where": list(item.where),
+                "sentence": item.sentence,
+                "stretches": [
+                    {"take": part.take, "start_s": part.start_s, "end_s": part.end_s}
+                    for part in item.stretches
+                ],
+            }
+            for item in diagnosis.findings
+        ],
+        "reference_problems": list(diagnosis.reference_problems),
+        "something_left": {
+            "is_left": diagnosis.left.is_left,
+            "depends_on": list(diagnosis.left.depends_on),
+            "sentence": diagnosis.left.sentence,
+        },
+        "next_take": None
+        if diagnosis.next_take is None
+        else {
+            "what": diagnosis.next_take.what,
+            "seconds": diagnosis.next_take.seconds,
+            "separates": list(diagnosis.next_take.separates),
+        },
+        "sentences": sentences(diagnosis),
+    }
+
+
+def sentences(diagnosis: Diagnosis) -> list[str]:
+    """What a mocap engineer should know, the most important first."""
+    told = list(diagnosis.reference_problems)
+    told += [item.sentence for item in diagnosis.findings]
+    if diagnosis.naming.ranked:
+        told.append(named_sentence(diagnosis))
+    elif not diagnosis.findings:
+        told.append("No known effect explains more of the error than its decoy does.")
+    if diagnosis.next_take is not None:
+        rivals = " and ".join(diagnosis.next_take.separates)
+        told.append(
+            f"To tell {rivals} apart record {diagnosis.next_take.seconds} s: {diagnosis.next_take.what}"
+        )
+    told.append(diagnosis.left.sentence)
+    told += [f"{item.effect} cannot be judged: {item.why}." for item in diagnosis.not_judgeable]
+    return told
+
+
+def named_sentence(diagnosis: Diagnosis) -> str:
+    """The first of the ranking, with its evidence, and whom it cannot be told from."""
+    item = diagnosis.naming.ranked[0]
+    before, after, decoy = errors_deg(item)
+    where = ", ".join(item.joints[i] for i in item.touched)
+    start = (
+        f"{item.effect} on {where}: it takes the error from {before:.2f} to {after:.2f} degrees on takes left"
+        f" out (its decoy to {decoy:.2f})"
+    )
+    rivals = diagnosis.naming.confidence_set[1:]
+    if rivals:
+        return f"{start}; these takes cannot tell it from {', '.join(rivals)}."
+    if item.effect == "cross_coupling" and diagnosis.left.is_left:
+        return f"{start}; or a common cause that was not recorded, such as grip pressure or a strap."
+    return f"{start}."
+
+
+def errors_deg(item: Assessment) -> tuple[float, float, float]:
+    """RMSE over the touched joints (all, if none) without the effect, with it, with its decoy."""
+    joints = item.touched or tuple(range(len(item.errors)))
+    rows = sum(item.errors[i].rows for i in joints)
+    parts = [[getattr(item.errors[i], name).sum() for i in joints] for name in ("base", "added", "decoy")]
+    before, after, decoy = (float(np.sqrt(max(sum(part), 0.0) / max(rows, 1))) for part in parts)
+    return before, after, decoy
+
+
+def _named(diagnosis: Diagnosis, item: Assessment) -> dict[str, Any]:
+    before, after, decoy = errors_deg(item)
+    return {
+        "effect": item.effect,
+        "where": [item.joints[i] for i in item.touched],
+        "verdict": "named" if len(diagnosis.naming.confidence_set) < 2 else "ambiguous",
+        "confidence_set": list(diagnosis.naming.confidence_set),
+        "parameters": {item.joints[i]: item.shape_described(i) for i in item.touched},
+        "saved_deg": before - after,
+        "decoy_saved_deg": before - decoy,
+        "sentence": named_sentence(diagnosis),
+    }
+
+
+def _candidate(item: Assessment) -> dict[str, Any]:
+    before, after, decoy = errors_deg(item)
+    worst = max(range(len(item.errors)), key=lambda i: item.errors[i].contrast)
+    return {
+        "effect": item.effect,
+        "where": [item.joints[i] for i in item.touched],
+        "rmse_before_deg": before,
+        "rmse_after_deg": after,
+        "rmse_decoy_deg": decoy,
+        "saved_share": {name: e.saved for name, e in zip(item.joints, item.errors, strict=True)},
+        "decoy_saved_share": {name: e.decoy_saved for name, e in zip(item.joints, item.errors, strict=True)},
+        "probability": item.probability,
+        "passes": bool(item.touched),
+        "sentence": (
+            f"{item.effect}: {before:.2f} to {after:.2f} degrees (decoy {decoy:.2f}); most on {item.joints[worst]}."
+        ),
+    }

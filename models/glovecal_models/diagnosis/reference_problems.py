@@ -1,0 +1,90 @@
+"""What is wrong with the measurement itself: looked at before any effect is blamed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from glovecal_models.layout import Layout
+from glovecal_models.takes.take import Take
+
+STILL_DEG = 0.5
+LARGEST_RADIANS = 3.5
+LEAST_RADIANS = 0.2
+JUMP_DEG = 25.0
+"""Between two frames, while the joint's sensor hardly moves."""
+SURE_CORRELATION = 0.5
+FEWEST_ROWS = 30
+
+
+def reference_problems(takes: Sequence[Take], layout: Layout) -> tuple[str, ...]:
+    """Sentences; none when the reference looks right."""
+    problems: list[str] = []
+    for rotation in layout.rotations:
+        measured = [(take, take.reference_at_frames([rotation])[:, 0]) for take in takes]
+        measured = [(take, values) for take, values in measured if np.isfinite(values).sum() >= FEWEST_ROWS]
+        if measured:
+            own = layout.correspondence(rotation)
+            inputs = [
+                own.input_columns(_in_order(take, layout), layout.sensors)[:, 0] for take, _ in measured
+            ]
+            problems.extend(_of_rotation(rotation, measured, inputs))
+    spans = _largest_span(takes)
+    if spans is not None and LEAST_RADIANS < spans <= LARGEST_RADIANS:
+        problems.insert(
+            0,
+            f"No reference angle spans more than {spans:.2f}: these look like radians. Angles are wanted in "
+            "degrees; multiply by 57.2958.",
+        )
+    return tuple(problems)
+
+
+def _in_order(take: Take, layout: Layout) -> np.ndarray:
+    return take.readings[:, [take.sensors.index(name) for name in layout.sensors]]
+
+
+def _largest_span(takes: Sequence[Take]) -> float | None:
+    spans = [
+        float(np.nanmax(take.reference[:, i]) - np.nanmin(take.reference[:, i]))
+        for take in takes
+        for i in range(len(take.rotations))
+        if np.isfinite(take.reference[:, i]).any()
+    ]
+    return max(spans) if spans else None
+
+
+def _of_rotation(
+    rotation: str, measured: Sequence[tuple[Take, np.ndarray]], inputs: Sequence[np.ndarray]
+) -> list[str]:
+    problems, correlations = [], []
+    for (take, values), own in zip(measured, inputs, strict=True):
+        known = np.isfinite(values)
+        angle, reading = values[known], own[known]
+        moves = float(np.std(reading)) > 0 and float(np.std(angle)) > 0
+        correlations.append(float(np.corrcoef(reading, angle)[0, 1]) if moves else 0.0)
+        if np.ptp(angle) < STILL_DEG and np.ptp(reading) > 0.3 * max(np.ptp(part) for part in inputs):
+            problems.append(
+                f"{rotation} in take {take.name}: the reference stays within {np.ptp(angle):.2g} degrees while"
+                " its sensor moves. Was the tracker frozen?"
+            )
+        jumps = _jumps(angle, reading)
+        if jumps:
+            problems.append(
+                f"{rotation} in take {take.name}: the reference jumps by more than {JUMP_DEG:g} degrees"
+                f" {jumps} time{'s' if jumps > 1 else ''} while its sensor stands. Did a marker swap?"
+            )
+    sign = np.sign(np.median(correlations))
+    for (take, _), correlation in zip(measured, correlations, strict=True):
+        if len(measured) > 2 and sign * correlation < -SURE_CORRELATION:
+            problems.append(
+                f"{rotation} in take {take.name}: the reference runs against its sensor, unlike in the other"
+                " takes. Is its sign flipped?"
+            )
+    return problems
+
+
+def _jumps(angle: np.ndarray, reading: np.ndarray) -> int:
+    steps, moved = np.abs(np.diff(angle)), np.abs(np.diff(reading))
+    span = max(float(np.ptp(reading)), 1e-9)
+    return int(((steps > JUMP_DEG) & (moved < 0.1 * span)).sum())

@@ -1,0 +1,65 @@
+"""Effects known by a signature in the recording, asked in the order in which they mislead others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from glovecal_models.diagnosis.naming import Naming
+from glovecal_models.effects.catalogue import catalogue
+from glovecal_models.effects.signature_effect import Finding, SignatureEffect
+from glovecal_models.layout import Layout
+from glovecal_models.takes.take import Take
+
+BEFORE_ALL = ("repeated_samples", "sensor_fault", "saturation")
+AFTER_ALL = ("garment_slip",)
+"""Creep looks like a slip: only asked when nothing else explains the error."""
+
+
+def own_sensors(layout: Layout, joints: Sequence[str]) -> dict[str, str]:
+    """The measuring sensor of each joint that has one."""
+    found = {}
+    for name in joints:
+        item = layout.correspondence(name)
+        if item.simulated is None and (item.rotation in item.sensors or len(item.sensors) == 1):
+            found[name] = item.sensors[item.sensors.index(name)] if name in item.sensors else item.sensors[0]
+    return found
+
+
+def signature_findings(
+    takes: Sequence[Take], layout: Layout, joints: Sequence[str], naming: Naming
+) -> Iterator[Finding]:
+    """Largest first within each effect."""
+    sensor_of = own_sensors(layout, joints)
+    if not sensor_of:
+        return
+    for name in BEFORE_ALL:
+        yield from _found(name, takes, sensor_of, None)
+    if not naming.ranked:
+        for name in AFTER_ALL:
+            yield from _found(name, takes, sensor_of, _static_errors(takes, sensor_of))
+
+
+def _found(
+    name: str, takes: Sequence[Take], sensor_of: dict[str, str], errors: Sequence[np.ndarray] | None
+) -> tuple[Finding, ...]:
+    effect = catalogue().get(name)
+    return effect.find(takes, sensor_of, errors) if isinstance(effect, SignatureEffect) else ()
+
+
+def _static_errors(takes: Sequence[Take], sensor_of: dict[str, str]) -> list[np.ndarray]:
+    """For each take (N, joints): what a smooth curve of each joint's own sensor leaves, degrees."""
+    result = [np.full((len(take.time_s), len(sensor_of)), np.nan) for take in takes]
+    for column, (rotation, sensor) in enumerate(sensor_of.items()):
+        x = [take.readings[:, take.sensors.index(sensor)] for take in takes]
+        y = [take.reference_at_frames([rotation])[:, 0] for take in takes]
+        every, target = np.concatenate(x), np.concatenate(y)
+        known = np.isfinite(target)
+        if known.sum() < 50 or np.ptp(every[known]) == 0:
+            continue
+        low, span = float(every.min()), max(float(np.ptp(every)), 1e-9)
+        curve = np.polynomial.legendre.legfit(2 * (every[known] - low) / span - 1, target[known], 7)
+        for part, reading, angle in zip(result, x, y, strict=True):
+            part[:, column] = np.polynomial.legendre.legval(2 * (reading - low) / span - 1, curve) - angle
+    return result

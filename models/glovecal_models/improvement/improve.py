@@ -1,0 +1,336 @@
+"""The loop walked by itself: compare, diagnose, add, verify, again, until the floor or nothing more is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.training import train
+from glovecal_models.calibration.training_settings import Report, TrainingSettings
+from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_models.comparison.noise_floor import noise_floor
+from glovecal_models.comparison.residuals import residuals
+from glovecal_models.diagnosis.diagnose import Diagnosis, diagnose
+from glovecal_models.diagnosis.diagnosis_document import errors_deg, named_sentence
+from glovecal_models.improvement.add_effect import (
+    Addition,
+    add_effect,
+    repaired_takes,
+    trained_rotations,
+    wanted_of,
+)
+from glovecal_models.improvement.clocks import clock_settings, coarse_clock_settings
+from glovecal_models.improvement.held_out_check import HeldOutErrors, held_out_errors
+from glovecal_models.improvement.known_effects import known_effects
+from glovecal_models.improvement.prepared_takes import PreparedTakes
+from glovecal_models.layout import Layout
+from glovecal_models.takes.take import Take
+
+FIRST_GAIN, LATER_GAIN = 0.05, 0.10
+"""Of the held-out RMSE of the touched rotations; a second effect must earn more."""
+AT_FLOOR = 1.15
+CLOCK = "clock_offset"
+
+
+@dataclass(frozen=True)
+class Step:
+    """One model on the way."""
+
+    model: CalibrationModel
+    added: dict[str, Any] | None
+    rmse_deg: float
+    per_rotation: dict[str, float]
+    decoy_rmse_deg: float | None = None
+    """What the error would be with the effect's decoy instead, over the rotations it touches."""
+
+
+@dataclass(frozen=True)
+class Improvement:
+    """The whole walk."""
+
+    steps: tuple[Step, ...]
+    noise_floor: dict[str, NoiseFloor]
+    stopped: str
+    diagnosis: Diagnosis | None
+    """The last one: what is left, and what to record next."""
+    undone: tuple[Addition, ...]
+    baselines: dict[str, float] = field(default_factory=dict)
+    """Errors (deg) of simpler calibrations on the same takes, for scale."""
+    sentences: tuple[str, ...] = ()
+
+    @property
+    def models(self) -> tuple[CalibrationModel, ...]:
+        """One for each step."""
+        return tuple(step.model for step in self.steps)
+
+    def to_document(self, model_ids: Sequence[str | None] | None = None) -> dict[str, Any]:
+        """The JSON contract of ``glovecal improve``; ids are those under which the models were stored."""
+        ids = list(model_ids) if model_ids is not None else [None] * len(self.steps)
+        ambiguous = next(
+            (s.added for s in reversed(self.steps) if s.added and s.added["verdict"] == "ambiguous"), None
+        )
+        following = self.diagnosis.next_take if self.diagnosis else None
+        if following is None and ambiguous is not None:
+            following = ambiguous.get("next_take")
+        elif following is not None:
+            following = {
+                "what": following.what, "seconds": following.seconds, "separates": list(following.separates)
+            }  # fmt: skip
+        return {
+            "steps": [
+                {
+                    "model": id,
+                    "added": step.added,
+                    "rmse_deg": step.rmse_deg,
+                    "per_rotation": step.per_rotation,
+                    "decoy_rmse_deg": step.decoy_rmse_deg,
+                }
+                for id, step in zip(ids, self.steps, strict=True)
+            ],
+            "baselines": self.baselines,
+            "noise_floor_deg": {name: floor.floor_deg for name, floor in self.noise_floor.items()},
+            "noise_floor_interval_deg": {
+                name: [floor.low_deg, floor.high_deg] for name, floor in self.noise_floor.items()
+            },
+            "stopped": self.stopped,
+            "undone": [item.to_document() for item in self.undone],
+            "something_left": bool(self.diagnosis and self.diagnosis.left.is_left),
+            "next_take": following,
+            "sentences": list(self.sentences),
+        }
+
+
+def improve(
+    takes: Sequence[Take],
+    layout: Layout,
+    subject: str,
+    settings: TrainingSettings | None = None,
+    *,
+    holdout: Sequence[Take] = (),
+    max_steps: int = 6,
+    seed: int = 0,
+    take_hashes: Sequence[str] = (),
+    cancelled: Callable[[], bool] | None = None,
+    report: Report | None = None,
+) -> Improvement:
+    """Train, then add what the diagnosis names while it pays. Raises NotTrainable, BadInput, Cancelled.
+
+    Errors are on ``holdout`` when given, else on takes left out of each fit.
+    """
+    settings = settings or TrainingSettings()
+    walk = _Walk(
+        takes, layout, subject, settings, tuple(holdout), seed, tuple(take_hashes), cancelled, report
+    )
+    walk.start()
+    while len(walk.steps) <= max_steps and walk.go_on():
+        pass
+    return walk.finished()
+
+
+class _Walk:
+    """The state of one walk."""
+
+    def __init__(
+        self,
+        takes: Sequence[Take],
+        layout: Layout,
+        subject: str,
+        settings: TrainingSettings,
+        holdout: tuple[Take, ...],
+        seed: int,
+        hashes: tuple[str, ...],
+        cancelled: Callable[[], bool] | None,
+        report: Report | None,
+    ) -> None:
+        self.takes, self.layout, self.subject, self.settings = list(takes), layout, subject, settings
+        self.holdout, self.seed, self.hashes = holdout, seed, hashes
+        self.cancelled, self.report = cancelled, report
+        self.steps: list[Step] = []
+        self.undone: list[Addition] = []
+        self.sentences: list[str] = []
+        self.stopped = "nothing_named"
+        self.diagnosis: Diagnosis | None = None
+        self.floors: dict[str, NoiseFloor] = {}
+        self.errors = HeldOutErrors({}, {})
+
+    def start(self) -> None:
+        """The base model, its error and its floor."""
+        self._say("training the base", 0.02)
+        fast = TrainingSettings(
+            self.settings.method, self.settings.samples, 0, self.settings.pseudo_inputs,
+            self.settings.iterations, self.settings.seed,
+        )  # fmt: skip
+        model = train(
+            self.takes, self.layout, self.subject, fast, take_hashes=self.hashes, cancelled=self.cancelled
+        )
+        self._say("measuring the base on takes left out", 0.1)
+        self.errors = self._held_out(model)
+        self._step(model, None)
+        found = residuals(model, self.takes)
+        generator = np.random.default_rng(self.seed)
+        for name in found.measured_rotations:
+            floor = noise_floor(found, name, generator)
+            if floor is not None:
+                self.floors[name] = floor
+
+    def go_on(self) -> bool:
+        """One round; False when the walk is over."""
+        model = self.steps[-1].model
+        share = 0.15 + 0.12 * len(self.steps)
+        if CLOCK not in {item.name for item in wanted_of(model)}:
+            clocks = coarse_clock_settings(self.takes)
+            if clocks is not None and self._add(CLOCK, None, clocks, None):
+                return True
+        self._say("looking for what is missing", share)
+        takes = repaired_takes(self.takes, wanted_of(model))
+        floors = {name: floor.floor_deg for name, floor in self.floors.items()}
+        self.diagnosis = diagnose(
+            takes, self.layout, linear=self.settings.method in ("raw", "linear"), known=known_effects(model),
+            noise_floor_deg=floors, seed=self.seed, cancelled=self.cancelled,
+        )  # fmt: skip
+        tried = {item.effect for item in self.undone}
+        for item in self.diagnosis.naming.ranked:
+            if item.effect in tried:
+                continue
+            where = [item.joints[i] for i in item.touched]
+            clock = None
+            if item.effect == CLOCK:
+                clock = clock_settings([take.name for take in self.takes], item.shapes[0])
+            if self._add(item.effect, where, clock, self.diagnosis):
+                return True
+            self.stopped = "not_better"
+            return False
+        self.stopped = "noise_floor" if self._is_at_floor() else "nothing_named"
+        return False
+
+    def finished(self) -> Improvement:
+        """Sum up."""
+        if self.stopped != "noise_floor" and self._is_at_floor():
+            self.stopped = "noise_floor"
+        last = next((s.added for s in reversed(self.steps) if s.added is not None), None)
+        if self.stopped != "noise_floor" and last is not None and last["verdict"] == "ambiguous":
+            self.stopped = "ambiguous"
+        if self.diagnosis is not None:
+            self.sentences += list(self.diagnosis.reference_problems)
+            self.sentences += [item.sentence for item in self.diagnosis.findings]
+            self.sentences += [
+                f"{item.effect} cannot be judged: {item.why}." for item in self.diagnosis.not_judgeable
+            ]
+            self.sentences.append(self.diagnosis.left.sentence)
+        self._say("done", 1.0)
+        return Improvement(
+            tuple(self.steps), self.floors, self.stopped, self.diagnosis, tuple(self.undone),
+            self._baselines(), tuple(self.sentences),
+        )  # fmt: skip
+
+    def _add(
+        self, name: str, where: list[str] | None, clock: dict[str, Any] | None, diagnosis: Diagnosis | None
+    ) -> bool:
+        model = self.steps[-1].model
+        every = trained_rotations(model)
+        chosen = every if where is None or clock is not None else [item for item in where if item in every]
+        self._say(f"adding {name}", 0.2 + 0.12 * len(self.steps))
+        added_before = sum(1 for step in self.steps if step.added is not None)
+        addition = add_effect(
+            model, self.takes, name, rotations=chosen, clock=clock, settings=self.settings,
+            before=self._of(chosen), least_gain=LATER_GAIN if added_before else FIRST_GAIN,
+            take_hashes=self.hashes, cancelled=self.cancelled,
+        )  # fmt: skip
+        self.sentences.append(addition.sentence)
+        if not addition.added:
+            self.undone.append(addition)
+            return False
+        self.errors = self.errors.with_those_of(addition.after)
+        self._step(addition.model, _added_document(addition, clock, diagnosis), diagnosis)
+        return True
+
+    def _of(self, rotations: Sequence[str]) -> HeldOutErrors:
+        return HeldOutErrors(
+            {name: self.errors.square[name] for name in rotations},
+            {name: self.errors.count[name] for name in rotations},
+        )
+
+    def _held_out(self, model: CalibrationModel) -> HeldOutErrors:
+        prepared = PreparedTakes.of(self.takes, self.layout)
+        return held_out_errors(
+            prepared, trained_rotations(model), [], self.settings, cancelled=self.cancelled
+        )
+
+    def _step(
+        self, model: CalibrationModel, added: dict[str, Any] | None, diagnosis: Diagnosis | None = None
+    ) -> None:
+        per_rotation, over_all = self._errors(model)
+        decoy = None
+        if diagnosis is not None and diagnosis.naming.ranked:
+            decoy = errors_deg(diagnosis.naming.ranked[0])[2]
+            self.sentences.append(named_sentence(diagnosis))
+        self.steps.append(Step(model, added, over_all, per_rotation, decoy))
+
+    def _errors(self, model: CalibrationModel) -> tuple[dict[str, float], float]:
+        """On the holdout when there is one, else on takes left out."""
+        if not self.holdout:
+            return {name: self.errors.rmse_deg(name) for name in self.errors.square}, self.errors.over_all_deg
+        found = residuals(model, self.holdout)
+        error = found.stacked("error")
+        each = {
+            name: float(np.sqrt(np.nanmean(error[:, found.column(name)] ** 2)))
+            for name in found.measured_rotations
+        }
+        return each, float(np.sqrt(np.nanmean(error**2)))
+
+    def _is_at_floor(self) -> bool:
+        last = self.steps[-1].per_rotation
+        floors = [(last[name], floor) for name, floor in self.floors.items() if name in last]
+        return bool(floors) and all(
+            not floor.is_lower_bound and error <= AT_FLOOR * floor.high_deg for error, floor in floors
+        )
+
+    def _baselines(self) -> dict[str, float]:
+        found: dict[str, float] = {}
+        for method in ("raw", "linear"):
+            if method == self.settings.method:
+                continue
+            settings = TrainingSettings(method=method, folds=self.settings.folds)  # pyright: ignore[reportArgumentType]
+            if self.holdout:
+                plain = TrainingSettings(method=method, folds=0)  # pyright: ignore[reportArgumentType]
+                model = train(self.takes, self.layout, self.subject, plain)
+                found[method] = float(
+                    np.sqrt(np.nanmean(residuals(model, self.holdout).stacked("error") ** 2))
+                )
+            else:
+                prepared = PreparedTakes.of(self.takes, self.layout)
+                names = trained_rotations(self.steps[0].model)
+                found[method] = held_out_errors(prepared, names, [], settings).over_all_deg
+        return found
+
+    def _say(self, text: str, share: float) -> None:
+        if self.report:
+            self.report(text, min(share, 1.0))
+
+
+def _added_document(
+    addition: Addition, clock: dict[str, Any] | None, diagnosis: Diagnosis | None
+) -> dict[str, Any]:
+    rivals = [addition.effect] if diagnosis is None else list(diagnosis.naming.confidence_set)
+    if addition.effect not in rivals:
+        rivals = [addition.effect]
+    parameters: dict[str, Any] = dict(addition.parameters)
+    if clock is not None:
+        parameters = {"offset_s": clock["offset_s"] if clock["per_take"] else clock["common_s"]}
+    document: dict[str, Any] = {
+        "effect": addition.effect,
+        "where": list(addition.rotations),
+        "verdict": "named" if len(rivals) < 2 else "ambiguous",
+        "confidence_set": rivals,
+        "parameters": parameters,
+    }
+    if diagnosis is not None and diagnosis.next_take is not None and len(rivals) > 1:
+        following = diagnosis.next_take
+        document["next_take"] = {
+            "what": following.what, "seconds": following.seconds, "separates": list(following.separates)
+        }  # fmt: skip
+    return document
