@@ -6,13 +6,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.comparison.noise_floor import noise_floor
+from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.effects.expression_effect import ExpressionEffect
 from glovecal_models.improvement.add_effect import repaired_takes, wanted_of
+from glovecal_models.improvement.known_effects import known_effects
+from glovecal_models.takes.take import Take
 from glovecal_service.jobs.declared_effects import declared_in, known_by_name
 from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult
-from glovecal_service.jobs.known_effects import known_effects
 from glovecal_service.jobs.model_work import ModelWork, takes_of, text_in
 from glovecal_service.jobs.task_key import task_key
 from glovecal_service.plain import plain
@@ -59,6 +65,8 @@ class DiagnoseJob:
 def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> TaskResult:
     """In a worker. Raises BadInput, Cancelled."""
     model = work.on.model
+    report("measuring the noise floors", 0.0)
+    floors = floors_deg(model, work.on.takes, work.seed)
     own = [ExpressionEffect.from_document(item) for item in work.declarations]
     with known_by_name([*declared_in(model), *own]):
         found = diagnose(
@@ -67,8 +75,16 @@ def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> T
             linear=model.method in ("raw", "linear"),
             known=known_effects(model),
             effects=list(catalogue().values()),
+            noise_floor_deg=floors,
             seed=work.seed,
             cancelled=cancelled,
             report=report,
         )
     return TaskResult({}, plain(found.to_document()))
+
+
+def floors_deg(model: CalibrationModel, takes: Sequence[Take], seed: int) -> dict[str, float]:
+    """How small the model's errors can get on these takes, for each rotation of which that is known."""
+    found, generator = residuals(model, takes), np.random.default_rng(seed)
+    floors = {name: noise_floor(found, name, generator) for name in found.measured_rotations}
+    return {name: floor.floor_deg for name, floor in floors.items() if floor is not None}

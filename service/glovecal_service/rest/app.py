@@ -18,6 +18,7 @@ from glovecal_service.rest import (
     effects,
     gloves,
     health,
+    improvements,
     jobs,
     metrics_page,
     model_effects,
@@ -46,7 +47,8 @@ JSON_LIMIT_BYTES = 8_000_000
 BODY_PATIENCE_S = 30.0
 ROUTERS = (
     *(subjects, gloves, clocks, takes, uploads, recordings),
-    *(training, models, comparisons, diagnosis, model_effects, effects, jobs, health, metrics_page),
+    *(training, models, comparisons, diagnosis, model_effects, effects, improvements),
+    *(jobs, health, metrics_page),
 )
 
 
