@@ -19,6 +19,7 @@ from glovecal_service.rest import (
     gloves,
     health,
     improvements,
+    job_reports,
     jobs,
     metrics_page,
     model_effects,
@@ -48,7 +49,7 @@ BODY_PATIENCE_S = 30.0
 ROUTERS = (
     *(subjects, gloves, clocks, takes, uploads, recordings),
     *(training, models, comparisons, diagnosis, model_effects, effects, improvements),
-    *(jobs, health, metrics_page),
+    *(jobs, job_reports, health, metrics_page),
 )
 
 
