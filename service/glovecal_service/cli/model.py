@@ -9,7 +9,7 @@ import typer
 
 from glovecal_service.cli.connection import connect
 from glovecal_service.cli.options import AsJson, Model, OnlyLayout, OnlySubject, Subject
-from glovecal_service.cli.printing import err, moment, out, print_facts, print_json, print_table
+from glovecal_service.cli.printing import err, moment, out, print_facts, print_json, print_table, text
 from glovecal_service.cli.refusal import Refusal
 from glovecal_service.cli.writing import Overwrite, require_place, write_whole
 
@@ -62,6 +62,10 @@ def show(model: Model, as_json: AsJson = False) -> None:
         "sensors": "sensors",
     }
     print_table(document["rotations"], columns, empty="No rotations.")
+    for item in document["effects"]:
+        out.print(f"\n{item['effect']} on {', '.join(item['where'])}: {item['explanation']}")
+        for rotation, values in item["parameters"].items():
+            out.print(f"  {rotation}: {text(values)}")
 
 
 def _facts(document: dict[str, Any], lineage: list[dict[str, Any]]) -> dict[str, Any]:
@@ -76,6 +80,7 @@ def _facts(document: dict[str, Any], lineage: list[dict[str, Any]]) -> dict[str,
         "trained on": [take["name"] for take in document["facts"].get("takes", [])],
         "simulated": document["simulated"],
         "trained": moment(document["created_at"]),
+        "effects": list(dict.fromkeys(item["effect"] for item in document["effects"])),
         "made from": [row["id"][:12] for row in lineage[1:]],
     }
 

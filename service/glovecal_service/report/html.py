@@ -13,7 +13,7 @@ h1 { font-size: 1.5rem } h2 { font-size: 1.15rem; margin-top: 2.2rem }
 svg { max-width: 100%; height: auto } figure { margin: 1rem 0 } figcaption { color: #444 }
 table { border-collapse: collapse } .note { background: #fdf3e3; padding: .6rem 1rem }
 th, td { text-align: right; padding: .15rem .7rem; border-bottom: 1px solid #ddd }
-th:first-child, td:first-child { text-align: left } td { white-space: nowrap }
+th:first-child, td:first-child, .text { text-align: left } td { white-space: nowrap }
 .side { display: flex; flex-wrap: wrap; gap: 1rem } .side figure { flex: 1 1 24rem }
 """
 

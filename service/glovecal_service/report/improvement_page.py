@@ -25,8 +25,8 @@ def improvement_page(found: Mapping[str, Any], method: str, subject: str) -> str
     picture, sentence = error_fall(falls_of(found, method), band_of(found))
     parts = [
         f"<h1>How the error of {escape(subject)}'s calibration fell</h1>",
-        f"<p><strong>{escape(sentence)}</strong> {escape(STOPPED.get(found['stopped'], ''))}</p>",
         figure(picture, sentence),
+        f"<p>{escape(STOPPED.get(found['stopped'], ''))}</p>",
         "<h2>Each rotation</h2>",
         _rotations(steps, found.get("noise_floor_deg") or {}, method),
         "<h2>Each step</h2>",

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 
 from glovecal_models.calibration.comparison import Comparison, summed_up
+from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.floor_estimate import ORDER, NoiseFloor
 from glovecal_models.comparison.residuals import Residuals, residuals
 from glovecal_models.comparison.rotation_noise import RotationNoise, rotation_noise
@@ -17,6 +18,7 @@ from glovecal_service.report.closer_pictures import (
     spectrum_of,
 )
 from glovecal_service.report.html import figure, table, whole_page
+from glovecal_service.report.lineage_fall import lineage_fall
 from glovecal_service.report.pictures import error_against, errors_and_floors, heat_map, over_time
 from glovecal_service.report.reported_model import ReportedModel
 from glovecal_service.report.sentences import counted, floors_sentence, heat_sentence, in_one_sentence
@@ -40,8 +42,18 @@ FLOORS = (
 )
 
 
-def report_page(main: ReportedModel, takes: Sequence[Take], beside: Sequence[ReportedModel] = ()) -> str:
-    """HTML, ``main`` looked at closely. Raises LayoutMismatch, and BadInput when nothing was measured."""
+def report_page(
+    main: ReportedModel,
+    takes: Sequence[Take],
+    beside: Sequence[ReportedModel] = (),
+    *,
+    ancestors: Sequence[CalibrationModel] = (),
+    simpler: Mapping[str, CalibrationModel] | None = None,
+) -> str:
+    """HTML, ``main`` looked at closely. Raises LayoutMismatch, and BadInput when nothing was measured.
+
+    ``ancestors``, oldest first, and ``simpler`` calibrations show how the error fell down to ``main``.
+    """
     found = residuals(main.model, takes)
     noise = rotation_noise(found)
     numbers, where = summed_up(found, noise), where_it_fails(found, noise=noise)
@@ -50,6 +62,7 @@ def report_page(main: ReportedModel, takes: Sequence[Take], beside: Sequence[Rep
         _what(main, takes),
         f"<p><strong>{escape(in_one_sentence(numbers, where))}</strong></p>",
         *_beside(main, numbers, takes, beside),
+        *_fall(main, ancestors, simpler or {}, takes, numbers),
         "<h2>How far off, and how far it could be</h2>",
         figure(errors_and_floors(where), floors_sentence(where)),
         _table(numbers, where),
@@ -72,6 +85,20 @@ def _beside(
     models |= {other.name: summed_up(residuals(other.model, takes)) for other in beside}
     notes = [_trained_on(other) for other in beside]
     return ["<h2>Side by side</h2>", *notes, figure(*side_by_side(models))]
+
+
+def _fall(
+    main: ReportedModel,
+    ancestors: Sequence[CalibrationModel],
+    simpler: Mapping[str, CalibrationModel],
+    takes: Sequence[Take],
+    numbers: Comparison,
+) -> list[str]:
+    """The part with the versions before this one, nothing for a first version."""
+    if not ancestors:
+        return []
+    picture = lineage_fall([*ancestors, main.model], simpler, takes, numbers.over_all)
+    return ["<h2>How the error fell</h2>", figure(*picture)]
 
 
 def _closely(item: RotationFindings, found: Residuals, noise: RotationNoise) -> list[str]:

@@ -18,6 +18,7 @@ from glovecal_service.rest.answers import change_problems
 from glovecal_service.rest.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.names import Id, ModelInPath, ModelReference
 from glovecal_service.rest.strict_body import StrictBody
+from glovecal_service.rest.versions_before import versions_before
 from glovecal_service.store.records import ModelRecord
 from glovecal_service.store.store import Store
 
@@ -191,7 +192,14 @@ def report_on_model(id: ModelInPath, body: AgainstBeside, parts: PartsNeeded) ->
         other, loaded, _, also_seen = _chosen(reference, body, parts)
         if other.id != record.id:
             others[other.id] = ReportedModel(other.id, loaded, also_seen)
-    page = report_page(ReportedModel(record.id, model, seen), takes, list(others.values()))
+    ancestors, simpler = versions_before(parts, record)
+    page = report_page(
+        ReportedModel(record.id, model, seen),
+        takes,
+        list(others.values()),
+        ancestors=ancestors,
+        simpler=simpler,
+    )
     return Response(page, media_type="text/html; charset=utf-8")
 
 
