@@ -94,8 +94,9 @@ def fall_sentence(falls: Sequence[Fall], band: FloorBand | None) -> str:
         )
     else:
         added = ", ".join(_inline(item.label) for item in falls[falls.index(base) + 1 :])
+        verb = "falls" if last.rmse_deg < base.rmse_deg else "goes"
         told = (
-            f"The error {'falls' if last.rmse_deg < base.rmse_deg else 'goes'} from {base.rmse_deg:.2f} degrees with {_inline(base.label)}{beside} to "
+            f"The error {verb} from {base.rmse_deg:.2f} degrees with {_inline(base.label)}{beside} to "
             f"{last.rmse_deg:.2f} with {added.replace('+ ', '')}"
         )
         if last.decoy_rmse_deg is not None:

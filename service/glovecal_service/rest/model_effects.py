@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
@@ -21,8 +22,8 @@ from glovecal_service.rest.model_takes import TakesNamed, model_takes
 from glovecal_service.rest.names import ONE_LINE, Channel, ModelInPath
 from glovecal_service.rest.new_job import new_job
 from glovecal_service.rest.strict_body import StrictBody
-from glovecal_service.store.errors import NotFound
-from glovecal_service.store.records import JobRecord
+from glovecal_service.store.errors import Conflict, NotFound
+from glovecal_service.store.records import JobRecord, TakeRecord
 
 router = APIRouter(prefix="/models", tags=["models"])
 
@@ -65,7 +66,9 @@ def add_effect(id: ModelInPath, body: EffectWanted, parts: PartsNeeded, response
         own = checked_declaration(body.effect.declaration, takes, model.layout.sensors)
         payload |= {"effect": own.name, "declaration": declaration_document(own)}
     else:
-        payload |= _named(model, body.effect)
+        payload |= _named(model, body.effect, takes)
+    if not set(rotations or trained_rotations(model)) - _rotations_with(model, payload["effect"]):
+        raise Conflict(f"model {record.id[:12]} has {payload['effect']} on all of these rotations already")
     return new_job(parts.store, response, "add_effect", payload, record.subject)
 
 
@@ -95,14 +98,25 @@ def remove_effect(
     return new_job(parts.store, response, "remove_effect", payload, record.subject)
 
 
-def _named(model: CalibrationModel, name: str) -> dict[str, Any]:
+def _named(model: CalibrationModel, name: str, takes: Sequence[TakeRecord]) -> dict[str, Any]:
     """An effect of the catalogue, or one of the user's own that the model has already on other rotations."""
     declaration = declaration_of(model, name)
     if declaration is None:
         effect = known_effect(name)
         if not can_be_added(effect):
             raise BadInput(f"effect {name!r} cannot be added to a model: {WHY_NOT[kind_of(effect)]}")
+        recorded = {column for take in takes for column in take.context}
+        for column in effect.context:
+            if column not in recorded:
+                there = ", ".join(f"c.{other}" for other in sorted(recorded)) or "none"
+                raise BadInput(
+                    f"effect {name!r} needs the context column c.{column}; these takes have {there}"
+                )
     return {"effect": name, "declaration": None if declaration is None else dict(declaration)}
+
+
+def _rotations_with(model: CalibrationModel, name: str) -> set[str]:
+    return {rotation for item in model.effects if item.name == name for rotation in item.active}
 
 
 def _checked_rotations(model: CalibrationModel, wanted: list[str] | None) -> list[str] | None:
