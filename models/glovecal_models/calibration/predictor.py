@@ -10,6 +10,7 @@ import numpy as np
 from glovecal_models.calibration.effect_correction import EffectCorrection
 from glovecal_models.calibration.fused_processes import FusedProcesses, grouped_by_nodes, is_fusible
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
+from glovecal_models.effects.saturation import SaturatedBand
 from glovecal_models.errors import BadInput
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.regression.rule_regressor import RuleRegressor
@@ -51,6 +52,7 @@ class GlovePredictor:
         self._groups, self._others = _split(model, measured)
         self._rules = _ordered_rules(model)
         self._model = model
+        self._bands = _saturated_bands(model)
         self.has_effects = not model.correction().is_empty
         items = model.rotations
         self._noise = np.array([[item.regressor.noise_variance] for item in items])
@@ -123,6 +125,8 @@ class GlovePredictor:
         flags = self._range.flags(columns, len(mean))
         np.bitwise_or(flags, TOO_UNCERTAIN, out=flags, where=variance > self._largest_variance)
         variance += self._noise
+        for row, sensor, band in self._bands:
+            variance[row] += band.extra_sd(readings[:, sensor]) ** 2
         for row, sources, weights in self._rules:
             mean[row] = weights @ mean[sources]
             variance[row] = (weights * weights) @ variance[sources]
@@ -153,6 +157,17 @@ class _Range:
         outside = (inputs < self._low) | (inputs > self._high)
         flags[self._rows] = np.logical_or.reduceat(outside, self._starts, axis=0)
         return flags
+
+
+def _saturated_bands(model: CalibrationModel) -> list[tuple[int, int, SaturatedBand]]:
+    """(row, sensor, band) where a sensor stops responding: the angle may be anything beyond it."""
+    sensors = model.layout.sensors
+    return [
+        (model.rotation_names.index(band.rotation), sensors.index(band.sensor), band)
+        for item in model.effects
+        if item.name == "saturation"
+        for band in (SaturatedBand(**document) for document in item.settings["bands"])
+    ]
 
 
 _Predict = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]

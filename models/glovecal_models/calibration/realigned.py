@@ -10,6 +10,7 @@ import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.effects.clock_scan import aligned
+from glovecal_models.effects.signature_effect import SignatureEffect
 from glovecal_models.takes.take import Take
 
 CLOCK_OFFSET = "clock_offset"
@@ -32,6 +33,16 @@ def realigned(model: CalibrationModel, take: Take, predicted: np.ndarray) -> Tak
     largest = max((abs(value) for value in offsets.values()), default=NEAR_S)
     width = NEAR_S if largest < 0.5 * NEAR_S else RANGE_S
     return aligned(take, offset_of(take, model.rotation_names, predicted, width))
+
+
+def usable(model: CalibrationModel, take: Take) -> Take:
+    """The take without what the model's effects say is no measurement: repeated frames, faulty pieces."""
+    for item in model.effects:
+        if item.name != CLOCK_OFFSET and item.effect.side == "reference":
+            found = item.effect
+            if isinstance(found, SignatureEffect):
+                take = found.repaired([take])[0]
+    return take
 
 
 def offset_of(take: Take, rotations: tuple[str, ...], predicted: np.ndarray, width_s: float) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_models.calibration.realigned import realigned
+from glovecal_models.calibration.realigned import realigned, usable
 from glovecal_models.calibration.samples import require_layout
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.take import Take
@@ -62,6 +62,7 @@ def residuals(model: CalibrationModel, takes: Sequence[Take]) -> Residuals:
     found = []
     for take in takes:
         require_layout(take, model.layout)
+        take = usable(model, take)
         index = [take.sensors.index(name) for name in model.layout.sensors]
         angles = predictor.predict_take(take.time_s, take.readings[:, index], take.context, take.wearing)
         take = realigned(model, take, angles.mean)

@@ -14,14 +14,15 @@ from glovecal_models.diagnosis.delay_verdict import MIDDLE, SHAPE_SMOOTHING, del
 from glovecal_models.diagnosis.delays import SMOOTHING, delay_errors
 from glovecal_models.diagnosis.diagnosis_document import document
 from glovecal_models.diagnosis.directions import Direction, forward
-from glovecal_models.diagnosis.evened import EvenTake, evened, smoothed
+from glovecal_models.diagnosis.evened import EvenTake, evened, shifted, smoothed
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.naming import Naming, named
 from glovecal_models.diagnosis.next_take import NextTake, next_take
 from glovecal_models.diagnosis.reference_problems import reference_problems
 from glovecal_models.diagnosis.signatures import signature_findings
 from glovecal_models.diagnosis.something_left import Left, something_left
-from glovecal_models.effects.catalogue import catalogue
+from glovecal_models.effects.catalogue import catalogue, effect
+from glovecal_models.effects.context_dependence import ContextDependence, unfamiliar_columns
 from glovecal_models.effects.effect import Effect
 from glovecal_models.effects.signature_effect import Finding
 from glovecal_models.errors import BadInput, Cancelled
@@ -48,6 +49,17 @@ class Diagnosis:
     """What is known by a signature in the recording."""
     left: Left
     next_take: NextTake | None
+
+    @property
+    def signature(self) -> tuple[Finding, ...]:
+        """Findings of the effect that is to be named by its signature, before any ranking; mostly none."""
+        for name in ("repeated_samples", "sensor_fault"):
+            found = tuple(item for item in self.findings if item.effect == name)
+            if found:
+                return found
+        if self.naming.ranked:
+            return ()
+        return tuple(item for item in self.findings if item.effect == self.findings[0].effect)
 
     @property
     def by_gain(self) -> list[Assessment]:
@@ -91,7 +103,7 @@ def diagnose(
     even = [evened(take, layout.sensors, joints) for take in takes]
     direction = _direction(even, SMOOTHING, layout, joints, linear, known)
     has = {item.effect.name for item in known}
-    candidates = [e for e in (catalogue().values() if effects is None else effects) if e.name not in has]
+    candidates = _candidates(direction, effects, has)
     found, impossible = assessed(direction, candidates, np.random.default_rng(seed), said)
     naming = _delay_told(named(found), even, direction, layout, joints, linear, known)
     findings = tuple(signature_findings(takes, layout, joints, naming)) if signatures else ()
@@ -100,7 +112,7 @@ def diagnose(
         for name, products in zip(joints, direction.products, strict=True)
     }
     floors = {name: float(value) for name, value in (noise_floor_deg or {}).items()}
-    left = something_left(direction, floors, seed)
+    left = something_left(_with_first(naming, even, direction, layout, joints, linear, known), seed)
     said("done", 1.0)
     following = next_take(naming.confidence_set)
     return Diagnosis(
@@ -115,6 +127,39 @@ def diagnose(
         left,
         following,
     )
+
+
+def _candidates(direction: Direction, effects: Sequence[Effect] | None, has: set[str]) -> list[Effect]:
+    """The catalogue, and a curve of each context column that nothing in it asks for."""
+    if effects is not None:
+        return list(effects)
+    known = list(catalogue().values())
+    familiar = {name for item in known for name in item.context}
+    unfamiliar = unfamiliar_columns(direction.signals, sorted(familiar))
+    every = [*known, *(ContextDependence.of(name, direction.signals) for name in unfamiliar)]
+    return [item for item in every if item.name not in has]
+
+
+def _with_first(
+    naming: Naming,
+    even: Sequence[EvenTake],
+    direction: Direction,
+    layout: Layout,
+    joints: Sequence[str],
+    linear: bool,
+    known: Sequence[KnownEffect],
+) -> Direction:
+    """The direction with the first of the ranking in its base: what is left after it."""
+    if not naming.ranked:
+        return direction
+    first = naming.ranked[0]
+    if first.effect == "clock_offset":
+        delay = np.broadcast_to(first.shapes[0], (len(even),))
+        moved = [shifted(take, float(by)) for take, by in zip(even, delay, strict=True)]
+        return _direction(moved, SMOOTHING, layout, joints, linear, known)
+    where = tuple(first.joints[i] for i in first.touched)
+    added = KnownEffect(effect(first.effect), where, tuple(first.shapes[i] for i in first.touched))
+    return _direction(even, SMOOTHING, layout, joints, linear, (*known, added))
 
 
 def measured_joints(takes: Sequence[Take], layout: Layout) -> tuple[str, ...]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from glovecal_models.diagnosis.assessment import Assessment
+from glovecal_models.effects.signature_effect import Finding
 
 if TYPE_CHECKING:
     from glovecal_models.diagnosis.diagnose import Diagnosis
@@ -15,12 +17,13 @@ if TYPE_CHECKING:
 def document(diagnosis: Diagnosis) -> dict[str, Any]:
     """JSON-able; every error in degrees, on takes left out, with readings and reference smoothed alike."""
     named = diagnosis.naming.ranked[0] if diagnosis.naming.ranked else None
+    signature = diagnosis.signature
     return {
         "rotations": {
             name: {"rmse_deg": value, "noise_floor_deg": diagnosis.noise_floor_deg.get(name)}
             for name, value in diagnosis.rmse_deg.items()
         },
-        "named": None if named is None else _named(diagnosis, named),
+        "named": _signature(signature) if signature else None if named is None else _named(diagnosis, named),
         "candidates": [_candidate(item) for item in diagnosis.by_gain],
         "not_judgeable": [{"effect": item.effect, "why": item.why} for item in diagnosis.not_judgeable],
         "findings": [
@@ -111,6 +114,20 @@ def _named(diagnosis: Diagnosis, item: Assessment) -> dict[str, Any]:
     }
 
 
+def _signature(findings: Sequence[Finding]) -> dict[str, Any]:
+    first = findings[0]
+    return {
+        "effect": first.effect,
+        "where": sorted({name for item in findings for name in item.where}),
+        "verdict": "named",
+        "confidence_set": [first.effect],
+        "parameters": dict(first.evidence),
+        "saved_deg": None,
+        "decoy_saved_deg": None,
+        "sentence": first.sentence,
+    }
+
+
 def _candidate(item: Assessment) -> dict[str, Any]:
     before, after, decoy = errors_deg(item)
     worst = max(range(len(item.errors)), key=lambda i: item.errors[i].contrast)
@@ -125,6 +142,7 @@ def _candidate(item: Assessment) -> dict[str, Any]:
         "probability": item.probability,
         "passes": bool(item.touched),
         "sentence": (
-            f"{item.effect}: {before:.2f} to {after:.2f} degrees (decoy {decoy:.2f}); most on {item.joints[worst]}."
+            f"{item.effect}: {before:.2f} to {after:.2f} degrees (decoy {decoy:.2f});"
+            f" most on {item.joints[worst]}."
         ),
     }

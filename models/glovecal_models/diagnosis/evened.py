@@ -56,6 +56,13 @@ def evened(take: Take, sensors: Sequence[str], rotations: Sequence[str], shift_s
     )  # fmt: skip
 
 
+def shifted(take: EvenTake, delay_s: float) -> EvenTake:
+    """The take with its reference ``delay_s`` later, as readings that come so late ask for."""
+    at = take.time_s - delay_s
+    moved = [np.interp(at, take.time_s, column, np.nan, np.nan) for column in take.reference.T]
+    return replace(take, reference=np.column_stack(moved))
+
+
 def smoothed(take: EvenTake, width: int) -> EvenTake:
     """Readings and reference both through a Hann window of ``width`` (odd) even times."""
     window = np.hanning(width + 2)[1:-1]

@@ -65,8 +65,8 @@ def _of_rotation(
         correlations.append(float(np.corrcoef(reading, angle)[0, 1]) if moves else 0.0)
         if np.ptp(angle) < STILL_DEG and np.ptp(reading) > 0.3 * max(np.ptp(part) for part in inputs):
             problems.append(
-                f"{rotation} in take {take.name}: the reference stays within {np.ptp(angle):.2g} degrees while"
-                " its sensor moves. Was the tracker frozen?"
+                f"{rotation} in take {take.name}: the reference stays within {np.ptp(angle):.2g} degrees"
+                " while its sensor moves. Was the tracker frozen?"
             )
         jumps = _jumps(angle, reading)
         if jumps:

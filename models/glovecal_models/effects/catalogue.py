@@ -10,6 +10,7 @@ from functools import cache
 from importlib.metadata import entry_points
 from typing import Any
 
+from glovecal_models.effects.context_dependence import PREFIX, ContextDependence
 from glovecal_models.effects.effect import Effect, Settings
 from glovecal_models.effects.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
@@ -36,6 +37,8 @@ def catalogue() -> dict[str, Effect]:
 def effect(name: str) -> Effect:
     """One effect by its name. Raises BadInput that lists those there are."""
     known = catalogue()
+    if name.startswith(PREFIX) and len(name) > len(PREFIX):
+        return ContextDependence(name.removeprefix(PREFIX))
     if name not in known:
         raise BadInput(f"no effect {name!r}; there are {', '.join(known)}")
     return known[name]

@@ -1,8 +1,9 @@
 """Creep: after each movement the reading goes on changing for seconds, as foam and glue give way.
 
 One to three relaxations (standard linear solid): x' = (joint - x) / tau; the columns are x of each time
-constant, in the ratio of a logarithmic grid. What came before a take is not known; the state starts where the
-hand is, as if it had rested there.
+constant, in the ratio of a logarithmic grid. What came before a take is not known: the state starts where the
+hand is, as if it had rested there, and two columns that decay tell how much of the way from the usual posture
+it still has to go (learned; the best guess without a recording of the time before).
 """
 
 from __future__ import annotations
@@ -14,10 +15,13 @@ import numpy as np
 
 from glovecal_models.effects.effect import Parameter, Settings, Signals
 from glovecal_models.effects.history_effect import HistoryEffect
+from glovecal_models.effects.joint_units import on_lanes, settle_joint_units
 from glovecal_models.effects.relaxation import relax, relax_once
 
 LONG_TO_SHORT = 5.0
 SLOW_S = (4.0, 6.5, 10.0, 16.0, 25.0, 40.0)
+FOLLOWING = np.array([1.0, 1.0, 0.0, 0.0])
+"""Two states follow the joint, two decay to nothing."""
 LONGEST_SHARE = 0.7
 """Of a take's length: a slower relaxation cannot be told from a constant."""
 
@@ -41,20 +45,31 @@ class Creep(HistoryEffect):
         pairs = np.column_stack([slow / LONG_TO_SHORT, slow])
         return np.repeat(pairs[:, None, :], takes[0].own.shape[1], axis=1)
 
+    def settle(self, takes: Sequence[Signals]) -> Settings:
+        return settle_joint_units(takes)
+
     def start(self, own: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
-        return np.repeat(own[:, None], shape.shape[1], axis=1)
+        usual = on_lanes(settings["own_centre_deg"], len(own)) if "own_centre_deg" in settings else own
+        rested, away = own[:, None], (usual - own)[:, None]
+        return np.concatenate([rested, rested, away, away], axis=1)
 
     def step(
         self, state: np.ndarray, elapsed_s: float, own: np.ndarray, settings: Settings, shape: np.ndarray
     ) -> np.ndarray:
-        relax_once(state, elapsed_s, own[:, None], shape)
-        return state - own[:, None]
+        towards = own[:, None] * FOLLOWING
+        relax_once(state, elapsed_s, towards, np.tile(shape, 2))
+        return state - towards
 
     def run(
         self, state: np.ndarray, elapsed_s: np.ndarray, own: np.ndarray, settings: Settings, shape: np.ndarray
     ) -> np.ndarray:
-        relaxed = relax(state, elapsed_s, own[:, :, None], shape)
-        return relaxed - own[:, :, None]
+        towards = own[:, :, None] * FOLLOWING
+        return relax(state, elapsed_s, towards, np.tile(shape, 2)) - towards
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
-        return ("fast_share_deg_per_deg", "slow_share_deg_per_deg")
+        return (
+            "fast_share_deg_per_deg",
+            "slow_share_deg_per_deg",
+            "fast_start_deg_per_deg",
+            "slow_start_deg_per_deg",
+        )

@@ -1,8 +1,8 @@
 """Lag: the sensor follows the joint late, as through a low pass of 5 to 150 ms.
 
-The columns are the joint minus low-passed selves of it, with tau, 2 tau and 4 tau. Forward, the first alone
-with weight -1 makes the lag. Inverse, they lead the reading back (a lead compensator: the derivative,
-smoothed); three of them find how much smoothing the noise wants, where one would double it.
+The columns are the joint minus low-passed selves of it, with tau / 2 to 8 tau. Forward, that of tau alone
+with weight -1 makes the lag. Inverse, they lead the reading back (the derivative, smoothed); together they
+find how much smoothing the noise wants: one left 1.3 times the error of a glove without lag, five 1.2 times.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from glovecal_models.effects.relaxation import relax, relax_once
 
 MULTIPLES = np.array([0.5, 1.0, 2.0, 4.0, 8.0])
 TAU_S = (0.02, 0.03, 0.045, 0.065, 0.1, 0.15)
+PRIOR = 8.0
+"""Of the weights: with a time constant below the lag's own they are its ratio, and of either sign."""
 FAST_SHARE = 1.0
 """Per second: a joint is moved fast when its speed reaches so many of its own standard deviations."""
 
@@ -49,6 +51,9 @@ class Lag(HistoryEffect):
     ) -> np.ndarray:
         relaxed = relax(state, elapsed_s, own[:, :, None], shape * MULTIPLES)
         return own[:, :, None] - relaxed
+
+    def prior_sd(self, settings: Settings) -> np.ndarray:
+        return np.full(len(MULTIPLES), PRIOR)
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         return tuple(f"lead_{multiple:g}_tau_deg_per_deg" for multiple in MULTIPLES)

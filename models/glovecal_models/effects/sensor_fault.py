@@ -7,10 +7,12 @@ Four signatures: *stuck* (one value while the reference moves), *spikes* (gone a
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
+from glovecal_models.effects.effect import Side
 from glovecal_models.effects.gain_jump import gain_jump
 from glovecal_models.effects.reading_faults import GRADUAL_SHARE, dropouts, spikes, stuck
 from glovecal_models.effects.signature_effect import (
@@ -31,6 +33,7 @@ LEAST_OF_RANGE = (0.5, 99.5)
 
 class SensorFault(SignatureEffect):
     name = "sensor_fault"
+    side: ClassVar[Side] = "reference"
     explanation = "A wire or plug fails: the sensor stands still, spikes, drops out or jumps."
     source = "signatures of readings against reference"
     kinds: ClassVar[tuple[str, ...]] = ("stuck", "spikes", "dropouts", "jump")
@@ -49,6 +52,10 @@ class SensorFault(SignatureEffect):
         for sensor, rotation in rotation_of.items():
             found += _faults(takes, sensor, rotation)
         return tuple(sorted(found, key=lambda item: (-len(item.stretches), item.where)))
+
+    def repaired(self, takes: Sequence[Take]) -> tuple[Take, ...]:
+        """The takes without reference where the joint's own sensor failed: it neither trains nor scores."""
+        return tuple(_without_faults(take) for take in takes)
 
 
 def _faults(takes: Sequence[Take], sensor: str, rotation: str) -> list[Finding]:
@@ -83,6 +90,21 @@ def _faults(takes: Sequence[Take], sensor: str, rotation: str) -> list[Finding]:
         for kind in SensorFault.kinds
         if len(stretches[kind]) >= least[kind]
     ]
+
+
+def _without_faults(take: Take) -> Take:
+    own = {name: name for name in take.rotations if name in take.sensors}
+    found = SensorFault().find([take], own)
+    if not found:
+        return take
+    reference = take.reference_at_frames(take.rotations)
+    for item in found:
+        for name in item.where:
+            if name in take.rotations:
+                for piece in item.stretches:
+                    inside = (take.time_s >= piece.start_s) & (take.time_s <= piece.end_s)
+                    reference[inside, take.rotations.index(name)] = np.nan
+    return replace(take, reference_time_s=take.time_s, reference=reference)
 
 
 def _finding(

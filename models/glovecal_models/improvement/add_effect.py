@@ -13,12 +13,13 @@ from glovecal_models.calibration.training_settings import Report, TrainingSettin
 from glovecal_models.effects.catalogue import effect as known_effect
 from glovecal_models.effects.clock_scan import aligned
 from glovecal_models.effects.effect import Signals
+from glovecal_models.effects.signature_effect import SignatureEffect
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.child_model import child_model
 from glovecal_models.improvement.effect_fit import fit_with_effects
 from glovecal_models.improvement.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.improvement.prepared_takes import PreparedTakes
-from glovecal_models.improvement.relearned import kept_lanes, reference_effects
+from glovecal_models.improvement.relearned import columnless_effects, kept_lanes
 from glovecal_models.improvement.wanted_effect import WantedEffect
 from glovecal_models.regression.rule_regressor import RuleRegressor
 from glovecal_models.takes.take import Take
@@ -63,7 +64,7 @@ def wanted_of(model: CalibrationModel) -> tuple[WantedEffect, ...]:
     for item in model.effects:
         before = merged.get(item.name)
         rotations = item.active if before is None else (*before.rotations, *item.active)
-        settings = item.settings if item.effect.side == "reference" else {}
+        settings = item.settings if not item.weights.shape[1] else {}
         merged[item.name] = WantedEffect(item.name, tuple(dict.fromkeys(rotations)), settings)
     return tuple(merged.values())
 
@@ -74,12 +75,14 @@ def trained_rotations(model: CalibrationModel) -> tuple[str, ...]:
 
 
 def repaired_takes(takes: Sequence[Take], wanted: Sequence[WantedEffect]) -> list[Take]:
-    """The takes with what their reference needs: clocks on the frames' time."""
+    """The takes with what their measurement needs: clocks on the frames' time, faulty pieces left out."""
     result = list(takes)
     for item in wanted:
         if item.name == "clock_offset":
             offsets, common = item.settings["offset_s"], float(item.settings["common_s"])
             result = [aligned(take, float(offsets.get(take.name, common))) for take in result]
+        elif item.is_on_reference and isinstance(item.effect, SignatureEffect):
+            result = list(item.effect.repaired(result))
     return result
 
 
@@ -94,7 +97,7 @@ def add_effect(
     name: str,
     *,
     rotations: Sequence[str] | None = None,
-    clock: dict[str, Any] | None = None,
+    constants: dict[str, Any] | None = None,
     settings: TrainingSettings | None = None,
     before: HeldOutErrors | None = None,
     least_gain: float = LEAST_GAIN,
@@ -105,9 +108,10 @@ def add_effect(
 ) -> Addition:
     """Learn ``model`` anew with effect ``name`` on ``rotations`` (default: all measured ones).
 
-    ``takes`` are the training takes. ``clock`` is the setting of a clock offset. ``before`` saves measuring
-    the parent. Undone, with the reason, unless the touched rotations' held-out RMSE falls by ``least_gain``.
-    Raises BadInput for an unknown effect or rotation, or when the takes cannot carry it; Cancelled.
+    ``takes`` are the training takes. ``constants``: settings of an effect without columns, such as the
+    clocks' offsets. ``before`` saves measuring the parent. Undone, with the reason, unless the touched
+    rotations' held-out RMSE falls by ``least_gain``. Raises BadInput for an unknown effect or rotation, or
+    when the takes cannot carry it; Cancelled.
     """
     effect = known_effect(name)
     settings = settings_of(model, settings)
@@ -117,10 +121,10 @@ def add_effect(
     unknown = [item for item in chosen if item not in every]
     if unknown:
         raise BadInput(f"no rotation {unknown[0]!r} is trained in this model; it has {', '.join(every)}")
-    fresh = WantedEffect(name, chosen, dict(clock or {}))
+    fresh = WantedEffect(name, chosen, dict(constants or {}))
     wanted = (*(item for item in has if item.name != name), _joined(has, fresh))
     prepared = PreparedTakes.of(repaired_takes(takes, wanted), model.layout)
-    if not fresh.is_on_reference:
+    if fresh.has_columns:
         _require_judgeable(prepared, effect.missing(_all_signals(prepared)), name)
     before = before or held_out_errors(
         PreparedTakes.of(repaired_takes(takes, has), model.layout), chosen, has, settings,
@@ -136,14 +140,20 @@ def add_effect(
     )
     gain = 1.0 - _total(after, chosen) / max(_total(before, chosen), 1e-12)
     sentence = _sentence(name, chosen, before, after, gain, least_gain)
-    if gain < least_gain:
+    widens = not fresh.has_columns and not fresh.is_on_reference
+    if widens:
+        sentence = (
+            f"{name} on {', '.join(chosen)}: no calibration brings back what the sensor does not say;"
+            " the interval is widened there."
+        )
+    elif gain < least_gain:
         return Addition(name, chosen, False, sentence, before, after, model, has)
     if report:
         report(f"learning {name} from all takes", 0.85)
     fit = fit_with_effects(prepared, chosen, wanted, settings, cancelled=cancelled)
     evidence = {"rmse_before_deg": _total(before, chosen), "rmse_after_deg": _total(after, chosen)}
     fitted = [replace(item, evidence=evidence) if item.name == name else item for item in fit.effects]
-    effects = [*kept_lanes(model.effects, chosen), *fitted, *reference_effects(wanted, every)]
+    effects = [*kept_lanes(model.effects, chosen), *fitted, *columnless_effects(wanted)]
     whole = before.with_those_of(after)
     child = child_model(model, parent_id, prepared, fit, effects, whole, settings, take_hashes)
     described = {

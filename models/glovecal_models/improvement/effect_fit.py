@@ -60,7 +60,7 @@ def fit_with_effects(
 
     ``start``: regressors trained on these takes without the newest effect; saves one training.
     """
-    wanted = [item for item in wanted if not item.is_on_reference and set(item.rotations) & set(rotations)]
+    wanted = [item for item in wanted if item.has_columns and set(item.rotations) & set(rotations)]
     columns = {name: correspondence_for(takes, name, settings) for name in rotations}
     corrected: dict[str, list[np.ndarray]] = {}
     results: dict[str, FitResult] = {}

@@ -1,4 +1,4 @@
-"""The loop walked by itself: compare, diagnose, add, verify, again, until the floor or nothing more is known."""
+"""The loop walked by itself: diagnose, add, verify, until the floor is reached or nothing more is known."""
 
 from __future__ import annotations
 
@@ -16,6 +16,10 @@ from glovecal_models.comparison.noise_floor import noise_floor
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.diagnose import Diagnosis, diagnose
 from glovecal_models.diagnosis.diagnosis_document import errors_deg, named_sentence
+from glovecal_models.diagnosis.signatures import own_sensors
+from glovecal_models.effects.catalogue import catalogue
+from glovecal_models.effects.saturation import saturated_bands
+from glovecal_models.effects.signature_effect import SignatureEffect
 from glovecal_models.improvement.add_effect import (
     Addition,
     add_effect,
@@ -185,6 +189,8 @@ class _Walk:
             clocks = coarse_clock_settings(self.takes)
             if clocks is not None and self._add(CLOCK, None, clocks, None):
                 return True
+        if self._add_repairs():
+            return True
         self._say("looking for what is missing", share)
         takes = repaired_takes(self.takes, wanted_of(model))
         floors = {name: floor.floor_deg for name, floor in self.floors.items()}
@@ -205,7 +211,7 @@ class _Walk:
             self.stopped = "not_better"
             return False
         self.stopped = "noise_floor" if self._is_at_floor() else "nothing_named"
-        return False
+        return self._add_saturation()
 
     def finished(self) -> Improvement:
         """Sum up."""
@@ -232,11 +238,11 @@ class _Walk:
     ) -> bool:
         model = self.steps[-1].model
         every = trained_rotations(model)
-        chosen = every if where is None or clock is not None else [item for item in where if item in every]
+        chosen = every if where is None or name == CLOCK else [item for item in where if item in every]
         self._say(f"adding {name}", 0.2 + 0.12 * len(self.steps))
         added_before = sum(1 for step in self.steps if step.added is not None)
         addition = add_effect(
-            model, self.takes, name, rotations=chosen, clock=clock, settings=self.settings,
+            model, self.takes, name, rotations=chosen, constants=clock, settings=self.settings,
             before=self._of(chosen), least_gain=LATER_GAIN if added_before else FIRST_GAIN,
             take_hashes=self.hashes, cancelled=self.cancelled,
         )  # fmt: skip
@@ -247,6 +253,34 @@ class _Walk:
         self.errors = self.errors.with_those_of(addition.after)
         self._step(addition.model, _added_document(addition, clock, diagnosis), diagnosis)
         return True
+
+    def _add_repairs(self) -> bool:
+        """Repeated frames and faulty sensors first: they look like lag, or like anything."""
+        model = self.steps[-1].model
+        has = {item.name for item in wanted_of(model)} | {item.effect for item in self.undone}
+        takes = repaired_takes(self.takes, wanted_of(model))
+        sensor_of = own_sensors(self.layout, trained_rotations(model))
+        for name in ("repeated_samples", "sensor_fault"):
+            effect = catalogue()[name]
+            if name in has or not isinstance(effect, SignatureEffect) or not sensor_of:
+                continue
+            found = effect.find(takes, sensor_of)
+            if found:
+                self.sentences += [item.sentence for item in found]
+                if self._add(name, None, {"where": sorted({w for item in found for w in item.where})}, None):
+                    return True
+        return False
+
+    def _add_saturation(self) -> bool:
+        model = self.steps[-1].model
+        sensor_of = own_sensors(self.layout, trained_rotations(model))
+        if "saturation" in {item.name for item in wanted_of(model)} or not sensor_of:
+            return False
+        bands = saturated_bands(repaired_takes(self.takes, wanted_of(model)), sensor_of)
+        if not bands:
+            return False
+        where = list(dict.fromkeys(band.rotation for band in bands))
+        return self._add("saturation", where, {"bands": [band.to_settings() for band in bands]}, None)
 
     def _of(self, rotations: Sequence[str]) -> HeldOutErrors:
         return HeldOutErrors(
@@ -319,11 +353,13 @@ def _added_document(
     if addition.effect not in rivals:
         rivals = [addition.effect]
     parameters: dict[str, Any] = dict(addition.parameters)
-    if clock is not None:
+    if clock is not None and addition.effect != CLOCK:
+        parameters = clock
+    elif clock is not None:
         parameters = {"offset_s": clock["offset_s"] if clock["per_take"] else clock["common_s"]}
     document: dict[str, Any] = {
         "effect": addition.effect,
-        "where": list(addition.rotations),
+        "where": list((clock or {}).get("where", addition.rotations)),
         "verdict": "named" if len(rivals) < 2 else "ambiguous",
         "confidence_set": rivals,
         "parameters": parameters,

@@ -7,7 +7,7 @@ from glovecal_models.diagnosis.known_effect import KnownEffect
 
 
 def known_effects(model: CalibrationModel) -> tuple[KnownEffect, ...]:
-    """One for each effect; the clocks' offset has no columns, it only is not looked for again."""
+    """One for each effect; those without columns only are not looked for again."""
     return tuple(
         KnownEffect(
             item.effect,

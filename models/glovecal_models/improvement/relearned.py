@@ -22,11 +22,12 @@ def kept_lanes(effects: Sequence[AddedEffect], relearned: Sequence[str]) -> list
     return kept
 
 
-def reference_effects(wanted: Sequence[WantedEffect], rotations: Sequence[str]) -> list[AddedEffect]:
-    """The effects among ``wanted`` that repair the measurement: settings only, no columns."""
-    nothing = np.zeros((len(rotations), 0))
-    return [
-        AddedEffect(item.name, tuple(rotations), item.settings, nothing, nothing, np.zeros(len(rotations)))
-        for item in wanted
-        if item.is_on_reference
-    ]
+def columnless_effects(wanted: Sequence[WantedEffect]) -> list[AddedEffect]:
+    """The effects among ``wanted`` that have settings only: repairs of the measurement, wider intervals."""
+    found = []
+    for item in wanted:
+        if not item.has_columns:
+            nothing = np.zeros((len(item.rotations), 0))
+            zero = np.zeros(len(item.rotations))
+            found.append(AddedEffect(item.name, item.rotations, item.settings, nothing, nothing, zero))
+    return found

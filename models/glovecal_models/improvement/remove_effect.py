@@ -12,7 +12,7 @@ from glovecal_models.improvement.child_model import child_model
 from glovecal_models.improvement.effect_fit import fit_with_effects
 from glovecal_models.improvement.held_out_check import held_out_errors
 from glovecal_models.improvement.prepared_takes import PreparedTakes
-from glovecal_models.improvement.relearned import reference_effects
+from glovecal_models.improvement.relearned import columnless_effects
 from glovecal_models.takes.take import Take
 
 
@@ -37,5 +37,5 @@ def remove_effect(
     prepared = PreparedTakes.of(repaired_takes(takes, wanted), model.layout)
     fit = fit_with_effects(prepared, every, wanted, settings, cancelled=cancelled)
     errors = held_out_errors(prepared, every, wanted, settings, cancelled=cancelled)
-    effects = [*fit.effects, *reference_effects(wanted, every)]
+    effects = [*fit.effects, *columnless_effects(wanted)]
     return child_model(model, parent_id, prepared, fit, effects, errors, settings, take_hashes)

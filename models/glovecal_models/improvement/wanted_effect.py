@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from glovecal_models.effects.catalogue import effect
+from glovecal_models.effects.columnless_effect import ColumnlessEffect
 from glovecal_models.effects.effect import Effect, Settings
 
 ONE_BY_ONE = ("cross_coupling", "palm_arch")
@@ -23,6 +24,11 @@ class WantedEffect:
     @property
     def effect(self) -> Effect:
         return effect(self.name)
+
+    @property
+    def has_columns(self) -> bool:
+        """It corrects the prediction; the others repair the measurement or widen the interval."""
+        return not isinstance(self.effect, ColumnlessEffect)
 
     @property
     def is_on_reference(self) -> bool:
