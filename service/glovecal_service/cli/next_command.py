@@ -16,9 +16,7 @@ def next_command(model: str, found: Mapping[str, Any]) -> str:
     named, following = found.get("named"), found.get("next_take")
     if named and named.get("verdict") == "named":
         where = "".join(f" --rotation {name}" for name in named.get("where") or ())
-        return f"glovecal add-effect {short} {named['effect']}" + (
-            "" if named["effect"] == "clock_offset" else where
-        )
+        return f"glovecal add-effect {short} {named['effect']}" + where * _is_on_rotations(found)
     if following:
         return f"glovecal record GLOVE deciding --seconds {following['seconds']}"
     if named:
@@ -35,3 +33,9 @@ def _take_of(found: Mapping[str, Any]) -> str:
     spoken_of = [name for name in names if f"take {name}:" in problem]
     name = (spoken_of or names or ["TAKE"])[0]
     return f"'{name}'" if " " in name else name
+
+
+def _is_on_rotations(found: Mapping[str, Any]) -> bool:
+    """Whether the named effect is a correction; a fault is named by its sensors or takes."""
+    ranked = {item["effect"] for item in found.get("candidates") or ()}
+    return found["named"]["effect"] in ranked - {"clock_offset"}

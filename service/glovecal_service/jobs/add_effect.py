@@ -6,11 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_service.jobs.child_record import artifact_array, keep_child
-from glovecal_service.jobs.clock_setting import CLOCK, clock_setting
 from glovecal_service.jobs.declared_effects import declared, declared_in, known_by_name
+from glovecal_service.jobs.effect_constants import effect_constants, saturated_rotations
 from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult
 from glovecal_service.jobs.model_work import ModelWork, takes_of, text_in
 from glovecal_service.jobs.task_key import task_key
@@ -80,18 +79,14 @@ def run(work: AdditionWork, cancelled: Callable[[], bool], report: Report) -> Ta
     """In a worker. Raises BadInput, NotTrainable, Cancelled."""
     on, model = work.on, work.on.model
     with known_by_name([*declared_in(model), *declared(work.declaration)]):
-        clock = None
-        if work.effect == CLOCK:
-            report("holding the clocks against each other", 0.0)
-            clock = clock_setting(model, on.takes, cancelled)
-            if clock is None:
-                raise BadInput(f"effect {CLOCK!r}: the clocks of glove and reference agree in these takes")
+        report(f"looking at the takes for {work.effect}", 0.0)
+        constants = effect_constants(model, on.takes, work.effect, cancelled)
         found = add_effect(
             model,
             on.takes,
             work.effect,
-            rotations=work.rotations,
-            clock=clock,
+            rotations=saturated_rotations(constants) or work.rotations,
+            constants=constants,
             settings=on.settings,
             parent_id=on.id,
             take_hashes=on.take_hashes,

@@ -40,10 +40,7 @@ def declared(document: Mapping[str, Any] | None) -> list[Effect]:
 
 @contextmanager
 def known_by_name(effects: Sequence[Effect]) -> Iterator[None]:
-    """Within the block ``effects`` answer to their names. One job at a time; without any it costs nothing."""
-    if not effects:
-        yield
-        return
+    """Within the block ``effects`` answer to their names; for one job of this process at a time."""
     with _ONE_JOB:
         known = catalogue()
         before = {item.name: known.get(item.name) for item in effects}

@@ -12,7 +12,6 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.noise_floor import noise_floor
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.diagnose import diagnose
-from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.effects.expression_effect import ExpressionEffect
 from glovecal_models.improvement.add_effect import repaired_takes, wanted_of
 from glovecal_models.improvement.known_effects import known_effects
@@ -74,7 +73,6 @@ def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> T
             model.layout,
             linear=model.method in ("raw", "linear"),
             known=known_effects(model),
-            effects=list(catalogue().values()),
             noise_floor_deg=floors,
             seed=work.seed,
             cancelled=cancelled,

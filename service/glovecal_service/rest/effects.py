@@ -8,9 +8,11 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Path
 from pydantic import BaseModel, Field
 
-from glovecal_models.effects.catalogue import GROUP, catalogue
+from glovecal_models.effects.catalogue import GROUP, catalogue, effect
 from glovecal_models.effects.columnless_effect import ColumnlessEffect
 from glovecal_models.effects.effect import Effect
+from glovecal_models.errors import BadInput
+from glovecal_service.jobs.effect_constants import ADDED_BY_SIGNATURE
 from glovecal_service.plain import plain
 from glovecal_service.rest.answers import problems
 from glovecal_service.rest.names import ONE_LINE
@@ -53,30 +55,30 @@ class EffectView(BaseModel):
 def list_effects() -> list[dict[str, Any]]:
     """Those of Glovecal by name, then the user's own. Effects declared in a text are with their models."""
     packages = effect_packages()
-    rows = [_row(effect, packages.get(name, "")) for name, effect in sorted(catalogue().items())]
+    rows = [_row(item, packages.get(name, "")) for name, item in sorted(catalogue().items())]
     return sorted(rows, key=lambda row: (row["own"], row["kind"] == "nothing"))
 
 
 @router.get("/{name}", response_model=EffectView, summary="One effect", responses=problems())
 def get_effect(name: EffectInPath) -> dict[str, Any]:
-    known = catalogue()
-    if name not in known:
-        raise NotFound(f"there is no effect {name!r}; there are {', '.join(sorted(known))}")
-    return _row(known[name], effect_packages().get(name, ""))
+    try:
+        return _row(effect(name), effect_packages().get(name, OURS))
+    except BadInput as error:
+        raise NotFound(f"there is no effect {name!r}; there are {', '.join(sorted(catalogue()))}") from error
 
 
-def kind_of(effect: Effect) -> Kind:
+def kind_of(item: Effect) -> Kind:
     """What an effect does to a calibration."""
-    if effect.name == NO_EFFECT:
+    if item.name == NO_EFFECT:
         return "nothing"
-    if effect.side == "reference":
+    if item.side == "reference":
         return "repair"
-    return "finding" if isinstance(effect, ColumnlessEffect) else "correction"
+    return "finding" if isinstance(item, ColumnlessEffect) else "correction"
 
 
-def can_be_added(effect: Effect) -> bool:
-    """Corrections, and the one repair whose size a model has to keep."""
-    return kind_of(effect) == "correction" or effect.name == "clock_offset"
+def can_be_added(item: Effect) -> bool:
+    """Corrections, and what is found in a recording as far as it can be repaired or told."""
+    return kind_of(item) == "correction" or item.name in ADDED_BY_SIGNATURE
 
 
 def effect_packages() -> dict[str, str]:
@@ -84,22 +86,22 @@ def effect_packages() -> dict[str, str]:
     return {point.name: point.dist.name if point.dist else "" for point in entry_points(group=GROUP)}
 
 
-def _row(effect: Effect, package: str) -> dict[str, Any]:
+def _row(item: Effect, package: str) -> dict[str, Any]:
     parameters = [
-        {"name": item.name, "unit": item.unit, "low": item.low, "high": item.high, "prior": item.prior}
-        for item in effect.parameters
+        {"name": one.name, "unit": one.unit, "low": one.low, "high": one.high, "prior": one.prior}
+        for one in item.parameters
     ]
     return plain(
         {
-            "name": effect.name,
-            "explanation": effect.explanation,
-            "kind": kind_of(effect),
-            "can_be_added": can_be_added(effect),
+            "name": item.name,
+            "explanation": item.explanation,
+            "kind": kind_of(item),
+            "can_be_added": can_be_added(item),
             "parameters": parameters,
-            "context": effect.context,
-            "has_memory": effect.has_memory,
-            "decoy": effect.decoy,
-            "source": effect.source,
+            "context": item.context,
+            "has_memory": item.has_memory,
+            "decoy": item.decoy,
+            "source": item.source,
             "own": package not in ("", OURS),
             "package": package,
         }

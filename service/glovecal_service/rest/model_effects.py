@@ -30,7 +30,7 @@ router = APIRouter(prefix="/models", tags=["models"])
 MOST_ROTATIONS = 512
 WHY_NOT = {
     "finding": "it is found, not fitted: no correction brings back what the recording lost",
-    "repair": "it is a fault of the recording; record again, or leave the take out of training",
+    "repair": "it is a fault of the measurement that has no repair",
     "nothing": "it is the null hypothesis",
 }
 EffectName = Annotated[str, StringConstraints(min_length=1, max_length=64, pattern=ONE_LINE)]
