@@ -107,7 +107,8 @@ def test_a_refusal_is_passed_on_and_a_mistake_is_called_one(dispatched, ledger):
     broken = wait_for_job(store, create(store, ledger, [2], ending="break").id)
     assert broken.error == "an error in Glovecal itself: ZeroDivisionError: a mistake in the program"
     unknown = wait_for_job(store, store.jobs.create("knit", {}).id)
-    assert unknown.error == "no job of kind 'knit'; there are count, train"
+    kinds = "add_effect, count, diagnose, improve, remove_effect, train"
+    assert unknown.error == f"no job of kind 'knit'; there are {kinds}"
 
 
 def test_stopping_leaves_the_job_for_the_next_start(sqlite_store, sqlite_settings, ledger):
