@@ -89,8 +89,8 @@ class RestClient:
     def put(self, path: str, body: Any) -> Any:
         return self._json("PUT", path, json=body)
 
-    def delete(self, path: str) -> None:
-        self._send("DELETE", path)
+    def delete(self, path: str, query: Mapping[str, Any] | None = None) -> Any:
+        return self._json("DELETE", path, params=query)
 
     def page(self, path: str, body: Any) -> str:
         """An HTML page that the service makes from what is asked."""

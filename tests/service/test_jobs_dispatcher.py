@@ -107,7 +107,8 @@ def test_a_refusal_is_passed_on_and_a_mistake_is_called_one(dispatched, ledger):
     broken = wait_for_job(store, create(store, ledger, [2], ending="break").id)
     assert broken.error == "an error in Glovecal itself: ZeroDivisionError: a mistake in the program"
     unknown = wait_for_job(store, store.jobs.create("knit", {}).id)
-    assert unknown.error == "no job of kind 'knit'; there are count, train"
+    kinds = "add_effect, count, diagnose, improve, remove_effect, train"
+    assert unknown.error == f"no job of kind 'knit'; there are {kinds}"
 
 
 def test_stopping_leaves_the_job_for_the_next_start(sqlite_store, sqlite_settings, ledger):
@@ -162,7 +163,7 @@ def test_a_result_that_went_with_its_process_is_not_waited_for_for_ever(
     store, dispatcher = dispatched
     monkeypatch.setattr(workers, "FETCH_WITHIN_S", 1.0)
     [task] = CountingJob().plan(store, create(store, ledger, [2])).tasks
-    future = dispatcher.workers.submit(task, tmp_path / "fits", tmp_path / "cancel")
+    future = dispatcher.workers.submit(task, tmp_path / "fits", tmp_path / "cancel", tmp_path / "progress")
     wait_for(future.done)
     cluster = dispatcher.workers._cluster
     cluster.scale(0)

@@ -18,8 +18,12 @@ from glovecal_service.cli import (
     capture,
     compare,
     demo,
+    diagnose,
+    effect_changes,
+    effects,
     find_port,
     glove,
+    improve,
     job,
     model,
     record,
@@ -55,6 +59,11 @@ app.command("train")(train.train)
 app.add_typer(model.app, name="model")
 app.command("compare")(compare.compare)
 app.command("where")(where.where)
+app.command("diagnose")(diagnose.diagnose)
+app.command("add-effect")(effect_changes.add_effect)
+app.command("remove-effect")(effect_changes.remove_effect)
+app.command("improve", cls=improve.SeveralFiles)(improve.improve)
+app.command("effects")(effects.effects)
 app.add_typer(job.app, name="job")
 
 

@@ -25,6 +25,11 @@ def fetch_report(service: RestClient, models: Sequence[str], takes: Sequence[dic
     return service.page(f"/models/{models[0]}/report", body).encode()
 
 
+def fetch_job_report(service: RestClient, job: str) -> bytes:
+    """The page of a finished job that has one."""
+    return service.download(f"/jobs/{job}/report")
+
+
 def write_report(file: Path, page: bytes, *, as_json: bool) -> None:
     """Say so where it does not get into the JSON."""
     write_whole({file: page}, tell=err if as_json else out)

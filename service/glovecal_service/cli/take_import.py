@@ -14,6 +14,7 @@ from glovecal_service.cli.options import AsJson, Subject
 from glovecal_service.cli.printing import err, print_json
 from glovecal_service.cli.refusal import REFUSED, sentence_of
 from glovecal_service.cli.take_rows import print_takes
+from glovecal_service.cli.two_tables import frames_among, reference_beside
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
@@ -50,7 +51,7 @@ def import_takes(
     """
     if reference and len(files) > 1:
         raise typer.BadParameter("--reference goes with one frames file")
-    frames = [file for file in files if not _is_reference_of_another(file, files)]
+    frames = frames_among(files)
     options = {"name": name, "wearing": wearing, "equal_times": "spread" if spread_equal_times else None}
     rows, refused = [], 0
     with connect() as service:
@@ -58,7 +59,7 @@ def import_takes(
         chosen = layout_named(service, layout)
         for file in frames:
             try:
-                rows += _import(service, file, reference or _beside(file), subject, chosen, options)
+                rows += _import(service, file, reference or reference_beside(file), subject, chosen, options)
             except ServiceError as error:
                 if error.status >= SERVER_FAULT:
                     raise
@@ -87,14 +88,3 @@ def _import(
     for sentence in answer["warnings"]:
         err.print(f"{file}: {sentence}", style="yellow")
     return answer["takes"]
-
-
-def _beside(frames: Path) -> Path | None:
-    """X.reference.csv for X.frames.csv, when it is there."""
-    stem, mark, rest = frames.name.rpartition(".frames.")
-    partner = frames.with_name(f"{stem}.reference.{rest}")
-    return partner if mark and partner.is_file() else None
-
-
-def _is_reference_of_another(file: Path, files: list[Path]) -> bool:
-    return any(_beside(other) == file for other in files if other != file)

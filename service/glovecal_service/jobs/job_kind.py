@@ -35,8 +35,9 @@ class Task:
     """Names the result: data, settings and software version hashed. A finished key is never run again."""
     label: str
     """For messages: ``I_PIP`` or ``I_PIP, fold 2``."""
-    function: Callable[[Any, Cancelled], TaskResult]
-    """A function of a module (workers import it); polls the second argument and raises Cancelled."""
+    function: Callable[[Any, Cancelled, Report], TaskResult]
+    """A function of a module (workers import it); polls the second argument and raises Cancelled. A long one
+    says to the third how far it is."""
     payload: Any
     """Its first argument: plain dataclasses, numbers, texts and arrays."""
 

@@ -13,7 +13,8 @@ import structlog
 
 from glovecal_models.errors import Cancelled, GlovecalError
 from glovecal_service.jobs.finished_tasks import FinishedTasks
-from glovecal_service.jobs.job_kind import JobKind, JobPlan, TaskResult
+from glovecal_service.jobs.job_kind import JobKind, JobPlan, Task, TaskResult
+from glovecal_service.jobs.progress_file import ProgressFile, TaskProgress
 from glovecal_service.jobs.task_run import TaskOutcome, run_task
 from glovecal_service.jobs.workers import Workers, WorkersLost, finished, outcome
 from glovecal_service.store import Store
@@ -43,6 +44,10 @@ class JobRun:
         self._workers = workers
         self._finished = FinishedTasks(folder)
         self._cancel_file = folder / f"cancel-{job.id}-{job.attempt}"
+        self._progress_file = folder / f"progress-{job.id}-{job.attempt}.json"
+        self._telling = threading.Lock()
+        self._heard: TaskProgress | None = None
+        self._tasks_done = self._tasks = 0
         self._ended = threading.Event()
         self._stopped = threading.Event()
         self._released = False
@@ -67,6 +72,7 @@ class JobRun:
             self._ended.set()
             watch.join()
             self._cancel_file.unlink(missing_ok=True)
+            self._progress_file.unlink(missing_ok=True)
 
     def _end(self) -> Callable[[], object]:
         """Do the work; the write that ends it."""
@@ -104,6 +110,7 @@ class JobRun:
         """Results that an earlier attempt or an earlier job left."""
         found = {number: self._finished.get(task.key) for number, task in enumerate(plan.tasks)}
         results = {number: result for number, result in found.items() if result is not None}
+        self._tasks_done, self._tasks = len(results), len(plan.tasks)
         already = f", {len(results)} of them known already" if results else ""
         self._progress(
             len(results) / max(1, len(plan.tasks)),
@@ -116,7 +123,10 @@ class JobRun:
         for number, task in enumerate(plan.tasks):
             self._raise_if_stopped()
             if number not in results:
-                self._take(plan, number, run_task(task, self._finished.folder, self._cancel_file), results)
+                self._take(plan, number, self._run_here(task), results)
+
+    def _run_here(self, task: Task) -> TaskOutcome:
+        return run_task(task, self._finished.folder, self._cancel_file, self._progress_file)
 
     def _fit_in_workers(self, plan: JobPlan, results: dict[int, TaskResult]) -> None:
         for restart in range(WORKER_RESTARTS + 1):
@@ -141,7 +151,8 @@ class JobRun:
                 while waiting and len(running) < 2 * self._workers.count:
                     number = waiting.pop(0)
                     task = plan.tasks[number]
-                    future = self._workers.submit(task, self._finished.folder, self._cancel_file)
+                    files = self._finished.folder, self._cancel_file, self._progress_file
+                    future = self._workers.submit(task, *files)
                     running[future] = number
                 self._workers.check()
                 for future in finished(list(running), WATCH_S):
@@ -171,11 +182,23 @@ class JobRun:
             raise WorkersLost(f"the result of {plan.tasks[number].label} is not in {self._finished.folder}")
         results[number] = result
         step = plan.step(number, results)
+        self._tasks_done = len(results)
         self._progress(len(results) / len(plan.tasks), step.sentence, step.detail)
 
     def _progress(self, fraction: float, sentence: str, detail: dict) -> None:
         jobs, id, attempt = self._store.jobs, self._job.id, self._job.attempt
-        self._written(lambda: jobs.progress(id, attempt, fraction, sentence, detail))
+        with self._telling:
+            self._written(lambda: jobs.progress(id, attempt, fraction, sentence, detail))
+
+    def _tell_on(self) -> None:
+        """Pass on what a running task said last, once; its file is gone before its own end is told."""
+        with self._telling:
+            said = ProgressFile(self._progress_file).read()
+            if said is None or said == self._heard or self._stopped.is_set():
+                return
+            self._heard = said
+            fraction = (self._tasks_done + said.share) / max(1, self._tasks)
+            self._store.jobs.progress(self._job.id, self._job.attempt, fraction, said.sentence)
 
     def _written(self, write: Callable[[], object]) -> None:
         """Repeat a write while the database is away; the lease outlives a short restart."""
@@ -196,6 +219,7 @@ class JobRun:
                 if time.monotonic() - beat >= HEARTBEAT_S:
                     beat = time.monotonic()
                     self._store.jobs.heartbeat(self._job.id, self._job.attempt)
+                self._tell_on()
                 if self._store.jobs.get(self._job.id).cancel_requested:
                     self._cancel_requested = True
                     self._cancel()

@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
+from glovecal_service.jobs.add_effect import AddEffectJob
+from glovecal_service.jobs.diagnose import DiagnoseJob
+from glovecal_service.jobs.improve import ImproveJob
 from glovecal_service.jobs.job_kind import JobKind
+from glovecal_service.jobs.remove_effect import RemoveEffectJob
 from glovecal_service.jobs.train import TrainJob
 
-KINDS: dict[str, JobKind] = {"train": TrainJob()}
+KINDS: dict[str, JobKind] = {
+    "train": TrainJob(),
+    "diagnose": DiagnoseJob(),
+    "add_effect": AddEffectJob(),
+    "remove_effect": RemoveEffectJob(),
+    "improve": ImproveJob(),
+}

@@ -9,6 +9,7 @@ from pathlib import Path
 from glovecal_models.errors import Cancelled, GlovecalError
 from glovecal_service.jobs.finished_tasks import FinishedTasks
 from glovecal_service.jobs.job_kind import Task
+from glovecal_service.jobs.progress_file import ProgressFile
 
 CANCEL_POLL_S = 0.05
 
@@ -23,22 +24,25 @@ class TaskOutcome:
     cancelled: bool = False
 
 
-def run_task(task: Task, folder: Path, cancel_file: Path) -> TaskOutcome:
+def run_task(task: Task, folder: Path, cancel_file: Path, progress_file: Path) -> TaskOutcome:
     """Run ``task`` unless its result is there. Once this returns without error, the result is on disk.
 
-    Stops soon after ``cancel_file`` appears.
+    Stops soon after ``cancel_file`` appears; what the task reports is in ``progress_file`` until it ends.
     """
     began, finished = time.perf_counter(), FinishedTasks(folder)
+    progress = ProgressFile(progress_file)
     cancelled = CancelFile(cancel_file)
     try:
         if finished.get(task.key) is None:
             if cancelled():
                 raise Cancelled("stopped before it began")
-            finished.put(task.key, task.function(task.payload, cancelled))
+            finished.put(task.key, task.function(task.payload, cancelled, progress.write))
     except Cancelled:
         return TaskOutcome(task.key, time.perf_counter() - began, cancelled=True)
     except GlovecalError as error:
         return TaskOutcome(task.key, time.perf_counter() - began, error=f"{task.label}: {error}")
+    finally:
+        progress.remove()
     return TaskOutcome(task.key, time.perf_counter() - began)
 
 

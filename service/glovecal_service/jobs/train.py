@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import asdict, fields
 from typing import Any
 
 from glovecal_models.calibration.artifact import dump
@@ -17,7 +17,7 @@ from glovecal_models.calibration.training_plan import TrainingPlan, plan_trainin
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput, NotTrainable
 from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_service.jobs.job_kind import JobPlan, Step, Task, TaskResult
+from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult
 from glovecal_service.store import Store
 from glovecal_service.store.records import JobRecord, TakeRecord
 
@@ -49,7 +49,7 @@ class TrainJob:
             hashes = [record.artifact for record in records]
             fits = [_fit_result(result) for result in results]
             model = assemble(plan, fits, take_hashes=hashes, parent=parent)
-            facts = _facts(model, plan, records)
+            facts = _facts(model, plan, records) | {"settings": asdict(settings)}
             return _keep(store, model, layout_name, facts, activate=bool(payload.get("activate", False)))
 
         return JobPlan(
@@ -60,7 +60,7 @@ class TrainJob:
         )
 
 
-def fit(task: FitTask, cancelled: Callable[[], bool]) -> TaskResult:
+def fit(task: FitTask, cancelled: Callable[[], bool], report: Report) -> TaskResult:
     """One fit, run in a worker. Raises Cancelled, NotTrainable."""
     result = run_fit(task, cancelled=cancelled)
     facts = {

@@ -84,14 +84,14 @@ class Workers:
             return self._settings.workers
         return max(1, sum(cast(dict[str, int], client.nthreads()).values()))
 
-    def submit(self, task: Task, folder: Path, cancel_file: Path) -> Future:
+    def submit(self, task: Task, folder: Path, cancel_file: Path, progress_file: Path) -> Future:
         """Hand a task out. Raises WorkersLost."""
         from distributed.client import ClosedClientError
 
         client = None
         try:
             client = self._started()
-            return client.submit(run_task, task, folder, cancel_file, pure=False)
+            return client.submit(run_task, task, folder, cancel_file, progress_file, pure=False)
         except (OSError, TimeoutError, RuntimeError, ClosedClientError) as error:
             raise WorkersLost(f"the training processes cannot be reached: {error}", client) from error
 

@@ -9,8 +9,8 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-MODEL, MEASURED, FLOOR, QUIET = "#1d6cab", "#1a1a1a", "#d9822b", "#c9ced4"
-"""Colours: what the model says, what was measured, noise floors, what is only there for scale."""
+MODEL, MEASURED, FLOOR, QUIET, DECOY = "#1d6cab", "#1a1a1a", "#d9822b", "#c9ced4", "#a3423f"
+"""Colours: what the model says, what was measured, noise floors, what is only there for scale, decoys."""
 
 mpl.rcParams["svg.fonttype"] = "none"  # text stays text: small files, and a reader can search them
 mpl.rcParams["svg.hashsalt"] = "glovecal"

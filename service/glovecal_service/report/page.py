@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
-from importlib.metadata import version
 
 from glovecal_models.calibration.comparison import Comparison, summed_up
+from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.floor_estimate import ORDER, NoiseFloor
 from glovecal_models.comparison.residuals import Residuals, residuals
 from glovecal_models.comparison.rotation_noise import RotationNoise, rotation_noise
@@ -17,6 +17,8 @@ from glovecal_service.report.closer_pictures import (
     measured_against_predicted,
     spectrum_of,
 )
+from glovecal_service.report.html import figure, table, whole_page
+from glovecal_service.report.lineage_fall import lineage_fall
 from glovecal_service.report.pictures import error_against, errors_and_floors, heat_map, over_time
 from glovecal_service.report.reported_model import ReportedModel
 from glovecal_service.report.sentences import counted, floors_sentence, heat_sentence, in_one_sentence
@@ -25,16 +27,6 @@ from glovecal_service.report.side_by_side import side_by_side
 LOOKED_AT_CLOSELY = 3
 """Rotations, those farthest above their floor."""
 
-STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; color: #1a1a1a; max-width: 60rem; margin: 2rem auto;
-  padding: 0 1rem }
-h1 { font-size: 1.5rem } h2 { font-size: 1.15rem; margin-top: 2.2rem }
-svg { max-width: 100%; height: auto } figure { margin: 1rem 0 } figcaption { color: #444 }
-table { border-collapse: collapse } .note { background: #fdf3e3; padding: .6rem 1rem }
-th, td { text-align: right; padding: .15rem .7rem; border-bottom: 1px solid #ddd }
-th:first-child, td:first-child { text-align: left } td { white-space: nowrap }
-.side { display: flex; flex-wrap: wrap; gap: 1rem } .side figure { flex: 1 1 24rem }
-"""
 ERRORS = (
     *("rotation", "RMSE", "noise floor", "mean |error|", "bias", "95 % below"),
     *("within 1 sd", "NLPD", "its own spread"),
@@ -50,8 +42,18 @@ FLOORS = (
 )
 
 
-def report_page(main: ReportedModel, takes: Sequence[Take], beside: Sequence[ReportedModel] = ()) -> str:
-    """HTML, ``main`` looked at closely. Raises LayoutMismatch, and BadInput when nothing was measured."""
+def report_page(
+    main: ReportedModel,
+    takes: Sequence[Take],
+    beside: Sequence[ReportedModel] = (),
+    *,
+    ancestors: Sequence[CalibrationModel] = (),
+    simpler: Mapping[str, CalibrationModel] | None = None,
+) -> str:
+    """HTML, ``main`` looked at closely. Raises LayoutMismatch, and BadInput when nothing was measured.
+
+    ``ancestors``, oldest first, and ``simpler`` calibrations show how the error fell down to ``main``.
+    """
     found = residuals(main.model, takes)
     noise = rotation_noise(found)
     numbers, where = summed_up(found, noise), where_it_fails(found, noise=noise)
@@ -60,21 +62,17 @@ def report_page(main: ReportedModel, takes: Sequence[Take], beside: Sequence[Rep
         _what(main, takes),
         f"<p><strong>{escape(in_one_sentence(numbers, where))}</strong></p>",
         *_beside(main, numbers, takes, beside),
+        *_fall(main, ancestors, simpler or {}, takes, numbers),
         "<h2>How far off, and how far it could be</h2>",
-        _figure(errors_and_floors(where), floors_sentence(where)),
+        figure(errors_and_floors(where), floors_sentence(where)),
         _table(numbers, where),
         "<h2>What the errors depend on</h2>",
-        _figure(heat_map(where), heat_sentence(where)),
+        figure(heat_map(where), heat_sentence(where)),
     ]
     for item in where.rotations[:LOOKED_AT_CLOSELY]:
         parts += _closely(item, found, noise[item.rotation])
     parts += ["<h2>The worst seconds</h2>", _stretches(where), "<h2>Noise floors</h2>", _floors(where)]
-    title = f"Glovecal: model {escape(main.id[:12])}"
-    return (
-        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
-        f"<style>{STYLE}</style></head><body>{''.join(parts)}"
-        f"<p>Glovecal {escape(version('glovecal-service'))}.</p></body></html>"
-    )
+    return whole_page(f"model {main.id[:12]}", parts)
 
 
 def _beside(
@@ -86,7 +84,21 @@ def _beside(
     models = {main.name: numbers}
     models |= {other.name: summed_up(residuals(other.model, takes)) for other in beside}
     notes = [_trained_on(other) for other in beside]
-    return ["<h2>Side by side</h2>", *notes, _figure(*side_by_side(models))]
+    return ["<h2>Side by side</h2>", *notes, figure(*side_by_side(models))]
+
+
+def _fall(
+    main: ReportedModel,
+    ancestors: Sequence[CalibrationModel],
+    simpler: Mapping[str, CalibrationModel],
+    takes: Sequence[Take],
+    numbers: Comparison,
+) -> list[str]:
+    """The part with the versions before this one, nothing for a first version."""
+    if not ancestors:
+        return []
+    picture = lineage_fall([*ancestors, main.model], simpler, takes, numbers.over_all)
+    return ["<h2>How the error fell</h2>", figure(*picture)]
 
 
 def _closely(item: RotationFindings, found: Residuals, noise: RotationNoise) -> list[str]:
@@ -99,13 +111,9 @@ def _closely(item: RotationFindings, found: Residuals, noise: RotationNoise) -> 
         figures.append(error_by_wearing(item.wearings))
     return [
         f"<h2>{escape(item.rotation)}</h2><p>{escape(item.sentence)}</p>",
-        _figure(*over_time(found, item.rotation)),
-        '<div class="side">' + "".join(_figure(*one) for one in figures) + "</div>",
+        figure(*over_time(found, item.rotation)),
+        '<div class="side">' + "".join(figure(*one) for one in figures) + "</div>",
     ]
-
-
-def _figure(picture: str, sentence: str) -> str:
-    return f"<figure>{picture}<figcaption>{escape(sentence)}</figcaption></figure>"
 
 
 def _what(main: ReportedModel, takes: Sequence[Take]) -> str:
@@ -141,7 +149,7 @@ def _table(numbers: Comparison, where: WhereItFails) -> str:
         )
         for name, one in named
     ]  # fmt: skip
-    return f"{_rows(ERRORS, rows)}<p>{escape(SCALES)}</p>"
+    return f"{table(ERRORS, rows)}<p>{escape(SCALES)}</p>"
 
 
 def _floor(floor: NoiseFloor | None) -> str:
@@ -161,7 +169,7 @@ def _floors(where: WhereItFails) -> str:
         every = (item.floor, *item.other_floors) if item.floor is not None else ()
         cells = {one.how: _with_interval(one) for one in every}
         rows.append((item.rotation, *(cells.get(how, "-") for how in ORDER)))
-    return f"{_rows(('rotation', *ORDER), rows)}<p>{escape(FLOORS)}</p>"
+    return f"{table(('rotation', *ORDER), rows)}<p>{escape(FLOORS)}</p>"
 
 
 def _stretches(where: WhereItFails) -> str:
@@ -173,10 +181,4 @@ def _stretches(where: WhereItFails) -> str:
         )
         for one in where.stretches
     ]  # fmt: skip
-    return _rows(heads, rows)
-
-
-def _rows(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    head = "".join(f"<th>{escape(name)}</th>" for name in heads)
-    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
-    return f"<table><tr>{head}</tr>{body}</table>"
+    return table(heads, rows)

@@ -14,10 +14,15 @@ from glovecal_service.jobs.dispatcher import Dispatcher
 from glovecal_service.rest import (
     clocks,
     comparisons,
+    diagnosis,
+    effects,
     gloves,
     health,
+    improvements,
+    job_reports,
     jobs,
     metrics_page,
+    model_effects,
     models,
     predictions,
     recordings,
@@ -44,7 +49,8 @@ JSON_LIMIT_BYTES = 8_000_000
 BODY_PATIENCE_S = 30.0
 ROUTERS = (
     *(subjects, gloves, clocks, takes, uploads, recordings),
-    *(training, models, predictions, comparisons, jobs, health, metrics_page),
+    *(training, models, predictions, comparisons, diagnosis, model_effects, effects, improvements),
+    *(jobs, job_reports, health, metrics_page),
 )
 
 

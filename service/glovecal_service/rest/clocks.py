@@ -9,10 +9,10 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from glovecal_models.effects.clock_scan import clock_offsets
+from glovecal_service.plain import plain
 from glovecal_service.rest.answers import change_problems
 from glovecal_service.rest.dependencies import StoreNeeded
 from glovecal_service.rest.names import Id
-from glovecal_service.rest.plain import plain
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.takes import CLOCK_OFFSET
 

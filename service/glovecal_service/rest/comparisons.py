@@ -11,13 +11,14 @@ from glovecal_models.calibration.comparison import compare
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.comparison.where_it_fails import where_it_fails
+from glovecal_service.plain import plain
 from glovecal_service.report.page import report_page
 from glovecal_service.report.reported_model import ReportedModel
 from glovecal_service.rest.answers import change_problems
 from glovecal_service.rest.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.names import Id, ModelInPath, ModelReference
-from glovecal_service.rest.plain import plain
 from glovecal_service.rest.strict_body import StrictBody
+from glovecal_service.rest.versions_before import versions_before
 from glovecal_service.store.records import ModelRecord
 from glovecal_service.store.store import Store
 
@@ -191,7 +192,14 @@ def report_on_model(id: ModelInPath, body: AgainstBeside, parts: PartsNeeded) ->
         other, loaded, _, also_seen = _chosen(reference, body, parts)
         if other.id != record.id:
             others[other.id] = ReportedModel(other.id, loaded, also_seen)
-    page = report_page(ReportedModel(record.id, model, seen), takes, list(others.values()))
+    ancestors, simpler = versions_before(parts, record)
+    page = report_page(
+        ReportedModel(record.id, model, seen),
+        takes,
+        list(others.values()),
+        ancestors=ancestors,
+        simpler=simpler,
+    )
     return Response(page, media_type="text/html; charset=utf-8")
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import BaseModel, Field
 
 from glovecal_models.calibration.added_effect import AddedEffect
-from glovecal_service.rest.plain import plain
+from glovecal_service.plain import plain
 
 
 class EffectView(BaseModel):

@@ -21,8 +21,8 @@ from glovecal_models.errors import (
     LayoutMismatch,
     NotTrainable,
 )
+from glovecal_service.plain import plain_text
 from glovecal_service.rest.names import MEANING
-from glovecal_service.rest.plain import plain_text
 from glovecal_service.rest.problem import Problem
 from glovecal_service.store.errors import Conflict, NotFound, StorageFull, StoreDamaged, StoreUnavailable
 

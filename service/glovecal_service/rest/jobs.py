@@ -12,10 +12,10 @@ from fastapi import APIRouter, Depends, Header
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import BaseModel, Field
 
+from glovecal_service.plain import plain
 from glovecal_service.rest.answers import change_problems, problems
 from glovecal_service.rest.dependencies import StoreNeeded
 from glovecal_service.rest.names import IdInPath, SubjectFilter
-from glovecal_service.rest.plain import plain
 from glovecal_service.store.records import FINISHED_JOB_STATES, JobEvent, JobRecord, JobState
 from glovecal_service.store.store import Store
 

@@ -10,11 +10,11 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field
 
 from glovecal_models.calibration.model import RotationModel
+from glovecal_service.plain import plain
 from glovecal_service.rest.answers import change_problems, problems
 from glovecal_service.rest.dependencies import PartsNeeded, StoreNeeded
 from glovecal_service.rest.effect_view import EffectView, effect_view
 from glovecal_service.rest.names import Identifier, LayoutFilter, ModelInPath, SubjectFilter
-from glovecal_service.rest.plain import plain
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.records import Activation, ModelRecord
 

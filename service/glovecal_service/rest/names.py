@@ -27,6 +27,8 @@ MEANING = {
 Identifier = Annotated[str, StringConstraints(pattern=IDENTIFIER)]
 """Subjects, gloves, layouts, wearings, recordings: as in ``glovecal_models.names``."""
 Channel = Annotated[str, StringConstraints(pattern=CHANNEL)]
+TakeReference = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=ONE_LINE)]
+"""A take's id, or its name."""
 ModelReference = Annotated[str, StringConstraints(pattern=SHA256_PREFIX)]
 """A model's id (sha256 of its artifact) or a prefix of at least 6 digits."""
 Sha256 = Annotated[str, StringConstraints(pattern=SHA256)]

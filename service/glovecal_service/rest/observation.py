@@ -11,8 +11,8 @@ from typing import Any
 import structlog
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from glovecal_service.plain import plain_text
 from glovecal_service.rest.metrics import Metrics
-from glovecal_service.rest.plain import plain_text
 from glovecal_service.rest.problem import Problem
 
 PREFIX = "/v1"

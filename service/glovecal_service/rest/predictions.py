@@ -10,10 +10,10 @@ from pydantic import BaseModel, Field, FiniteFloat
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.errors import BadInput, LayoutMismatch
+from glovecal_service.plain import plain
 from glovecal_service.rest.answers import change_problems
 from glovecal_service.rest.dependencies import PartsNeeded
 from glovecal_service.rest.names import Channel, ModelInPath, WearingName
-from glovecal_service.rest.plain import plain
 from glovecal_service.rest.strict_body import StrictBody
 
 router = APIRouter(prefix="/models", tags=["models"])

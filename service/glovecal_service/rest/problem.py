@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.responses import Response
 
-from glovecal_service.rest.plain import plain, plain_text
+from glovecal_service.plain import plain, plain_text
 
 MEDIA_TYPE = "application/problem+json"
 

@@ -18,10 +18,10 @@ from starlette.background import BackgroundTask
 from glovecal_models.takes.examination import examine
 from glovecal_models.takes.table import read_reference, read_takes, write_takes
 from glovecal_models.takes.take import Take as TakeArrays
+from glovecal_service.plain import plain
 from glovecal_service.rest.answers import change_problems, problems
 from glovecal_service.rest.dependencies import Parts, PartsNeeded, StoreNeeded
 from glovecal_service.rest.names import IDENTIFIER, SHA256, IdInPath, LayoutFilter, SubjectFilter, WearingName
-from glovecal_service.rest.plain import plain
 from glovecal_service.rest.problem import Problem
 from glovecal_service.rest.reference_clock import ReferenceClock, on_take_clock
 from glovecal_service.rest.table_upload import (

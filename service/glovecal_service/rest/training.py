@@ -13,6 +13,7 @@ from glovecal_service.rest.answers import change_problems
 from glovecal_service.rest.dependencies import StoreNeeded
 from glovecal_service.rest.jobs import Job
 from glovecal_service.rest.names import Id, Identifier, ModelReference
+from glovecal_service.rest.new_job import new_job
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.errors import Conflict
 from glovecal_service.store.records import JobRecord, TakeRecord
@@ -21,7 +22,6 @@ from glovecal_service.store.store import Store
 router = APIRouter(prefix="/models", tags=["models"])
 
 MOST_TAKES = 1000
-MOST_UNFINISHED_JOBS = 100
 
 
 class Training(StrictBody):
@@ -59,14 +59,10 @@ def train(body: Training, store: StoreNeeded, response: Response) -> JobRecord:
     store.subjects.get(body.subject)
     store.layouts.get(body.layout)
     takes = _chosen_takes(store, body)
-    if len(store.jobs.list(only_unfinished=True)) >= MOST_UNFINISHED_JOBS:
-        raise Conflict(f"{MOST_UNFINISHED_JOBS} jobs are waiting already; cancel some or wait")
     payload: dict[str, Any] = body.model_dump() | {"takes": [take.id for take in takes]}
     if body.parent is not None:
         payload["parent"] = store.models.get(body.parent).id
-    record = store.jobs.create("train", payload, subject=body.subject)
-    response.headers["Location"] = f"/v1/jobs/{record.id}"
-    return record
+    return new_job(store, response, "train", payload, body.subject)
 
 
 def _chosen_takes(store: Store, body: Training) -> list[TakeRecord]:

@@ -1,0 +1,89 @@
+"""Takes in files for a verb that works on stored ones: imported under a subject, found again next time."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from glovecal_client.errors import ServiceError
+from glovecal_service.cli.printing import err
+from glovecal_service.cli.refusal import Refusal, exit_code_of, sentence_of
+from glovecal_service.cli.two_tables import frames_among, reference_beside
+
+if TYPE_CHECKING:
+    from glovecal_client.rest import RestClient
+
+PREFIX = "improve-"
+READ_BYTES = 1 << 20
+
+
+@dataclass
+class FileSubject:
+    """The subject under which files are imported, and their layout once it is known."""
+
+    service: RestClient
+    name: str
+    layout: str | None
+    tell: bool = True
+    """Whether the files' warnings are printed."""
+    _told: set[str] = field(default_factory=set)
+
+    @classmethod
+    def of(
+        cls,
+        service: RestClient,
+        files: Sequence[Path],
+        *,
+        subject: str | None,
+        layout: str | None,
+        tell: bool = True,
+    ) -> FileSubject:
+        """``subject``, else whoever has one of the files already, else a new one named after the first."""
+        hashes = [_sha256(file) for file in files]
+        rows = [] if subject is not None else service.get("/takes")
+        owners: list[str] = [row["subject"] for row in rows if row["original_sha256"] in hashes]
+        subject = subject or next(iter(owners), PREFIX + hashes[0][:8])
+        if subject not in {row["name"] for row in service.get("/subjects")}:
+            service.post("/subjects", {"name": subject, "title": f"Takes of {files[0].name}"})
+        return cls(service, subject, layout, tell)
+
+    def take_ids(self, files: Sequence[Path]) -> list[str]:
+        """Ids of the takes in ``files``, imported unless they were. Raises Refusal that names the file."""
+        return [row["id"] for file in frames_among(files) for row in self._imported(file)]
+
+    def _imported(self, file: Path) -> list[dict[str, Any]]:
+        self._require_layout(file)
+        try:
+            answer = self.service.upload_takes(
+                file, subject=self.name, layout=self.layout, reference=reference_beside(file)
+            )
+        except ServiceError as error:
+            if exit_code_of(error) != 1:
+                raise
+            raise Refusal(f"{file}: {sentence_of(error)}") from error
+        self.layout = answer["layout"]
+        for sentence in answer["warnings"]:
+            if self.tell and sentence not in self._told:
+                self._told.add(sentence)
+                err.print(f"{file}: {sentence}", style="yellow")
+        return answer["takes"]
+
+    def _require_layout(self, file: Path) -> None:
+        digest = _sha256(file)
+        for row in self.service.get("/takes", {"subject": self.name}):
+            if row["original_sha256"] == digest and self.layout not in (None, row["layout"]):
+                raise Refusal(
+                    f"{file} was imported before with layout {row['layout']}, not {self.layout}; give that "
+                    "one, or set GLOVECAL_DATA to another folder"
+                )
+
+
+def _sha256(file: Path) -> str:
+    digest = hashlib.sha256()
+    with file.open("rb") as stream:
+        while chunk := stream.read(READ_BYTES):
+            digest.update(chunk)
+    return digest.hexdigest()

@@ -1,0 +1,88 @@
+"""Job kind ``diagnose``: a model and takes in, the evidence for effects that it lacks out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.comparison.noise_floor import noise_floor
+from glovecal_models.comparison.residuals import residuals
+from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.effects.expression_effect import ExpressionEffect
+from glovecal_models.improvement.add_effect import repaired_takes, wanted_of
+from glovecal_models.improvement.known_effects import known_effects
+from glovecal_models.takes.take import Take
+from glovecal_service.jobs.declared_effects import declared_in, known_by_name
+from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult
+from glovecal_service.jobs.model_work import ModelWork, takes_of, text_in
+from glovecal_service.jobs.task_key import task_key
+from glovecal_service.plain import plain
+from glovecal_service.store import Store
+from glovecal_service.store.records import JobRecord
+
+
+@dataclass(frozen=True)
+class DiagnosisWork:
+    on: ModelWork
+    seed: int
+    declarations: tuple[dict[str, Any], ...]
+    """Effects of the user's own that are tried beside the catalogue's."""
+
+
+class DiagnoseJob:
+    """Payload: ``model``, ``takes`` (ids, or None for those it was trained on), ``seed``, ``declarations``.
+
+    Result: the diagnosis document, ``model`` and ``takes`` (id and name).
+    """
+
+    def plan(self, store: Store, job: JobRecord) -> JobPlan:
+        """Raises NotFound (model, takes), NotTrainable (no reference), BadInput, DamagedArtifact."""
+        payload = job.payload
+        record = store.models.get(text_in(payload, "model"))
+        takes = takes_of(store, record, payload.get("takes"))
+        on = ModelWork.of(store, record, takes)
+        work = DiagnosisWork(on, int(payload.get("seed", 0)), tuple(payload.get("declarations") or ()))
+        facts = {"seed": work.seed, "declarations": list(work.declarations)}
+        key = task_key("diagnose", {"model": on.id, "takes": list(on.take_hashes), **facts})
+
+        def finish(results: Sequence[TaskResult]) -> dict[str, Any]:
+            told = [{"id": take.id, "name": take.name} for take in takes]
+            return {**results[0].facts, "model": record.id, "takes": told}
+
+        return JobPlan(
+            tasks=[Task(key, f"diagnosis of model {record.id[:12]}", run, work)],
+            step=lambda number, results: Step("the diagnosis is made"),
+            finish=finish,
+            in_this_process=on.is_short,
+        )
+
+
+def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> TaskResult:
+    """In a worker. Raises BadInput, Cancelled."""
+    model = work.on.model
+    report("measuring the noise floors", 0.0)
+    floors = floors_deg(model, work.on.takes, work.seed)
+    own = [ExpressionEffect.from_document(item) for item in work.declarations]
+    with known_by_name([*declared_in(model), *own]):
+        found = diagnose(
+            repaired_takes(work.on.takes, wanted_of(model)),
+            model.layout,
+            linear=model.method in ("raw", "linear"),
+            known=known_effects(model),
+            noise_floor_deg=floors,
+            seed=work.seed,
+            cancelled=cancelled,
+            report=report,
+        )
+    return TaskResult({}, plain(found.to_document()))
+
+
+def floors_deg(model: CalibrationModel, takes: Sequence[Take], seed: int) -> dict[str, float]:
+    """How small the model's errors can get on these takes, for each rotation of which that is known."""
+    found, generator = residuals(model, takes), np.random.default_rng(seed)
+    floors = {name: noise_floor(found, name, generator) for name in found.measured_rotations}
+    return {name: floor.floor_deg for name, floor in floors.items() if floor is not None}
