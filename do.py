@@ -71,7 +71,7 @@ def bench(arguments: list[str]) -> int:
 
 
 def study(arguments: list[str]) -> int:
-    return run("python", "tests/study/study.py", *arguments, groups=("bench",))
+    return run("python", "tests/study/study.py", *arguments)
 
 
 def install_gpytorch() -> None:
