@@ -94,20 +94,29 @@ def _draw(rows: Sequence[Row], folder: Path, ending: str) -> None:
 
 
 def _write(figures: dict[str, list[StudyFigure]], choices: StudyChoices, software: str, path: Path) -> None:
+    """Parts that were not run now keep what they found with the same programs."""
+    kept = _earlier(path.with_suffix(".json"), software) | figures
     forms = "set-aside forms" if choices.set_aside else "open forms"
     head = f"# Blind study of the diagnosis\n\nSimulated gloves, {forms}; programs {software[:10]}.\n"
-    text = [
-        head,
-        *(f"## {name}\n\n{PARTS[name].sentence}\n\n{table(some)}\n" for name, some in figures.items()),
-    ]
+    parts = [(name, part, kept[name]) for name, part in PARTS.items() if name in kept]
+    text = [head, *(f"## {name}\n\n{part.sentence}\n\n{table(some)}\n" for name, part, some in parts)]
     path.with_suffix(".md").write_text("\n".join(text), encoding="utf-8")
     document = {
         "software": software,
         "set_aside": choices.set_aside,
-        "figures": {name: [figure.to_document() for figure in some] for name, some in figures.items()},
+        "figures": {name: [figure.to_document() for figure in some] for name, _, some in parts},
     }
     path.with_suffix(".json").write_text(json.dumps(document, indent=1), encoding="utf-8")
     print(f"\nwritten: {path.with_suffix('.md')}, {path.with_suffix('.json')} and pictures beside them")
+
+
+def _earlier(path: Path, software: str) -> dict[str, list[StudyFigure]]:
+    document = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    if document.get("software") != software:
+        return {}
+    return {
+        name: [StudyFigure.from_document(each) for each in some] for name, some in document["figures"].items()
+    }
 
 
 def _parser() -> argparse.ArgumentParser:

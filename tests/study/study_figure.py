@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -53,6 +53,10 @@ class StudyFigure:
 
     def to_document(self) -> dict[str, Any]:
         return asdict(self) | {"is_met": self.is_met}
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> StudyFigure:
+        return cls(**{key: value for key, value in document.items() if key != "is_met"})
 
     def row(self) -> str:
         if not self.gloves:
