@@ -7,6 +7,7 @@
     python3 do.py test      the test suite
     python3 do.py check     format, lint, types
     python3 do.py bench     speed against other libraries, as ratios, with a picture
+    python3 do.py study     the blind study of the diagnosis: figures, confusion matrix (hours)
 
 uv is installed into .tools and the locked packages into .venv; nothing outside this folder is touched.
 """
@@ -69,6 +70,10 @@ def bench(arguments: list[str]) -> int:
     return run("python", "tests/bench/bench.py", *arguments, groups=("bench",))
 
 
+def study(arguments: list[str]) -> int:
+    return run("python", "tests/study/study.py", *arguments)
+
+
 def install_gpytorch() -> None:
     """GPyTorch stays out of the lock file: on Linux its torch brings gigabytes of GPU libraries.
 
@@ -82,7 +87,15 @@ def install_gpytorch() -> None:
         print("GPyTorch could not be installed: the bench goes on without it", file=sys.stderr)
 
 
-VERBS = {"demo": demo, "serve": serve, "glovecal": glovecal, "test": test, "check": check, "bench": bench}
+VERBS = {
+    "demo": demo,
+    "serve": serve,
+    "glovecal": glovecal,
+    "test": test,
+    "check": check,
+    "bench": bench,
+    "study": study,
+}
 
 
 def main(arguments: list[str]) -> int:

@@ -1,0 +1,118 @@
+"""One glove of the blind study: what is hidden in it, how it is built, and its recording.
+
+A diagnosis gets the takes and the layout. What is hidden stays here, for the marking.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from glovecal_models.layout import Layout
+from glovecal_models.simulation.causes.cause import Cause
+from glovecal_models.simulation.session import RecordedSession, record_session
+from glovecal_models.simulation.session_plan import FIVE_SENSORS, SessionPlan
+from glovecal_models.takes.take import Take
+
+PALM_SENSORS = ("I_MCP", "M_MCP", "R_MCP", "P_MCP", "P_PIP", "PALM_ARCH")
+"""Five joints, and the sensor without which no palm arch can be seen."""
+BYSTANDER_DEG = 1e-3
+"""A recorded column whose cause is this small explains nothing."""
+
+Nuisance = Literal["white", "drift", "posture"]
+Bystander = Literal["none", "contact_pressure", "unknown:context"]
+
+
+@dataclass(frozen=True)
+class BlindGlove:
+    """Plain settings; the same settings are the same glove, to the byte."""
+
+    part: str
+    truth: str
+    """The row it is marked in: an effect's name, two joined by "+", "none", or "unknown:..."."""
+    number: int
+    size: float
+    """Strength of each cause in noise floors; 0 for a clean glove."""
+    seed: int
+    causes: tuple[Cause, ...] = ()
+    bits: int = 8
+    nuisance: Nuisance = "drift"
+    linear: bool = False
+    """Whether the calibration is a straight line of the own sensor; else it bends (the flexible base)."""
+    bystander: Bystander = "none"
+    """A cause's column that is recorded without the cause."""
+    palm: bool = False
+    set_aside: bool = False
+    wearings: int = 3
+    takes_per_wearing: int = 4
+    take_s: float = 40.0
+
+    @property
+    def key(self) -> str:
+        """All settings as text: two gloves are the same if their keys are."""
+        return json.dumps(self.to_document(), sort_keys=True)
+
+    def to_document(self) -> dict[str, Any]:
+        return asdict(self)
+
+    @property
+    def plan(self) -> SessionPlan:
+        return SessionPlan(
+            seed=self.seed,
+            sensors=PALM_SENSORS if self.palm else FIVE_SENSORS,
+            bits=self.bits,
+            nuisance=self.nuisance,
+            wearings=self.wearings,
+            takes_per_wearing=self.takes_per_wearing,
+            take_s=self.take_s,
+        )
+
+    @property
+    def layout(self) -> Layout:
+        """Each joint from its own sensor; the palm's sensor is read by none of them."""
+        rotations = {name: [name] for name in self.plan.rotations if name != "PALM_ARCH"}
+        counts = [1, 2**self.bits - 1]
+        document = {"name": "study", "sensors": list(self.plan.sensors), "rotations": rotations}
+        return Layout.from_document(document | {"counts": counts})
+
+    @cached_property
+    def session(self) -> RecordedSession:
+        """The recording; a bystander's column stands in it, its cause does not show."""
+        extra = () if self.bystander == "none" else (Cause(self.bystander, strength_deg=BYSTANDER_DEG),)
+        return record_session(self.plan, (*self.causes, *extra))
+
+    @property
+    def takes(self) -> tuple[Take, ...]:
+        """What the diagnosis sees."""
+        return self.session.takes
+
+    @property
+    def clean_takes(self) -> tuple[Take, ...]:
+        """The same glove and noise without causes."""
+        return self.session.clean
+
+    @property
+    def floor_deg(self) -> float:
+        """RMS over joints of what a perfect static calibration of the healthy glove leaves."""
+        return float(np.sqrt(np.mean(np.square(list(self.session.floor_deg.values())))))
+
+    @property
+    def column(self) -> str | None:
+        """The context column that records an unknown cause, where there is one."""
+        return next((item.column for item in self.session.causes[: len(self.causes)] if item.column), None)
+
+    def told(self) -> dict[str, Any]:
+        """What was hidden, for the record: forms, sensors, and the strength that was reached."""
+        return {
+            "forms": [item.form for item in self.session.causes[: len(self.causes)]],
+            "channels": [list(item.channels) for item in self.session.causes[: len(self.causes)]],
+            "reached_deg": [
+                round(float(np.sqrt(np.mean(np.square(list(item.reached_deg.values()))))), 3)
+                for item in self.session.causes[: len(self.causes)]
+            ],
+            "floor_deg": round(self.floor_deg, 3),
+        }

@@ -1,0 +1,154 @@
+"""Which gloves the study makes: as unlike as can be, and the same ones in every run.
+
+Properties are dealt like cards: among any six gloves of one effect every form, bit depth, nuisance and
+number of channels comes in turn, in an order of their own that does not tie one property to another.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TypeVar, get_args
+
+import numpy as np
+from blind_glove import BlindGlove, Bystander, Nuisance
+
+from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES, UNKNOWN_CAUSES, forms
+from glovecal_models.simulation.causes.cause import Cause
+from glovecal_models.simulation.causes.form import Form
+from glovecal_models.simulation.session_plan import FIVE_SENSORS
+
+FLOOR_DEG = 0.77
+"""The noise floor of such a glove; sizes are multiples of it."""
+BITS = (8, 12)
+NUISANCES: tuple[Nuisance, ...] = get_args(Nuisance)
+BYSTANDERS: tuple[Bystander, ...] = get_args(Bystander)
+CONTEXT_CAUSES = ("contact_pressure", "unknown:context")
+PARTNERS = (
+    "cross_coupling", "hysteresis", "creep", "lag", "clock_offset", "warmup_drift", "temperature",
+    "donning_shift", "supply_sag", "contact_pressure",
+)  # fmt: skip
+NO_PAIRS = (
+    {"lag", "clock_offset"},  # two delays of the same readings: only their sum is there
+    {"hysteresis", "creep"},  # both are the cloth's memory; how to share it between them is a convention
+    {"warmup_drift", "supply_sag"},  # a battery falls with the time since power-on
+)
+"""Pairs whose members have no answer of their own in free motion."""
+
+T = TypeVar("T")
+
+
+def dealt(choices: Sequence[T], number: int, *stream: object) -> T:
+    """The choice of glove ``number``: every run of len(choices) gloves has each of them once."""
+    block, place = divmod(number, len(choices))
+    random = np.random.default_rng([zlib.crc32(repr(stream).encode()), block])
+    return choices[int(random.permutation(len(choices))[place])]
+
+
+def with_cause(
+    part: str, name: str, size: float, number: int, *, set_aside: bool = False
+) -> BlindGlove | None:
+    """A glove with one cause; None when the cause has no set-aside form."""
+    chosen = [form for form in forms(name) if form.set_aside == set_aside]
+    if not chosen:
+        return None
+    label = (part, name, size, set_aside)
+    form = dealt(chosen, number, *label, "form")
+    cause = Cause(name, form.name, size * FLOOR_DEG, _channels(form, number, label))
+    bystander = "none" if name in CONTEXT_CAUSES else dealt(BYSTANDERS, number, *label, "bystander")
+    return _glove(
+        part, name, size, number, label, (cause,), bystander,
+        linear=name == "nonlinearity", palm=name == "palm_arch", set_aside=set_aside,
+    )  # fmt: skip
+
+
+def clean(number: int, *, linear: bool) -> BlindGlove:
+    """A glove that is healthy; one in four has a palm sensor too."""
+    label = ("clean", linear)
+    bystander = dealt(BYSTANDERS, number, *label, "bystander")
+    palm = dealt((False, False, False, True), number, *label, "palm")
+    return _glove("clean", "none", 0.0, number, label, (), bystander, linear=linear, palm=palm)
+
+
+def unknown(name: str, size: float, number: int) -> BlindGlove:
+    """A glove with a cause outside the catalogue, on one channel or all."""
+    found = with_cause("unknown", name, size, number)
+    assert found is not None, f"{name} has no open form"
+    return found
+
+
+def pair(number: int, size: float, *, set_aside: bool = False) -> BlindGlove:
+    """A glove with two causes of ``PARTNERS``, every partner as often as the others."""
+    possible = [
+        (one, other)
+        for place, one in enumerate(PARTNERS)
+        for other in PARTNERS[place + 1 :]
+        if {one, other} not in NO_PAIRS
+    ]
+    names = dealt(possible, number, "pairs")
+    label = ("pairs", size, set_aside)
+    causes = []
+    for name in names:
+        chosen = [form for form in forms(name) if form.set_aside == set_aside]
+        form = dealt(chosen, number, *label, name)
+        causes.append(Cause(name, form.name, size * FLOOR_DEG))
+    return _glove("pairs", "+".join(names), size, number, label, tuple(causes), "none", set_aside=set_aside)
+
+
+def undecided(name: str, number: int, *, set_aside: bool = False) -> BlindGlove | None:
+    """A weak cause in few short takes, as leaves rivals; None where there is no such form."""
+    found = with_cause("next-take", name, 0.65, number, set_aside=set_aside)
+    return None if found is None else replace(found, wearings=2, takes_per_wearing=3, take_s=25.0)
+
+
+def effect_names(wanted: Sequence[str] | None) -> tuple[str, ...]:
+    """Those of the catalogue that were asked for, or all. Raises ValueError for another name."""
+    for name in wanted or ():
+        if name not in (*KNOWN_CAUSES, *UNKNOWN_CAUSES):
+            raise ValueError(
+                f"no effect {name!r} can be hidden; there are {', '.join(KNOWN_CAUSES + UNKNOWN_CAUSES)}"
+            )
+    return tuple(name for name in KNOWN_CAUSES if not wanted or name in wanted)
+
+
+def unknown_names(wanted: Sequence[str] | None) -> tuple[str, ...]:
+    """Causes outside the catalogue, all or those that were asked for."""
+    return tuple(name for name in UNKNOWN_CAUSES if not wanted or name in wanted)
+
+
+def _channels(form: Form, number: int, label: tuple[object, ...]) -> tuple[str, ...] | None:
+    """One sensor in every second glove, where the form can sit on one; else where it sits by itself."""
+    if form.shared or form.touches not in ("all", "one_or_all"):
+        return None
+    one = dealt(FIVE_SENSORS, number, *label, "channel")
+    return dealt((None, (one,)), number, *label, "channels")
+
+
+def _glove(
+    part: str,
+    truth: str,
+    size: float,
+    number: int,
+    label: tuple[object, ...],
+    causes: tuple[Cause, ...],
+    bystander: Bystander,
+    *,
+    linear: bool = False,
+    palm: bool = False,
+    set_aside: bool = False,
+) -> BlindGlove:
+    return BlindGlove(
+        part=part,
+        truth=truth,
+        number=number,
+        size=size,
+        seed=zlib.crc32(repr((*label, truth, number)).encode()),
+        causes=causes,
+        bits=dealt(BITS, number, *label, "bits"),
+        nuisance=dealt(NUISANCES, number, *label, "nuisance"),
+        linear=linear,
+        bystander=bystander,
+        palm=palm,
+        set_aside=set_aside,
+    )

@@ -1,0 +1,100 @@
+"""Gloves worked off by two processes, one glove one job, with progress and the time that is left."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from multiprocessing import connection, get_context, parent_process
+from typing import Any
+
+from blind_glove import BlindGlove
+from finished_gloves import FinishedGloves
+
+from glovecal_models.threads import pin_blas_to_one_thread
+
+WORKERS = 2
+Job = Callable[[BlindGlove], dict[str, Any]]
+Row = tuple[BlindGlove, dict[str, Any]]
+
+
+def answers(
+    gloves: Sequence[BlindGlove], job: Job, finished: FinishedGloves, label: str, workers: int = WORKERS
+) -> list[Row]:
+    """The job's answer for every glove, in order. A job that fails is reported and left out."""
+    waiting = [glove for glove in gloves if finished.get(glove.key) is None]
+    progress = _Progress(label, len(gloves), len(gloves) - len(waiting))
+    if waiting:
+        with ProcessPoolExecutor(workers, get_context("spawn"), _start_worker) as pool:
+            running: dict[Future[dict[str, Any]], BlindGlove] = {}
+            while waiting or running:
+                while waiting and len(running) <= workers:  # few, so that Ctrl-C has little to wait for
+                    glove = waiting.pop(0)
+                    running[pool.submit(job, glove)] = glove
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    glove = running.pop(future)
+                    _keep(future, glove, finished)
+                    progress.step(f"{glove.truth} {glove.number}")
+    progress.end()
+    return [(glove, answer) for glove in gloves if (answer := finished.get(glove.key)) is not None]
+
+
+def _start_worker() -> None:
+    """One BLAS thread; no word at Ctrl-C, which the parent answers; no life without the parent."""
+    pin_blas_to_one_thread()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+
+
+def _end_with(sentinel: int) -> None:
+    connection.wait([sentinel])
+    os._exit(1)
+
+
+def _keep(future: Future[dict[str, Any]], glove: BlindGlove, finished: FinishedGloves) -> None:
+    problem = future.exception()
+    if problem is None:
+        finished.keep(glove.key, future.result())
+    else:
+        print(
+            f"\n{glove.part}: glove {glove.truth} {glove.number} (seed {glove.seed}) failed: "
+            f"{type(problem).__name__}: {problem}",
+            file=sys.stderr,
+        )
+
+
+class _Progress:
+    """One line on a terminal; now and then a line in a log."""
+
+    def __init__(self, label: str, total: int, done: int) -> None:
+        self._label, self._total, self._done, self._before = label, total, done, done
+        self._start = self._shown = time.monotonic()
+
+    def step(self, what: str) -> None:
+        self._done += 1
+        now = time.monotonic()
+        every_s = 0.5 if sys.stderr.isatty() else 20.0
+        if now - self._shown < every_s:
+            return
+        self._shown = now
+        left_s = (now - self._start) / (self._done - self._before) * (self._total - self._done)
+        text = f"{self._label}: {self._done} of {self._total} gloves, about {_time(left_s)} left ({what})"
+        print(f"\r{text:<90}" if sys.stderr.isatty() else text, end="" if sys.stderr.isatty() else "\n",
+              file=sys.stderr, flush=True)  # fmt: skip
+
+    def end(self) -> None:
+        took = _time(time.monotonic() - self._start)
+        text = (
+            f"{self._label}: {self._done} of {self._total} gloves, {self._before} known before, took {took}"
+        )
+        print(f"\r{text:<90}" if sys.stderr.isatty() else text, file=sys.stderr, flush=True)
+
+
+def _time(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"

@@ -1,0 +1,30 @@
+"""95 % intervals: Wilson's for counts, bootstrap for means."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+QUANTILE = 1.959964
+RESAMPLES = 2000
+
+
+def wilson(count: int, total: int) -> tuple[float, float]:
+    """Between which shares the true one lies (Wilson 1927); 0 to 1 when nothing was counted."""
+    if total == 0:
+        return 0.0, 1.0
+    share, spread = count / total, QUANTILE**2 / total
+    middle = (share + spread / 2) / (1 + spread)
+    half = QUANTILE * np.sqrt(share * (1 - share) / total + spread / (4 * total)) / (1 + spread)
+    return max(float(middle - half), 0.0), min(float(middle + half), 1.0)
+
+
+def bootstrap(values: Sequence[float], seed: int = 0) -> tuple[float, float]:
+    """Between which means the true one lies, by drawing ``values`` again; NaN without values."""
+    if not len(values):
+        return float("nan"), float("nan")
+    random = np.random.default_rng(seed)
+    drawn = random.choice(np.asarray(values, float), (RESAMPLES, len(values)))
+    low, high = np.quantile(drawn.mean(axis=1), [0.025, 0.975])
+    return float(low), float(high)

@@ -1,0 +1,100 @@
+"""The figures of names, sizes, clean gloves and causes outside the catalogue."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from diagnosis_answer import NOTHING
+from glove_jobs import Row
+from study_figure import StudyFigure
+
+JUDGED_SIZE = 1.3
+"""Floors at which the first name has to be right."""
+SMALL_SIZE = 0.65
+"""Floors at which the truth has to be in the confidence set."""
+
+
+def right_first(row: Row) -> bool:
+    glove, answer = row
+    return answer["first"] in answer["right"] and (
+        answer["first"] == glove.truth or "context:" in answer["first"]
+    )
+
+
+def names_figures(rows: Sequence[Row]) -> list[StudyFigure]:
+    """The right effect first, open and set-aside forms apart."""
+    found = []
+    for forms, mine in _by_forms(rows):
+        for size in sorted({glove.size for glove, _ in mine}):
+            some = [row for row in mine if row[0].size == size]
+            judged = size == JUDGED_SIZE
+            label = f"right effect first at {size:g} x floor{forms}"
+            limit = {"at_least": 0.95} if judged else {}
+            found.append(StudyFigure.share(f"{label}, all", [right_first(row) for row in some], **limit))
+            limit = {"at_least": 0.85} if judged else {}
+            for effect in dict.fromkeys(glove.truth for glove, _ in some):
+                hits = [right_first(row) for row in some if row[0].truth == effect]
+                found.append(StudyFigure.share(f"{label}, {effect}", hits, **limit))
+    return found
+
+
+def sizes_figures(rows: Sequence[Row]) -> list[StudyFigure]:
+    """First names at other sizes, and confidence sets of weak effects."""
+    found = []
+    for forms, mine in _by_forms(rows):
+        small = [row for row in mine if row[0].size == SMALL_SIZE]
+        inside = [glove.truth in answer["confidence_set"] for glove, answer in small]
+        sizes = [len(answer["confidence_set"]) for _, answer in small if answer["confidence_set"]]
+        label = f"at {SMALL_SIZE:g} x floor{forms}"
+        found.append(StudyFigure.share(f"truth inside the confidence set {label}", inside, at_least=0.9))
+        found.append(StudyFigure.mean(f"members of a confidence set {label}", sizes, at_most=2.0))
+        for effect in dict.fromkeys(glove.truth for glove, _ in small):
+            hits = [
+                glove.truth in answer["confidence_set"] for glove, answer in small if glove.truth == effect
+            ]
+            found.append(StudyFigure.share(f"truth inside the set {label}, {effect}", hits))
+    return [*found, *names_figures(rows)]
+
+
+def clean_figures(rows: Sequence[Row]) -> list[StudyFigure]:
+    """Effects named on healthy gloves, in all and by base and nuisance."""
+    found = [StudyFigure.share("an effect named on a clean glove", _false(rows), at_most=0.02)]
+    for linear in (False, True):
+        some = [row for row in rows if row[0].linear is linear]
+        label = "linear base (its own curve may be named)" if linear else "flexible base"
+        found.append(
+            StudyFigure.share(f"an effect named on a clean glove, {label}", _false(some), at_most=0.02)
+        )
+    straight = [row for row in rows if row[0].linear]
+    others = [bool(set(answer["ranked"]) - set(answer["right"])) for _, answer in straight]
+    found.append(StudyFigure.share("linear base: another effect beyond chance beside the curve", others))
+    for nuisance in ("white", "drift", "posture"):
+        some = [row for row in rows if row[0].nuisance == nuisance]
+        found.append(
+            StudyFigure.share(f"an effect named on a clean glove, {nuisance} nuisance", _false(some))
+        )
+    return found
+
+
+def unknown_figures(rows: Sequence[Row]) -> list[StudyFigure]:
+    """Catalogue names given to causes that are not in it; the alarm's part comes from ``repair``."""
+    found = [StudyFigure.share("outside the catalogue: a name of the catalogue", _false(rows))]
+    for cause in dict.fromkeys(glove.truth for glove, _ in rows):
+        some = [row for row in rows if row[0].truth == cause]
+        found.append(
+            StudyFigure.share(f"outside the catalogue: a name of the catalogue, {cause}", _false(some))
+        )
+    recorded = [right_first(row) for row in rows if row[0].truth == "unknown:context"]
+    found.append(StudyFigure.share("recorded but unfamiliar: its column is named first", recorded))
+    return found
+
+
+def _false(rows: Sequence[Row]) -> list[bool]:
+    return [answer["first"] != NOTHING and answer["first"] not in answer["right"] for _, answer in rows]
+
+
+def _by_forms(rows: Sequence[Row]) -> list[tuple[str, list[Row]]]:
+    """Open and set-aside forms are never counted together."""
+    parts = ((", set-aside forms", True), ("", False))
+    found = [(label, [row for row in rows if row[0].set_aside is aside]) for label, aside in parts]
+    return [(label, mine) for label, mine in found if mine]

@@ -1,0 +1,36 @@
+"""Whether the take that the diagnosis asks for settles what it could not tell apart."""
+
+from __future__ import annotations
+
+from typing import Any, cast, get_args
+
+from blind_glove import BlindGlove
+
+from glovecal_models.diagnosis.diagnose import Diagnosis, diagnose
+from glovecal_models.diagnosis.next_take import NextTake
+from glovecal_models.simulation.session_plan import TakeMotion
+from glovecal_models.takes.take import Take
+
+MOST_TAKES = 2
+NEW_WEARING_S = 40.0
+
+
+def next_take_answer(glove: BlindGlove) -> dict[str, Any]:
+    """Confidence sets before and after each recorded take, and the motions that were asked for."""
+    takes = list(glove.takes)
+    found = diagnose(takes, glove.layout, linear=glove.linear)
+    sets, motions = [list(found.naming.confidence_set)], []
+    while len(motions) < MOST_TAKES and len(sets[-1]) > 1 and found.next_take is not None:
+        motions.append(found.next_take.motion)
+        takes.append(_recorded(glove, found.next_take, len(motions) - 1))
+        found: Diagnosis = diagnose(takes, glove.layout, linear=glove.linear)
+        sets.append(list(found.naming.confidence_set))
+    return {"confidence_sets": sets, "motions": motions, **glove.told()}
+
+
+def _recorded(glove: BlindGlove, asked: NextTake, repeat: int) -> Take:
+    """The wearer does as told, in the last wearing; whatever is no motion is a new wearing in free motion."""
+    if asked.motion in get_args(TakeMotion):
+        motion = cast(TakeMotion, asked.motion)
+        return glove.session.also(motion, float(asked.seconds), glove.wearings - 1, repeat=repeat).take
+    return glove.session.also("natural", NEW_WEARING_S, glove.wearings + repeat).take

@@ -1,0 +1,42 @@
+"""What ``improve`` does with one glove by itself: effects added, verdicts, errors and the alarm."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from blind_glove import BlindGlove
+from diagnosis_answer import diagnosis_answer
+from repair_answer import training_settings
+
+from glovecal_models.improvement.held_out_check import held_out_errors
+from glovecal_models.improvement.improve import improve
+from glovecal_models.improvement.prepared_takes import PreparedTakes
+
+
+def walk_answer(glove: BlindGlove) -> dict[str, Any]:
+    """The diagnosis of the untouched takes, and the whole walk."""
+    return diagnosis_answer(glove) | {"walk": walk(glove)}
+
+
+def pair_answer(glove: BlindGlove) -> dict[str, Any]:
+    """The same, and the clean twin's error beside the walk's last one, over all joints."""
+    settings = training_settings(glove)
+    prepared = PreparedTakes.of(glove.clean_takes, glove.layout)
+    twin = held_out_errors(prepared, glove.layout.rotations, (), settings)
+    return walk_answer(glove) | {"twin_deg": round(twin.over_all_deg, 4)}
+
+
+def walk(glove: BlindGlove) -> dict[str, Any]:
+    """The contract's document, shortened to what is marked."""
+    document = improve(glove.takes, glove.layout, "study", training_settings(glove)).to_document()
+    added = [step["added"] for step in document["steps"] if step["added"]]
+    return {
+        "added": [item["effect"] for item in added],
+        "verdicts": [item["verdict"] for item in added],
+        "confidence_sets": [list(item["confidence_set"]) for item in added],
+        "rmse_deg": [round(step["rmse_deg"], 4) for step in document["steps"]],
+        "undone": [item["effect"] for item in document["undone"]],
+        "stopped": document["stopped"],
+        "something_left": bool(document["something_left"]),
+        "sentences": document["sentences"],
+    }
