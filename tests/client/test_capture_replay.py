@@ -155,3 +155,12 @@ def test_bad_log_header_is_refused(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:12])
     with pytest.raises(BadOption, match="not a frame log"):
         ReplayDevice(path)
+
+
+def test_a_table_of_simulated_takes_is_replayed_as_simulated(tmp_path):
+    marked = "time_s,s.A,c.supply_v,c.simulated\n0.00,1,5,{mark}\n0.01,2,5,{mark}\n"
+    simulated = ReplayDevice(table(tmp_path, marked.format(mark="1.0")))
+    assert simulated.simulated
+    assert simulated.context == ("supply_v",)
+    assert not ReplayDevice(table(tmp_path, marked.format(mark="0.0"))).simulated
+    assert not ReplayDevice(table(tmp_path)).simulated

@@ -16,6 +16,10 @@ from glovecal_client.errors import BadName, BadOption, DamagedLog, WireError
 from glovecal_client.log_records import MAGIC, Recording
 from glovecal_client.names import check_channel_name
 
+SIMULATED_COLUMN = "c.simulated"
+"""Marks the takes of a table that were never measured."""
+_NOT_SIMULATED = ("", "0", "0.0")
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReplayedFrame:
@@ -79,20 +83,26 @@ def _names(meta: dict[str, Any], key: str, path: Path) -> tuple[str, ...]:
 
 
 class _TableRecording:
+    """A take table; ``c.simulated`` other than 0 in its first row marks it, and is no context."""
+
     hand = "unknown"
-    simulated = False
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self.layout = path.stem
         with path.open(encoding="utf-8-sig", newline="") as file:
-            header = next(csv.reader(file), [])
+            rows = csv.reader(file)
+            header, first = next(rows, []), next(rows, [])
         if "time_s" not in header:
             raise BadOption(f"replay of {path}: line 1 has no column time_s")
         self._time = header.index("time_s")
         self._take = header.index("take") if "take" in header else None
         self._sensor_columns = [i for i, name in enumerate(header) if name.startswith("s.")]
-        self._context_columns = [i for i, name in enumerate(header) if name.startswith("c.")]
+        self._context_columns = [
+            i for i, name in enumerate(header) if name.startswith("c.") and name != SIMULATED_COLUMN
+        ]
+        marks = dict(zip(header, first, strict=False))
+        self.simulated = marks.get(SIMULATED_COLUMN, "").strip() not in _NOT_SIMULATED
         self.sensors = tuple(check_channel_name(header[i][2:], "sensor") for i in self._sensor_columns)
         self.context = tuple(check_channel_name(header[i][2:], "context") for i in self._context_columns)
         if not self.sensors:

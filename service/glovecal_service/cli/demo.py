@@ -1,17 +1,29 @@
-"""``glovecal demo``: the whole spine on a bare machine, no question asked."""
+"""``glovecal demo``: the whole spine and the whole loop on a bare machine, no question asked."""
 
 from __future__ import annotations
 
 import json
+import secrets
 import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from glovecal_models.errors import BadInput
 from glovecal_service.cli.printing import err, out, show
+
+if TYPE_CHECKING:
+    from glovecal_client.rest import RestClient
+    from glovecal_service.demo.hidden_session import HiddenSession
+    from glovecal_service.demo.processes import DemoPlace
+    from glovecal_service.demo.second_act import Findings
+
+FIRST_ACT_SEED = 1
+SEEDS = 10_000
+"""Drawn below this: short enough to be typed again."""
 
 
 def demo(
@@ -19,9 +31,41 @@ def demo(
         bool, typer.Option("--json", help="Print the figures as one line of JSON, last.")
     ] = False,
     keep: Annotated[bool, typer.Option("--keep", help="Leave the service and a live glove running.")] = False,
-    seed: Annotated[int, typer.Option(help="Which simulated hand and glove.")] = 1,
+    seed: Annotated[
+        int | None,
+        typer.Option(min=0, help="Which simulated hands and gloves. Default: a new hidden effect each time."),
+    ] = None,
+    effect: Annotated[
+        str,
+        typer.Option(
+            help="What is hidden in the second glove: random, none, unknown, or a name of glovecal effects."
+        ),
+    ] = "random",
+    write_takes: Annotated[
+        Path | None,
+        typer.Option(
+            file_okay=False,
+            help="Only write the second glove's takes into this folder as CSV files, to walk the loop oneself.",
+        ),
+    ] = None,
 ) -> None:
-    """Calibrate a simulated CyberGlove over real zenoh and show what it brings, in under 90 seconds."""
+    """Calibrate a simulated CyberGlove live, then find the effect hidden in another; under 90 seconds."""
+    from glovecal_service.demo.hidden_session import check_effect, hidden_session
+
+    try:
+        check_effect(effect)
+    except BadInput as error:
+        raise typer.BadParameter(str(error), param_hint="--effect") from error
+    drawn = seed if seed is not None else secrets.randbelow(SEEDS)
+    if write_takes is not None:
+        _write(hidden_session(effect, drawn), write_takes, effect)
+        return
+    _run(FIRST_ACT_SEED if seed is None else seed, effect, drawn, as_json=as_json, keep=keep)
+
+
+def _run(seed: int, effect: str, drawn: int, *, as_json: bool, keep: bool) -> None:
+    from glovecal_service.demo.error_fall import hidden_contract
+    from glovecal_service.demo.hidden_session import hidden_session
     from glovecal_service.demo.keeping import keep_running
     from glovecal_service.demo.processes import demo_place, running_service
     from glovecal_service.demo.table import contract, error_table, sentences
@@ -36,18 +80,58 @@ def demo(
             out.print()
             show(error_table(found))
             out.print()
-            for sentence in sentences(found, time.monotonic() - started):
+            for sentence in sentences(found):
                 out.print(sentence)
+            hidden = hidden_session(effect, drawn)
+            second = _second_act(service, place, hidden)
+            out.print(
+                f"\nAll this was done by glovecal serve, capture and REST in {time.monotonic() - started:.0f} "
+                "s. Gloves and hands are simulated; their truth is known."
+            )
             out.print(NEXT)
             if as_json:
-                sys.stdout.write(json.dumps(contract(found)) + "\n")
+                sys.stdout.write(json.dumps(contract(found) | hidden_contract(hidden, second)) + "\n")
                 sys.stdout.flush()
             if keep:
                 keep_running(place, seed, lambda sentence: err.print(sentence))
 
 
+def _second_act(service: RestClient, place: DemoPlace, hidden: HiddenSession) -> Findings:
+    from glovecal_service.demo.error_fall import chart, verdict
+    from glovecal_service.demo.live_child import live_child, live_sentence
+    from glovecal_service.demo.second_act import SUBJECT, second_act
+
+    def say(sentence: str) -> None:
+        out.print(sentence)
+
+    say(
+        f"\nSecond act: another simulated glove, {len(hidden.session.takes)} takes in "
+        f"{hidden.session.plan.wearings} wearings. Something may be hidden in it (seed {hidden.seed})."
+    )
+    found = second_act(
+        service, hidden, place.folder / "hidden", say, progress=lambda sentence: err.print(sentence)
+    )
+    live = live_child(service, place, hidden.live(), subject=SUBJECT, layout=found.layout, model=found.served)
+    say(live_sentence(live))
+    say("\nError on takes not trained on, all rotations (degrees, RMSE):")
+    for line in (*chart(found), "", *verdict(hidden, found)):
+        say(line)
+    return found
+
+
+def _write(hidden: HiddenSession, folder: Path, effect: str) -> None:
+    training, test = hidden.write(folder)
+    out.print(f"{training}: {len(hidden.training)} simulated takes to learn from")
+    out.print(f"{test}: {len(hidden.test)} simulated takes to test on")
+    out.print(
+        f"Made by glovecal demo --effect {effect} --seed {hidden.seed}; column c.simulated marks every row."
+    )
+
+
 NEXT = """
 Where to look next:
+  docs/tutorial.md          the second act by your own hand, verb by verb
+  glovecal demo --effect hysteresis | none | unknown   another effect, none, or one that has no name
   glovecal demo --keep      leaves it running, with the address of its REST interface
   glovecal serve            your own service; then glovecal capture --device cyberglove --glove right
   glovecal take import      calibrate from recordings you have (CSV, Parquet)

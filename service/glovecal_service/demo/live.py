@@ -28,6 +28,8 @@ class PoseMeter:
         self._calibrated = 0
         self._run_id = 0
         self._skipped = 0
+        self.poses: list[Pose] = []
+        """All that came, each frame's once."""
 
     def hear(self, sample: zenoh.Sample) -> None:
         now = time.monotonic_ns()
@@ -39,6 +41,7 @@ class PoseMeter:
         if self._order.accept(pose) and not pose.stale:
             self._count_skipped(pose)
             self._latency_ns.append(now - pose.monotonic_ns)
+            self.poses.append(pose)
             self._calibrated += not pose.uncalibrated
 
     @property

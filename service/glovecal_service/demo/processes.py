@@ -66,10 +66,16 @@ def running_service(place: DemoPlace) -> Iterator[RestClient]:
 
 @contextmanager
 def running_capture(
-    place: DemoPlace, *, glove: str, subject: str, wearing: str, options: Mapping[str, str]
+    place: DemoPlace,
+    *,
+    glove: str,
+    subject: str,
+    wearing: str,
+    options: Mapping[str, str],
+    device: str = "simulated",
 ) -> Iterator[subprocess.Popen[bytes]]:
-    """``glovecal capture --device simulated`` as a process; stopped at the end of the block."""
-    command = [*_glovecal(), "capture", "--device", "simulated"]
+    """``glovecal capture`` as a process; stopped at the end of the block."""
+    command = [*_glovecal(), "capture", "--device", device]
     command += ["--glove", glove, "--subject", subject, "--wearing", wearing]
     for key, value in options.items():
         command += ["--option", f"{key}={value}"]

@@ -33,7 +33,7 @@ def rmse_deg(found: Walk) -> dict[str, float]:
     return {method: found.comparisons[method]["over_all"]["rmse_deg"] for method in METHODS}
 
 
-def sentences(found: Walk, seconds: float) -> list[str]:
+def sentences(found: Walk) -> list[str]:
     """What the figures say, with a scale for each."""
     rmse, frames = rmse_deg(found), contract(found)["frames"]
     lost = frames["sent"] - frames["received"] - frames["skipped"]
@@ -48,8 +48,6 @@ def sentences(found: Walk, seconds: float) -> list[str]:
         "a frame lasts 8.3 ms at 120 Hz.",
         f"Frames: {frames['sent']} sent, {frames['received']} poses received, "
         f"{frames['skipped']} skipped by the service, {lost} lost.",
-        f"All this was done by glovecal serve, capture and REST in {seconds:.0f} s. The glove and the hand "
-        "in it are simulated; their truth is known.",
     ]
 
 

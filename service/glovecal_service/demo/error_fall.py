@@ -1,0 +1,111 @@
+"""The end of the second act: the error falls (a chart of text), and what was hidden: was it found?"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from glovecal_service.demo.hidden_session import HiddenSession
+from glovecal_service.demo.second_act import Findings
+
+LABELS = {"raw": "raw", "linear": "linear", "lmc_gpr": "LMC-GPR"}
+BAR_WIDTH = 48
+
+
+def errors_deg(found: Findings) -> dict[str, float]:
+    """RMSE over all rotations of the takes not trained on, by method; ``with_effect`` is the child's."""
+    return {name: item["over_all"]["rmse_deg"] for name, item in found.comparisons.items()}
+
+
+def floor_deg(found: Findings) -> float | None:
+    """The noise floor as the service measured it on the same takes; None where it could not."""
+    floor = found.last["over_all"]["floor"]
+    return None if floor is None else floor["floor_deg"]
+
+
+def chart(found: Findings) -> list[str]:
+    """One bar for each calibration and one for the floor."""
+    named = found.diagnosis["named"]
+    labels = LABELS | {"with_effect": f"+ {named['effect']}" if named else ""}
+    rows = [(labels[name], value) for name, value in errors_deg(found).items()]
+    floor = floor_deg(found)
+    if floor is not None:
+        at_least = " >" if found.last["over_all"]["floor"]["is_lower_bound"] else ""
+        rows.append((f"noise floor{at_least}", floor))
+    width, largest = max(len(label) for label, _ in rows), max(value for _, value in rows)
+    return [
+        f"  {label:<{width}} {value:6.2f}  {'█' * max(1, round(BAR_WIDTH * value / largest))}"
+        for label, value in rows
+    ]
+
+
+def verdict(hidden: HiddenSession, found: Findings) -> list[str]:
+    """What was hidden, and whether that is what was said."""
+    truth, named = hidden.truth, _named(found)
+    perfect = max(hidden.session.floor_deg.values())
+    floor = f"A perfect calibration of this glove without it would be off by up to {perfect:.2f} degrees."
+    if truth is None:
+        told = ["Hidden was: nothing. This simulated glove is healthy."]
+        return [*told, "Right: nothing was named." if named is None else f"Wrong: {named} was named."]
+    where = "all sensors" if len(truth.channels) == len(hidden.session.plan.sensors) else ""
+    told = [
+        f"Hidden was: {truth.name}, of the form {truth.form}, on {where or ', '.join(truth.channels)}. "
+        f"{truth.description}",
+        floor,
+    ]
+    if is_right(hidden, found):
+        also = _named_after(found)
+        if truth.name.startswith("unknown:"):
+            return [*told, "Right: no effect of the catalogue was named, and something was said to be left."]
+        if also is not None:
+            return [*told, f"Right: {named} was named. Wrong: {also} was named too, afterwards."]
+        return [*told, f"Right: {named} was named."]
+    if truth.name.startswith("unknown:"):
+        said = f"{named} was named" if named else "nothing was said to be left"
+        return [*told, f"Wrong: {said}, and no effect of the catalogue is this one."]
+    if truth.name in _confidence_set(found):
+        return [*told, f"Not quite: {named} was named first; {truth.name} is in the confidence set."]
+    return [*told, f"Wrong: {'nothing' if named is None else named} was named."]
+
+
+def is_right(hidden: HiddenSession, found: Findings) -> bool:
+    """Named was what is hidden; without a name of its own, that nothing was and that something is left."""
+    truth, named = hidden.truth, _named(found)
+    if truth is None:
+        return named is None
+    if not truth.name.startswith("unknown:"):
+        return named == truth.name
+    if truth.column is not None:
+        return named == f"context:{truth.column}"
+    return named is None and bool(found.diagnosis["something_left"]["is_left"])
+
+
+def hidden_contract(hidden: HiddenSession, found: Findings) -> dict[str, Any]:
+    """What the second act adds to the JSON of ``glovecal demo --json``."""
+    truth, floor = hidden.truth, floor_deg(found)
+    return {
+        "hidden": {
+            "truth": truth.name if truth else "none",
+            "form": truth.form if truth else None,
+            "seed": hidden.seed,
+            "named": _named(found),
+            "confidence_set": _confidence_set(found),
+            "right": is_right(hidden, found),
+        },
+        "error_fall_deg": {name: round(value, 4) for name, value in errors_deg(found).items()},
+        "noise_floor_deg": None if floor is None else round(floor, 4),
+    }
+
+
+def _named(found: Findings) -> str | None:
+    named = found.diagnosis["named"]
+    return named["effect"] if named else None
+
+
+def _named_after(found: Findings) -> str | None:
+    named = found.diagnosis_after["named"] if found.diagnosis_after else None
+    return named["effect"] if named else None
+
+
+def _confidence_set(found: Findings) -> list[str]:
+    named = found.diagnosis["named"]
+    return list(named["confidence_set"]) if named else []

@@ -1,0 +1,70 @@
+"""The model of the second act, live: one more take of the hidden glove through capture, zenoh and service."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from glovecal_client.rest import RestClient
+from glovecal_client.wire.pose import Pose, PoseFlag
+from glovecal_models.simulation.session import RecordedTake
+from glovecal_models.takes.table import write_takes
+from glovecal_service.demo.live import metered_poses
+from glovecal_service.demo.processes import DemoPlace, running_capture
+from glovecal_service.demo.walk import CAPTURE_PATIENCE_S, SITE
+
+GLOVE = "demo-hidden"
+
+
+@dataclass(frozen=True)
+class LiveFigures:
+    """What came, and how far it was from what the hand really did."""
+
+    sent: int
+    poses: int
+    """From the model in question."""
+    settled: int
+    """Of these, with all effects knowing enough of the past."""
+    rmse_deg: float
+    """Over settled poses; NaN without any."""
+
+
+def live_child(
+    service: RestClient, place: DemoPlace, recorded: RecordedTake, *, subject: str, layout: str, model: str
+) -> LiveFigures:
+    """Stream ``recorded`` at its own pace while ``model`` is active."""
+    take = recorded.take
+    table = place.folder / "live.csv"
+    write_takes([take], table)
+    with metered_poses(place.zenoh, SITE, GLOVE) as meter:
+        with running_capture(
+            place,
+            device=f"replay:{table}",
+            glove=GLOVE,
+            subject=subject,
+            wearing=take.wearing,
+            options={"layout": layout},
+        ) as capture:
+            capture.wait(CAPTURE_PATIENCE_S)
+        made = [pose for pose in meter.poses if pose.model_sha256 == model]
+    rotations = [item["rotation"] for item in service.get(f"/models/{model}")["rotations"]]
+    return _figures(made, [take.rotations.index(name) for name in rotations], recorded.truth)
+
+
+def _figures(made: list[Pose], columns: list[int], truth: np.ndarray) -> LiveFigures:
+    """A pose belongs to the frame of its sequence number, whenever it was sent."""
+    settled = [pose for pose in made if not pose.flags & PoseFlag.SETTLING and pose.sequence < len(truth)]
+    errors = [pose.degrees - truth[pose.sequence, columns] for pose in settled]
+    rmse = float(np.sqrt(np.nanmean(np.square(errors)))) if errors else float("nan")
+    return LiveFigures(len(truth), len(made), len(settled), rmse)
+
+
+def live_sentence(live: LiveFigures) -> str:
+    """One sentence for people."""
+    if not live.settled:
+        return f"Live: of {live.sent} frames streamed {live.poses} became poses, none of them settled."
+    return (
+        f"Live: {live.sent} frames of one more take streamed, {live.poses} poses came from this model; the "
+        f"{live.settled} settled ones are {live.rmse_deg:.2f} degrees from what the hand really did."
+    )

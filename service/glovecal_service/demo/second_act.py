@@ -1,0 +1,142 @@
+"""The second act: the loop on a glove with a hidden effect, by the REST calls that a user's verbs make.
+
+take import -> train -> compare -> where -> diagnose -> add-effect -> compare -> diagnose
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from glovecal_client.rest import RestClient
+from glovecal_service.demo.hidden_session import HiddenSession
+
+SUBJECT = "demo-hidden"
+BASES = ("raw", "linear", "lmc_gpr")
+DIAGNOSED = "lmc_gpr"
+TRAINING = {"samples": 1000, "folds": 0}
+Say = Callable[[str], None]
+
+
+@dataclass
+class Findings:
+    """What the service answered."""
+
+    layout: str = ""
+    models: dict[str, str] = field(default_factory=dict)
+    comparisons: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """By method; that of the child is ``with_effect``."""
+    where: str = ""
+    diagnosis: dict[str, Any] = field(default_factory=dict)
+    addition: dict[str, Any] | None = None
+    """None when nothing was named."""
+    diagnosis_after: dict[str, Any] | None = None
+
+    @property
+    def child(self) -> str | None:
+        """The model with the effect, if one was named and stayed."""
+        return self.addition["model"] if self.addition else None
+
+    @property
+    def served(self) -> str:
+        """The model that is active in the end."""
+        return self.child or self.models[DIAGNOSED]
+
+    @property
+    def last(self) -> dict[str, Any]:
+        """The comparison of the model that is active in the end."""
+        return self.comparisons.get("with_effect", self.comparisons[DIAGNOSED])
+
+
+def second_act(service: RestClient, hidden: HiddenSession, folder: Path, say: Say, progress: Say) -> Findings:
+    """Walk the loop once. ``say`` gets what a user should read, ``progress`` what goes on meanwhile."""
+    found = Findings()
+    service.post("/subjects", {"name": SUBJECT, "title": "Simulated subject with a hidden effect"})
+    training, test = hidden.write(folder)
+    learned = service.upload_takes(training, subject=SUBJECT)
+    found.layout = learned["layout"]
+    held_out = service.upload_takes(test, subject=SUBJECT, layout=found.layout)
+    takes, tests = ([take["id"] for take in answer["takes"]] for answer in (learned, held_out))
+    progress(f"  {len(takes)} takes to learn from and {len(tests)} to test on are imported")
+    for method in BASES:
+        found.models[method] = _train(service, found.layout, method, takes)
+        found.comparisons[method] = service.post(f"/models/{found.models[method]}/compare", {"takes": tests})
+    model = found.models[DIAGNOSED]
+    _say_errors(found.comparisons[DIAGNOSED], say)
+    found.where = service.post(f"/models/{model}/where", {"takes": tests})["rotations"][0]["sentence"]
+    say(f"Where: {found.where}")
+    found.diagnosis = _finished(service, service.post(f"/models/{model}/diagnose", {}), progress)
+    _say_diagnosis(found.diagnosis, say)
+    named = found.diagnosis["named"]
+    if named is None:
+        return found
+    _add(service, found, named, say, progress)
+    if found.child is not None:
+        body = {"takes": tests}
+        found.comparisons["with_effect"] = service.post(f"/models/{found.child}/compare", body)
+        job = service.post(f"/models/{found.child}/diagnose", {})
+        found.diagnosis_after = _finished(service, job, progress)
+        say(f"Diagnosed again: {_after(found.diagnosis_after)}")
+    return found
+
+
+def _train(service: RestClient, layout: str, method: str, takes: list[str]) -> str:
+    body = {"subject": SUBJECT, "layout": layout, "method": method, "takes": takes}
+    job = service.post("/models/train", body | TRAINING | {"activate": method == DIAGNOSED})
+    return service.wait_for_job(job["id"])["result"]["model"]
+
+
+def _add(service: RestClient, found: Findings, named: dict[str, Any], say: Say, progress: Say) -> None:
+    """As ``glovecal diagnose`` proposes it; the effect stays only if the error on takes left out falls."""
+    corrected = {item["effect"] for item in found.diagnosis["candidates"]} - {"clock_offset"}
+    body = {"effect": named["effect"], "activate": True}
+    if named["where"] and named["effect"] in corrected:
+        body["rotations"] = named["where"]
+    job = service.post(f"/models/{found.models[DIAGNOSED]}/effects", body)
+    found.addition = _finished(service, job, progress)
+    say(f"Added: {found.addition['sentence']}")
+
+
+def _finished(service: RestClient, job: dict[str, Any], progress: Say) -> dict[str, Any]:
+    """The job's result; each new sentence of it on the way."""
+    told: set[str] = set()
+
+    def show(document: dict[str, Any]) -> None:
+        sentence = document["sentence"]
+        if sentence and sentence not in told:
+            told.add(sentence)
+            progress(f"  {round(100 * document['fraction']):>3} %  {sentence}")
+
+    return service.wait_for_job(job["id"], progress=show)["result"]
+
+
+def _say_errors(comparison: dict[str, Any], say: Say) -> None:
+    say("LMC-GPR on takes it has not seen, error beside the noise floor (degrees):")
+    for name, errors in comparison["rotations"].items():
+        floor = errors["floor"]
+        known = "unknown" if floor is None else f"{floor['floor_deg']:.2f}"
+        say(f"  {name:<8} {errors['rmse_deg']:5.2f}   floor {known}")
+
+
+def _say_diagnosis(found: dict[str, Any], say: Say) -> None:
+    for sentence in (*found["reference_problems"], *(item["sentence"] for item in found["findings"])):
+        say(f"Found in the recording: {sentence}")
+    named = found["named"]
+    if named is None:
+        say("Diagnosis: nothing can be named; no known effect saves more than its decoy and chance do.")
+        say(found["something_left"]["sentence"])
+        return
+    say(f"Diagnosis: {named['sentence']}")
+    say(f"Confidence set: {', '.join(named['confidence_set'])}.")
+    following = found["next_take"]
+    if following:
+        rivals = " and ".join(following["separates"])
+        say(f"To tell {rivals} apart one would record {following['seconds']} s: {following['what']}")
+
+
+def _after(found: dict[str, Any]) -> str:
+    if found["named"] is None:
+        return f"nothing more can be named. {found['something_left']['sentence']}"
+    return found["named"]["sentence"]
