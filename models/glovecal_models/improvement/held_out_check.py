@@ -70,7 +70,9 @@ def held_out_errors(
     )
     for at, held in enumerate(folds):
         if report:
-            report(f"leaving out part {at + 1} of {len(folds)}", at / len(folds))
+            so_far = HeldOutErrors(square, count).over_all_deg
+            known = f", so far {so_far:.2f} degrees" if any(count.values()) else ""
+            report(f"leaving out part {at + 1} of {len(folds)}{known}", at / len(folds))
         kept = parts.some(np.flatnonzero(~held).tolist())
         left = parts.some(np.flatnonzero(held).tolist())
         try:

@@ -7,6 +7,7 @@ import secrets
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -45,7 +46,7 @@ def demo(
         Path | None,
         typer.Option(
             file_okay=False,
-            help="Only write the second glove's takes into this folder as CSV files, to walk the loop oneself.",
+            help="Only write the second glove's takes into this folder, as CSV files for the other verbs.",
         ),
     ] = None,
 ) -> None:
@@ -65,7 +66,6 @@ def demo(
 
 def _run(seed: int, effect: str, drawn: int, *, as_json: bool, keep: bool) -> None:
     from glovecal_service.demo.error_fall import hidden_contract
-    from glovecal_service.demo.hidden_session import hidden_session
     from glovecal_service.demo.keeping import keep_running
     from glovecal_service.demo.processes import demo_place, running_service
     from glovecal_service.demo.table import contract, error_table, sentences
@@ -75,18 +75,21 @@ def _run(seed: int, effect: str, drawn: int, *, as_json: bool, keep: bool) -> No
     with tempfile.TemporaryDirectory(prefix="glovecal-demo-") as folder:
         place = demo_place(Path(folder))
         err.print("Starting glovecal serve ...")
-        with running_service(place) as service:
+        with running_service(place) as service, ThreadPoolExecutor(1) as beside:
+            # the takes of the first act are recorded at their own pace: time for the second glove's training
+            prepared = beside.submit(_prepared, service, place, effect, drawn)
             found = walk(service, place, seed, lambda sentence: err.print(sentence))
             out.print()
             show(error_table(found))
             out.print()
             for sentence in sentences(found):
                 out.print(sentence)
-            hidden = hidden_session(effect, drawn)
-            second = _second_act(service, place, hidden)
+            hidden, second = prepared.result()
+            _second_act(service, place, hidden, second)
+            seconds = time.monotonic() - started
             out.print(
-                f"\nAll this was done by glovecal serve, capture and REST in {time.monotonic() - started:.0f} "
-                "s. Gloves and hands are simulated; their truth is known."
+                f"\nAll this was done by glovecal serve, capture and REST in {seconds:.0f} s. Gloves and "
+                "hands are simulated; their truth is known."
             )
             out.print(NEXT)
             if as_json:
@@ -96,27 +99,34 @@ def _run(seed: int, effect: str, drawn: int, *, as_json: bool, keep: bool) -> No
                 keep_running(place, seed, lambda sentence: err.print(sentence))
 
 
-def _second_act(service: RestClient, place: DemoPlace, hidden: HiddenSession) -> Findings:
+def _prepared(
+    service: RestClient, place: DemoPlace, effect: str, seed: int
+) -> tuple[HiddenSession, Findings]:
+    from glovecal_service.demo.hidden_session import hidden_session
+    from glovecal_service.demo.second_act import prepare
+
+    hidden = hidden_session(effect, seed)
+    return hidden, prepare(service, hidden, place.folder / "hidden")
+
+
+def _second_act(service: RestClient, place: DemoPlace, hidden: HiddenSession, found: Findings) -> None:
     from glovecal_service.demo.error_fall import chart, verdict
     from glovecal_service.demo.live_child import live_child, live_sentence
-    from glovecal_service.demo.second_act import SUBJECT, second_act
+    from glovecal_service.demo.second_act import second_act
 
-    def say(sentence: str) -> None:
-        out.print(sentence)
-
-    say(
-        f"\nSecond act: another simulated glove, {len(hidden.session.takes)} takes in "
-        f"{hidden.session.plan.wearings} wearings. Something may be hidden in it (seed {hidden.seed})."
+    plan = hidden.session.plan
+    out.print(
+        f"\nSecond act: another simulated subject, {plan.takes} takes in {plan.wearings} wearings of a glove "
+        f"with {len(plan.sensors)} sensors.\nSomething may be hidden in it (seed {hidden.seed}; --seed "
+        f"{hidden.seed} shows it again). {plan.takes - len(found.tests)} takes are for training, "
+        f"{len(found.tests)} for testing."
     )
-    found = second_act(
-        service, hidden, place.folder / "hidden", say, progress=lambda sentence: err.print(sentence)
-    )
-    live = live_child(service, place, hidden.live(), subject=SUBJECT, layout=found.layout, model=found.served)
-    say(live_sentence(live))
-    say("\nError on takes not trained on, all rotations (degrees, RMSE):")
+    second_act(service, found, out.print, progress=err.print)
+    live = live_child(service, place, hidden.live(), found)
+    out.print(live_sentence(live))
+    out.print("\nError on takes not trained on, all rotations (degrees, RMSE):")
     for line in (*chart(found), "", *verdict(hidden, found)):
-        say(line)
-    return found
+        out.print(line)
 
 
 def _write(hidden: HiddenSession, folder: Path, effect: str) -> None:

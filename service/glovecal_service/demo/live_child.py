@@ -12,6 +12,7 @@ from glovecal_models.simulation.session import RecordedTake
 from glovecal_models.takes.table import write_takes
 from glovecal_service.demo.live import metered_poses
 from glovecal_service.demo.processes import DemoPlace, running_capture
+from glovecal_service.demo.second_act import Findings
 from glovecal_service.demo.walk import CAPTURE_PATIENCE_S, SITE
 
 GLOVE = "demo-hidden"
@@ -30,10 +31,8 @@ class LiveFigures:
     """Over settled poses; NaN without any."""
 
 
-def live_child(
-    service: RestClient, place: DemoPlace, recorded: RecordedTake, *, subject: str, layout: str, model: str
-) -> LiveFigures:
-    """Stream ``recorded`` at its own pace while ``model`` is active."""
+def live_child(service: RestClient, place: DemoPlace, recorded: RecordedTake, found: Findings) -> LiveFigures:
+    """Stream ``recorded`` at its own pace while the walk's last model is active."""
     take = recorded.take
     table = place.folder / "live.csv"
     write_takes([take], table)
@@ -42,13 +41,13 @@ def live_child(
             place,
             device=f"replay:{table}",
             glove=GLOVE,
-            subject=subject,
+            subject=found.subject,
             wearing=take.wearing,
-            options={"layout": layout},
+            options={"layout": found.layout},
         ) as capture:
             capture.wait(CAPTURE_PATIENCE_S)
-        made = [pose for pose in meter.poses if pose.model_sha256 == model]
-    rotations = [item["rotation"] for item in service.get(f"/models/{model}")["rotations"]]
+        made = [pose for pose in meter.poses if pose.model_sha256 == found.served]
+    rotations = [item["rotation"] for item in service.get(f"/models/{found.served}")["rotations"]]
     return _figures(made, [take.rotations.index(name) for name in rotations], recorded.truth)
 
 

@@ -16,7 +16,8 @@ from glovecal_service.demo.hidden_session import HiddenSession
 SUBJECT = "demo-hidden"
 BASES = ("raw", "linear", "lmc_gpr")
 DIAGNOSED = "lmc_gpr"
-TRAINING = {"samples": 1000, "folds": 0}
+TRAINING = {"samples": 600, "folds": 0}
+"""Five joints with one sensor each need no more; the test takes will show the error."""
 Say = Callable[[str], None]
 
 
@@ -24,7 +25,10 @@ Say = Callable[[str], None]
 class Findings:
     """What the service answered."""
 
+    subject: str = SUBJECT
     layout: str = ""
+    tests: list[str] = field(default_factory=list)
+    """Ids of the takes that no model is trained on."""
     models: dict[str, str] = field(default_factory=dict)
     comparisons: dict[str, dict[str, Any]] = field(default_factory=dict)
     """By method; that of the child is ``with_effect``."""
@@ -50,40 +54,47 @@ class Findings:
         return self.comparisons.get("with_effect", self.comparisons[DIAGNOSED])
 
 
-def second_act(service: RestClient, hidden: HiddenSession, folder: Path, say: Say, progress: Say) -> Findings:
-    """Walk the loop once. ``say`` gets what a user should read, ``progress`` what goes on meanwhile."""
-    found = Findings()
-    service.post("/subjects", {"name": SUBJECT, "title": "Simulated subject with a hidden effect"})
+def prepare(service: RestClient, hidden: HiddenSession, folder: Path, *, subject: str = SUBJECT) -> Findings:
+    """Import the takes and train the bases; nobody needs to watch it."""
+    found = Findings(subject)
+    service.post("/subjects", {"name": subject, "title": "Simulated subject with a hidden effect"})
     training, test = hidden.write(folder)
-    learned = service.upload_takes(training, subject=SUBJECT)
+    learned = service.upload_takes(training, subject=subject)
     found.layout = learned["layout"]
-    held_out = service.upload_takes(test, subject=SUBJECT, layout=found.layout)
-    takes, tests = ([take["id"] for take in answer["takes"]] for answer in (learned, held_out))
-    progress(f"  {len(takes)} takes to learn from and {len(tests)} to test on are imported")
+    held_out = service.upload_takes(test, subject=subject, layout=found.layout)
+    takes, found.tests = ([take["id"] for take in answer["takes"]] for answer in (learned, held_out))
     for method in BASES:
-        found.models[method] = _train(service, found.layout, method, takes)
-        found.comparisons[method] = service.post(f"/models/{found.models[method]}/compare", {"takes": tests})
+        found.models[method] = _train(service, found, method, takes)
+    return found
+
+
+def second_act(service: RestClient, found: Findings, say: Say, progress: Say) -> None:
+    """Walk the loop once and complete ``found``.
+
+    ``say`` gets what a user should read, ``progress`` what goes on meanwhile.
+    """
+    tests = {"takes": found.tests}
+    for method in BASES:
+        found.comparisons[method] = service.post(f"/models/{found.models[method]}/compare", tests)
     model = found.models[DIAGNOSED]
     _say_errors(found.comparisons[DIAGNOSED], say)
-    found.where = service.post(f"/models/{model}/where", {"takes": tests})["rotations"][0]["sentence"]
+    found.where = service.post(f"/models/{model}/where", tests)["rotations"][0]["sentence"]
     say(f"Where: {found.where}")
     found.diagnosis = _finished(service, service.post(f"/models/{model}/diagnose", {}), progress)
     _say_diagnosis(found.diagnosis, say)
     named = found.diagnosis["named"]
     if named is None:
-        return found
+        return
     _add(service, found, named, say, progress)
     if found.child is not None:
-        body = {"takes": tests}
-        found.comparisons["with_effect"] = service.post(f"/models/{found.child}/compare", body)
+        found.comparisons["with_effect"] = service.post(f"/models/{found.child}/compare", tests)
         job = service.post(f"/models/{found.child}/diagnose", {})
         found.diagnosis_after = _finished(service, job, progress)
         say(f"Diagnosed again: {_after(found.diagnosis_after)}")
-    return found
 
 
-def _train(service: RestClient, layout: str, method: str, takes: list[str]) -> str:
-    body = {"subject": SUBJECT, "layout": layout, "method": method, "takes": takes}
+def _train(service: RestClient, found: Findings, method: str, takes: list[str]) -> str:
+    body = {"subject": found.subject, "layout": found.layout, "method": method, "takes": takes}
     job = service.post("/models/train", body | TRAINING | {"activate": method == DIAGNOSED})
     return service.wait_for_job(job["id"])["result"]["model"]
 
@@ -105,7 +116,7 @@ def _finished(service: RestClient, job: dict[str, Any], progress: Say) -> dict[s
 
     def show(document: dict[str, Any]) -> None:
         sentence = document["sentence"]
-        if sentence and sentence not in told:
+        if 0 < document["fraction"] < 1 and sentence not in told:
             told.add(sentence)
             progress(f"  {round(100 * document['fraction']):>3} %  {sentence}")
 

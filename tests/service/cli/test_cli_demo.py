@@ -90,7 +90,7 @@ def check_nothing_is_left(process: subprocess.Popen[str], folder: Path, ports: s
 @linux
 @pytest.mark.timeout(300)
 def test_the_demo_keeps_its_promises(tmp_path):
-    process = start(tmp_path, "--json", "--seed", "2")
+    process = start(tmp_path, "--json", "--seed", "2", "--effect", "hysteresis")
     try:
         ports = ports_while_streaming(process)
         said, complaints = process.communicate(timeout=280)
@@ -99,7 +99,8 @@ def test_the_demo_keeps_its_promises(tmp_path):
     assert process.returncode == 0, complaints
     assert "Traceback" not in complaints
     figures = json.loads(said.splitlines()[-1])
-    assert set(figures) == {"rmse_deg", "latency_ms", "frames"}
+    second_act = {"hidden", "error_fall_deg", "noise_floor_deg"}
+    assert set(figures) == {"rmse_deg", "latency_ms", "frames"} | second_act
     error = figures["rmse_deg"]
     assert set(error) == {"raw", "linear", "lmc_gpr", "spgp"}
     assert error["raw"] > error["linear"]
@@ -112,6 +113,15 @@ def test_the_demo_keeps_its_promises(tmp_path):
     assert frames["sent"] == frames["received"] + frames["skipped"] > 1000, said + complaints
     assert len(ports) >= 2
     assert "simulated" in said
+    hidden, fall = figures["hidden"], figures["error_fall_deg"]
+    assert (hidden["truth"], hidden["named"], hidden["right"], hidden["seed"]) == (
+        "hysteresis",
+        "hysteresis",
+        True,
+        2,
+    )
+    assert fall["with_effect"] < 0.6 * fall["lmc_gpr"]
+    assert re.search(r"(\d+) settled ones are [01]\.\d+ degrees", said), said
     check_nothing_is_left(process, tmp_path, ports)
 
 

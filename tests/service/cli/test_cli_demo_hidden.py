@@ -1,0 +1,116 @@
+"""The demo's second act on a service in this process: hidden, found or honestly not, and told."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from cli_running import glovecal
+
+from glovecal_client.rest import RestClient
+from glovecal_models.errors import BadInput
+from glovecal_models.takes.table import read_takes
+from glovecal_service.demo.error_fall import chart, hidden_contract, verdict
+from glovecal_service.demo.hidden_session import RANDOM_EFFECTS, check_effect, hidden_session
+from glovecal_service.demo.second_act import Findings, prepare, second_act
+from glovecal_service.rest.in_process import in_process_client
+from glovecal_service.settings import Settings
+
+TAKE_S = 10.0
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RestClient]:
+    with in_process_client(Settings(data=tmp_path_factory.mktemp("demo") / "data")) as client:
+        yield client
+
+
+def walked(
+    service: RestClient, folder: Path, effect: str, seed: int
+) -> tuple[Findings, list[str], list[str], dict]:
+    """What was found, said in the walk, said at its end, and the JSON."""
+    hidden = hidden_session(effect, seed, take_s=TAKE_S)
+    said: list[str] = []
+    found = prepare(service, hidden, folder, subject=effect)
+    second_act(service, found, said.append, said.append)
+    return found, said, [*chart(found), *verdict(hidden, found)], hidden_contract(hidden, found)
+
+
+def test_a_hidden_effect_is_compared_placed_named_added_and_revealed(service, tmp_path):
+    found, said, ending, figures = walked(service, tmp_path, "hysteresis", 3)
+    assert figures["hidden"] == {
+        "truth": "hysteresis",
+        "form": figures["hidden"]["form"],
+        "seed": 3,
+        "named": "hysteresis",
+        "confidence_set": ["hysteresis"],
+        "right": True,
+    }
+    fall = figures["error_fall_deg"]
+    assert list(fall) == ["raw", "linear", "lmc_gpr", "with_effect"]
+    assert fall["with_effect"] < 0.6 * fall["lmc_gpr"] < fall["raw"]
+    assert 0 < figures["noise_floor_deg"] < fall["with_effect"]
+    assert found.child is not None
+    text = "\n".join(said)
+    for part in ("noise floor", "Where: ", "Diagnosis: hysteresis on", "its decoy", "Confidence set: hys"):
+        assert part in text
+    assert "so far" in text, "the error on takes left out is told while it is measured"
+    assert "Added: hysteresis" in text
+    assert "Right: hysteresis was named." in ending
+    assert any(line.strip().startswith("+ hysteresis") for line in ending)
+
+
+def test_a_cause_without_a_name_is_said_to_be_left(service, tmp_path):
+    found, said, ending, figures = walked(service, tmp_path, "unknown", 3)
+    assert list(figures["error_fall_deg"]) == ["raw", "linear", "lmc_gpr"]
+    assert found.child is None
+    assert found.served == found.models["lmc_gpr"]
+    assert any("nothing can be named" in sentence for sentence in said)
+    assert figures["hidden"]["truth"].startswith("unknown:")
+    assert figures["hidden"]["right"] is True
+    assert any("Something is left" in sentence for sentence in said)
+    assert any("something was said to be left" in sentence for sentence in ending)
+
+
+def test_a_wrong_name_is_called_wrong():
+    hidden, healthy = (hidden_session(name, 1, take_s=6.0) for name in ("lag", "none"))
+    named = {"effect": "creep", "confidence_set": ["creep", "lag"]}
+    error = {"over_all": {"rmse_deg": 2.0, "floor": None}}
+    found = Findings(comparisons={"lmc_gpr": error}, diagnosis={"named": named})
+    assert verdict(hidden, found)[-1].startswith("Not quite: creep was named first; lag is in")
+    named["confidence_set"] = ["creep"]
+    assert verdict(hidden, found)[-1] == "Wrong: creep was named."
+    assert hidden_contract(hidden, found)["hidden"]["right"] is False
+    assert verdict(healthy, found)[-1] == "Wrong: creep was named."
+    found.diagnosis = {"named": None, "something_left": {"is_left": False}}
+    assert verdict(hidden, found)[-1] == "Wrong: nothing was named."
+    assert verdict(healthy, found)[-1] == "Right: nothing was named."
+    assert hidden_contract(healthy, found)["hidden"]["truth"] == "none"
+    assert hidden_contract(hidden, found)["noise_floor_deg"] is None
+
+
+def test_every_effect_that_may_be_drawn_can_be_hidden():
+    for name in RANDOM_EFFECTS:
+        assert check_effect(name) == name
+    with pytest.raises(BadInput, match="palm"):
+        check_effect("palm_arch")
+
+
+def test_takes_for_the_tutorial_are_written_and_marked(tmp_path):
+    answer = glovecal({}, "demo", "--effect", "creep", "--seed", 4, "--write-takes", tmp_path / "glove")
+    assert answer.code == 0, answer.err
+    assert "--effect creep --seed 4" in answer.out
+    training = read_takes(tmp_path / "glove" / "training.csv")
+    assert len(training) == 9
+    assert all(take.simulated for take in training)
+    assert len(read_takes(tmp_path / "glove" / "test.csv")) == 3
+
+
+def test_an_effect_that_does_not_exist_is_refused_with_those_that_do():
+    answer = glovecal({}, "demo", "--effect", "gremlins")
+    assert answer.code == 2
+    assert "gremlins" in answer.said
+    assert "hysteresis" in answer.said
+    assert "Traceback" not in answer.err
+    assert not answer.out
