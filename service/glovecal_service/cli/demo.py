@@ -110,7 +110,7 @@ def _prepared(
 
 
 def _second_act(service: RestClient, place: DemoPlace, hidden: HiddenSession, found: Findings) -> None:
-    from glovecal_service.demo.error_fall import chart, verdict
+    from glovecal_service.demo.error_fall import chart, fall, verdict
     from glovecal_service.demo.live_child import live_child, live_sentence
     from glovecal_service.demo.second_act import second_act
 
@@ -121,11 +121,13 @@ def _second_act(service: RestClient, place: DemoPlace, hidden: HiddenSession, fo
         f"{hidden.seed} shows it again). {plan.takes - len(found.tests)} takes are for training, "
         f"{len(found.tests)} for testing."
     )
-    second_act(service, found, out.print, progress=err.print)
-    live = live_child(service, place, hidden.live(), found)
-    out.print(live_sentence(live))
+
+    def live() -> None:
+        out.print(live_sentence(live_child(service, place, hidden.live(), found)))
+
+    second_act(service, found, out.print, err.print, live)
     out.print("\nError on takes not trained on, all rotations (degrees, RMSE):")
-    for line in (*chart(found), "", *verdict(hidden, found)):
+    for line in (*chart(found), *fall(found), "", *verdict(hidden, found)):
         out.print(line)
 
 
@@ -133,6 +135,7 @@ def _write(hidden: HiddenSession, folder: Path, effect: str) -> None:
     training, test = hidden.write(folder)
     out.print(f"{training}: {len(hidden.training)} simulated takes to learn from")
     out.print(f"{test}: {len(hidden.test)} simulated takes to test on")
+    out.print(f"{hidden.write_truth(folder)}: what is hidden in them; look at it last")
     out.print(
         f"Made by glovecal demo --effect {effect} --seed {hidden.seed}; column c.simulated marks every row."
     )

@@ -38,6 +38,19 @@ def chart(found: Findings) -> list[str]:
     ]
 
 
+def fall(found: Findings) -> list[str]:
+    """How much of what is above the floor the effect took away; empty where none was added."""
+    errors, floor = errors_deg(found), floor_deg(found)
+    if "with_effect" not in errors or floor is None:
+        return []
+    above, left = (max(errors[name] ** 2 - floor**2, 0.0) ** 0.5 for name in ("lmc_gpr", "with_effect"))
+    times = errors["with_effect"] / floor
+    return [
+        f"Above the floor LMC-GPR was off by {above:.2f} degrees, with the effect by {left:.2f}. The error "
+        f"is now {times:.1f} times the floor."
+    ]
+
+
 def verdict(hidden: HiddenSession, found: Findings) -> list[str]:
     """What was hidden, and whether that is what was said."""
     truth, named = hidden.truth, _named(found)

@@ -5,7 +5,8 @@ The service sees the tables only; what was hidden stays here until the demo reve
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +32,7 @@ pressure that nobody recorded looks like cross coupling, and is named so with th
 STRENGTH_DEG = 3.0
 """Some four noise floors: a pinch that visibly does not close."""
 WEARINGS, TAKES_PER_WEARING, TAKE_S = 3, 4, 20.0
-LIVE_S = 6.0
+LIVE_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,13 @@ class HiddenSession:
         for file, takes in zip(files, (self.training, self.test), strict=True):
             write_takes(takes, file)
         return files
+
+    def write_truth(self, folder: Path) -> Path:
+        """``hidden.json``: what was hidden, for whoever walked the loop alone."""
+        truth = None if self.truth is None else asdict(self.truth)
+        file = folder / "hidden.json"
+        file.write_text(json.dumps({"seed": self.seed, "hidden": truth}, indent=2) + "\n")
+        return file
 
     def _is_test(self, place: int) -> bool:
         return (place + 1) % self.session.plan.takes_per_wearing == 0

@@ -28,7 +28,9 @@ class LiveFigures:
     settled: int
     """Of these, with all effects knowing enough of the past."""
     rmse_deg: float
-    """Over settled poses; NaN without any."""
+    """Over all of these poses; NaN without any."""
+    settled_rmse_deg: float
+    """Over settled ones; NaN without any."""
 
 
 def live_child(service: RestClient, place: DemoPlace, recorded: RecordedTake, found: Findings) -> LiveFigures:
@@ -53,17 +55,24 @@ def live_child(service: RestClient, place: DemoPlace, recorded: RecordedTake, fo
 
 def _figures(made: list[Pose], columns: list[int], truth: np.ndarray) -> LiveFigures:
     """A pose belongs to the frame of its sequence number, whenever it was sent."""
-    settled = [pose for pose in made if not pose.flags & PoseFlag.SETTLING and pose.sequence < len(truth)]
-    errors = [pose.degrees - truth[pose.sequence, columns] for pose in settled]
-    rmse = float(np.sqrt(np.nanmean(np.square(errors)))) if errors else float("nan")
-    return LiveFigures(len(truth), len(made), len(settled), rmse)
+    made = [pose for pose in made if pose.sequence < len(truth)]
+    settled = [pose for pose in made if not pose.flags & PoseFlag.SETTLING]
+
+    def rmse(poses: list[Pose]) -> float:
+        errors = [pose.degrees - truth[pose.sequence, columns] for pose in poses]
+        return float(np.sqrt(np.nanmean(np.square(errors)))) if errors else float("nan")
+
+    return LiveFigures(len(truth), len(made), len(settled), rmse(made), rmse(settled))
 
 
 def live_sentence(live: LiveFigures) -> str:
     """One sentence for people."""
+    start = f"Live: {live.sent} frames of one more take streamed, {live.poses} poses came from this model"
+    if not live.poses:
+        return f"{start}."
+    start += f", {live.rmse_deg:.2f} degrees from what the hand really did"
     if not live.settled:
-        return f"Live: of {live.sent} frames streamed {live.poses} became poses, none of them settled."
-    return (
-        f"Live: {live.sent} frames of one more take streamed, {live.poses} poses came from this model; the "
-        f"{live.settled} settled ones are {live.rmse_deg:.2f} degrees from what the hand really did."
-    )
+        return f"{start}; all are flagged settling, because the effect remembers longer than this take."
+    if live.settled == live.poses:
+        return f"{start}."
+    return f"{start}; {live.settled} of them are past settling, {live.settled_rmse_deg:.2f} degrees from it."

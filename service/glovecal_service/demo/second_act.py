@@ -68,10 +68,17 @@ def prepare(service: RestClient, hidden: HiddenSession, folder: Path, *, subject
     return found
 
 
-def second_act(service: RestClient, found: Findings, say: Say, progress: Say) -> None:
+def second_act(
+    service: RestClient,
+    found: Findings,
+    say: Say,
+    progress: Say,
+    live: Callable[[], None] = lambda: None,
+) -> None:
     """Walk the loop once and complete ``found``.
 
-    ``say`` gets what a user should read, ``progress`` what goes on meanwhile.
+    ``say`` gets what a user should read, ``progress`` what goes on meanwhile; ``live`` streams with the last
+    model, which is active then and being diagnosed: prediction does not wait for that.
     """
     tests = {"takes": found.tests}
     for method in BASES:
@@ -83,14 +90,16 @@ def second_act(service: RestClient, found: Findings, say: Say, progress: Say) ->
     found.diagnosis = _finished(service, service.post(f"/models/{model}/diagnose", {}), progress)
     _say_diagnosis(found.diagnosis, say)
     named = found.diagnosis["named"]
-    if named is None:
+    if named is not None:
+        _add(service, found, named, say, progress)
+    if found.child is None:
+        live()
         return
-    _add(service, found, named, say, progress)
-    if found.child is not None:
-        found.comparisons["with_effect"] = service.post(f"/models/{found.child}/compare", tests)
-        job = service.post(f"/models/{found.child}/diagnose", {})
-        found.diagnosis_after = _finished(service, job, progress)
-        say(f"Diagnosed again: {_after(found.diagnosis_after)}")
+    found.comparisons["with_effect"] = service.post(f"/models/{found.child}/compare", tests)
+    again = service.post(f"/models/{found.child}/diagnose", {})
+    live()
+    found.diagnosis_after = _finished(service, again, progress)
+    say(f"Diagnosed again: {_after(found.diagnosis_after)}")
 
 
 def _train(service: RestClient, found: Findings, method: str, takes: list[str]) -> str:

@@ -15,14 +15,15 @@ from glovecal_service.demo.live import PoseMeter, metered_poses
 from glovecal_service.demo.processes import DemoPlace, running_capture
 
 SUBJECT, GLOVE, SITE, LAYOUT = "demo-subject", "demo-right", "lab", "cyberglove18"
-FREE_MOTION_S = 7.0
+FREE_MOTION_S = 5.0
 SAMPLING = ("key_poses", "cross_couple", "thumb", "wrist", "free")
 BEFORE, MEANWHILE = ("raw", "linear", "lmc_gpr"), "spgp"
 """What is trained before the second wearing, and during it: prediction does not wait for training."""
 METHODS = (*BEFORE, MEANWHILE)
 SERVED = "lmc_gpr"
-QUICK_TRAINING = {"samples": 1000, "folds": 0}
-"""Half the samples of a usual training, and no error estimate: the second wearing will show the error."""
+QUICK_TRAINING = {"samples": 1000, "folds": 0, "iterations": 100}
+"""Half the samples and rounds of a usual training, and no error estimate: the second wearing will show the
+error."""
 CAPTURE_PATIENCE_S = 120.0
 Say = Callable[[str], None]
 

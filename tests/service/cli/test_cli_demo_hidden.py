@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -101,6 +102,9 @@ def test_takes_for_the_tutorial_are_written_and_marked(tmp_path):
     answer = glovecal({}, "demo", "--effect", "creep", "--seed", 4, "--write-takes", tmp_path / "glove")
     assert answer.code == 0, answer.err
     assert "--effect creep --seed 4" in answer.out
+    hidden = json.loads((tmp_path / "glove" / "hidden.json").read_text())
+    assert hidden["seed"] == 4
+    assert hidden["hidden"]["name"] == "creep"
     training = read_takes(tmp_path / "glove" / "training.csv")
     assert len(training) == 9
     assert all(take.simulated for take in training)
