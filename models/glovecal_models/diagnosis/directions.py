@@ -23,7 +23,7 @@ DirectionName = Literal["inverse", "forward"]
 EVERY = 2
 """Of the even times: neighbours say nearly the same."""
 QUARTERS = 4
-SHORT_S = 12.0
+SHORT_S = 10.0
 """Takes of one motion each that are so short cannot be left out whole: nothing else shows that motion."""
 
 
