@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, urlsplit
 
 from glovecal_client.errors import BadName, ClientError, ServiceError
+from glovecal_client.frames_to_predict import frames_to_predict
 
 if TYPE_CHECKING:
     import httpx
+    from numpy.typing import ArrayLike
 
 FINISHED = ("done", "failed", "cancelled")
 CSV, PARQUET = "text/csv", "application/vnd.apache.parquet"
@@ -131,6 +133,22 @@ class RestClient:
         """Give a take the reference angles of a table; ``clock`` is ``take`` or ``wall`` (Unix seconds)."""
         query = {"clock": clock, "filename": file.name}
         return self._send_file("PUT", f"/takes/{quote(take, safe='')}/reference", file, query)
+
+    def predict(
+        self,
+        model: str,
+        readings: ArrayLike,
+        *,
+        sensors: Sequence[str] | None = None,
+        time_s: ArrayLike | None = None,
+        context: Mapping[str, ArrayLike] | None = None,
+        wearing: str | None = None,
+    ) -> dict[str, Any]:
+        """Rotations of ``readings`` (N, S). With effects that remember, ``time_s`` (N,) is needed: one take.
+
+        ``context`` holds columns (N,), NaN where unknown."""
+        body = frames_to_predict(readings, sensors, time_s, context, wearing)
+        return self.post(f"/models/{quote(model, safe='')}/predict", body)
 
     def wait_for_job(
         self,

@@ -6,7 +6,7 @@ Three processes: the real-time process of the product, a publisher of all gloves
 their poses. Latency is from just before a frame's ``put`` to the pose callback (two hops and a prediction,
 one machine, so one clock); age is what the pose states. Every glove has a calibration model of its own, 22
 rotations with 100 nodes each; the overload case serves models so large that the machine manages half of
-what is sent.
+what is sent. Before that, without any network: what two effects with a memory add to a frame.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from typing import Any
 
 import numpy as np
 import zenoh
+from effects_cost import cost_of_effects, sentence
 
 from glovecal_client.keys import GloveKeys, all_gloves, all_services
 from glovecal_client.queries import ask_json
@@ -68,10 +69,12 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     arguments = parser.parse_args()
     pin_blas_to_one_thread()
+    effects = cost_of_effects(random_model("nobody", 100, seed=0))
+    print(sentence(effects), flush=True)
     results = run_all(quick=arguments.quick)
     print_table(results)
     if arguments.json:
-        arguments.json.write_text(json.dumps(results, indent=1))
+        arguments.json.write_text(json.dumps([effects, *results], indent=1))
 
 
 def run_all(*, quick: bool) -> list[dict[str, Any]]:

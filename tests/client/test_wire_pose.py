@@ -48,8 +48,17 @@ def test_golden_pose_is_read_and_written_to_the_byte() -> None:
         assert getattr(pose, name).tolist() == VALUES[name]
     assert (pose.extrapolating, pose.too_uncertain, pose.simulated) == (True, True, True)
     assert (pose.uncalibrated, pose.stale, pose.state_reset) == (False, False, False)
+    assert not pose.settling
     arrays = {name: np.array(VALUES[name]) for name in ARRAYS}
     assert encode_pose(Pose(**(VALUES | arrays))) == MESSAGE
+
+
+def test_golden_settling_pose_is_read_and_written_to_the_byte() -> None:
+    message = (GOLDEN / "pose_v1_settling.bin").read_bytes()
+    values = json.loads((GOLDEN / "pose_v1_settling.json").read_text())
+    pose = decode_pose(message)
+    assert (pose.state_reset, pose.settling, pose.simulated, pose.stale) == (True, True, False, False)
+    assert encode_pose(Pose(**(values | {name: np.array(values[name]) for name in ARRAYS}))) == message
 
 
 @given(poses())
@@ -105,5 +114,5 @@ def test_values_outside_the_format_are_refused(change: dict, sentence: str) -> N
 
 
 def test_flag_bits_are_those_of_the_document() -> None:
-    assert [int(flag) for flag in PoseFlag] == [1, 2, 4, 8, 16, 32]
+    assert [int(flag) for flag in PoseFlag] == [1, 2, 4, 8, 16, 32, 64]
     assert [int(flag) for flag in RotationFlag] == [1, 2, 4]

@@ -202,3 +202,24 @@ def test_rules_in_a_circle_are_refused() -> None:
     items = tuple(circle if item is pip else item for item in model.rotations)
     with pytest.raises(BadInput, match="circle"):
         GlovePredictor(CalibrationModel(LAYOUT, "anna", "lmc_gpr", items, ()))
+
+
+def test_an_unusable_correction_is_left_out_and_flagged_through_the_rules() -> None:
+    predictor = GlovePredictor(make_model())
+    angles = predictor.predict(np.random.default_rng(4).uniform(100, 150, (3, len(LAYOUT.sensors))))
+    correction = np.full_like(angles.mean, 2.0)
+    source = predictor.rotations.index("I_PIP")
+    correction[0, source], correction[1, source] = np.nan, -400.0
+    doubtful = np.zeros(correction.shape, dtype=bool)
+    doubtful[2, source] = True
+    corrected = predictor.corrected(angles, correction, doubtful)
+    np.testing.assert_allclose(corrected.mean[:, source] - angles.mean[:, source], [0.0, 0.0, 2.0])
+    assert (corrected.flags[:, source] & TOO_UNCERTAIN).all()
+    plain = predictor.corrected(angles, np.full_like(angles.mean, 2.0))
+    np.testing.assert_array_equal(plain.flags, angles.flags)
+    followers = [
+        row for row in range(len(predictor.rotations))
+        if ((corrected.flags & ~plain.flags)[:, row] & TOO_UNCERTAIN).any() and row != source
+    ]  # fmt: skip
+    assert followers
+    assert all((corrected.flags[:, row] & BY_RULE).all() for row in followers)

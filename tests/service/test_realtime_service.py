@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import zenoh
+from effect_models import HYSTERESIS, UNITS, added, model_with
 from realtime_support import (
     LAYOUT,
     WireGlove,
@@ -27,6 +29,7 @@ from glovecal_client.queries import ask_json
 from glovecal_client.session import open_client
 from glovecal_client.wire.frame import encode_frame
 from glovecal_client.wire.pose import Pose, decode_pose
+from glovecal_models.calibration.artifact import dump
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_service.realtime.model_choice import choose
 from glovecal_service.serve import real_time
@@ -109,6 +112,49 @@ def test_poses_are_what_the_active_model_predicts(
     assert {(pose.model_sha256, pose.run_id) for pose in poses.live} == {(model_id, glove.run_id)}
     with PoseSubscriber(session, settings.site, "g-anna") as subscriber:
         assert subscriber.rotations(poses.live[-1]) == LAYOUT.rotations
+
+
+def test_effects_are_told_the_wearing_and_the_context(
+    session: zenoh.Session, settings: Settings, store: Store
+) -> None:
+    shift = added("donning_shift", (), (3.0, 0.0), settings={"wearings": ["monday"], **UNITS})
+    span = {"low": 20.0, "high": 30.0, "usual": 25.0}
+    heat = added("temperature", (), (10.0, 0.0), settings={**span, **UNITS})
+    model = replace(model_with(HYSTERESIS, shift, heat), subject="effie")
+    store.subjects.create("effie")
+    record = store.models.add(
+        dump(model), subject="effie", layout=LAYOUT.name, method="linear", parent=None, facts={}
+    )
+    store.models.activate(record.id)
+    glove = WireGlove(session, settings, "g-effie", subject="effie")
+    poses = Poses(session, glove)
+    glove.say_meta(wearing="monday", context=["supply_v"])
+    meta = eventually(lambda: served(session, glove, record.id), "the glove is served")
+    assert (meta["wearing"], meta["effects"]) == ("monday", ["hysteresis", "donning_shift", "temperature"])
+    glove.send(context=np.array([4.9], np.float32))
+    eventually(lambda: len(poses.live) == 1, "the first pose")
+    assert (poses.live[0].state_reset, poses.live[0].settling) == (True, True)
+    effects = glove_status(session, settings, "g-effie")["effects"]
+    assert effects["sentences"] == ["context temperature_c is not sent: temperature is not corrected"]
+    glove.say_meta(wearing="monday", context=["temperature_c"])
+
+    def is_corrected() -> bool:
+        glove.send(context=np.array([30.0], np.float32))
+        return not glove_status(session, settings, "g-effie")["effects"]["sentences"]
+
+    eventually(is_corrected, "the temperature is corrected")
+    base = GlovePredictor(model).predict(np.array([[120.0, 130.0, 140.0]])).mean
+    np.testing.assert_allclose(poses.live[0].degrees, base[0] + 3.0, rtol=1e-5)
+    np.testing.assert_allclose(poses.live[-1].degrees, base[0] + 8.0, rtol=1e-5)
+    store.gloves.assign("g-effie", "effie", "tuesday")
+
+    def is_another_wearing() -> bool:
+        glove.send(context=np.array([30.0], np.float32))
+        return glove_status(session, settings, "g-effie")["effects"]["starts"] == 2
+
+    eventually(is_another_wearing, "a new wearing begins anew")
+    said = glove_status(session, settings, "g-effie")["effects"]["sentences"]
+    assert said == ["wearing 'tuesday' was not in training: donning_shift is not corrected"]
 
 
 def test_activation_and_roll_back_change_the_model_between_two_frames(

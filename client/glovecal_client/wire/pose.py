@@ -30,6 +30,7 @@ class PoseFlag(IntFlag):
     TOO_UNCERTAIN = 8
     STATE_RESET = 16
     SIMULATED = 32
+    SETTLING = 64
 
 
 class RotationFlag(IntFlag):
@@ -92,7 +93,13 @@ class Pose:
 
     @property
     def state_reset(self) -> bool:
+        """An effect with a memory started anew with this frame: new run or wearing, gap, other model."""
         return bool(self.flags & PoseFlag.STATE_RESET)
+
+    @property
+    def settling(self) -> bool:
+        """An effect with a memory runs for shorter than its longest time constant; it corrects less well."""
+        return bool(self.flags & PoseFlag.SETTLING)
 
     @property
     def simulated(self) -> bool:

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect
-from glovecal_models.effects.effect import Signals
+from glovecal_models.effects.effect import Effect, Signals
+from glovecal_models.errors import BadInput
+
+LARGEST_CORRECTION_DEG = 360.0
+"""No effect turns a joint by more than this; what is larger, or no number, is an effect gone wrong."""
+
+
+def usable_correction(correction: np.ndarray) -> np.ndarray:
+    """Where ``correction``, degrees of any shape, is a number that an effect may add."""
+    return np.abs(correction) <= LARGEST_CORRECTION_DEG
 
 
 class SignalScale:
@@ -25,18 +34,67 @@ class EffectCorrection:
     """All effects of one model together."""
 
     def __init__(self, effects: Sequence[AddedEffect], rotations: Sequence[str], scale: SignalScale) -> None:
-        """``rotations``: the columns of the base's prediction."""
+        """``rotations``: the columns of the base's prediction.
+
+        Raises BadInput for an effect that this machine does not have, or has in another version.
+        """
         self._lanes = [
             (item, np.array([list(rotations).index(name) for name in item.rotations]))
             for item in effects
-            if item.weights.shape[1]
+            if item.weights.any()
         ]
         self._scale = scale
-        self._streams = [item.effect.stream(item.settings, item.shape) for item, _ in self._lanes]
+        self._effects = [_fitting(item) for item, _ in self._lanes]
+        self._streams = [
+            effect.stream(item.settings, item.shape)
+            for effect, (item, _) in zip(self._effects, self._lanes, strict=True)
+        ]
+        self.undefined: np.ndarray | None = None
+        """(R,) True for rotations that some effect could not correct in the last frame; None: no such."""
+        self.context = tuple(dict.fromkeys(name for effect in self._effects for name in effect.context))
+        """Context columns that the effects read."""
+        self.settling_s = max(
+            (
+                effect.settling_s(item.shape[item.weights.any(axis=1)])
+                for effect, (item, _) in zip(self._effects, self._lanes, strict=True)
+            ),
+            default=0.0,
+        )
+        """So long after a start the state still shows that it was started anew; 0: nothing is remembered."""
 
     @property
     def is_empty(self) -> bool:
         return not self._lanes
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Effects that correct something, in their order."""
+        return tuple(item.name for item, _ in self._lanes)
+
+    @property
+    def rows(self) -> np.ndarray:
+        """Indices of the rotations that are corrected."""
+        return (
+            np.unique(np.concatenate([lanes for _, lanes in self._lanes]))
+            if self._lanes
+            else np.empty(0, int)
+        )
+
+    @property
+    def needing_time(self) -> tuple[str, ...]:
+        """Names of the effects whose columns depend on when the frames were."""
+        return tuple(effect.name for effect in self._effects if effect.needs_time)
+
+    def silent(self, context: Collection[str], wearing: str) -> tuple[str, ...]:
+        """A sentence for each effect that corrects nothing for want of something it is not told.
+
+        ``context`` are the columns whose values are known.
+        """
+        said = [
+            (effect.lacks(item.settings, context, wearing), effect.name)
+            for effect, (item, _) in zip(self._effects, self._lanes, strict=True)
+        ]
+        return tuple(f"{lacking}: {name} is not corrected" for lacking, name in said if lacking)
 
     def of_take(
         self,
@@ -64,7 +122,7 @@ class EffectCorrection:
         wearing: str,
     ) -> np.ndarray:
         """(R,) degrees to add to ``base`` (R,), the next frame of a stream; the same as in a take."""
-        total = np.zeros_like(base)
+        total, self.undefined = np.zeros_like(base), None
         if not self._lanes:
             return total
         others = self._scale.others(readings[None, :])
@@ -73,9 +131,26 @@ class EffectCorrection:
         for (item, lanes), stream in zip(self._lanes, self._streams, strict=True):
             frame = Signals(time, base[None, lanes], others, now, wearing, zero_deg=item.zero_deg)
             total[lanes] += np.einsum("lc,lc->l", stream.columns(frame)[0], item.weights)
+            if stream.undefined is not None:
+                if self.undefined is None:
+                    self.undefined = np.zeros(len(base), dtype=bool)
+                self.undefined[lanes] = True
         return total
 
     def reset(self) -> None:
         """A new wearing, or frames were lost: effects with a memory start anew."""
         for stream in self._streams:
             stream.reset()
+
+
+def _fitting(added: AddedEffect) -> Effect:
+    """Its effect, if it still has the parameters and columns that the model learned."""
+    effect = added.effect
+    wanted = (len(effect.parameters), len(effect.weight_names(added.settings)))
+    learned = (added.shape.shape[1], added.weights.shape[1])
+    if learned != wanted:
+        raise BadInput(
+            f"effect {added.name!r} was learned with {learned[0]} parameters and {learned[1]} weights, "
+            f"but here it has {wanted[0]} and {wanted[1]}; install the version it was learned with"
+        )
+    return effect

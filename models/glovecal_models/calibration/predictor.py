@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glovecal_models.calibration.effect_correction import EffectCorrection
+from glovecal_models.calibration.effect_correction import EffectCorrection, usable_correction
 from glovecal_models.calibration.fused_processes import FusedProcesses, grouped_by_nodes, is_fusible
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.effects.saturation import SaturatedBand
@@ -103,12 +103,25 @@ class GlovePredictor:
         correction = self._model.correction().of_take(time_s, angles.mean, readings, context, wearing)
         return self.corrected(angles, correction)
 
-    def corrected(self, angles: GloveAngles, correction: np.ndarray) -> GloveAngles:
-        """``angles`` with the effects' ``correction`` (N, R) added; rules follow the rotations they read."""
-        mean = angles.mean + correction
+    def corrected(
+        self, angles: GloveAngles, correction: np.ndarray, doubtful: np.ndarray | None = None
+    ) -> GloveAngles:
+        """``angles`` with the effects' ``correction`` (N, R) added; rules follow the rotations they read.
+
+        Where the correction is unusable the rotation stays as it was. There, and where ``doubtful`` (N, R)
+        says so, it is flagged too uncertain.
+        """
+        usable = usable_correction(correction)
+        mean, flags = angles.mean + np.where(usable, correction, 0.0), angles.flags
+        bad = ~usable if doubtful is None else ~usable | doubtful
+        any_bad = bool(bad.any())
+        if any_bad:
+            flags = np.where(bad, flags | TOO_UNCERTAIN, flags).astype(np.uint8)
         for row, sources, weights in self._rules:
             mean[:, row] = mean[:, sources] @ weights
-        return GloveAngles(mean, angles.sd, angles.flags)
+            if any_bad:
+                flags[:, row] |= np.bitwise_or.reduce(flags[:, sources] & TOO_UNCERTAIN, axis=1)
+        return GloveAngles(mean, angles.sd, flags)
 
     def stream(self) -> EffectCorrection:
         """The effects' state for one glove's frames, to be used with ``corrected``."""

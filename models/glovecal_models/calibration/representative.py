@@ -31,12 +31,22 @@ def _cells(samples: Samples, count: int) -> np.ndarray:
     unit = (space - low) / np.where(high > low, high - low, 1.0)
     cells = samples.take
     for divisions in (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 128):
-        grid = np.column_stack([samples.take, np.floor(unit * divisions * (1 - 1e-12))])
-        finer = np.unique(grid, axis=0, return_inverse=True)[1].ravel()
+        finer = _numbered(samples.take, np.floor(unit * divisions * (1 - 1e-12)), divisions)
         if finer.max() >= count:
             break
         cells = finer
     return cells
+
+
+def _numbered(take: np.ndarray, grid: np.ndarray, divisions: int) -> np.ndarray:
+    """A number for each row of (take, grid), in their order; by one integer key where it has room."""
+    columns = grid.astype(np.int64)
+    if (int(take.max()) + 1) * float(divisions) ** columns.shape[1] > 2**62:
+        return np.unique(np.column_stack([take, columns]), axis=0, return_inverse=True)[1].ravel()
+    key = take.astype(np.int64)
+    for column in columns.T:
+        key = key * divisions + column
+    return np.unique(key, return_inverse=True)[1].ravel()
 
 
 def _turn_within(cells: np.ndarray) -> np.ndarray:

@@ -101,17 +101,17 @@ def _partitions(counts: tuple[int, ...]) -> int:
 
 def _deals(owners: np.ndarray, counts: tuple[int, ...], generator: np.random.Generator) -> list[np.ndarray]:
     """All other partitions when they are few, else many random ones, each at most once."""
-    true = _canonical(owners)
+    true = partition_of(owners)
     found: dict[tuple[int, ...], np.ndarray] = {}
     if len(counts) == 2 and _partitions(counts) <= MOST_PARTITIONS:
         for chosen in combinations(range(len(owners)), counts[0]):
             dealt = np.ones(len(owners), dtype=int)
             dealt[list(chosen)] = 0
-            found[_canonical(dealt)] = dealt
+            found[partition_of(dealt)] = dealt
     else:
         for _ in range(2 * MOST_PARTITIONS):
             dealt = generator.permutation(owners)
-            found[_canonical(dealt)] = dealt
+            found[partition_of(dealt)] = dealt
     found.pop(true, None)
     return list(found.values())[:MOST_PARTITIONS]
 
@@ -123,7 +123,7 @@ def other_deals(owners: np.ndarray, most: int, generator: np.random.Generator) -
     return [deals[i] for i in generator.permutation(len(deals))[:most]]
 
 
-def _canonical(owners: np.ndarray) -> tuple[int, ...]:
+def partition_of(owners: np.ndarray) -> tuple[int, ...]:
     """The same for partitions that differ only in the groups' names."""
     names: dict[int, int] = {}
     return tuple(names.setdefault(int(owner), len(names)) for owner in owners)

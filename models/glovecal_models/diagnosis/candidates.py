@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,9 +33,14 @@ def assessed(
     direction: Direction,
     effects: Sequence[Effect],
     generator: np.random.Generator,
+    without: Set[str] = frozenset(),
     report: Callable[[str, float], None] | None = None,
 ) -> tuple[list[Assessment], list[NotJudgeable]]:
-    """Every judgeable effect, and why the others are not. ``lag`` brings ``clock_offset`` with it."""
+    """Every judgeable effect, and why the others are not.
+
+    ``lag`` brings ``clock_offset`` with it; ``without`` names effects that the model has already.
+    """
+    effects = [effect for effect in effects if effect.name not in without or effect.name == "lag"]
     effects = [effect for effect in effects if not isinstance(effect, ColumnlessEffect)]
     found: list[Assessment] = []
     impossible: list[NotJudgeable] = []
@@ -46,7 +51,7 @@ def assessed(
         if why is not None:
             impossible.append(NotJudgeable(effect.name, why))
         elif effect.name == "lag":
-            found.extend(_delays(direction))
+            found.extend(item for item in _delays(direction) if item.effect not in without)
         else:
             found.append(_assessed(direction, effect, generator))
     return found, impossible
@@ -54,7 +59,7 @@ def assessed(
 
 def _assessed(direction: Direction, effect: Effect, generator: np.random.Generator) -> Assessment:
     evidence = screen(direction, effect, generator)
-    errors = tuple(_joint_errors(item) for item in evidence)
+    errors = tuple(_joint_errors(item, np.array(direction.unit_take)) for item in evidence)
     probability = None
     if effect.decoy in SESSION_DECOYS:
         some = [i for i, item in enumerate(errors) if item.contrast >= LEAST_SESSION_CONTRAST]
@@ -73,7 +78,7 @@ def _assessed(direction: Direction, effect: Effect, generator: np.random.Generat
     )
 
 
-def _joint_errors(evidence: Evidence) -> JointErrors:
+def _joint_errors(evidence: Evidence, take: np.ndarray) -> JointErrors:
     true, decoy = evidence.true, evidence.decoy
     starts = block_starts([len(part) for part in true.residual], BLOCK_ROWS)
     return JointErrors(
@@ -81,7 +86,7 @@ def _joint_errors(evidence: Evidence) -> JointErrors:
         _blocks(true.residual_added, starts),
         _blocks(decoy.residual_added, starts),
         int(true.count.sum()),
-        np.searchsorted(np.cumsum([len(part) for part in true.residual]), starts, side="right"),
+        take[np.searchsorted(np.cumsum([len(part) for part in true.residual]), starts, side="right")],
     )
 
 

@@ -73,7 +73,7 @@ def _joint(direction: Direction, joint: int, cells: np.ndarray, block_rows: int)
     base = np.concatenate([unit.base for unit in products.units])
     orthogonal, _ = np.linalg.qr(base)
     target = np.concatenate([unit.target for unit in products.units])
-    used = list(zip(direction.signals, direction.used[joint], strict=True))
+    used = [(direction.signals[take], rows) for take, rows in direction.units(joint)]
     moved = np.concatenate([_moved(take.time_s, take.own[:, joint], rows, cells) for take, rows in used])
     own = np.concatenate([take.own[rows, joint] for take, rows in used])
     moved *= _slope(base, products.whole, own)[:, None]
@@ -87,7 +87,7 @@ def _joint(direction: Direction, joint: int, cells: np.ndarray, block_rows: int)
         cells,
         np.add.reduceat(moved * moved, starts, axis=0),
         np.add.reduceat(left * left, starts),
-        np.searchsorted(ends, starts, side="right"),
+        np.array(direction.unit_take)[np.searchsorted(ends, starts, side="right")],
     )
 
 

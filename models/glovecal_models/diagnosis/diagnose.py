@@ -103,8 +103,8 @@ def diagnose(
     even = [evened(take, layout.sensors, joints) for take in takes]
     direction = _direction(even, SMOOTHING, layout, joints, linear, known)
     has = {item.effect.name for item in known}
-    candidates = _candidates(direction, effects, has)
-    found, impossible = assessed(direction, candidates, np.random.default_rng(seed), said)
+    candidates = _candidates(direction, effects)
+    found, impossible = assessed(direction, candidates, np.random.default_rng(seed), has, said)
     naming = _delay_told(named(found), even, direction, layout, joints, linear, known)
     findings = tuple(signature_findings(takes, layout, joints, naming)) if signatures else ()
     errors = {
@@ -129,15 +129,14 @@ def diagnose(
     )
 
 
-def _candidates(direction: Direction, effects: Sequence[Effect] | None, has: set[str]) -> list[Effect]:
+def _candidates(direction: Direction, effects: Sequence[Effect] | None) -> list[Effect]:
     """The catalogue, and a curve of each context column that nothing in it asks for."""
     if effects is not None:
         return list(effects)
     known = list(catalogue().values())
     familiar = {name for item in known for name in item.context}
     unfamiliar = unfamiliar_columns(direction.signals, sorted(familiar))
-    every = [*known, *(ContextDependence.of(name, direction.signals) for name in unfamiliar)]
-    return [item for item in every if item.name not in has]
+    return [*known, *(ContextDependence.of(name, direction.signals) for name in unfamiliar)]
 
 
 def _with_first(

@@ -86,8 +86,8 @@ def named_sentence(diagnosis: Diagnosis) -> str:
     rivals = diagnosis.naming.confidence_set[1:]
     if rivals:
         return f"{start}; these takes cannot tell it from {', '.join(rivals)}."
-    if item.effect == "cross_coupling" and diagnosis.left.is_left:
-        return f"{start}; or a common cause that was not recorded, such as grip pressure or a strap."
+    if item.effect == "cross_coupling":
+        return f"{start}, or a common cause that was not recorded, such as grip pressure or a strap."
     return f"{start}."
 
 

@@ -6,7 +6,7 @@ regressing an angle on noisy sensors punishes its inverse. Neither is trusted al
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -17,11 +17,19 @@ from glovecal_models.diagnosis.evened import EvenTake
 from glovecal_models.diagnosis.held_out import BaseProducts, Rows
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.effects.effect import Signals
-from glovecal_models.layout import Layout
+from glovecal_models.layout import Correspondence, Layout
 
 DirectionName = Literal["inverse", "forward"]
 EVERY = 2
 """Of the even times: neighbours say nearly the same."""
+QUARTERS = 4
+SHORT_S = 12.0
+"""Takes of one motion each that are so short cannot be left out whole: nothing else shows that motion."""
+
+
+def are_short(times: Sequence[np.ndarray]) -> bool:
+    """Whether takes of these frame times are left out in quarters instead of whole."""
+    return float(np.median([part[-1] - part[0] if len(part) else 0.0 for part in times])) < SHORT_S
 
 
 @dataclass(frozen=True)
@@ -34,58 +42,20 @@ class Direction:
     """One for each take, own (N, R)."""
     known: tuple[frozenset[str], ...]
     """Names among ``others`` that the base of each joint reads already."""
+    unit_take: tuple[int, ...]
+    """The take of each unit that is left out: a whole take, or a quarter of a short one."""
     used: tuple[tuple[np.ndarray, ...], ...]
-    """For each joint and take: indices of the rows that are fitted."""
+    """For each joint and unit: indices of its take's rows that are fitted."""
     products: tuple[BaseProducts, ...]
     """For each joint."""
 
     def rows(self, joint: int, columns: Sequence[np.ndarray]) -> list[np.ndarray]:
         """``columns``: for each take (N, ...); the fitted rows of those."""
-        return [part[index] for part, index in zip(columns, self.used[joint], strict=True)]
+        return [columns[take][index] for take, index in self.units(joint)]
 
-
-def inverse(
-    takes: Sequence[EvenTake], layout: Layout, rotations: Sequence[str], *, linear: bool
-) -> Direction:
-    """Angle from sensors; a joint's own signal is what its base predicts."""
-    sensors = list(layout.sensors)
-    owns, zeros, known, used, products = [], [], [], [], []
-    for column, rotation in enumerate(rotations):
-        item = layout.correspondence(rotation)
-        inputs = [item.input_columns(take.readings, sensors) for take in takes]
-        if linear:
-            inputs = [part[:, :1] for part in inputs]
-        features = BaseFeatures.settle(inputs, linear=linear)
-        base = [features.columns(part) for part in inputs]
-        index = [np.flatnonzero(np.isfinite(take.reference[:, column]))[::EVERY] for take in takes]
-        units = [
-            Rows(part[rows], take.reference[rows, column])
-            for part, take, rows in zip(base, takes, index, strict=True)
-        ]
-        fit = BaseProducts(units)
-        owns.append([fit.fitted(part) for part in base])
-        zeros.append(_at_zero([part[:, 0] for part in inputs], owns[-1]))
-        known.append(frozenset(item.sensors[:1] if linear else item.sensors))
-        used.append(tuple(index))
-        products.append(fit)
-    spread = np.std(np.concatenate([take.readings for take in takes]), axis=0)
-    centre = np.mean(np.concatenate([take.readings for take in takes]), axis=0)
-    signals = tuple(
-        Signals(
-            take.time_s,
-            np.column_stack([own[number] for own in owns]),
-            {
-                name: (take.readings[:, i] - centre[i]) / max(spread[i], 1e-9)
-                for i, name in enumerate(sensors)
-            },
-            take.context,
-            take.wearing,
-            take.name,
-            np.array(zeros),
-        )
-        for number, take in enumerate(takes)
-    )
-    return Direction("inverse", tuple(rotations), signals, tuple(known), tuple(used), tuple(products))
+    def units(self, joint: int) -> Iterator[tuple[int, np.ndarray]]:
+        """Take and row indices of each unit."""
+        return zip(self.unit_take, self.used[joint], strict=True)
 
 
 def forward(
@@ -117,23 +87,45 @@ def forward(
         )
         for take, angles, values in zip(takes, filled, standard, strict=True)
     )
+    pieces = QUARTERS if are_short([take.time_s for take in takes]) else 1
+    unit_take = tuple(number for number in range(len(takes)) for _ in range(pieces))
     read, used, products = [], [], []
     for column, rotation in enumerate(rotations):
         item = layout.correspondence(rotation)
-        neighbours = [] if linear else [name for name in item.sensors if name in names and name != rotation]
+        neighbours = [] if linear else _read_beside(item, names, layout)
         columns = [column, *(names.index(name) for name in neighbours)]
         features = BaseFeatures.settle([part[:, columns] for part in filled], linear=linear)
-        index = [np.flatnonzero(np.isfinite(take.reference[:, column]))[::EVERY] for take in takes]
-        without = [_without(take, frozenset({rotation, *neighbours})) for take in signals]
+        index = [
+            part
+            for take in takes
+            for part in np.array_split(
+                np.flatnonzero(np.isfinite(take.reference[:, column]))[::EVERY], pieces
+            )
+        ]
+        without = [_without(take, frozenset({rotation, *neighbours, *item.sensors})) for take in signals]
         extra = [found for each in known if (found := each.columns(without, column, rotation)) is not None]
         units = []
-        for number, (part, values, rows) in enumerate(zip(filled, sensor[column].values, index, strict=True)):
-            base = np.column_stack([features.columns(part[:, columns]), *(found[number] for found in extra)])
-            units.append(Rows(base[rows], values[rows]))
-        read.append(frozenset({rotation, *neighbours}))
+        bases = [
+            np.column_stack([features.columns(part[:, columns]), *(found[number] for found in extra)])
+            for number, part in enumerate(filled)
+        ]
+        for take, rows in zip(unit_take, index, strict=True):
+            units.append(Rows(bases[take][rows], sensor[column].values[take][rows]))
+        read.append(frozenset({rotation, *neighbours, *item.sensors}))
         used.append(tuple(index))
         products.append(BaseProducts(units))
-    return Direction("forward", tuple(rotations), signals, tuple(read), tuple(used), tuple(products))
+    return Direction(
+        "forward", tuple(rotations), signals, tuple(read), unit_take, tuple(used), tuple(products)
+    )
+
+
+def _read_beside(item: Correspondence, names: Sequence[str], layout: Layout) -> list[str]:
+    """Other joints that the base knows through its sensors: neighbours by name; without a sensor of its own,
+    all joints that share sensors with it."""
+    if item.rotation in item.sensors or len(item.inputs) == 1:
+        return [name for name in item.sensors if name in names and name != item.rotation]
+    shared = [name for name in names if set(layout.correspondence(name).sensors) & set(item.sensors)]
+    return [name for name in shared if name != item.rotation]
 
 
 def _standard(readings: Sequence[np.ndarray]) -> list[np.ndarray]:
@@ -173,14 +165,6 @@ def _own_sensor(takes: Sequence[EvenTake], layout: Layout, rotation: str, column
     slope = np.linalg.solve(gram, z.T @ (y - y.mean())) / scale
     values = [(part - x.mean(axis=0)) @ slope for part in inputs]
     return _OwnSensor(values, float(-x.mean(axis=0) @ slope))
-
-
-def _at_zero(readings: Sequence[np.ndarray], own: Sequence[np.ndarray]) -> float:
-    """The joint's signal at a reading of zero, by a straight line."""
-    x, y = np.concatenate(readings), np.concatenate(own)
-    variance = float(np.var(x))
-    slope = float(np.mean((x - x.mean()) * (y - y.mean()))) / variance if variance > 0 else 0.0
-    return float(y.mean() - slope * x.mean())
 
 
 def _filled(reference: np.ndarray) -> np.ndarray:

@@ -26,10 +26,11 @@ def reference_problems(takes: Sequence[Take], layout: Layout) -> tuple[str, ...]
         measured = [(take, values) for take, values in measured if np.isfinite(values).sum() >= FEWEST_ROWS]
         if measured:
             own = layout.correspondence(rotation)
+            has_own = own.simulated is None and (rotation in own.sensors or len(own.sensors) == 1)
             inputs = [
                 own.input_columns(_in_order(take, layout), layout.sensors)[:, 0] for take, _ in measured
             ]
-            problems.extend(_of_rotation(rotation, measured, inputs))
+            problems.extend(_of_rotation(rotation, measured, inputs, has_own))
     spans = _largest_span(takes)
     if spans is not None and LEAST_RADIANS < spans <= LARGEST_RADIANS:
         problems.insert(
@@ -55,7 +56,7 @@ def _largest_span(takes: Sequence[Take]) -> float | None:
 
 
 def _of_rotation(
-    rotation: str, measured: Sequence[tuple[Take, np.ndarray]], inputs: Sequence[np.ndarray]
+    rotation: str, measured: Sequence[tuple[Take, np.ndarray]], inputs: Sequence[np.ndarray], has_own: bool
 ) -> list[str]:
     problems, correlations = [], []
     for (take, values), own in zip(measured, inputs, strict=True):
@@ -63,12 +64,16 @@ def _of_rotation(
         angle, reading = values[known], own[known]
         moves = float(np.std(reading)) > 0 and float(np.std(angle)) > 0
         correlations.append(float(np.corrcoef(reading, angle)[0, 1]) if moves else 0.0)
-        if np.ptp(angle) < STILL_DEG and np.ptp(reading) > 0.3 * max(np.ptp(part) for part in inputs):
+        if (
+            has_own
+            and np.ptp(angle) < STILL_DEG
+            and np.ptp(reading) > 0.3 * max(np.ptp(part) for part in inputs)
+        ):
             problems.append(
                 f"{rotation} in take {take.name}: the reference stays within {np.ptp(angle):.2g} degrees"
                 " while its sensor moves. Was the tracker frozen?"
             )
-        jumps = _jumps(angle, reading)
+        jumps = _jumps(angle, reading) if has_own else 0
         if jumps:
             problems.append(
                 f"{rotation} in take {take.name}: the reference jumps by more than {JUMP_DEG:g} degrees"
@@ -76,7 +81,7 @@ def _of_rotation(
             )
     sign = np.sign(np.median(correlations))
     for (take, _), correlation in zip(measured, correlations, strict=True):
-        if len(measured) > 2 and sign * correlation < -SURE_CORRELATION:
+        if has_own and len(measured) > 2 and sign * correlation < -SURE_CORRELATION:
             problems.append(
                 f"{rotation} in take {take.name}: the reference runs against its sensor, unlike in the other"
                 " takes. Is its sign flipped?"

@@ -11,13 +11,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from glovecal_models.comparison.wearings import other_deals
+from glovecal_models.comparison.wearings import other_deals, partition_of
 from glovecal_models.diagnosis.directions import Direction
-from glovecal_models.effects.decoy import with_context
+from glovecal_models.effects.decoy import motions_of, with_context
 from glovecal_models.effects.effect import Effect, Signals
 
 DEALS = 299
 ROWS_PER_TAKE = 80
+FEWEST_DEALS = 19
+"""With fewer no answer can be better than one in twenty."""
 
 
 def session_probability(direction: Direction, effect: Effect, generator: np.random.Generator) -> float | None:
@@ -57,11 +59,31 @@ def _deals(direction: Direction, effect: Effect, generator: np.random.Generator)
     if effect.decoy == "dealt wearings":
         names = [take.wearing for take in direction.signals]
         order = list(dict.fromkeys(names))
-        deals = other_deals(np.array([order.index(name) for name in names]), DEALS, generator)
-        return deals if len(deals) >= 19 else None
+        owners = np.array([order.index(name) for name in names])
+        deals = _within_motions(owners, motions_of(direction.signals), generator)
+        if not deals:
+            deals = other_deals(owners, DEALS, generator)
+        return deals if len(deals) >= FEWEST_DEALS else None
     if count < 5:
         return None
     return [generator.permutation(count) for _ in range(DEALS)]
+
+
+def _within_motions(
+    owners: np.ndarray, motions: Sequence[str], generator: np.random.Generator
+) -> list[np.ndarray]:
+    """Distinct deals that move takes only among takes of the same motion; none when names tell no motions."""
+    groups = [np.flatnonzero([m == motion for m in motions]) for motion in dict.fromkeys(motions)]
+    if len(groups) < 2 or any(len(set(owners[group].tolist())) < 2 for group in groups):
+        return []
+    found: dict[tuple[int, ...], np.ndarray] = {}
+    for _ in range(20 * DEALS):
+        dealt = owners.copy()
+        for group in groups:
+            dealt[group] = owners[generator.permutation(group)]
+        found[partition_of(dealt)] = dealt
+    found.pop(partition_of(owners), None)
+    return list(found.values())[:DEALS]
 
 
 def _dealt(takes: Sequence[Signals], deal: np.ndarray, effect: Effect) -> list[Signals]:
@@ -89,16 +111,17 @@ def _projected(
     direction: Direction, joint: int, rows: Sequence[np.ndarray]
 ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
     """An orthonormal base, what it leaves of the target, and which of the thinned rows were measured."""
-    base, target, used, offset = [], [], [], 0
-    products = direction.products[joint]
-    for unit, some, fitted in zip(products.units, rows, direction.used[joint], strict=True):
-        at = np.searchsorted(fitted, some)
-        at = np.clip(at, 0, max(len(fitted) - 1, 0))
-        near = (np.abs(fitted[at] - some) <= 2) if len(fitted) else np.zeros(len(some), bool)
-        base.append(unit.base[at[near]] if len(fitted) else unit.base[:0])
-        target.append(unit.target[at[near]] if len(fitted) else unit.target[:0])
-        used.append(offset + np.flatnonzero(near))
-        offset += len(some)
+    starts = np.cumsum([0, *(len(some) for some in rows)])
+    base, target, used = [], [], []
+    for unit, (take, fitted) in zip(direction.products[joint].units, direction.units(joint), strict=True):
+        if not len(fitted):
+            continue
+        some = rows[take]
+        at = np.clip(np.searchsorted(fitted, some), 0, len(fitted) - 1)
+        near = np.abs(fitted[at] - some) <= 2
+        base.append(unit.base[at[near]])
+        target.append(unit.target[at[near]])
+        used.append(starts[take] + np.flatnonzero(near))
     orthogonal, _ = np.linalg.qr(np.concatenate(base))
     values = np.concatenate(target)
     return orthogonal, (values - orthogonal @ (orthogonal.T @ values), np.concatenate(used))

@@ -15,6 +15,8 @@ from glovecal_models.effects.effect import Decoy, InstantEffect, Settings, Signa
 from glovecal_models.effects.joint_units import in_joint_units, settle_joint_units
 
 PRIOR_DEG = 3.0
+PALM = "PALM_ARCH"
+"""Has an effect of its own."""
 
 
 class CrossCoupling(InstantEffect):
@@ -27,7 +29,7 @@ class CrossCoupling(InstantEffect):
         return None if any(take.others for take in takes) else "no other sensor was recorded"
 
     def settle(self, takes: Sequence[Signals]) -> Settings:
-        names = list(dict.fromkeys(name for take in takes for name in take.others))
+        names = list(dict.fromkeys(name for take in takes for name in take.others if name != PALM))
         return {
             "neighbours": names,
             **settle_joint_units(takes),
@@ -40,6 +42,8 @@ class CrossCoupling(InstantEffect):
         lanes = take.own.shape[1]
         joint = in_joint_units(take.own, settings)[:, :, None]
         rest = np.zeros(len(take))
+        if not settings["neighbours"]:
+            return np.zeros((len(take), take.own.shape[1], 0))
         others = np.column_stack([take.others.get(name, rest) for name in settings["neighbours"]])[:, None, :]
         others = np.repeat(others, lanes, axis=1)
         return np.concatenate([others, others * joint], axis=2)

@@ -96,7 +96,7 @@ def _stretched(context: Mapping[str, np.ndarray], length: int) -> dict[str, np.n
 def _dealt(takes: Sequence[Signals], generator: np.random.Generator) -> list[Signals]:
     """The takes dealt to other wearings, within the same motion where names tell; never as they were."""
     true = _partition([take.wearing for take in takes])
-    for motions in (_motions(takes), [""] * len(takes)):
+    for motions in (motions_of(takes), [""] * len(takes)):
         for _ in range(MOST_DEALS):
             dealt = _permuted([take.wearing for take in takes], motions, generator)
             if _partition(dealt) != true:
@@ -120,7 +120,7 @@ def _partition(wearings: Sequence[str]) -> frozenset[frozenset[int]]:
     )
 
 
-def _motions(takes: Sequence[Signals]) -> list[str]:
+def motions_of(takes: Sequence[Signals]) -> list[str]:
     """The words of each take's name that are neither numbered nor part of its wearing's name."""
     motions = []
     for take in takes:

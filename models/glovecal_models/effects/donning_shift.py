@@ -6,7 +6,7 @@ gets none, until a few poses with known angles are taken in it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -30,6 +30,11 @@ class DonningShift(InstantEffect):
         if wearings == len(takes):
             return "every wearing has only one take; record two in one of them"
         return None
+
+    def lacks(self, settings: Settings, context: Collection[str], wearing: str) -> str | None:
+        if wearing in settings["wearings"]:
+            return None
+        return f"wearing {wearing!r} was not in training" if wearing else "nobody said which wearing this is"
 
     def settle(self, takes: Sequence[Signals]) -> Settings:
         return {

@@ -13,7 +13,7 @@ Lanes are joints (and, while a shape is searched, joints times shapes): everythi
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
@@ -21,6 +21,8 @@ import numpy as np
 
 Settings = dict[str, Any]
 """Constants an effect takes from its training takes: plain JSON-able data."""
+LEAST_SETTLING_S = 1.0
+"""An effect with a memory counts as settled after this or, if longer, its longest time constant."""
 Side = Literal["sensor", "reference"]
 Decoy = Literal["reversed in time", "rolled in time", "context of other takes", "dealt wearings", "none"]
 
@@ -88,6 +90,26 @@ class Effect(ABC):
                 return f"the context column c.{name} never changes ({values[0]:g})"
         return None
 
+    @property
+    def needs_time(self) -> bool:
+        """Whether its columns depend on when the frames were: it remembers, or it reads the time itself."""
+        return self.has_memory
+
+    def lacks(self, settings: Settings, context: Collection[str], wearing: str) -> str | None:
+        """What it would have to be told and is not, so that it corrects nothing; None if nothing.
+
+        ``context`` are the columns whose values are known now.
+        """
+        unknown = [name for name in self.context if name not in context]
+        return f"context {unknown[0]} is not sent" if unknown else None
+
+    def settling_s(self, shape: np.ndarray) -> float:
+        """How long a state started anew still shows, for lanes of ``shape`` (L, P); 0 without a memory."""
+        if not self.has_memory or not len(shape):
+            return 0.0
+        times = [shape[:, at].max() for at, item in enumerate(self.parameters) if item.unit == "s"]
+        return float(max([LEAST_SETTLING_S, *times]))
+
     def settle(self, takes: Sequence[Signals]) -> Settings:
         """Constants from the training takes; the same settings are used wherever the effect is applied."""
         return {}
@@ -122,6 +144,9 @@ class Effect(ABC):
 
 class Stream(ABC):
     """An effect's state between frames of one glove."""
+
+    undefined: str | None = None
+    """Why the last frame's columns had no value and are zero; None when they had one."""
 
     @abstractmethod
     def columns(self, frame: Signals) -> np.ndarray:

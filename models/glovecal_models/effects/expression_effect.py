@@ -32,6 +32,7 @@ class ExpressionEffect(Effect):
         self.declaration = declaration
         self._signals = declaration.signals
         self._reads_own = any("own" in node.names for node in declaration.columns)
+        self._reads_time = any("t" in node.names for node in declaration.columns)
         shown = declaration.explanation or f"Declared by the user: {declaration.columns_text}."
         # Every other effect has these as attributes of its class; here each object has its own.
         vars(self).update(
@@ -42,6 +43,10 @@ class ExpressionEffect(Effect):
             decoy=declaration.decoy,
             has_memory=any(node.has_memory for node in declaration.columns),
         )
+
+    @property
+    def needs_time(self) -> bool:
+        return self._reads_time or self.has_memory
 
     @classmethod
     def parse(cls, text: str) -> ExpressionEffect:

@@ -2,7 +2,8 @@
 
 Linear terms of the palm-arch sensor and of the thumb's roll and abduction, as in Krnoul et al. 2016: the
 little finger's metacarpal follows the palm sensor (equation 2) and hands 75 % of it to its flexion (3), the
-thumb's abduction (4) gets a gain of the palm sensor added (5). Gains are learned here, 75 % included.
+thumb's abduction (4) gets a gain of the palm sensor added (5). Gains are learned here, 75 % included; a
+square of the palm sensor follows the hollow where it is a cylinder's.
 """
 
 from __future__ import annotations
@@ -46,10 +47,11 @@ class PalmArch(InstantEffect):
 
     def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
         rest = np.zeros(len(take))
-        result = np.empty((len(take), take.own.shape[1], len(settings["signals"])))
+        result = np.empty((len(take), take.own.shape[1], len(self.weight_names(settings))))
         for column, (name, (low, high)) in enumerate(settings["signals"].items()):
             result[:, :, column] = np.clip(take.others.get(name, rest), low, high)[:, None]
+        result[:, :, -1] = result[:, :, list(settings["signals"]).index(PALM)] ** 2
         return result
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
-        return tuple(f"deg_per_sd[{name}]" for name in settings["signals"])
+        return (*(f"deg_per_sd[{name}]" for name in settings["signals"]), f"deg_per_sd2[{PALM}]")

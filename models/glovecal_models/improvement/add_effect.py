@@ -100,6 +100,7 @@ def add_effect(
     constants: dict[str, Any] | None = None,
     settings: TrainingSettings | None = None,
     before: HeldOutErrors | None = None,
+    judged: Sequence[str] | None = None,
     least_gain: float = LEAST_GAIN,
     parent_id: str | None = None,
     take_hashes: Sequence[str] = (),
@@ -109,9 +110,9 @@ def add_effect(
     """Learn ``model`` anew with effect ``name`` on ``rotations`` (default: all measured ones).
 
     ``takes`` are the training takes. ``constants``: settings of an effect without columns, such as the
-    clocks' offsets. ``before`` saves measuring the parent. Undone, with the reason, unless the touched
-    rotations' held-out RMSE falls by ``least_gain``. Raises BadInput for an unknown effect or rotation, or
-    when the takes cannot carry it; Cancelled.
+    clocks' offsets. ``before`` saves measuring the parent. Undone, with the reason, unless the held-out RMSE
+    of the ``judged`` rotations (default: all chosen) falls by ``least_gain``. Raises BadInput for an unknown
+    effect or rotation, or when the takes cannot carry it; Cancelled.
     """
     effect = known_effect(name)
     settings = settings_of(model, settings)
@@ -138,8 +139,9 @@ def add_effect(
         cancelled=cancelled,
         report=_part(report, 0.4, 0.8, f"with {name}"),
     )
-    gain = 1.0 - _total(after, chosen) / max(_total(before, chosen), 1e-12)
-    sentence = _sentence(name, chosen, before, after, gain, least_gain)
+    judged = tuple(judged or chosen)
+    gain = 1.0 - _total(after, judged) / max(_total(before, judged), 1e-12)
+    sentence = _sentence(name, judged, before, after, gain, least_gain)
     widens = not fresh.has_columns and not fresh.is_on_reference
     if widens:
         sentence = (

@@ -11,6 +11,7 @@ import numpy as np
 from glovecal_models.calibration.effect_correction import EffectCorrection
 from glovecal_models.calibration.folds import folds_over_takes
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.diagnosis.directions import QUARTERS, are_short
 from glovecal_models.errors import NotTrainable
 from glovecal_models.improvement.effect_fit import (
     EffectFit,
@@ -54,18 +55,24 @@ def held_out_errors(
     cancelled: Callable[[], bool] | None = None,
     report: Report | None = None,
 ) -> HeldOutErrors:
-    """Leave out whole takes in turn, ``settings.folds`` of them at least two. Raises NotTrainable, Cancelled.
+    """Leave out whole takes, in ``settings.folds`` folds, at least two. Raises NotTrainable, Cancelled.
 
-    With a single take it is left out in halves of time, since nothing else can be.
+    A single take, and short takes of one motion each, are left out in quarters of time.
     """
     square, count = dict.fromkeys(rotations, 0.0), dict.fromkeys(rotations, 0)
-    parts = takes if len(takes.takes) > 1 else _halved(takes)
-    folds = folds_over_takes(np.arange(len(parts.takes)), max(settings.folds, 2))
-    for number, fold in enumerate(folds):
+    short = len(takes.takes) == 1 or are_short([take.time_s for take in takes.takes])
+    parts = _quartered(takes) if short else takes
+    number = np.arange(len(parts.takes))
+    folds = (
+        [number % QUARTERS == i for i in range(QUARTERS)]
+        if short
+        else [fold.held_out for fold in folds_over_takes(number, max(settings.folds, 2))]
+    )
+    for at, held in enumerate(folds):
         if report:
-            report(f"leaving out {fold.sentence}", number / len(folds))
-        kept = parts.some(np.flatnonzero(~fold.held_out).tolist())
-        left = parts.some(np.flatnonzero(fold.held_out).tolist())
+            report(f"leaving out part {at + 1} of {len(folds)}", at / len(folds))
+        kept = parts.some(np.flatnonzero(~held).tolist())
+        left = parts.some(np.flatnonzero(held).tolist())
         try:
             fit = fit_with_effects(kept, rotations, wanted, settings, cancelled=cancelled)
         except NotTrainable:
@@ -98,24 +105,26 @@ def errors_of(
     return {name: np.concatenate(parts) for name, parts in found.items()}
 
 
-def _halved(takes: PreparedTakes) -> PreparedTakes:
-    """The only take in four stretches of time, as takes of their own."""
-    take = takes.takes[0]
-    edges = np.linspace(0, len(take.time_s), 5).astype(int)
-    pieces = []
-    for number, (start, end) in enumerate(itertools.pairwise(edges)):
-        rows = slice(int(start), int(end))
-        pieces.append(
-            replace(
-                take,
-                name=f"{take.name}, part {number + 1}",
-                time_s=take.time_s[rows],
-                readings=take.readings[rows],
-                rotations=takes.layout.rotations,
-                reference_time_s=take.time_s[rows],
-                reference=takes.reference[0][rows],
-                context={name: values[rows] for name, values in take.context.items()},
-                poses=None if take.poses is None else take.poses[rows],
+def _quartered(takes: PreparedTakes) -> PreparedTakes:
+    """Each take in four stretches of time, as takes of their own."""
+    pieces, reference = [], []
+    for take, measured in zip(takes.takes, takes.reference, strict=True):
+        edges = np.linspace(0, len(take.time_s), QUARTERS + 1).astype(int)
+        for number, (start, end) in enumerate(itertools.pairwise(edges.tolist())):
+            rows = slice(start, end)
+            reference.append(measured[rows])
+            pieces.append(
+                replace(
+                    take,
+                    name=f"{take.name}, part {number + 1}",
+                    time_s=take.time_s[rows],
+                    readings=take.readings[rows],
+                    rotations=takes.layout.rotations,
+                    reference_time_s=take.time_s[rows],
+                    reference=measured[rows],
+                    context={name: values[rows] for name, values in take.context.items()},
+                    poses=None if take.poses is None else take.poses[rows],
+                )
             )
-        )
-    return PreparedTakes.of(pieces, takes.layout)
+    prepared = PreparedTakes.of(pieces, takes.layout)
+    return replace(prepared, reference=tuple(reference), scale=takes.scale)

@@ -12,8 +12,8 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
 from glovecal_models.comparison.floor_estimate import NoiseFloor
-from glovecal_models.comparison.noise_floor import noise_floor
 from glovecal_models.comparison.residuals import residuals
+from glovecal_models.comparison.rotation_noise import rotation_noise
 from glovecal_models.diagnosis.diagnose import Diagnosis, diagnose
 from glovecal_models.diagnosis.diagnosis_document import errors_deg, named_sentence
 from glovecal_models.diagnosis.signatures import own_sensors
@@ -37,6 +37,8 @@ from glovecal_models.takes.take import Take
 FIRST_GAIN, LATER_GAIN = 0.05, 0.10
 """Of the held-out RMSE of the touched rotations; a second effect must earn more."""
 AT_FLOOR = 1.15
+MOST_UNDONE = 2
+"""After so many that did not help the walk ends."""
 CLOCK = "clock_offset"
 
 
@@ -160,6 +162,7 @@ class _Walk:
         self.diagnosis: Diagnosis | None = None
         self.floors: dict[str, NoiseFloor] = {}
         self.errors = HeldOutErrors({}, {})
+        self.clocks_scanned = False
 
     def start(self) -> None:
         """The base model, its error and its floor."""
@@ -175,18 +178,15 @@ class _Walk:
         self.errors = self._held_out(model)
         self._step(model, None)
         found = residuals(model, self.takes)
-        generator = np.random.default_rng(self.seed)
-        for name in found.measured_rotations:
-            floor = noise_floor(found, name, generator)
-            if floor is not None:
-                self.floors[name] = floor
+        noise = rotation_noise(found, seed=self.seed)
+        self.floors = {name: item.floor for name, item in noise.items() if item.floor is not None}
 
     def go_on(self) -> bool:
         """One round; False when the walk is over."""
         model = self.steps[-1].model
         share = 0.15 + 0.12 * len(self.steps)
         if CLOCK not in {item.name for item in wanted_of(model)}:
-            clocks = coarse_clock_settings(self.takes)
+            clocks = self._coarse_clocks()
             if clocks is not None and self._add(CLOCK, None, clocks, None):
                 return True
         if self._add_repairs():
@@ -209,7 +209,11 @@ class _Walk:
             if self._add(item.effect, where, clock, self.diagnosis):
                 return True
             self.stopped = "not_better"
-            return False
+            tried.add(item.effect)
+            if len(tried) > MOST_UNDONE:
+                return False
+        if tried:
+            return self._add_saturation()
         self.stopped = "noise_floor" if self._is_at_floor() else "nothing_named"
         return self._add_saturation()
 
@@ -239,11 +243,13 @@ class _Walk:
         model = self.steps[-1].model
         every = trained_rotations(model)
         chosen = every if where is None or name == CLOCK else [item for item in where if item in every]
+        concerned = set((clock or {}).get("where", chosen))
+        judged = [item for item in chosen if item in concerned]
         self._say(f"adding {name}", 0.2 + 0.12 * len(self.steps))
         added_before = sum(1 for step in self.steps if step.added is not None)
         addition = add_effect(
             model, self.takes, name, rotations=chosen, constants=clock, settings=self.settings,
-            before=self._of(chosen), least_gain=LATER_GAIN if added_before else FIRST_GAIN,
+            before=self._of(chosen), judged=judged, least_gain=LATER_GAIN if added_before else FIRST_GAIN,
             take_hashes=self.hashes, cancelled=self.cancelled,
         )  # fmt: skip
         self.sentences.append(addition.sentence)
@@ -253,6 +259,13 @@ class _Walk:
         self.errors = self.errors.with_those_of(addition.after)
         self._step(addition.model, _added_document(addition, clock, diagnosis), diagnosis)
         return True
+
+    def _coarse_clocks(self) -> dict[str, Any] | None:
+        """Looked for once: the scan takes its time."""
+        if self.clocks_scanned:
+            return None
+        self.clocks_scanned = True
+        return coarse_clock_settings(self.takes)
 
     def _add_repairs(self) -> bool:
         """Repeated frames and faulty sensors first: they look like lag, or like anything."""

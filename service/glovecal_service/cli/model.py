@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from glovecal_service.cli.connection import connect
+from glovecal_service.cli.model_effects import EFFECT_COLUMNS, effect_rows
 from glovecal_service.cli.options import AsJson, Model, OnlyLayout, OnlySubject, Subject
-from glovecal_service.cli.printing import err, moment, out, print_facts, print_json, print_table, text
+from glovecal_service.cli.printing import err, moment, out, print_facts, print_json, print_table
 from glovecal_service.cli.refusal import Refusal
 from glovecal_service.cli.writing import Overwrite, require_place, write_whole
 
@@ -28,7 +29,10 @@ def list_models(subject: OnlySubject = None, layout: OnlyLayout = None, as_json:
     if as_json:
         print_json(rows)
         return
-    shown = [{**row, "short": row["id"][:12], "created_at": moment(row["created_at"])} for row in rows]
+    shown = [
+        {**row, "short": row["id"][:12], "method": _method(row), "created_at": moment(row["created_at"])}
+        for row in rows
+    ]
     columns = {
         "short": "model",
         "subject": "subject",
@@ -43,7 +47,7 @@ def list_models(subject: OnlySubject = None, layout: OnlyLayout = None, as_json:
 
 @app.command("show")
 def show(model: Model, as_json: AsJson = False) -> None:
-    """Show one model: errors of each rotation, takes, lineage."""
+    """Show one model: errors of each rotation, effects, takes, lineage."""
     with connect() as service:
         document = service.get(f"/models/{model}")
         lineage = service.get(f"/models/{document['id']}/lineage")
@@ -62,10 +66,14 @@ def show(model: Model, as_json: AsJson = False) -> None:
         "sensors": "sensors",
     }
     print_table(document["rotations"], columns, empty="No rotations.")
-    for item in document["effects"]:
-        out.print(f"\n{item['effect']} on {', '.join(item['where'])}: {item['explanation']}")
-        for rotation, values in item["parameters"].items():
-            out.print(f"  {rotation}: {text(values)}")
+    if document["effect_details"]:
+        out.print()
+        print_table(effect_rows(document["effect_details"]), EFFECT_COLUMNS, empty="")
+
+
+def _method(row: dict[str, Any]) -> str:
+    """The regressors and the effects on top of them."""
+    return " + ".join([row["method"], *([", ".join(row["effects"])] if row["effects"] else [])])
 
 
 def _facts(document: dict[str, Any], lineage: list[dict[str, Any]]) -> dict[str, Any]:
@@ -80,7 +88,6 @@ def _facts(document: dict[str, Any], lineage: list[dict[str, Any]]) -> dict[str,
         "trained on": [take["name"] for take in document["facts"].get("takes", [])],
         "simulated": document["simulated"],
         "trained": moment(document["created_at"]),
-        "effects": list(dict.fromkeys(item["effect"] for item in document["effects"])),
         "made from": [row["id"][:12] for row in lineage[1:]],
     }
 

@@ -137,6 +137,7 @@ def _state(poses: PoseSubscriber, pose: Pose) -> str:
         PoseFlag.UNCALIBRATED: "uncalibrated",
         PoseFlag.EXTRAPOLATING: "extrapolating",
         PoseFlag.TOO_UNCERTAIN: "too uncertain",
+        PoseFlag.SETTLING: "settling",
         PoseFlag.SIMULATED: "simulated glove",
     }
     said = [word for flag, word in words.items() if pose.flags & flag]

@@ -9,7 +9,9 @@ from glovecal_client.keys import GloveKeys
 from glovecal_client.wire.frame import Frame
 from glovecal_client.wire.pose import Pose
 from glovecal_service.realtime.frame_gate import FrameGate
+from glovecal_service.realtime.lane_effects import LaneEffects
 from glovecal_service.realtime.refusal import RefusalCount, Refused
+from glovecal_service.realtime.served_model import ServedModel
 
 WAITING_LIMIT = 64
 
@@ -43,6 +45,8 @@ class GloveLane:
         self.last_pose_received_ns = 0
         self.stale_published_ns = 0
         self.model_id: str | None = None
+        self.effects: LaneEffects | None = None
+        """State of its model's effects; None for a model without."""
         self._waiting: deque[Waiting] = deque()
 
     def __len__(self) -> int:
@@ -93,9 +97,15 @@ class GloveLane:
         self._skipped_unseen = 0
         return frame
 
+    def effects_of(self, model: ServedModel) -> LaneEffects:
+        """The state of the effects of ``model``, a fresh one if the glove had another model before."""
+        if self.effects is None or self.effects.model is not model:
+            self.effects = LaneEffects(model)
+        return self.effects
+
     def status(self) -> dict[str, Any]:
         """Counts for the status document."""
-        run_id = self.gate.run_id
+        run_id, effects = self.gate.run_id, self.effects
         return {
             "received": self.received,
             "predicted": self.predicted,
@@ -107,4 +117,5 @@ class GloveLane:
             "runs": self.gate.runs,
             "sequence": self.gate.sequence,
             "model": self.model_id,
+            "effects": None if effects is None else effects.status(),
         }

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from glovecal_models.calibration.artifact import load
-from glovecal_models.errors import DamagedArtifact
+from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_service.realtime.pose_meta import Serving
 from glovecal_service.realtime.served_model import ServedModel
 from glovecal_service.store.errors import NotFound
@@ -26,15 +27,16 @@ def choose(
     except NotFound:
         return Serving(sentence=f"glove {glove} has not said yet which layout it has")
     subject, layout = record.subject, record.layout
+    serving = Serving(subject, layout, wearing=record.wearing)
     if layout is None:
-        return Serving(subject, layout, sentence=f"glove {glove} has not said yet which layout it has")
+        return replace(serving, sentence=f"glove {glove} has not said yet which layout it has")
     if subject is None:
-        return Serving(subject, layout, sentence=f"nobody wears glove {glove}; assign a subject to it")
+        return replace(serving, sentence=f"nobody wears glove {glove}; assign a subject to it")
     chain = _activations(store, subject, layout)
     if not chain:
         sentence = f"subject {subject} has no active model for layout {layout}; train and activate one"
-        return Serving(subject, layout, sentence=sentence)
-    return _first_that_loads(store, chain, Serving(subject, layout), meta, prepared)
+        return replace(serving, sentence=sentence)
+    return _first_that_loads(store, chain, serving, meta, prepared)
 
 
 def _activations(store: Store, subject: str, layout: str) -> list[str]:
@@ -62,16 +64,16 @@ def _first_that_loads(
     for model_id in chain:
         try:
             model = prepared.get(model_id) or _prepare(store, model_id)
-        except (DamagedArtifact, NotFound) as error:
+        except (DamagedArtifact, NotFound, BadInput) as error:
             problems.append(f"model {model_id[:12]} cannot be served: {error}")
             continue
         misfit = _misfit(model, meta)
         if misfit:
-            return Serving(serving.subject, serving.layout, None, "; ".join([*problems, misfit]))
+            return replace(serving, sentence="; ".join([*problems, misfit]))
         if problems:
             problems.append(f"model {model_id[:12]}, active before it, is served")
-        return Serving(serving.subject, serving.layout, model, "; ".join(problems))
-    return Serving(serving.subject, serving.layout, None, "; ".join(problems))
+        return replace(serving, model=model, sentence="; ".join(problems))
+    return replace(serving, sentence="; ".join(problems))
 
 
 def _prepare(store: Store, model_id: str) -> ServedModel:

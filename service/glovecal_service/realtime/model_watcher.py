@@ -15,6 +15,7 @@ from glovecal_service.realtime.glove_metas import GloveMetas
 from glovecal_service.realtime.model_choice import choose
 from glovecal_service.realtime.pose_meta import PoseMetas, Serving
 from glovecal_service.realtime.served_model import ServedModels
+from glovecal_service.realtime.worn_gloves import WornGlove, WornGloves
 from glovecal_service.store.errors import StoreError, StoreUnavailable
 from glovecal_service.store.store import Store
 
@@ -37,6 +38,7 @@ class ModelWatcher:
         lanes: Callable[[], list[GloveLane]],
         models: ServedModels,
         pose_metas: PoseMetas,
+        worn: WornGloves,
     ) -> None:
         self.database_problem = ""
         """Why the store does not answer, "" while it does."""
@@ -46,6 +48,7 @@ class ModelWatcher:
         self._lanes = lanes
         self._models = models
         self._pose_metas = pose_metas
+        self._worn = worn
         self._revision: int | None = None
         self._gloves: set[str] = set()
         self._unnoted: set[str] = set()
@@ -107,6 +110,7 @@ class ModelWatcher:
             raise
         except (GlovecalError, ArithmeticError, ValueError, MemoryError) as error:
             serving = self._keep(glove, str(error))
+        self._worn.put(glove, WornGlove.of(self._metas.of(glove), serving.wearing))
         self._serve(glove, serving)
         self._gloves.add(glove)
         self._to_choose.discard(glove)
@@ -114,7 +118,8 @@ class ModelWatcher:
     def _keep(self, glove: str, problem: str) -> Serving:
         model = self._models.of(glove)
         known = self._pose_metas.documents().get(glove, {})
-        return Serving(known.get("subject"), known.get("layout"), model, f"the model stays: {problem}")
+        sentence = f"the model stays: {problem}"
+        return Serving(known.get("subject"), known.get("layout"), model, sentence, known.get("wearing"))
 
     def _serve(self, glove: str, serving: Serving) -> None:
         """Say first what the poses will mean, then let the next frame have it."""

@@ -20,9 +20,11 @@ from glovecal_client.keys import parse_glove_key
 from glovecal_client.wire.frame import Frame, FrameFlag
 from glovecal_client.wire.pose import Pose, PoseFlag, encode_pose
 from glovecal_service.realtime.arrivals import Arrival, Arrivals
+from glovecal_service.realtime.corrected_frames import corrected
 from glovecal_service.realtime.glove_lane import GloveLane, Waiting
 from glovecal_service.realtime.refusal import Refusal, Refused
 from glovecal_service.realtime.served_model import ServedModel, ServedModels
+from glovecal_service.realtime.worn_gloves import WornGloves
 
 OLDEST_NS = 25_000_000
 """A frame that waited longer is skipped; with the budget of a round this keeps a pose younger than 50 ms."""
@@ -50,10 +52,13 @@ PublishPose = Callable[[str, bytes], None]
 class PoseLoop:
     """Frames in, poses out. ``lanes`` may be read, by copying it, from any thread."""
 
-    def __init__(self, arrivals: Arrivals, models: ServedModels, publish: PublishPose) -> None:
+    def __init__(
+        self, arrivals: Arrivals, models: ServedModels, publish: PublishPose, worn: WornGloves
+    ) -> None:
         self._arrivals = arrivals
         self._models = models
         self._publish = publish
+        self._worn = worn
         self._lanes_by_key: dict[str, GloveLane] = {}
         self._pending: dict[GloveLane, None] = {}
         self._looked_for_stale_ns = 0
@@ -146,6 +151,7 @@ class PoseLoop:
             for lane, frame, _ in opened:
                 lane.refusals.add(_not_predictable(frame, model, str(error)))
             return
+        angles, effect_flags = corrected(model, opened, angles, self._worn)
         usable: list[bool] = np.min(np.isfinite(angles.mean + angles.sd), axis=1).tolist()
         any_flags = np.bitwise_or.reduce(angles.flags, axis=1).tolist()
         mean, sd = angles.mean.astype(np.float32), angles.sd.astype(np.float32)
@@ -153,11 +159,12 @@ class PoseLoop:
             if not usable[row]:
                 lane.refusals.add(_not_predictable(frame, model, "an angle is not finite"))
                 continue
-            flags = _simulated(frame) | _POSE_FLAGS[any_flags[row] & 3]
+            flags = _simulated(frame) | _POSE_FLAGS[any_flags[row] & 3] | effect_flags[row]
             values = (mean[row], sd[row], angles.flags[row], model.model_id, flags)
             self._send(lane, frame, received_ns, *values)
 
     def _serve_uncalibrated(self, lane: GloveLane) -> None:
+        lane.effects = None
         for frame, received_ns in self._open(lane, None, len(lane)):
             flags = int(PoseFlag.UNCALIBRATED) | _simulated(frame)
             self._send(lane, frame, received_ns, _NO_ANGLES, _NO_ANGLES, _NO_FLAGS, None, flags)

@@ -21,6 +21,7 @@ class Serving:
     layout: str | None = None
     model: ServedModel | None = None
     sentence: str = ""
+    wearing: str | None = None
 
     def document(self, glove: str) -> dict[str, Any]:
         """``rotations`` are in the order of the pose's numbers."""
@@ -30,10 +31,12 @@ class Serving:
             "state": "uncalibrated" if model is None else "calibrated",
             "sentence": self.sentence,
             "subject": self.subject,
+            "wearing": self.wearing,
             "layout": self.layout,
             "model": None if model is None else model.model_id,
             "method": None if model is None else model.method,
             "model_simulated": None if model is None else model.simulated,
+            "effects": [] if model is None else list(model.effects),
             "rotations": [] if model is None else list(model.rotations),
         }
 

@@ -24,6 +24,7 @@ from glovecal_service.realtime.pose_meta import PoseMetas
 from glovecal_service.realtime.pose_publishers import PosePublishers
 from glovecal_service.realtime.served_model import ServedModels
 from glovecal_service.realtime.service_status import ServiceStatus
+from glovecal_service.realtime.worn_gloves import WornGloves
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
 
@@ -60,7 +61,8 @@ def _serve(
 ) -> None:
     models = ServedModels()
     arrivals = Arrivals(session, all_gloves(settings.site, "raw"))
-    loop = PoseLoop(arrivals, models, PosePublishers(session, settings.site).publish)
+    worn = WornGloves()
+    loop = PoseLoop(arrivals, models, PosePublishers(session, settings.site).publish, worn)
     pose_metas = PoseMetas(session, settings.site)
     watcher = ModelWatcher(
         lambda: Store.open(settings),
@@ -68,6 +70,7 @@ def _serve(
         lambda: loop.lanes,
         models,
         pose_metas,
+        worn,
     )
     status = ServiceStatus(
         session,

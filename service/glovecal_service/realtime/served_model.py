@@ -5,9 +5,11 @@ from __future__ import annotations
 import timeit
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
+from glovecal_models.calibration.effect_correction import EffectCorrection
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GloveAngles, GlovePredictor
 from glovecal_service.realtime.pace import Pace
@@ -32,6 +34,8 @@ class ServedModel:
     rotations: tuple[str, ...]
     counts: tuple[float, float] | None
     predictor: GlovePredictor
+    effects: tuple[str, ...] = ()
+    """Names of the effects that correct the prediction."""
     pace: Pace = field(default_factory=Pace)
     """Belongs to the thread that predicts."""
 
@@ -41,7 +45,8 @@ class ServedModel:
         predictor = GlovePredictor(model)
         low, high = model.layout.counts or (0.0, 1.0)
         readings = np.full((1, len(model.layout.sensors)), 0.5 * (low + high))
-        seconds = min(timeit.repeat(lambda: predictor.predict(readings), number=1, repeat=3))
+        frame = partial(_predict_one, predictor, predictor.stream(), readings)
+        seconds = min(timeit.repeat(frame, number=1, repeat=3))
         return cls(
             model_id=model_id,
             subject=model.subject,
@@ -52,6 +57,7 @@ class ServedModel:
             rotations=tuple(predictor.rotations),
             counts=model.layout.counts,
             predictor=predictor,
+            effects=predictor.stream().names,
             pace=Pace(2 * seconds + BESIDES_PREDICTION_S),
         )
 
@@ -75,6 +81,11 @@ class ServedModel:
     def predict(self, readings: Sequence[np.ndarray]) -> GloveAngles:
         """Angles of several frames at once, each (S,)."""
         return self.predictor.predict(np.stack(readings).astype(np.float64))
+
+
+def _predict_one(predictor: GlovePredictor, effects: EffectCorrection, readings: np.ndarray) -> None:
+    base = predictor.predict(readings).mean[0]
+    effects.of_frame(0.0, base, readings[0], {}, "")
 
 
 class ServedModels:

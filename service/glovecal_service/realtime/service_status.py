@@ -66,7 +66,7 @@ class ServiceStatus:
                 **lanes.get(glove, {}),
                 **{
                     name: metas.get(glove, {}).get(name)
-                    for name in ("state", "subject", "layout", "sentence")
+                    for name in ("state", "subject", "wearing", "layout", "sentence")
                 },
             }
             for glove in sorted(lanes.keys() | metas.keys())

@@ -24,6 +24,7 @@ from glovecal_service.rest import (
     metrics_page,
     model_effects,
     models,
+    predictions,
     recordings,
     subjects,
     takes,
@@ -48,7 +49,7 @@ JSON_LIMIT_BYTES = 8_000_000
 BODY_PATIENCE_S = 30.0
 ROUTERS = (
     *(subjects, gloves, clocks, takes, uploads, recordings),
-    *(training, models, comparisons, diagnosis, model_effects, effects, improvements),
+    *(training, models, predictions, comparisons, diagnosis, model_effects, effects, improvements),
     *(jobs, job_reports, health, metrics_page),
 )
 

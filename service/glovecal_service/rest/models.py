@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from fastapi import APIRouter, Response
-from pydantic import BaseModel, Field, FiniteFloat
+from pydantic import BaseModel, Field
 
-from glovecal_models.calibration.added_effect import AddedEffect
-from glovecal_models.calibration.model import CalibrationModel, RotationModel
-from glovecal_models.errors import LayoutMismatch
+from glovecal_models.calibration.model import RotationModel
 from glovecal_service.plain import plain
 from glovecal_service.rest.answers import change_problems, problems
 from glovecal_service.rest.dependencies import PartsNeeded, StoreNeeded
-from glovecal_service.rest.names import Channel, Identifier, LayoutFilter, ModelInPath, SubjectFilter
+from glovecal_service.rest.effect_view import EffectView, effect_view
+from glovecal_service.rest.names import Identifier, LayoutFilter, ModelInPath, SubjectFilter
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.records import Activation, ModelRecord
 
 router = APIRouter(prefix="/models", tags=["models"])
-
-MOST_FRAMES = 20_000
-MOST_SENSORS = 512
 
 
 class Model(BaseModel):
@@ -35,6 +31,7 @@ class Model(BaseModel):
         description="Whether live frames of the subject with the layout are predicted by it."
     )
     held_out_rmse_deg: float | None = Field(description="Error on takes left out of training, degrees.")
+    effects: list[str] = Field(description="Names of its effects, in the order in which they were added.")
     facts: dict[str, Any] = Field(description="Takes trained on, errors, how long it took ...")
     created_at: datetime
 
@@ -50,20 +47,9 @@ class Rotation(BaseModel):
     samples: int
 
 
-class ModelEffect(BaseModel):
-    effect: str
-    explanation: str
-    where: list[str] = Field(description="Rotations that it corrects.")
-    parameters: dict[str, dict[str, float | None]] = Field(
-        description="For each rotation, units in the names."
-    )
-    evidence: dict[str, Any] = Field(description="What it saved when it was added.")
-    declaration: dict[str, Any] | None = Field(description="Of a user's own effect.")
-
-
 class ModelInFull(Model):
     rotations: list[Rotation]
-    effects: list[ModelEffect] = Field(description="In the order in which they were added.")
+    effect_details: list[EffectView]
     simulated: bool = Field(description="Whether any training take came from a simulated glove.")
     error_estimate: dict[str, Any]
 
@@ -81,24 +67,6 @@ class ActivationView(BaseModel):
 class Which(StrictBody):
     subject: Identifier
     layout: Identifier
-
-
-class Readings(StrictBody):
-    readings: Annotated[
-        list[Annotated[list[FiniteFloat], Field(max_length=MOST_SENSORS)]],
-        Field(min_length=1, max_length=MOST_FRAMES, description="Frames of raw readings."),
-    ]
-    sensors: Annotated[list[Channel], Field(max_length=MOST_SENSORS)] | None = Field(
-        None, description="Order of the readings; None: that of the model's layout."
-    )
-
-
-class Angles(BaseModel):
-    model: str
-    rotations: list[str]
-    mean_deg: list[list[float | None]]
-    sd_deg: list[list[float | None]] = Field(description="Of the rotation with its measurement noise.")
-    flags: list[list[int]] = Field(description="Sum of 1 extrapolating, 2 too uncertain, 4 by rule.")
 
 
 @router.get("", response_model=list[Model], summary="Models, oldest first", responses=problems())
@@ -130,7 +98,8 @@ def get_model(id: ModelInPath, parts: PartsNeeded) -> dict[str, Any]:
     model, _ = parts.predictors.get(record.id)
     return _row(record, active is not None and active.id == record.id) | {
         "rotations": [_rotation(item) for item in model.rotations],
-        "effects": [_effect(item) for item in model.effects],
+        "effects": [item.name for item in model.effects],
+        "effect_details": [effect_view(item) for item in model.effects],
         "simulated": model.simulated,
         "error_estimate": plain(model.error_estimate),
         "held_out_rmse_deg": plain(model.error_estimate.get("rmse_deg")),
@@ -182,29 +151,9 @@ def export_model(id: ModelInPath, store: StoreNeeded) -> Response:
     )
 
 
-@router.post(
-    "/{id}/predict",
-    response_model=Angles,
-    summary="Rotations of given readings",
-    responses=change_problems(409),
-)
-def predict(id: ModelInPath, body: Readings, parts: PartsNeeded) -> dict[str, Any]:
-    """For trying a model out; the live stream goes over zenoh. 422 when the sensors are not the model's."""
-    record = parts.store.models.get(id)
-    model, predictor = parts.predictors.get(record.id)
-    angles = predictor.predict(_in_model_order(body, model))
-    parts.metrics.predicted_frames.inc(len(body.readings))
-    return {
-        "model": record.id,
-        "rotations": list(predictor.rotations),
-        "mean_deg": plain(angles.mean),
-        "sd_deg": plain(angles.sd),
-        "flags": angles.flags.tolist(),
-    }
-
-
 def _row(record: ModelRecord, active: bool) -> dict[str, Any]:
-    row = {**record.__dict__, "active": active, "facts": plain(record.facts)}
+    effects = list(record.facts.get("effects", ()))
+    row = {**record.__dict__, "active": active, "effects": effects, "facts": plain(record.facts)}
     return row | {"held_out_rmse_deg": plain(record.facts.get("held_out_rmse_deg"))}
 
 
@@ -219,31 +168,3 @@ def _rotation(item: RotationModel) -> dict[str, Any]:
         "uncertain_above_deg": item.uncertain_above_deg,
         "samples": item.samples,
     }
-
-
-def _effect(item: AddedEffect) -> dict[str, Any]:
-    return plain(
-        {
-            "effect": item.name,
-            "explanation": item.effect.explanation,
-            "where": item.active,
-            "parameters": item.described() if item.weights.shape[1] else {},
-            "evidence": item.evidence,
-            "declaration": item.settings.get("declaration"),
-        }
-    )
-
-
-def _in_model_order(body: Readings, model: CalibrationModel) -> np.ndarray:
-    wanted = model.layout.sensors
-    given = tuple(body.sensors) if body.sensors is not None else wanted
-    missing = [name for name in wanted if name not in given]
-    if missing:
-        raise LayoutMismatch(f"no readings of sensor {missing[0]!r}, which the model's layout needs")
-    for number, frame in enumerate(body.readings):
-        if len(frame) != len(given):
-            raise LayoutMismatch(
-                f"frame {number} has {len(frame)} readings, but there are {len(given)} sensors: "
-                f"{', '.join(given)}"
-            )
-    return np.array(body.readings, dtype=float)[:, [given.index(name) for name in wanted]]

@@ -20,6 +20,8 @@ class Predictors:
         self._store = store
         self._kept: OrderedDict[str, tuple[CalibrationModel, GlovePredictor]] = OrderedDict()
         self._lock = threading.Lock()
+        self.one_at_a_time = threading.Lock()
+        """Held while predicting: a predictor keeps work arrays, and requests run in several threads."""
 
     def get(self, id: str) -> tuple[CalibrationModel, GlovePredictor]:
         """By full id. Raises NotFound, DamagedArtifact."""

@@ -8,7 +8,8 @@ from typing import Any
 
 from sqlalchemy import Connection, Row, insert, select
 
-from glovecal_models.errors import BadInput
+from glovecal_models.calibration.artifact import read_manifest
+from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.names import check_identifier
 from glovecal_service.store import revision, tables
 from glovecal_service.store.artifacts import Artifacts
@@ -40,7 +41,8 @@ class Models:
     ) -> ModelRecord:
         """Keep a model; its id is the sha256 of its artifact. The very same again gives the record there is.
 
-        ``facts["takes"]`` lists the ids of the takes it was trained on (texts, or objects with ``id``).
+        ``facts["takes"]`` lists the ids of the takes it was trained on (texts, or objects with ``id``);
+        ``facts["effects"]`` becomes the names of the artifact's effects, if it has any.
         Raises NotFound (subject or parent), Conflict (same bytes under another subject), StorageFull.
         """
         record = ModelRecord(
@@ -49,7 +51,7 @@ class Models:
             layout=check_identifier(layout, "layout"),
             method=check_identifier(method, "method"),
             parent=parent,
-            facts=dict(facts),
+            facts={**facts, **_effect_names(artifact)},
             created_at=now(),
         )
         takes = _take_ids(facts.get("takes", ()))
@@ -142,6 +144,15 @@ class Models:
         with self._database.read() as connection:
             rows = connection.execute(statement.order_by(table.c.id)).all()
         return [_checked_activation(row) for row in rows]
+
+
+def _effect_names(artifact: bytes) -> dict[str, list[str]]:
+    """So that models can be listed without opening their artifacts."""
+    try:
+        effects = read_manifest(artifact).get("effects")
+    except DamagedArtifact:
+        return {}
+    return {"effects": [item["name"] for item in effects]} if effects else {}
 
 
 def _find(connection: Connection, id: str) -> ModelRecord | None:

@@ -36,6 +36,8 @@ POSE = {
     "rotation_flags": [0, 4, 3],
 }
 
+SETTLING_POSE = POSE | {"flags": 16 | 64, "skipped": 0}
+
 
 def sealed(body: bytes) -> bytes:
     return body + struct.pack("<I", zlib.crc32(body))
@@ -61,6 +63,7 @@ def main() -> None:
     for name, values, message in (
         ("frame_v1", FRAME, frame_bytes(FRAME)),
         ("pose_v1", POSE, pose_bytes(POSE)),
+        ("pose_v1_settling", SETTLING_POSE, pose_bytes(SETTLING_POSE)),
     ):
         (HERE / f"{name}.bin").write_bytes(message)
         (HERE / f"{name}.json").write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")

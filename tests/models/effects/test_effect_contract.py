@@ -307,3 +307,30 @@ def test_an_unknown_moment_does_not_spoil_the_rest(
     )
     for take in (bare, unknown):
         assert np.isfinite(effect.columns(take, settings, shape)).all()
+
+
+def test_it_says_what_it_lacks_and_how_long_it_settles(
+    effect: Effect, signals: list[Signals], settings: Settings
+) -> None:
+    known = list(signals[0].context)
+    assert effect.lacks(settings, known, signals[0].wearing) is None
+    if effect.context:
+        assert effect.lacks(settings, [], signals[0].wearing) == f"context {effect.context[0]} is not sent"
+    settling_s = effect.settling_s(effect.grid(signals, settings)[-1])
+    assert (settling_s >= 1.0) == effect.has_memory
+    assert effect.needs_time or not effect.has_memory
+    assert effect.settling_s(np.zeros((0, len(effect.parameters)))) == 0.0
+
+
+def test_a_wearing_without_a_name_and_an_unknown_one_are_told_apart(signals: list[Signals]) -> None:
+    shift = catalogue()["donning_shift"]
+    settings = shift.settle(signals)
+    assert shift.lacks(settings, [], "") == "nobody said which wearing this is"
+    assert shift.lacks(settings, [], "z") == "wearing 'z' was not in training"
+
+
+def test_creep_settles_with_its_slow_part_and_time_itself_needs_times() -> None:
+    assert catalogue()["creep"].settling_s(np.array([[2.0, 10.0], [5.0, 25.0]])) == 25.0
+    assert catalogue()["lag"].settling_s(np.array([[0.05]])) == 1.0
+    assert [effect.needs_time for effect in DECLARED] == [False, True, True]
+    assert [effect.has_memory for effect in DECLARED] == [False, True, False]

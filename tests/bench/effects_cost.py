@@ -1,0 +1,78 @@
+"""What effects add to the prediction of one live frame: two with a memory, on every rotation of the glove."""
+
+from __future__ import annotations
+
+import timeit
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from glovecal_client.wire.frame import Frame
+from glovecal_models.calibration.added_effect import AddedEffect
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.effects.catalogue import stored_effect
+from glovecal_service.realtime.lane_effects import LaneEffects
+from glovecal_service.realtime.served_model import ServedModel
+from glovecal_service.realtime.worn_gloves import WornGlove
+
+FRAMES = 2000
+MOST_ADDED_MS = 0.2
+
+
+def cost_of_effects(base: CalibrationModel) -> dict[str, Any]:
+    """Milliseconds a frame without and with hysteresis and creep on all rotations of ``base``."""
+    names = base.rotation_names
+    lanes, sensors = len(names), len(base.layout.sensors)
+    effects = (_everywhere("hysteresis", names, [4.0]), _everywhere("creep", names, [2.0, 10.0]))
+    model = ServedModel.prepare("1" * 64, replace(base, effects=effects))
+    of_glove, worn = LaneEffects(model), WornGlove()
+    readings = np.random.default_rng(1).uniform(60, 190, (FRAMES, sensors)).astype(np.float32)
+
+    def without() -> None:
+        for row in readings:
+            model.predict([row])
+
+    def with_effects() -> None:
+        for number, row in enumerate(readings):
+            angles = model.predict([row])
+            frame = Frame(number, 1, number * 8_333_333, 0, row)
+            correction = of_glove.correct(frame, worn, angles.mean[0]).degrees
+            model.predictor.corrected(angles, correction[None])
+
+    before, after = _milliseconds(without), _milliseconds(with_effects)
+    return {
+        "case": f"two effects on {lanes} rotations, {sensors} sensors, one frame, no network",
+        "without_ms": before,
+        "with_ms": after,
+        "ratio": after / before,
+        "targets": [
+            {
+                "figure": "added_ms",
+                "is": "<=",
+                "value": MOST_ADDED_MS,
+                "met": bool(after - before <= MOST_ADDED_MS),
+            }
+        ],
+        "added_ms": after - before,
+    }
+
+
+def _everywhere(name: str, rotations: tuple[str, ...], shape: list[float]) -> AddedEffect:
+    lanes, effect = len(rotations), stored_effect(name, {})
+    weights = np.full((lanes, len(effect.weight_names({}))), 0.1)
+    return AddedEffect(name, rotations, {}, np.tile(shape, (lanes, 1)), weights, np.zeros(lanes))
+
+
+def sentence(cost: dict[str, Any]) -> str:
+    """One line for the terminal."""
+    met = "met" if cost["targets"][0]["met"] else "MISSED"
+    return (
+        f"{cost['case']}: {cost['without_ms']:.3f} ms without, {cost['with_ms']:.3f} ms with: "
+        f"x {cost['ratio']:.2f}, {met} added_ms <= {MOST_ADDED_MS}: {cost['added_ms']:.3f}"
+    )
+
+
+def _milliseconds(work: Callable[[], None]) -> float:
+    return min(timeit.repeat(work, number=1, repeat=3)) / FRAMES * 1e3
