@@ -11,11 +11,11 @@ from scipy.stats import wilcoxon
 
 LEAST_CONTRAST = 0.04
 """Share of the squared error a cause must save beyond its decoy."""
-LEAST_SESSION_CONTRAST = 0.08
+LEAST_SESSION_CONTRAST = 0.12
 """The same for causes that change from take to take: there are few takes."""
 JOINT_PROBABILITY = 0.002
 POOLED_PROBABILITY = 0.001
-FEWEST_BLOCKS = 16
+FEWEST_BLOCKS = 9
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class Assessment:
         )
 
 
-SESSION_PROBABILITY = 0.01
+SESSION_PROBABILITY = 0.007
 WEARING_PROBABILITY = 0.04
 """Wearings have one way to be dealt, where context columns have many names: less is asked of them."""
 
@@ -113,7 +113,7 @@ def signed_rank(values: np.ndarray) -> float:
     """One-sided Wilcoxon: the probability that values symmetric about zero are so positive."""
     if len(values) < FEWEST_BLOCKS or not np.any(values):
         return 1.0
-    found: Any = wilcoxon(values, alternative="greater", method="approx")
+    found: Any = wilcoxon(values, alternative="greater", method="exact" if len(values) <= 25 else "approx")
     return float(found.pvalue)
 
 

@@ -19,7 +19,7 @@ from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.naming import Naming, named
 from glovecal_models.diagnosis.next_take import NextTake, next_take
 from glovecal_models.diagnosis.reference_problems import reference_problems
-from glovecal_models.diagnosis.signatures import signature_findings
+from glovecal_models.diagnosis.signatures import jump_beside_curve, signature_findings
 from glovecal_models.diagnosis.something_left import Left, something_left
 from glovecal_models.effects.catalogue import catalogue, effect
 from glovecal_models.effects.context_dependence import ContextDependence, unfamiliar_columns
@@ -55,7 +55,7 @@ class Diagnosis:
         """Findings of the effect that is to be named by its signature, before any ranking; mostly none."""
         for name in ("repeated_samples", "sensor_fault"):
             found = tuple(item for item in self.findings if item.effect == name)
-            if found:
+            if found and name not in self.naming.confidence_set:
                 return found
         if self.naming.ranked:
             return ()
@@ -107,6 +107,7 @@ def diagnose(
     found, impossible = assessed(direction, candidates, np.random.default_rng(seed), has, said)
     naming = _delay_told(named(found), even, direction, layout, joints, linear, known)
     findings = tuple(signature_findings(takes, layout, joints, naming)) if signatures else ()
+    naming = jump_beside_curve(naming, takes, findings)
     errors = {
         name: float(np.sqrt(products.error.sum() / max(products.count.sum(), 1)))
         for name, products in zip(joints, direction.products, strict=True)

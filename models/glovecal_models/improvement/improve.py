@@ -16,7 +16,7 @@ from glovecal_models.comparison.residuals import residuals
 from glovecal_models.comparison.rotation_noise import rotation_noise
 from glovecal_models.diagnosis.diagnose import Diagnosis, diagnose
 from glovecal_models.diagnosis.diagnosis_document import errors_deg, named_sentence
-from glovecal_models.diagnosis.signatures import own_sensors
+from glovecal_models.diagnosis.signatures import are_held_levels, own_sensors
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.effects.saturation import saturated_bands
 from glovecal_models.effects.signature_effect import SignatureEffect
@@ -275,7 +275,12 @@ class _Walk:
         sensor_of = own_sensors(self.layout, trained_rotations(model))
         for name in ("repeated_samples", "sensor_fault"):
             effect = catalogue()[name]
-            if name in has or not isinstance(effect, SignatureEffect) or not sensor_of:
+            if (
+                name in has
+                or are_held_levels(takes)
+                or not isinstance(effect, SignatureEffect)
+                or not sensor_of
+            ):
                 continue
             found = effect.find(takes, sensor_of)
             if found:
