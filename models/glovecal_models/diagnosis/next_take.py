@@ -40,7 +40,7 @@ _INSTRUCTIONS: dict[str, tuple[str, int]] = {
         30,
     ),
     SHUFFLED: (
-        "Set the same angles once more, in another order, without touching the sensor's mounting.",
+        "Set the same angles once more, in another order, without touching the mounting.",
         60,
     ),
     CROSSED: (
