@@ -20,7 +20,7 @@ from glovecal_models.diagnosis.naming import Naming, named
 from glovecal_models.diagnosis.next_take import NextTake, next_take
 from glovecal_models.diagnosis.reference_problems import reference_problems
 from glovecal_models.diagnosis.signatures import jump_beside_curve, signature_findings
-from glovecal_models.diagnosis.something_left import Left, something_left
+from glovecal_models.diagnosis.something_left import NOT_TOLD, Left, something_left
 from glovecal_models.effects.catalogue import catalogue, effect
 from glovecal_models.effects.context_dependence import ContextDependence, unfamiliar_columns
 from glovecal_models.effects.effect import Effect
@@ -104,7 +104,11 @@ def diagnose(
     direction = _direction(even, SMOOTHING, layout, joints, linear, known)
     has = {item.effect.name for item in known}
     candidates = _candidates(direction, effects)
+    sparse = all(take.is_sparse for take in even)
+    lasting = [item for item in candidates if sparse and (item.has_memory or item.name in DELAYS)]
+    candidates = [item for item in candidates if item not in lasting]
     found, impossible = assessed(direction, candidates, np.random.default_rng(seed), has, said)
+    impossible += [NotJudgeable(item.name, "the frames are single poses, too far apart") for item in lasting]
     naming = _delay_told(named(found), even, direction, layout, joints, linear, known)
     findings = tuple(signature_findings(takes, layout, joints, naming)) if signatures else ()
     naming = jump_beside_curve(naming, takes, findings)
@@ -113,7 +117,11 @@ def diagnose(
         for name, products in zip(joints, direction.products, strict=True)
     }
     floors = {name: float(value) for name, value in (noise_floor_deg or {}).items()}
-    left = something_left(_with_first(naming, even, direction, layout, joints, linear, known), seed)
+    left = (
+        NOT_TOLD
+        if sparse
+        else something_left(_with_first(naming, even, direction, layout, joints, linear, known), seed)
+    )
     said("done", 1.0)
     following = next_take(naming.confidence_set)
     return Diagnosis(

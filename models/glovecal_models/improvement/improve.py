@@ -273,14 +273,11 @@ class _Walk:
         has = {item.name for item in wanted_of(model)} | {item.effect for item in self.undone}
         takes = repaired_takes(self.takes, wanted_of(model))
         sensor_of = own_sensors(self.layout, trained_rotations(model))
+        if not sensor_of or are_held_levels(takes):
+            return False
         for name in ("repeated_samples", "sensor_fault"):
             effect = catalogue()[name]
-            if (
-                name in has
-                or are_held_levels(takes)
-                or not isinstance(effect, SignatureEffect)
-                or not sensor_of
-            ):
+            if name in has or not isinstance(effect, SignatureEffect):
                 continue
             found = effect.find(takes, sensor_of)
             if found:
