@@ -67,7 +67,9 @@ def held_out_errors(
         folds = [place == at for at in np.unique(place)]
     for at, held in enumerate(folds):
         if report:
-            report(f"leaving out part {at + 1} of {len(folds)}", at / len(folds))
+            so_far = np.sqrt(sum(square.values()) / max(sum(count.values()), 1))
+            told = f", error so far {so_far:.2f} degrees" if at else ""
+            report(f"leaving out part {at + 1} of {len(folds)}{told}", at / len(folds))
         kept = parts.some(np.flatnonzero(~held).tolist())
         left = parts.some(np.flatnonzero(held).tolist())
         try:

@@ -51,7 +51,7 @@ class Step:
     rmse_deg: float
     per_rotation: dict[str, float]
     decoy_rmse_deg: float | None = None
-    """What the error would be with the effect's decoy instead, over the rotations it touches."""
+    """What the error would be with the effect's decoy instead: the share it saves, of the step before."""
 
 
 @dataclass(frozen=True)
@@ -315,7 +315,8 @@ class _Walk:
         per_rotation, over_all = self._errors(model)
         decoy = None
         if diagnosis is not None and diagnosis.naming.ranked:
-            decoy = errors_deg(diagnosis.naming.ranked[0])[2]
+            before, _, with_decoy = errors_deg(diagnosis.naming.ranked[0])
+            decoy = self.steps[-1].rmse_deg * min(with_decoy / max(before, 1e-12), 1.0)
             self.sentences.append(named_sentence(diagnosis))
         self.steps.append(Step(model, added, over_all, per_rotation, decoy))
 
