@@ -103,6 +103,8 @@ def diagnose(
     even = [evened(take, layout.sensors, joints) for take in takes]
     direction = _direction(even, SMOOTHING, layout, joints, linear, known)
     has = {item.effect.name for item in known}
+    if has & set(DELAYS):
+        has |= set(DELAYS)  # what is left of one looks like the other; a shifted reference would hide a delay
     candidates = _candidates(direction, effects)
     sparse = all(take.is_sparse for take in even)
     lasting = [item for item in candidates if sparse and (item.has_memory or item.name in DELAYS)]

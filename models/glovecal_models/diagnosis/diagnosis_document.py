@@ -77,7 +77,8 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
 def _nothing_named(diagnosis: Diagnosis) -> str:
     blocks = max((len(e.base) for item in diagnosis.assessments for e in item.errors), default=0)
     if blocks < FEWEST_BLOCKS:
-        return f"Too little was recorded to judge any effect: {blocks} pieces of 5 s, {FEWEST_BLOCKS} are needed."
+        needed = f"{blocks} pieces of 5 s, {FEWEST_BLOCKS} are needed"
+        return f"Too little was recorded to judge any effect: {needed}."
     return "No known effect explains more of the error than its decoy does."
 
 

@@ -31,6 +31,7 @@ from glovecal_models.improvement.clocks import clock_settings, coarse_clock_sett
 from glovecal_models.improvement.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.improvement.known_effects import known_effects
 from glovecal_models.improvement.prepared_takes import PreparedTakes
+from glovecal_models.improvement.remove_effect import remove_effect, unneeded
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
@@ -257,8 +258,25 @@ class _Walk:
             self.undone.append(addition)
             return False
         self.errors = self.errors.with_those_of(addition.after)
-        self._step(addition.model, _added_document(addition, clock, diagnosis), diagnosis)
+        model = self._pruned(addition)
+        self._step(model, _added_document(addition, clock, diagnosis), diagnosis)
         return True
+
+    def _pruned(self, addition: Addition) -> CalibrationModel:
+        """Without earlier effects that the new one makes needless; an alias may have been added first."""
+        model = addition.model
+        for earlier in addition.wanted:
+            if earlier.name == addition.effect or not earlier.has_columns:
+                continue
+            without = unneeded(model, self.takes, earlier.name, self._of(earlier.rotations), self.settings)
+            if without is not None:
+                self._say(f"taking {earlier.name} out again", 0.5)
+                self.errors = self.errors.with_those_of(without)
+                self.sentences.append(f"{earlier.name} is not needed any more beside {addition.effect}.")
+                model = remove_effect(
+                    model, self.takes, earlier.name, settings=self.settings, take_hashes=self.hashes
+                )
+        return model
 
     def _coarse_clocks(self) -> dict[str, Any] | None:
         """Looked for once: the scan takes its time."""
