@@ -19,8 +19,8 @@ from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.naming import Naming, named
 from glovecal_models.diagnosis.next_take import NextTake, next_take
 from glovecal_models.diagnosis.reference_problems import reference_problems
-from glovecal_models.diagnosis.signatures import signature_findings
-from glovecal_models.diagnosis.something_left import Left, something_left
+from glovecal_models.diagnosis.signatures import jump_beside_curve, signature_findings
+from glovecal_models.diagnosis.something_left import NOT_TOLD, Left, something_left
 from glovecal_models.effects.catalogue import catalogue, effect
 from glovecal_models.effects.context_dependence import ContextDependence, unfamiliar_columns
 from glovecal_models.effects.effect import Effect
@@ -55,7 +55,7 @@ class Diagnosis:
         """Findings of the effect that is to be named by its signature, before any ranking; mostly none."""
         for name in ("repeated_samples", "sensor_fault"):
             found = tuple(item for item in self.findings if item.effect == name)
-            if found:
+            if found and name not in self.naming.confidence_set:
                 return found
         if self.naming.ranked:
             return ()
@@ -103,16 +103,27 @@ def diagnose(
     even = [evened(take, layout.sensors, joints) for take in takes]
     direction = _direction(even, SMOOTHING, layout, joints, linear, known)
     has = {item.effect.name for item in known}
+    if has & set(DELAYS):
+        has |= set(DELAYS)  # what is left of one looks like the other; a shifted reference would hide a delay
     candidates = _candidates(direction, effects)
+    sparse = all(take.is_sparse for take in even)
+    lasting = [item for item in candidates if sparse and (item.has_memory or item.name in DELAYS)]
+    candidates = [item for item in candidates if item not in lasting]
     found, impossible = assessed(direction, candidates, np.random.default_rng(seed), has, said)
+    impossible += [NotJudgeable(item.name, "the frames are single poses, too far apart") for item in lasting]
     naming = _delay_told(named(found), even, direction, layout, joints, linear, known)
     findings = tuple(signature_findings(takes, layout, joints, naming)) if signatures else ()
+    naming = jump_beside_curve(naming, takes, findings)
     errors = {
         name: float(np.sqrt(products.error.sum() / max(products.count.sum(), 1)))
         for name, products in zip(joints, direction.products, strict=True)
     }
     floors = {name: float(value) for name, value in (noise_floor_deg or {}).items()}
-    left = something_left(_with_first(naming, even, direction, layout, joints, linear, known), seed)
+    left = (
+        NOT_TOLD
+        if sparse
+        else something_left(_with_first(naming, even, direction, layout, joints, linear, known), seed)
+    )
     said("done", 1.0)
     following = next_take(naming.confidence_set)
     return Diagnosis(

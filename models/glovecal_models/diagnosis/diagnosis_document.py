@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from glovecal_models.diagnosis.assessment import Assessment
+from glovecal_models.diagnosis.assessment import FEWEST_BLOCKS, Assessment
 from glovecal_models.effects.signature_effect import Finding
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.naming.ranked:
         told.append(named_sentence(diagnosis))
     elif not diagnosis.findings:
-        told.append("No known effect explains more of the error than its decoy does.")
+        told.append(_nothing_named(diagnosis))
     if diagnosis.next_take is not None:
         rivals = " and ".join(diagnosis.next_take.separates)
         told.append(
@@ -72,6 +72,14 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     told.append(diagnosis.left.sentence)
     told += [f"{item.effect} cannot be judged: {item.why}." for item in diagnosis.not_judgeable]
     return told
+
+
+def _nothing_named(diagnosis: Diagnosis) -> str:
+    blocks = max((len(e.base) for item in diagnosis.assessments for e in item.errors), default=0)
+    if blocks < FEWEST_BLOCKS:
+        needed = f"{blocks} pieces of 5 s, {FEWEST_BLOCKS} are needed"
+        return f"Too little was recorded to judge any effect: {needed}."
+    return "No known effect explains more of the error than its decoy does."
 
 
 def named_sentence(diagnosis: Diagnosis) -> str:

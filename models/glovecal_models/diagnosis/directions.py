@@ -16,20 +16,13 @@ from glovecal_models.diagnosis.base_features import BaseFeatures
 from glovecal_models.diagnosis.evened import EvenTake
 from glovecal_models.diagnosis.held_out import BaseProducts, Rows
 from glovecal_models.diagnosis.known_effect import KnownEffect
+from glovecal_models.diagnosis.left_out import are_short, pieces
 from glovecal_models.effects.effect import Signals
 from glovecal_models.layout import Correspondence, Layout
 
 DirectionName = Literal["inverse", "forward"]
 EVERY = 2
 """Of the even times: neighbours say nearly the same."""
-QUARTERS = 4
-SHORT_S = 12.0
-"""Takes of one motion each that are so short cannot be left out whole: nothing else shows that motion."""
-
-
-def are_short(times: Sequence[np.ndarray]) -> bool:
-    """Whether takes of these frame times are left out in quarters instead of whole."""
-    return float(np.median([part[-1] - part[0] if len(part) else 0.0 for part in times])) < SHORT_S
 
 
 @dataclass(frozen=True)
@@ -87,8 +80,9 @@ def forward(
         )
         for take, angles, values in zip(takes, filled, standard, strict=True)
     )
-    pieces = QUARTERS if are_short([take.time_s for take in takes]) else 1
-    unit_take = tuple(number for number in range(len(takes)) for _ in range(pieces))
+    short = len(takes) == 1 or are_short([take.time_s for take in takes])
+    cut = [pieces(take.time_s, take.reference) if short else [slice(0, len(take.time_s))] for take in takes]
+    unit_take = tuple(number for number, parts in enumerate(cut) for _ in parts)
     read, used, products = [], [], []
     for column, rotation in enumerate(rotations):
         item = layout.correspondence(rotation)
@@ -96,11 +90,10 @@ def forward(
         columns = [column, *(names.index(name) for name in neighbours)]
         features = BaseFeatures.settle([part[:, columns] for part in filled], linear=linear)
         index = [
-            part
-            for take in takes
-            for part in np.array_split(
-                np.flatnonzero(np.isfinite(take.reference[:, column]))[::EVERY], pieces
-            )
+            rows[(rows >= piece.start) & (rows < piece.stop)]
+            for take, parts in zip(takes, cut, strict=True)
+            for rows in [np.flatnonzero(np.isfinite(take.reference[:, column]))[::EVERY]]
+            for piece in parts
         ]
         without = [_without(take, frozenset({rotation, *neighbours, *item.sensors})) for take in signals]
         extra = [found for each in known if (found := each.columns(without, column, rotation)) is not None]

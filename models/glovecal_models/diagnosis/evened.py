@@ -32,10 +32,14 @@ class EvenTake:
     """(N, R), degrees, NaN where not measured."""
     context: dict[str, np.ndarray]
     """(N,) each, NaN where unknown."""
+    is_sparse: bool = False
+    """Single frames, too far apart for anything between them to be known: left as they are."""
 
 
 def evened(take: Take, sensors: Sequence[str], rotations: Sequence[str], shift_s: float = 0.0) -> EvenTake:
     """``shift_s``: the reference is read so much later than its time column says."""
+    if len(take.time_s) > 1 and float(np.median(np.diff(take.time_s))) > LONGEST_BRIDGED_S:
+        return _sparse(take, sensors, rotations)
     count = max(int(take.duration_s * RATE_HZ) + 1, 1)
     time = take.time_s[0] + np.arange(count) / RATE_HZ
     index = [take.sensors.index(name) for name in sensors]
@@ -56,6 +60,14 @@ def evened(take: Take, sensors: Sequence[str], rotations: Sequence[str], shift_s
     )  # fmt: skip
 
 
+def _sparse(take: Take, sensors: Sequence[str], rotations: Sequence[str]) -> EvenTake:
+    readings = take.readings[:, [take.sensors.index(name) for name in sensors]]
+    reference = take.reference_at_frames(rotations)
+    return EvenTake(
+        take.name, take.wearing, take.time_s, readings, reference, dict(take.context), is_sparse=True
+    )
+
+
 def shifted(take: EvenTake, delay_s: float) -> EvenTake:
     """The take with its reference ``delay_s`` later, as readings that come so late ask for."""
     at = take.time_s - delay_s
@@ -65,6 +77,8 @@ def shifted(take: EvenTake, delay_s: float) -> EvenTake:
 
 def smoothed(take: EvenTake, width: int) -> EvenTake:
     """Readings and reference both through a Hann window of ``width`` (odd) even times."""
+    if take.is_sparse or len(take.time_s) <= width:
+        return take
     window = np.hanning(width + 2)[1:-1]
     return replace(
         take,

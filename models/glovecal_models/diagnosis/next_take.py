@@ -10,6 +10,7 @@ RAMPS = "ramps"
 CLAP = "clap"
 ONE_FINGER = "one_finger"
 CROSSED = "crossed"
+SHUFFLED = "shuffled"
 WEARINGS = "wearings"
 
 
@@ -38,6 +39,10 @@ _INSTRUCTIONS: dict[str, tuple[str, int]] = {
         "Rest the hand on a table and move one finger after another while the others lie still.",
         30,
     ),
+    SHUFFLED: (
+        "Set the same angles once more, in another order, without touching the mounting.",
+        60,
+    ),
     CROSSED: (
         "Change one thing at a time: put in a fresh battery without switching off, take the glove off and on"
         " without switching off, switch off and on without taking it off; 40 s of free motion after each.",
@@ -55,6 +60,7 @@ _RELATED: tuple[tuple[frozenset[str], str], ...] = (
     (frozenset({"cross_coupling", "palm_arch"}), ONE_FINGER),
     (frozenset({"cross_coupling", "contact_pressure"}), ONE_FINGER),
     (frozenset({"nonlinearity", "saturation"}), RAMPS),
+    (frozenset({"nonlinearity", "sensor_fault"}), SHUFFLED),
 )
 _SESSION = frozenset(
     {"warmup_drift", "temperature", "humidity", "supply_sag", "donning_shift", "garment_slip"}

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from glovecal_models.diagnosis.left_out import held_levels
 from glovecal_models.diagnosis.naming import Naming
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.effects.signature_effect import Finding, SignatureEffect
@@ -34,11 +36,28 @@ def signature_findings(
     sensor_of = own_sensors(layout, joints)
     if not sensor_of:
         return
+    if are_held_levels(takes):
+        faults = _found("sensor_fault", takes, sensor_of, None)
+        yield from (item for item in faults if item.kind == "jump")
+        return
     for name in BEFORE_ALL:
         yield from _found(name, takes, sensor_of, None)
     if not naming.ranked:
         for name in AFTER_ALL:
             yield from _found(name, takes, sensor_of, _static_errors(takes, sensor_of))
+
+
+def are_held_levels(takes: Sequence[Take]) -> bool:
+    """Whether all takes only hold one angle after another: there nothing moves, and repeats mean nothing."""
+    return bool(takes) and all(held_levels(take.reference) is not None for take in takes)
+
+
+def jump_beside_curve(naming: Naming, takes: Sequence[Take], findings: Sequence[Finding]) -> Naming:
+    """One pass over known angles cannot tell a curve from a sensor that moved half-way: both are named."""
+    first = naming.ranked[0].effect if naming.ranked else None
+    if first != "nonlinearity" or not findings or not are_held_levels(takes):
+        return naming
+    return replace(naming, confidence_set=(*naming.confidence_set, "sensor_fault"))
 
 
 def _found(

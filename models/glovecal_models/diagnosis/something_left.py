@@ -32,6 +32,9 @@ class Left:
     sentence: str
 
 
+NOT_TOLD = Left(False, {}, 0.0, (), "Single poses do not tell whether something is left that lasts.")
+
+
 def something_left(direction: Direction, seed: int = 0) -> Left:
     """Judge the held-out residuals of ``direction``, known effects included in its base."""
     slow = {}

@@ -15,6 +15,8 @@ from glovecal_models.effects.effect import Decoy, InstantEffect, Settings, Signa
 from glovecal_models.effects.joint_units import on_lanes
 
 DEGREES = (2, 3, 4, 5, 6, 7)
+PRIOR_DEG = 20.0
+"""Over the degree: higher ones are smaller."""
 LEAST_RANGE_DEG = 5.0
 """A joint that moves less shows no curve."""
 
@@ -46,6 +48,9 @@ class Nonlinearity(InstantEffect):
         low, high = on_lanes(settings["own_low_deg"], lanes), on_lanes(settings["own_high_deg"], lanes)
         place = np.clip(2.0 * (take.own - low) / np.maximum(high - low, 1e-6) - 1.0, -1.0, 1.0)
         return _legendre(place)
+
+    def prior_sd(self, settings: Settings) -> np.ndarray:
+        return PRIOR_DEG / np.array(DEGREES, dtype=float)
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         return tuple(f"legendre_{degree}_deg" for degree in DEGREES)

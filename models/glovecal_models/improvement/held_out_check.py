@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -11,7 +10,7 @@ import numpy as np
 from glovecal_models.calibration.effect_correction import EffectCorrection
 from glovecal_models.calibration.folds import folds_over_takes
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.diagnosis.directions import QUARTERS, are_short
+from glovecal_models.diagnosis.left_out import are_short, pieces
 from glovecal_models.errors import NotTrainable
 from glovecal_models.improvement.effect_fit import (
     EffectFit,
@@ -57,22 +56,20 @@ def held_out_errors(
 ) -> HeldOutErrors:
     """Leave out whole takes, in ``settings.folds`` folds, at least two. Raises NotTrainable, Cancelled.
 
-    A single take, and short takes of one motion each, are left out in quarters of time.
+    A single take, and short takes of one motion each, are left out in pieces (``left_out``).
     """
     square, count = dict.fromkeys(rotations, 0.0), dict.fromkeys(rotations, 0)
     short = len(takes.takes) == 1 or are_short([take.time_s for take in takes.takes])
-    parts = _quartered(takes) if short else takes
-    number = np.arange(len(parts.takes))
-    folds = (
-        [number % QUARTERS == i for i in range(QUARTERS)]
-        if short
-        else [fold.held_out for fold in folds_over_takes(number, max(settings.folds, 2))]
-    )
+    number = np.arange(len(takes.takes))
+    parts, folds = takes, [fold.held_out for fold in folds_over_takes(number, max(settings.folds, 2))]
+    if short:
+        parts, place = _cut(takes)
+        folds = [place == at for at in np.unique(place)]
     for at, held in enumerate(folds):
         if report:
-            so_far = HeldOutErrors(square, count).over_all_deg
-            known = f", so far {so_far:.2f} degrees" if any(count.values()) else ""
-            report(f"leaving out part {at + 1} of {len(folds)}{known}", at / len(folds))
+            so_far = np.sqrt(sum(square.values()) / max(sum(count.values()), 1))
+            told = f", error so far {so_far:.2f} degrees" if at else ""
+            report(f"leaving out part {at + 1} of {len(folds)}{told}", at / len(folds))
         kept = parts.some(np.flatnonzero(~held).tolist())
         left = parts.some(np.flatnonzero(held).tolist())
         try:
@@ -107,15 +104,14 @@ def errors_of(
     return {name: np.concatenate(parts) for name, parts in found.items()}
 
 
-def _quartered(takes: PreparedTakes) -> PreparedTakes:
-    """Each take in four stretches of time, as takes of their own."""
-    pieces, reference = [], []
+def _cut(takes: PreparedTakes) -> tuple[PreparedTakes, np.ndarray]:
+    """Each take in pieces, as takes of their own; and each piece's number within its take."""
+    found, reference, place = [], [], []
     for take, measured in zip(takes.takes, takes.reference, strict=True):
-        edges = np.linspace(0, len(take.time_s), QUARTERS + 1).astype(int)
-        for number, (start, end) in enumerate(itertools.pairwise(edges.tolist())):
-            rows = slice(start, end)
+        for number, rows in enumerate(pieces(take.time_s, measured)):
+            place.append(number)
             reference.append(measured[rows])
-            pieces.append(
+            found.append(
                 replace(
                     take,
                     name=f"{take.name}, part {number + 1}",
@@ -128,5 +124,5 @@ def _quartered(takes: PreparedTakes) -> PreparedTakes:
                     poses=None if take.poses is None else take.poses[rows],
                 )
             )
-    prepared = PreparedTakes.of(pieces, takes.layout)
-    return replace(prepared, reference=tuple(reference), scale=takes.scale)
+    prepared = PreparedTakes.of(found, takes.layout)
+    return replace(prepared, reference=tuple(reference), scale=takes.scale), np.array(place)

@@ -16,7 +16,7 @@ from glovecal_models.comparison.residuals import residuals
 from glovecal_models.comparison.rotation_noise import rotation_noise
 from glovecal_models.diagnosis.diagnose import Diagnosis, diagnose
 from glovecal_models.diagnosis.diagnosis_document import errors_deg, named_sentence
-from glovecal_models.diagnosis.signatures import own_sensors
+from glovecal_models.diagnosis.signatures import are_held_levels, own_sensors
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.effects.saturation import saturated_bands
 from glovecal_models.effects.signature_effect import SignatureEffect
@@ -31,6 +31,7 @@ from glovecal_models.improvement.clocks import clock_settings, coarse_clock_sett
 from glovecal_models.improvement.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.improvement.known_effects import known_effects
 from glovecal_models.improvement.prepared_takes import PreparedTakes
+from glovecal_models.improvement.remove_effect import remove_effect, unneeded
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
@@ -51,7 +52,7 @@ class Step:
     rmse_deg: float
     per_rotation: dict[str, float]
     decoy_rmse_deg: float | None = None
-    """What the error would be with the effect's decoy instead, over the rotations it touches."""
+    """What the error would be with the effect's decoy instead: the share it saves, of the step before."""
 
 
 @dataclass(frozen=True)
@@ -257,8 +258,25 @@ class _Walk:
             self.undone.append(addition)
             return False
         self.errors = self.errors.with_those_of(addition.after)
-        self._step(addition.model, _added_document(addition, clock, diagnosis), diagnosis)
+        model = self._pruned(addition)
+        self._step(model, _added_document(addition, clock, diagnosis), diagnosis)
         return True
+
+    def _pruned(self, addition: Addition) -> CalibrationModel:
+        """Without earlier effects that the new one makes needless; an alias may have been added first."""
+        model = addition.model
+        for earlier in addition.wanted:
+            if earlier.name == addition.effect or not earlier.has_columns:
+                continue
+            without = unneeded(model, self.takes, earlier.name, self._of(earlier.rotations), self.settings)
+            if without is not None:
+                self._say(f"taking {earlier.name} out again", 0.5)
+                self.errors = self.errors.with_those_of(without)
+                self.sentences.append(f"{earlier.name} is not needed any more beside {addition.effect}.")
+                model = remove_effect(
+                    model, self.takes, earlier.name, settings=self.settings, take_hashes=self.hashes
+                )
+        return model
 
     def _coarse_clocks(self) -> dict[str, Any] | None:
         """Looked for once: the scan takes its time."""
@@ -273,9 +291,11 @@ class _Walk:
         has = {item.name for item in wanted_of(model)} | {item.effect for item in self.undone}
         takes = repaired_takes(self.takes, wanted_of(model))
         sensor_of = own_sensors(self.layout, trained_rotations(model))
+        if not sensor_of or are_held_levels(takes):
+            return False
         for name in ("repeated_samples", "sensor_fault"):
             effect = catalogue()[name]
-            if name in has or not isinstance(effect, SignatureEffect) or not sensor_of:
+            if name in has or not isinstance(effect, SignatureEffect):
                 continue
             found = effect.find(takes, sensor_of)
             if found:
@@ -313,7 +333,8 @@ class _Walk:
         per_rotation, over_all = self._errors(model)
         decoy = None
         if diagnosis is not None and diagnosis.naming.ranked:
-            decoy = errors_deg(diagnosis.naming.ranked[0])[2]
+            before, _, with_decoy = errors_deg(diagnosis.naming.ranked[0])
+            decoy = self.steps[-1].rmse_deg * min(with_decoy / max(before, 1e-12), 1.0)
             self.sentences.append(named_sentence(diagnosis))
         self.steps.append(Step(model, added, over_all, per_rotation, decoy))
 

@@ -10,10 +10,28 @@ from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_effect import repaired_takes, settings_of, trained_rotations, wanted_of
 from glovecal_models.improvement.child_model import child_model
 from glovecal_models.improvement.effect_fit import fit_with_effects
-from glovecal_models.improvement.held_out_check import held_out_errors
+from glovecal_models.improvement.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.improvement.prepared_takes import PreparedTakes
 from glovecal_models.improvement.relearned import columnless_effects
 from glovecal_models.takes.take import Take
+
+NEEDLESS = 1.02
+"""An effect without which the held-out error rises by no more than this factor is not needed."""
+
+
+def unneeded(
+    model: CalibrationModel,
+    takes: Sequence[Take],
+    name: str,
+    now: HeldOutErrors,
+    settings: TrainingSettings | None = None,
+) -> HeldOutErrors | None:
+    """The errors without effect ``name`` where it is not needed on the rotations of ``now``, else None."""
+    settings = settings_of(model, settings)
+    wanted = [item for item in wanted_of(model) if item.name != name]
+    prepared = PreparedTakes.of(repaired_takes(takes, wanted), model.layout)
+    without = held_out_errors(prepared, tuple(now.square), wanted, settings)
+    return without if without.over_all_deg <= NEEDLESS * now.over_all_deg else None
 
 
 def remove_effect(

@@ -79,7 +79,9 @@ def run(work: AdditionWork, cancelled: Callable[[], bool], report: Report) -> Ta
     """In a worker. Raises BadInput, NotTrainable, Cancelled."""
     on, model = work.on, work.on.model
     with known_by_name([*declared_in(model), *declared(work.declaration)]):
-        report(f"looking at the takes for {work.effect}", 0.0)
+        known = model.error_estimate.get("rmse_deg")
+        error = "" if known is None else f", {known:.2f} degrees on takes left out so far"
+        report(f"looking at the takes for {work.effect}{error}", 0.0)
         constants = effect_constants(model, on.takes, work.effect, cancelled)
         found = add_effect(
             model,

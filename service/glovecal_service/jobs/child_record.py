@@ -46,6 +46,7 @@ def keep_child(
                 "held_out_rmse_deg": model.error_estimate.get("rmse_deg"),
                 "held_out_how": model.error_estimate.get("how"),
                 "per_rotation": {item.rotation: item.held_out_rmse_deg for item in model.rotations},
+                "effects": list(dict.fromkeys(item.name for item in model.effects)),
                 "simulated": model.simulated,
                 "settings": asdict(settings),
                 **facts,

@@ -6,11 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.comparison.noise_floor import noise_floor
 from glovecal_models.comparison.residuals import residuals
+from glovecal_models.comparison.rotation_noise import rotation_noise
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.effects.expression_effect import ExpressionEffect
 from glovecal_models.improvement.add_effect import repaired_takes, wanted_of
@@ -83,6 +81,5 @@ def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> T
 
 def floors_deg(model: CalibrationModel, takes: Sequence[Take], seed: int) -> dict[str, float]:
     """How small the model's errors can get on these takes, for each rotation of which that is known."""
-    found, generator = residuals(model, takes), np.random.default_rng(seed)
-    floors = {name: noise_floor(found, name, generator) for name in found.measured_rotations}
-    return {name: floor.floor_deg for name, floor in floors.items() if floor is not None}
+    noise = rotation_noise(residuals(model, takes), seed=seed)
+    return {name: item.floor.floor_deg for name, item in noise.items() if item.floor is not None}

@@ -33,10 +33,22 @@ def figure(picture: str, sentence: str) -> str:
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Cells are text."""
-    head = "".join(f"<th>{escape(name)}</th>" for name in heads)
-    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
-    return f"<table><tr>{head}</tr>{body}</table>"
+    """Columns with words are set left, numbers right."""
+    texts = [any(_is_text(row[column]) for row in rows) for column in range(len(heads))]
+
+    def line(tag: str, cells: Sequence[str]) -> str:
+        pairs = zip(cells, texts, strict=True)
+        inside = (
+            f"<{tag}{' class=text' if is_text else ''}>{escape(cell)}</{tag}>" for cell, is_text in pairs
+        )
+        return f"<tr>{''.join(inside)}</tr>"
+
+    return f"<table>{line('th', heads)}{''.join(line('td', row) for row in rows)}</table>"
+
+
+def _is_text(cell: str) -> bool:
+    """No number, and not the dash of a missing one."""
+    return cell[:1].isalpha()
 
 
 def listed(sentences: Sequence[str]) -> str:

@@ -68,7 +68,10 @@ def band_of(found: Mapping[str, Any]) -> FloorBand | None:
 
 
 def _with_decoy(before: Mapping[str, Any], step: Mapping[str, Any]) -> float | None:
-    """Over all rotations, in degrees: those the effect touches with its decoy, the others as they were."""
+    """Over all rotations, in degrees: those the effect touches with its decoy, the others as they were.
+
+    Not above the error before: what made it worse would have been undone.
+    """
     decoy, added = step.get("decoy_rmse_deg"), step["added"]
     if decoy is None or not added:
         return None
@@ -77,7 +80,7 @@ def _with_decoy(before: Mapping[str, Any], step: Mapping[str, Any]) -> float | N
         for name, error in before["per_rotation"].items()
         if error is not None
     ]
-    return float(np.sqrt(np.mean(squares))) if squares else None
+    return min(float(np.sqrt(np.mean(squares))), before["rmse_deg"]) if squares else None
 
 
 def _rotations(steps: Sequence[Mapping[str, Any]], floors: Mapping[str, float], method: str) -> str:

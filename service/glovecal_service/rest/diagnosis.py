@@ -7,7 +7,6 @@ from typing import Annotated
 from fastapi import APIRouter, Response
 from pydantic import Field
 
-from glovecal_models.errors import BadInput
 from glovecal_service.rest.answers import change_problems
 from glovecal_service.rest.declarations import Declared, checked_declaration, declaration_document
 from glovecal_service.rest.dependencies import StoreNeeded
@@ -44,11 +43,6 @@ def diagnose_model(
     """The job's result is the diagnosis; `GET /v1/jobs/{id}/report` shows it with pictures."""
     record = store.models.get(id)
     takes = model_takes(store, record, body.takes)
-    if len(takes) < 2:
-        raise BadInput(
-            f"take {takes[0].name!r} is the only one: a diagnosis judges each take by the others, so it "
-            "needs at least two with reference angles"
-        )
     sensors = store.layouts.get(record.layout).sensors
     own = [checked_declaration(item.declaration, takes, sensors) for item in body.effects]
     payload = {

@@ -23,6 +23,7 @@ class EffectView(BaseModel):
         description="So long after a start a live pose is flagged as settling; 0: never."
     )
     evidence: dict[str, Any] = Field(description="What it saved when it was added.")
+    declaration: dict[str, Any] | None = Field(description="Of an effect of the user's own.")
 
 
 def effect_view(added: AddedEffect) -> dict[str, Any]:
@@ -37,4 +38,5 @@ def effect_view(added: AddedEffect) -> dict[str, Any]:
         "has_memory": effect.has_memory,
         "settling_s": effect.settling_s(added.shape[[name in added.active for name in added.rotations]]),
         "evidence": plain(dict(added.evidence)),
+        "declaration": plain(added.settings.get("declaration")),
     }

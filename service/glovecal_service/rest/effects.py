@@ -34,7 +34,7 @@ class ParameterView(BaseModel):
     prior: str = Field(description="What is known before any measurement.")
 
 
-class EffectView(BaseModel):
+class CatalogueEffect(BaseModel):
     name: str
     explanation: str
     kind: Kind = Field(
@@ -51,7 +51,9 @@ class EffectView(BaseModel):
     package: str
 
 
-@router.get("", response_model=list[EffectView], summary="The catalogue of effects", responses=problems())
+@router.get(
+    "", response_model=list[CatalogueEffect], summary="The catalogue of effects", responses=problems()
+)
 def list_effects() -> list[dict[str, Any]]:
     """Those of Glovecal by name, then the user's own. Effects declared in a text are with their models."""
     packages = effect_packages()
@@ -59,7 +61,7 @@ def list_effects() -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: (row["own"], row["kind"] == "nothing"))
 
 
-@router.get("/{name}", response_model=EffectView, summary="One effect", responses=problems())
+@router.get("/{name}", response_model=CatalogueEffect, summary="One effect", responses=problems())
 def get_effect(name: EffectInPath) -> dict[str, Any]:
     try:
         return _row(effect(name), effect_packages().get(name, OURS))

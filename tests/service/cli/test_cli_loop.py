@@ -55,8 +55,8 @@ def test_diagnose_names_shows_evidence_and_says_what_to_run(loop: tuple[Run, str
     again = run("diagnose", model, "--json").json
     assert again["named"]["effect"] == CAUSE
     lonely = run("diagnose", model, "--take", "w1-t1")
-    assert lonely.code == 1
-    assert "is the only one" in lonely.said
+    assert lonely.code == 0, lonely.err
+    assert "donning_shift: all takes are of one wearing" in lonely.out
 
 
 def test_an_effect_is_added_shown_and_taken_out(loop: tuple[Run, str, Path]) -> None:
@@ -68,7 +68,7 @@ def test_an_effect_is_added_shown_and_taken_out(loop: tuple[Run, str, Path]) -> 
     child = answer.out.split("Model ")[1].split(",")[0]
     shown = run("model", "show", child).out
     assert f"made from     {model[:12]}" in shown
-    assert "hysteresis on I_PIP: The sensor sticks" in shown
+    assert CAUSE in shown
     removed = run("remove-effect", child, CAUSE, "--json").json
     assert removed["parent"].startswith(child)
     assert removed["model"]

@@ -104,16 +104,16 @@ def test_an_added_effect_is_a_child_and_comes_out_again(walk: Walk) -> None:
     job = walk.client.post(f"/models/{walk.model}/effects", {"effect": CAUSE, "rotations": ["M_PIP"]})
     result = walk.result(job)
     assert result["added"]
-    assert result["after"]["M_PIP"] < 0.6 * result["before"]["M_PIP"]
+    assert result["after"]["M_PIP"] < 0.75 * result["before"]["M_PIP"]
     child = walk.client.get(f"/models/{result['model']}")
     assert child["parent"] == walk.model
-    assert [item["effect"] for item in child["effects"]] == [CAUSE]
-    assert child["effects"][0]["where"] == ["M_PIP"]
+    assert child["effects"] == [CAUSE]
+    assert child["effect_details"][0]["rotations"] == ["M_PIP"]
     assert child["facts"]["addition"]["sentence"] == result["sentence"]
     lineage = walk.client.get(f"/models/{child['id']}/lineage")
     assert [row["id"] for row in lineage] == [child["id"], walk.model]
     told = walk.client.download(f"/jobs/{job['id']}/events").decode()
-    assert "leaving out" in told
+    assert "the error on takes left out falls from" in told
     assert f'"after":{{"M_PIP":{result["after"]["M_PIP"]:.3f}'[:-2] in told.replace(" ", "")
 
     with pytest.raises(Refused, match="has hysteresis on all of these rotations already") as refused:
@@ -121,7 +121,8 @@ def test_an_added_effect_is_a_child_and_comes_out_again(walk: Walk) -> None:
     assert refused.value.status == 409
     both = walk.add(CAUSE, model=child["id"], activate=True)
     assert walk.client.get(f"/models/{both['model']}")["active"]
-    assert set(walk.client.get(f"/models/{both['model']}")["effects"][0]["where"]) == set(ROTATIONS)
+    grown = walk.client.get(f"/models/{both['model']}")["effect_details"]
+    assert {name for item in grown for name in item["rotations"]} == set(ROTATIONS)
 
     removed = walk.result(walk.client.delete(f"/models/{both['model']}/effects/{CAUSE}"))
     assert removed["after"] > removed["before"]
@@ -145,14 +146,17 @@ def test_an_effect_of_ones_own_lives_with_its_model_only(walk: Walk) -> None:
     assert result["added"], result["sentence"]
     assert "sticky" not in {row["name"] for row in walk.client.get("/effects")}
     child = walk.client.get(f"/models/{result['model']}")
-    assert child["effects"][0]["declaration"]["columns"] == "tanh(own_deg - lowpass(own_deg, 0.1))"
-    angles = walk.client.post(f"/models/{child['id']}/predict", {"readings": [[100.0, 100.0]] * 3})
+    assert child["effect_details"][0]["declaration"]["columns"] == "tanh(own_deg - lowpass(own_deg, 0.1))"
+    angles = walk.client.post(
+        f"/models/{child['id']}/predict", {"readings": [[100.0, 100.0]] * 3, "time_s": [0, 0.1, 0.2]}
+    )
     assert len(angles["mean_deg"]) == 3
 
     grown = walk.add(CAUSE, model=child["id"], rotations=["I_PIP"])
     assert grown["added"], grown["sentence"]
-    effects = walk.client.get(f"/models/{grown['model']}")["effects"]
-    assert {item["effect"] for item in effects} == {"sticky", CAUSE}
+    assert set(walk.client.get(f"/models/{grown['model']}")["effects"]) == {"sticky", CAUSE}
+    listed = {row["id"]: row["effects"] for row in walk.client.get("/models")}
+    assert set(listed[grown["model"]]) == {"sticky", CAUSE}
     found = walk.result(walk.client.post(f"/models/{child['id']}/diagnose", {}))
     assert found["named"]["effect"] == CAUSE
     with pytest.raises(Refused, match="it has sticky"):
@@ -195,6 +199,15 @@ def test_effects_that_cannot_be_are_refused_before_any_work(
     assert len(walk.client.get("/jobs")) == jobs
 
 
+def test_a_single_take_says_what_it_cannot_show(walk: Walk) -> None:
+    body = {"takes": [walk.takes[0]["id"]]}
+    found = walk.result(walk.client.post(f"/models/{walk.model}/diagnose", body))
+    why = {item["effect"]: item["why"] for item in found["not_judgeable"]}
+    assert "one wearing" in why["donning_shift"]
+    with pytest.raises(ServiceError, match="cannot be learned from these 1 takes: all takes are of one"):
+        walk.add("donning_shift", takes=[walk.takes[0]["name"]])
+
+
 def test_a_division_by_zero_is_named_with_its_frame(walk: Walk) -> None:
     with pytest.raises(ServiceError, match=r"division by zero in .* at frame 0 of take w1-t"):
         walk.add({"declaration": "name = zero; columns = 1 / (c.supply_v - c.supply_v)"})
@@ -202,9 +215,6 @@ def test_a_division_by_zero_is_named_with_its_frame(walk: Walk) -> None:
 
 def test_takes_that_cannot_be_used_are_named(walk: Walk) -> None:
     post = walk.client.post
-    lonely = {"takes": [walk.takes[0]["id"]]}
-    with pytest.raises(Refused, match="'w1-t1' is the only one: a diagnosis judges each take by the others"):
-        post(f"/models/{walk.model}/diagnose", lonely)
     with pytest.raises(Refused, match="has no reference angles; attach some"):
         post(f"/models/{walk.model}/diagnose", {"takes": [walk.mute["name"]]})
     with pytest.raises(Refused, match="subject 'anna' has no take 'tuesday'; there are w1-t1"):
@@ -247,7 +257,7 @@ def test_improve_walks_the_loop_and_keeps_every_step(walk: Walk) -> None:
     base, step = found["steps"]
     assert base["added"] is None
     assert step["added"]["effect"] == CAUSE
-    assert step["rmse_deg"] < 0.6 * base["rmse_deg"]
+    assert step["rmse_deg"] < 0.75 * base["rmse_deg"]
     assert set(step["per_rotation"]) == set(found["noise_floor_deg"]) == set(ROTATIONS)
     lineage = walk.client.get(f"/models/{step['model']}/lineage")
     assert [row["id"] for row in lineage] == [step["model"], base["model"]]
