@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
 
 STEP_S = 0.1
+BAR_WIDTH, TEXT_WIDTH = 12, 52
+"""Text, bar, percentage and time fit into 80 columns."""
 
 
 def wait_for_job(
@@ -26,7 +28,7 @@ def wait_for_job(
 
         def show(document: dict[str, Any]) -> None:
             sentence = document["sentence"] or "waiting for a worker"
-            progress.update(bar, completed=document["fraction"], description=sentence[:48])
+            progress.update(bar, completed=document["fraction"], description=_short(sentence))
 
         try:
             return service.wait_for_job(job, progress=show)
@@ -52,7 +54,17 @@ def wait_seconds(seconds: float, what: str, *, quiet: bool = False) -> None:
             progress.update(bar, completed=seconds - max(0.0, until - time.monotonic()))
 
 
+def _short(sentence: str) -> str:
+    """What fits; before a colon stands what the bar is about, after it how far that is."""
+    _, colon, news = sentence.partition(": ")
+    return (news if colon and len(sentence) > TEXT_WIDTH else sentence)[:TEXT_WIDTH]
+
+
 def _bar(quiet: bool) -> Progress:
-    columns = (TextColumn("{task.description}"), BarColumn(20), TextColumn("{task.percentage:>3.0f} %"))
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(BAR_WIDTH),
+        TextColumn("{task.percentage:>3.0f} %"),
+    )
     shown = err.is_terminal and not quiet
     return Progress(*columns, TimeElapsedColumn(), console=err, transient=True, disable=not shown)
