@@ -23,6 +23,8 @@ class LiveFigures:
     """What came, and how far it was from what the hand really did."""
 
     sent: int
+    uncalibrated: int
+    """Poses before the service had the model ready for this glove."""
     poses: int
     """From the model in question."""
     settled: int
@@ -49,11 +51,13 @@ def live_child(service: RestClient, place: DemoPlace, recorded: RecordedTake, fo
         ) as capture:
             capture.wait(CAPTURE_PATIENCE_S)
         made = [pose for pose in meter.poses if pose.model_sha256 == found.served]
+        uncalibrated = sum(pose.uncalibrated for pose in meter.poses)
     rotations = [item["rotation"] for item in service.get(f"/models/{found.served}")["rotations"]]
-    return _figures(made, [take.rotations.index(name) for name in rotations], recorded.truth)
+    columns = [take.rotations.index(name) for name in rotations]
+    return _figures(made, columns, recorded.truth, uncalibrated)
 
 
-def _figures(made: list[Pose], columns: list[int], truth: np.ndarray) -> LiveFigures:
+def _figures(made: list[Pose], columns: list[int], truth: np.ndarray, uncalibrated: int) -> LiveFigures:
     """A pose belongs to the frame of its sequence number, whenever it was sent."""
     made = [pose for pose in made if pose.sequence < len(truth)]
     settled = [pose for pose in made if not pose.flags & PoseFlag.SETTLING]
@@ -62,12 +66,17 @@ def _figures(made: list[Pose], columns: list[int], truth: np.ndarray) -> LiveFig
         errors = [pose.degrees - truth[pose.sequence, columns] for pose in poses]
         return float(np.sqrt(np.nanmean(np.square(errors)))) if errors else float("nan")
 
-    return LiveFigures(len(truth), len(made), len(settled), rmse(made), rmse(settled))
+    return LiveFigures(len(truth), uncalibrated, len(made), len(settled), rmse(made), rmse(settled))
 
 
 def live_sentence(live: LiveFigures) -> str:
     """One sentence for people."""
-    start = f"Live: {live.sent} frames of one more take streamed, {live.poses} poses came from this model"
+    start = f"Live: {live.sent} frames of one more take streamed"
+    if live.uncalibrated:
+        start += f"; {live.uncalibrated} poses while the service loaded the model, then"
+    else:
+        start += ";"
+    start += f" {live.poses} poses from it"
     if not live.poses:
         return f"{start}."
     start += f", {live.rmse_deg:.2f} degrees from what the hand really did"

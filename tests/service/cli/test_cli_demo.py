@@ -121,9 +121,7 @@ def test_the_demo_keeps_its_promises(tmp_path):
         2,
     )
     assert fall["with_effect"] < 0.6 * fall["lmc_gpr"]
-    assert re.search(r"poses came from this model, [01]\.\d+ degrees from what the hand really did", said), (
-        said
-    )
+    assert re.search(r"poses from it, [01]\.\d+ degrees from what the hand really did", said), said
     check_nothing_is_left(process, tmp_path, ports)
 
 
