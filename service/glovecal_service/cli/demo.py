@@ -7,7 +7,6 @@ import secrets
 import sys
 import tempfile
 import time
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -66,8 +65,10 @@ def demo(
 
 def _run(seed: int, effect: str, drawn: int, *, as_json: bool, keep: bool) -> None:
     from glovecal_service.demo.error_fall import hidden_contract
+    from glovecal_service.demo.hidden_session import hidden_session
     from glovecal_service.demo.keeping import keep_running
     from glovecal_service.demo.processes import demo_place, running_service
+    from glovecal_service.demo.second_act import prepare
     from glovecal_service.demo.table import contract, error_table, sentences
     from glovecal_service.demo.walk import walk
 
@@ -75,16 +76,16 @@ def _run(seed: int, effect: str, drawn: int, *, as_json: bool, keep: bool) -> No
     with tempfile.TemporaryDirectory(prefix="glovecal-demo-") as folder:
         place = demo_place(Path(folder))
         err.print("Starting glovecal serve ...")
-        with running_service(place) as service, ThreadPoolExecutor(1) as beside:
-            # the takes of the first act are recorded at their own pace: time for the second glove's training
-            prepared = beside.submit(_prepared, service, place, effect, drawn)
+        with running_service(place) as service:
+            hidden = hidden_session(effect, drawn)
+            # its models are trained while the takes of the first act are recorded, at their own pace
+            second = prepare(service, hidden, place.folder / "hidden")
             found = walk(service, place, seed, lambda sentence: err.print(sentence))
             out.print()
             show(error_table(found))
             out.print()
             for sentence in sentences(found):
                 out.print(sentence)
-            hidden, second = prepared.result()
             _second_act(service, place, hidden, second)
             seconds = time.monotonic() - started
             out.print(
@@ -97,16 +98,6 @@ def _run(seed: int, effect: str, drawn: int, *, as_json: bool, keep: bool) -> No
                 sys.stdout.flush()
             if keep:
                 keep_running(place, seed, lambda sentence: err.print(sentence))
-
-
-def _prepared(
-    service: RestClient, place: DemoPlace, effect: str, seed: int
-) -> tuple[HiddenSession, Findings]:
-    from glovecal_service.demo.hidden_session import hidden_session
-    from glovecal_service.demo.second_act import prepare
-
-    hidden = hidden_session(effect, seed)
-    return hidden, prepare(service, hidden, place.folder / "hidden")
 
 
 def _second_act(service: RestClient, place: DemoPlace, hidden: HiddenSession, found: Findings) -> None:

@@ -29,6 +29,8 @@ class Findings:
     layout: str = ""
     tests: list[str] = field(default_factory=list)
     """Ids of the takes that no model is trained on."""
+    trainings: dict[str, str] = field(default_factory=dict)
+    """Jobs by method."""
     models: dict[str, str] = field(default_factory=dict)
     comparisons: dict[str, dict[str, Any]] = field(default_factory=dict)
     """By method; that of the child is ``with_effect``."""
@@ -55,7 +57,7 @@ class Findings:
 
 
 def prepare(service: RestClient, hidden: HiddenSession, folder: Path, *, subject: str = SUBJECT) -> Findings:
-    """Import the takes and train the bases; nobody needs to watch it."""
+    """Import the takes and begin to train the bases; nobody needs to watch or to wait."""
     found = Findings(subject)
     service.post("/subjects", {"name": subject, "title": "Simulated subject with a hidden effect"})
     training, test = hidden.write(folder)
@@ -64,7 +66,7 @@ def prepare(service: RestClient, hidden: HiddenSession, folder: Path, *, subject
     held_out = service.upload_takes(test, subject=subject, layout=found.layout)
     takes, found.tests = ([take["id"] for take in answer["takes"]] for answer in (learned, held_out))
     for method in BASES:
-        found.models[method] = _train(service, found, method, takes)
+        found.trainings[method] = _train(service, found, method, takes)
     return found
 
 
@@ -82,6 +84,7 @@ def second_act(
     """
     tests = {"takes": found.tests}
     for method in BASES:
+        found.models[method] = service.wait_for_job(found.trainings[method])["result"]["model"]
         found.comparisons[method] = service.post(f"/models/{found.models[method]}/compare", tests)
     model = found.models[DIAGNOSED]
     _say_errors(found.comparisons[DIAGNOSED], say)
@@ -104,8 +107,7 @@ def second_act(
 
 def _train(service: RestClient, found: Findings, method: str, takes: list[str]) -> str:
     body = {"subject": found.subject, "layout": found.layout, "method": method, "takes": takes}
-    job = service.post("/models/train", body | TRAINING | {"activate": method == DIAGNOSED})
-    return service.wait_for_job(job["id"])["result"]["model"]
+    return service.post("/models/train", body | TRAINING | {"activate": method == DIAGNOSED})["id"]
 
 
 def _add(service: RestClient, found: Findings, named: dict[str, Any], say: Say, progress: Say) -> None:
