@@ -58,7 +58,13 @@ def verdict(hidden: HiddenSession, found: Findings) -> list[str]:
     floor = f"A perfect calibration of this glove without it would be off by up to {perfect:.2f} degrees."
     if truth is None:
         told = ["Hidden was: nothing. This simulated glove is healthy."]
-        return [*told, "Right: nothing was named." if named is None else f"Wrong: {named} was named."]
+        told.append("Right: nothing was named." if named is None else f"Wrong: {named} was named.")
+        if named is None and found.diagnosis["something_left"]["is_left"]:
+            told.append(
+                f"What was said to be left is the slip of any cloth, {hidden.session.plan.nuisance_deg:g} degrees "
+                "in this simulation; it has no cause that could be named."
+            )
+        return told
     where = "all sensors" if len(truth.channels) == len(hidden.session.plan.sensors) else ""
     told = [
         f"Hidden was: {truth.name}, of the form {truth.form}, on {where or ', '.join(truth.channels)}. "
