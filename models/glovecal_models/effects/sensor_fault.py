@@ -109,20 +109,17 @@ def _short_faults(
     angles = [take.reference_at_frames([rotation])[:, 0] for take in takes]
     expected, gain = expected_readings(np.concatenate(columns), np.concatenate(angles))
     parts = np.split(expected, np.cumsum([len(column) for column in columns])[:-1])
-    found = [
-        {
-            "stuck": shortly_stuck(take.time_s, column, low, high, part, gain, _others_move(take, sensor)),
-            "dropouts": small_dropouts(take.time_s, column, high - low, part),
-        }
-        for take, column, part in zip(takes, columns, parts, strict=True)
-    ]
+    found = []
+    for take, column, part in zip(takes, columns, parts, strict=True):
+        moving = _others_move(take, sensor)
+        held = shortly_stuck(take.time_s, column, low, high, part, gain, moving)
+        away = small_dropouts(take.time_s, column, high - low, part, moving)
+        found.append({"stuck": held, "dropouts": away})
     for kind in ("stuck", "dropouts"):
-        if (
-            sum(len(stretches_of(take, masks[kind])) for take, masks in zip(takes, found, strict=True))
-            < FEWEST
-        ):
-            for masks in found:
-                masks[kind][:] = False
+        masks = [each[kind] for each in found]
+        if sum(len(stretches_of(take, mask)) for take, mask in zip(takes, masks, strict=True)) < FEWEST:
+            for mask in masks:
+                mask[:] = False
     return found
 
 

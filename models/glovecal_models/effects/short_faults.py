@@ -76,12 +76,15 @@ def shortly_stuck(
     return found
 
 
-def small_dropouts(time_s: np.ndarray, readings: np.ndarray, span: float, expected: np.ndarray) -> np.ndarray:
+def small_dropouts(
+    time_s: np.ndarray, readings: np.ndarray, span: float, expected: np.ndarray, others_move: np.ndarray
+) -> np.ndarray:
     """Pieces of three frames to half a second that stand off, entered and left by jumps of about one size.
 
-    ``span`` is the sensor's range in readings.
+    ``span`` is the sensor's range in readings; ``others_move`` (N,): no repeated frame.
     """
     found = np.zeros(len(readings), dtype=bool)
+    fresh = others_move | (np.diff(readings, prepend=np.nan) != 0)
     change = np.diff(readings - expected, prepend=np.nan)
     known = np.isfinite(change)
     if span <= 0 or known.sum() < 100:
@@ -103,7 +106,8 @@ def small_dropouts(time_s: np.ndarray, readings: np.ndarray, span: float, expect
         # Against the frames before, of which a small spike may have moved one.
         before = np.median(level[max(away - BEFORE_FRAMES, 0) : away])
         held = float(np.median(level[away:back]) - before) / jump[away]
-        found[away:back] = back - away >= DROPOUT_FRAMES and held > ALIKE
+        lasts = back - away >= DROPOUT_FRAMES
+        found[away:back] = lasts and held > ALIKE and fresh[away + 1 : back].mean() > 0.5
         # Both jumps are used up, by a spike too: its way back is not the beginning of a dropout.
-        at += 2 if back - away < DROPOUT_FRAMES or held > ALIKE else 1
+        at += 2 if not lasts or held > ALIKE else 1
     return found
