@@ -112,7 +112,7 @@ def test_frames_that_all_sensors_repeat_are_not_stuck(glove):
     for take in glove.takes():
         held = np.arange(len(take.readings)) // 12 * 12
         takes.append(replace(take, readings=take.readings[held]))
-    assert FAULT.find(takes, glove.sensor_of) == ()
+    assert "stuck" not in [item.kind for item in FAULT.find(takes, glove.sensor_of)]
 
 
 def drift(counts, generator):
