@@ -16,7 +16,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from glovecal_models.effects.signature_effect import Finding, SignatureEffect, check_signature_input
-from glovecal_models.effects.take_spread import TakeSpread, spread_of_takes
+from glovecal_models.effects.take_spread import TakeSpread, is_common, spread_of_takes
 from glovecal_models.takes.take import Take
 
 MEAN_S = 10.0
@@ -77,20 +77,21 @@ class GarmentSlip(SignatureEffect):
         check_signature_input(takes, sensor_of, errors)
         if errors is None:
             return ()
-        found = []
+        found, between = [], []
         for column, rotation in enumerate(sensor_of):
             own = [error[:, column] for error in errors]
             slip = slip_of(takes, own, rotation)
-            plain = _without_posture(takes, own, rotation)
-            spread = spread_of_takes(takes, plain)
             if slip is not None and slip.is_slip:
                 found.append(_finding(rotation, slip))
-            elif (
-                spread is not None
-                and spread.is_slip
-                and spread.size_deg > OVER_NOISE * _frame_noise(plain, takes)
-            ):
-                found.append(_finding_between(rotation, spread))
+                continue
+            plain = _without_posture(takes, own, rotation)
+            spread = spread_of_takes(takes, plain)
+            if spread is None or not spread.is_slip:
+                continue
+            if spread.size_deg > OVER_NOISE * _frame_noise(plain, takes):
+                between.append((_finding_between(rotation, spread), plain))
+        if not is_common(takes, [plain for _, plain in between]):
+            found += [finding for finding, _ in between]
         return tuple(sorted(found, key=lambda item: -(item.size_deg or 0.0)))
 
 

@@ -23,6 +23,10 @@ SHORTEST_TAKE_S = 2 * MEAN_S
 FEWEST_FREE = 3
 """Takes that are left when wearings and context columns have taken theirs."""
 EXPLAINING = ("power_on_s", "supply_v", "temperature_c", "humidity_pct")
+LATE, LATE_SHARE = "humidity_pct", 0.5
+"""Sensors follow this one late: its slope may explain too, where it leaves no more than this share."""
+COMMON_JOINTS, COMMON_SHARE = 3, 0.8
+"""Sensors slip each by itself; what moves so many together has a cause outside them."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +56,7 @@ def spread_of_takes(takes: Sequence[Take], errors: Sequence[np.ndarray]) -> Take
         return None
     means, takes = [means[number] for number in used], [takes[number] for number in used]
     target = np.array([each.mean() for each in means])
-    explained = _explained_by(takes)
+    explained = _explained_by(takes, target)
     free = len(takes) - explained.shape[1]
     if free < FEWEST_FREE:
         return None
@@ -69,6 +73,21 @@ def spread_of_takes(takes: Sequence[Take], errors: Sequence[np.ndarray]) -> Take
     )  # fmt: skip
 
 
+def is_common(takes: Sequence[Take], errors: Sequence[Sequence[np.ndarray]]) -> bool:
+    """Whether the takes of several joints differ together: ``errors`` (N,) for each joint and take."""
+    if len(errors) < COMMON_JOINTS:
+        return False
+    known = [number for number in range(len(takes)) if all(np.isfinite(e[number]).any() for e in errors)]
+    if len(known) <= FEWEST_FREE:
+        return False
+    means = np.array([[np.nanmean(joint[number]) for joint in errors] for number in known])
+    wearing = _basis(_wearings([takes[number] for number in known]))
+    left = means - wearing @ (wearing.T @ means)
+    left /= np.maximum(np.linalg.norm(left, axis=0), 1e-12)
+    together = np.linalg.svd(left, compute_uv=False) ** 2
+    return bool(together[0] > COMMON_SHARE * together.sum())
+
+
 def _long_means(time_s: np.ndarray, error: np.ndarray) -> np.ndarray:
     """Means over each complete 10 s of which at least half was measured."""
     piece = ((time_s - time_s[0]) / MEAN_S).astype(int)
@@ -80,21 +99,49 @@ def _long_means(time_s: np.ndarray, error: np.ndarray) -> np.ndarray:
     return total[good] / count[good]
 
 
-def _explained_by(takes: Sequence[Take]) -> np.ndarray:
+def _explained_by(takes: Sequence[Take], target: np.ndarray) -> np.ndarray:
     """Orthonormal (T, K): the wearings, and the context columns that change inside wearings."""
-    wearings = np.array([take.wearing for take in takes])
-    columns = [(wearings == name).astype(float) for name in dict.fromkeys(wearings.tolist())]
-    wearing = np.column_stack(columns) / np.sqrt(np.sum(columns, axis=1))
-    for name in EXPLAINING:
-        known = [take.context.get(name, np.full(1, np.nan)) for take in takes]
-        if not all(np.isfinite(values).any() for values in known):
-            continue
-        mean = np.array([values[np.isfinite(values)].mean() for values in known])
-        column = mean - wearing @ (wearing.T @ mean)
-        if np.linalg.norm(column) > 1e-6 * max(1.0, float(np.abs(mean).max())):
-            columns.append(column / np.linalg.norm(column))
-    vectors, sizes, _ = np.linalg.svd(np.column_stack(columns), full_matrices=False)
-    return vectors[:, sizes > 1e-6 * sizes[0]]
+    columns = [*_wearings(takes), *(_level(takes, name) for name in EXPLAINING)]
+    # Chance seldom gives a slope so much beside its own column, and each column costs a take.
+    late = _basis([*_wearings(takes), _level(takes, LATE), _slope(takes, LATE)])
+    plain = _basis([*_wearings(takes), _level(takes, LATE)])
+    left, left_late = (float(np.sum((target - part @ (part.T @ target)) ** 2)) for part in (plain, late))
+    return _basis([*columns, _slope(takes, LATE)] if left_late < LATE_SHARE * left else columns)
+
+
+def _wearings(takes: Sequence[Take]) -> list[np.ndarray]:
+    names = np.array([take.wearing for take in takes])
+    return [(names == name).astype(float) for name in dict.fromkeys(names.tolist())]
+
+
+def _level(takes: Sequence[Take], name: str) -> np.ndarray:
+    """(T,) mean of a context column in each take; zero when a take does not know it."""
+    known = [take.context.get(name, np.full(1, np.nan)) for take in takes]
+    if not all(np.isfinite(values).any() for values in known):
+        return np.zeros(len(takes))
+    means = np.array([values[np.isfinite(values)].mean() for values in known])
+    return means - means.mean()
+
+
+def _slope(takes: Sequence[Take], name: str) -> np.ndarray:
+    """(T,) per second, of a line through a context column in each take; zero when a take does not know it."""
+    found = np.zeros(len(takes))
+    for number, take in enumerate(takes):
+        values = take.context.get(name, np.full(len(take.time_s), np.nan))
+        known = np.isfinite(values)
+        if known.sum() < 2:
+            return np.zeros(len(takes))
+        time = take.time_s[known] - take.time_s[known].mean()
+        found[number] = float(time @ values[known]) / float(time @ time)
+    return found - found.mean()
+
+
+def _basis(columns: Sequence[np.ndarray]) -> np.ndarray:
+    """Orthonormal (T, K) of the columns (T,), each made as long as the others."""
+    sizes = [float(np.linalg.norm(column)) for column in columns]
+    scaled = [column / size for column, size in zip(columns, sizes, strict=True) if size > 1e-9]
+    vectors, weights, _ = np.linalg.svd(np.column_stack(scaled), full_matrices=False)
+    return vectors[:, weights > 1e-6 * weights[0]]
 
 
 def _wander_of_mean(length_s: float) -> float:

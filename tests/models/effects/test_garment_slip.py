@@ -94,5 +94,13 @@ def test_what_wearings_or_context_explain_is_no_slip(glove):
     assert SLIP.find(worn, glove.sensor_of, glove.errors(worn)) == ()
 
 
+def test_what_all_sensors_do_together_is_no_slip(glove):
+    def together(counts, generator):
+        return every_glove(counts, generator) + 3 * generator.normal()
+
+    takes = glove.takes(count=8, shape_counts=together)
+    assert SLIP.find(takes, glove.sensor_of, glove.errors(takes)) == ()
+
+
 def test_uncertainty_grows_from_the_last_known_pose():
     np.testing.assert_allclose(slip_sd(2.0, np.array([-1.0, 0.0, 60.0, 240.0])), [0.0, 0.0, 2.0, 4.0])
