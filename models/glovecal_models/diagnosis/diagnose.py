@@ -19,7 +19,12 @@ from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.naming import Naming, named
 from glovecal_models.diagnosis.next_take import NextTake, next_take
 from glovecal_models.diagnosis.reference_problems import reference_problems
-from glovecal_models.diagnosis.signatures import jump_beside_curve, signature_findings
+from glovecal_models.diagnosis.signatures import (
+    AFTER_ALL,
+    jump_beside_curve,
+    may_be_slip,
+    signature_findings,
+)
 from glovecal_models.diagnosis.something_left import NOT_TOLD, Left, something_left
 from glovecal_models.effects.catalogue import catalogue, effect
 from glovecal_models.effects.context_dependence import ContextDependence, unfamiliar_columns
@@ -58,7 +63,8 @@ class Diagnosis:
             if found and name not in self.naming.confidence_set:
                 return found
         if self.naming.ranked:
-            return ()
+            slips = tuple(item for item in self.findings if item.effect in AFTER_ALL)
+            return slips if may_be_slip(self.naming) else ()
         return tuple(item for item in self.findings if item.effect == self.findings[0].effect)
 
     @property

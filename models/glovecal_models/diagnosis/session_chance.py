@@ -15,6 +15,7 @@ from glovecal_models.comparison.wearings import other_deals, partition_of
 from glovecal_models.diagnosis.directions import Direction
 from glovecal_models.effects.decoy import motions_of, with_context
 from glovecal_models.effects.effect import Effect, Signals
+from glovecal_models.effects.history_effect import LONGEST_GAP_S
 
 DEALS = 299
 ROWS_PER_TAKE = 80
@@ -33,7 +34,7 @@ def session_probability(direction: Direction, effect: Effect, generator: np.rand
         return None
     settings = effect.settle(direction.signals)
     grid = effect.grid(direction.signals, settings)
-    rows = [_thinned(len(take)) for take in direction.signals]
+    rows = [_thinned(take.time_s) for take in direction.signals]
     thin = [_some(take, some) for take, some in zip(direction.signals, rows, strict=True)]
     bases, targets = zip(*(_projected(direction, joint, rows) for joint in joints), strict=True)
     prior = effect.prior_sd(settings)
@@ -93,8 +94,11 @@ def _dealt(takes: Sequence[Signals], deal: np.ndarray, effect: Effect) -> list[S
     return [with_context(take, takes[int(to)]) for take, to in zip(takes, deal, strict=True)]
 
 
-def _thinned(length: int) -> np.ndarray:
-    return np.unique(np.linspace(0, length - 1, min(ROWS_PER_TAKE, length)).astype(int))
+def _thinned(time_s: np.ndarray) -> np.ndarray:
+    """Rows of a take: few, but close enough that nothing that remembers takes them for a gap."""
+    length = len(time_s)
+    wanted = max(ROWS_PER_TAKE, round(2.0 * float(time_s[-1] - time_s[0]) / LONGEST_GAP_S)) if length else 0
+    return np.unique(np.linspace(0, length - 1, min(wanted, length)).astype(int))
 
 
 def _some(take: Signals, rows: np.ndarray) -> Signals:

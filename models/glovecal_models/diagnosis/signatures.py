@@ -17,6 +17,13 @@ from glovecal_models.takes.take import Take
 BEFORE_ALL = ("repeated_samples", "sensor_fault", "saturation")
 AFTER_ALL = ("garment_slip",)
 """Creep looks like a slip: only asked when nothing else explains the error."""
+SLIP_TOO = ("donning_shift",)
+"""A walk over minutes differs between wearings too; what is left inside wearings tells whether it is one."""
+
+
+def may_be_slip(naming: Naming) -> bool:
+    """Whether nothing is ranked but what a slip brings about as well."""
+    return all(item.effect in SLIP_TOO for item in naming.ranked)
 
 
 def own_sensors(layout: Layout, joints: Sequence[str]) -> dict[str, str]:
@@ -42,7 +49,7 @@ def signature_findings(
         return
     for name in BEFORE_ALL:
         yield from _found(name, takes, sensor_of, None)
-    if not naming.ranked:
+    if may_be_slip(naming):
         for name in AFTER_ALL:
             yield from _found(name, takes, sensor_of, _static_errors(takes, sensor_of))
 

@@ -1,9 +1,10 @@
-"""Garment slip: the cloth creeps over the skin, and the error wanders slowly inside a take.
+"""Garment slip: the cloth creeps over the skin, and the error wanders slowly, inside takes and between them.
 
-The error of a calibrated model is averaged over 10 s. Frame noise and everything that is stationary within
-10 s (misfit that comes and goes with the posture) give such means a variance that can be worked out from the
-10 s themselves; a slip gives far more, and its means follow one another. Every glove slips by a few tenths of
-a degree; that is not named.
+Inside a take the error of a calibrated model is averaged over 10 s. Frame noise and everything that is
+stationary within 10 s (misfit that comes and goes with the posture) give such means a variance that can be
+worked out from the 10 s themselves; a slip gives far more, and its means follow one another. A slower slip
+shows in how the takes of one wearing differ (take_spread.py). Every glove slips by a few tenths of a degree;
+that is not named.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from glovecal_models.effects.signature_effect import Finding, SignatureEffect, check_signature_input
+from glovecal_models.effects.take_spread import TakeSpread, is_common, spread_of_takes
 from glovecal_models.takes.take import Take
 
 MEAN_S = 10.0
@@ -75,11 +77,21 @@ class GarmentSlip(SignatureEffect):
         check_signature_input(takes, sensor_of, errors)
         if errors is None:
             return ()
-        found = []
+        found, between = [], []
         for column, rotation in enumerate(sensor_of):
-            slip = slip_of(takes, [error[:, column] for error in errors], rotation)
+            own = [error[:, column] for error in errors]
+            slip = slip_of(takes, own, rotation)
             if slip is not None and slip.is_slip:
                 found.append(_finding(rotation, slip))
+                continue
+            plain = _without_posture(takes, own, rotation)
+            spread = spread_of_takes(takes, plain)
+            if spread is None or not spread.is_slip:
+                continue
+            if spread.size_deg > OVER_NOISE * _frame_noise(plain, takes):
+                between.append((_finding_between(rotation, spread), plain))
+        if not is_common(takes, [plain for _, plain in between]):
+            found += [finding for finding, _ in between]
         return tuple(sorted(found, key=lambda item: -(item.size_deg or 0.0)))
 
 
@@ -179,3 +191,19 @@ def _finding(rotation: str, slip: Slip) -> Finding:
     return Finding(
         GarmentSlip.name, (rotation,), sentence, size_deg=slip.size_deg, count=slip.means, evidence=evidence
     )
+
+
+def _finding_between(rotation: str, spread: TakeSpread) -> Finding:
+    sentence = (
+        f"{rotation}: the mean error of takes inside one wearing differs by {spread.size_deg:.1f} deg, "
+        f"on a healthy glove by {spread.healthy_deg:.1f} deg; start every take with a known pose."
+    )
+    evidence = {
+        "least_size_deg": spread.least_deg,
+        "healthy_size_deg": spread.healthy_deg,
+        "variance_over_wander_1": spread.over_wander,
+    }
+    return Finding(
+        GarmentSlip.name, (rotation,), sentence, kind="between takes", size_deg=spread.size_deg,
+        count=spread.takes, evidence=evidence,
+    )  # fmt: skip

@@ -1,12 +1,12 @@
-"""Humidity: sweat and moist air change the sensors' resistance."""
+"""Humidity: sweat and moist air change the sensors; the fabric takes moisture up within minutes."""
 
 from typing import ClassVar
 
-from glovecal_models.effects.context_effect import ContextEffect
+from glovecal_models.effects.slow_context_effect import SlowContextEffect
 
 
-class Humidity(ContextEffect):
+class Humidity(SlowContextEffect):
     name = "humidity"
     explanation = "The reading changes with the humidity inside the glove."
-    source = "linear coefficients of offset and gain, deg/%"
+    source = "linear coefficients of offset and gain, deg/%; follows within minutes"
     context: ClassVar = ("humidity_pct",)

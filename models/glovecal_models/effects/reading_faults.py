@@ -37,7 +37,7 @@ def spikes(readings: np.ndarray, span: float) -> np.ndarray:
 def dropouts(readings: np.ndarray, span: float) -> np.ndarray:
     """Runs of two frames or more at one constant value, entered and left by a jump."""
     found = np.zeros(len(readings), dtype=bool)
-    for start, end in _constant_runs(readings):
+    for start, end in constant_runs(readings):
         if end - start < 2 or start == 0 or end == len(readings) or span <= 0:
             continue
         entered = abs(readings[start] - readings[start - 1])
@@ -55,7 +55,7 @@ def stuck(time_s: np.ndarray, readings: np.ndarray, low: float, high: float, mov
     found = np.zeros(len(readings), dtype=bool)
     margin = GRADUAL_SHARE * (high - low)
     never_changes = high <= low
-    for start, end in _constant_runs(readings):
+    for start, end in constant_runs(readings):
         lasts = time_s[end - 1] - time_s[start]
         if end - start < STUCK_FRAMES or lasts < STUCK_S:
             continue
@@ -66,7 +66,7 @@ def stuck(time_s: np.ndarray, readings: np.ndarray, low: float, high: float, mov
     return found
 
 
-def _constant_runs(readings: np.ndarray) -> list[tuple[int, int]]:
+def constant_runs(readings: np.ndarray) -> list[tuple[int, int]]:
     edges = np.concatenate([[0], np.flatnonzero(np.diff(readings) != 0) + 1, [len(readings)]])
     long = np.flatnonzero(np.diff(edges) >= 2)
     return [(int(edges[run]), int(edges[run + 1])) for run in long]

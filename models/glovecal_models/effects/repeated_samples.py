@@ -26,6 +26,10 @@ from glovecal_models.takes.take import Take
 LEAST_SHARE = 0.02
 """Of the moments inside a movement."""
 LEAST_COUNT = 10
+BEYOND_CHANCE = 1.5
+"""Columns must repeat together so many times more often than each for itself makes likely."""
+FINE_SHARE = 0.5
+"""Distinct values of a single column, by rows, above which it does not repeat by coarse steps."""
 CLEAR_STEP = 2.0
 """A sensor moves for certain when it steps by so many quanta in one frame."""
 NEAR_FRAMES = 5
@@ -42,6 +46,10 @@ class Repeats:
     """Repeats in the middle of a movement that goes on afterwards."""
     moving: int
     """Steps in the middle of a movement, for comparison."""
+    together: float = 0.0
+    """Share of the rows in or near a movement in which all columns repeat."""
+    by_chance: float = 0.0
+    """What that share would be if each column repeated for itself, as coarse steps of a slow movement do."""
 
     @property
     def share(self) -> float:
@@ -91,12 +99,29 @@ def repeats(values: np.ndarray) -> Repeats:
     moving = np.zeros(len(values), dtype=bool)
     moving[fresh[1:]] = (clear != 0).any(axis=1)
     near = np.convolve(moving, np.ones(2 * NEAR_FRAMES + 1), mode="same") > 0
-    return Repeats(same & near, int((goes_on & padded).sum()), int((goes_on & ~padded).sum()))
+    together = float(same[near].mean()) if near.any() else 0.0
+    interrupted, going = int((goes_on & padded).sum()), int((goes_on & ~padded).sum())
+    return Repeats(same & near, interrupted, going, together, _by_chance(values, steps, near, together))
+
+
+def _by_chance(values: np.ndarray, steps: np.ndarray, near: np.ndarray, together: float) -> float:
+    known = np.isfinite(values).any(axis=0)
+    if known.sum() == 1:
+        column = values[:, known]
+        is_fine = len(np.unique(column[np.isfinite(column)])) > FINE_SHARE * len(column)
+        return 0.0 if is_fine else together
+    single = (steps[near[1:]][:, known] == 0).mean(axis=0) if near[1:].any() else np.zeros(1)
+    return float(np.prod(single))
 
 
 def _is_found(found: Sequence[Repeats]) -> bool:
     interrupted, moving = sum(item.interrupted for item in found), sum(item.moving for item in found)
-    return interrupted >= LEAST_COUNT and interrupted >= LEAST_SHARE * (interrupted + moving)
+    if interrupted < LEAST_COUNT or interrupted < LEAST_SHARE * (interrupted + moving):
+        return False
+    together, by_chance = (
+        float(np.mean([getattr(r, name) for r in found])) for name in ("together", "by_chance")
+    )
+    return together >= LEAST_SHARE + BEYOND_CHANCE * by_chance
 
 
 def _finding(kind: str, takes: Sequence[Take], found: Sequence[Repeats]) -> Finding | None:

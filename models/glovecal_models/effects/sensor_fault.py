@@ -15,11 +15,13 @@ import numpy as np
 from glovecal_models.effects.effect import Side
 from glovecal_models.effects.gain_jump import gain_jump
 from glovecal_models.effects.reading_faults import GRADUAL_SHARE, dropouts, spikes, stuck
+from glovecal_models.effects.short_faults import FEWEST, expected_readings, shortly_stuck, small_dropouts
 from glovecal_models.effects.signature_effect import (
     Finding,
     SignatureEffect,
     Stretch,
     check_signature_input,
+    frames_inside,
     named,
     stretches_of,
 )
@@ -55,20 +57,27 @@ class SensorFault(SignatureEffect):
 
     def repaired(self, takes: Sequence[Take]) -> tuple[Take, ...]:
         """The takes without reference where the joint's own sensor failed: it neither trains nor scores."""
-        return tuple(_without_faults(take) for take in takes)
+        if not takes:
+            return ()
+        # Looked for in all takes together: a short fault may be rare in each of them.
+        shared = set.intersection(*(set(take.sensors) for take in takes))
+        rotations = dict.fromkeys(name for take in takes for name in take.rotations)
+        found = self.find(takes, {name: name for name in rotations if name in shared})
+        return tuple(_without_faults(take, found) for take in takes)
 
 
 def _faults(takes: Sequence[Take], sensor: str, rotation: str) -> list[Finding]:
     columns = [take.readings[:, take.sensors.index(sensor)] for take in takes]
     low, high = (float(v) for v in np.percentile(np.concatenate(columns), LEAST_OF_RANGE))
+    short = _short_faults(takes, sensor, rotation, low, high)
     stretches: dict[str, list[Stretch]] = {kind: [] for kind in SensorFault.kinds}
     frames = dict.fromkeys(SensorFault.kinds, 0)
     jumps = []
-    for take, readings in zip(takes, columns, strict=True):
+    for take, readings, brief in zip(takes, columns, short, strict=True):
         angles = take.reference_at_frames([rotation])[:, 0]
         masks = {
-            "stuck": stuck(take.time_s, readings, low, high, angles / REFERENCE_MOVES_DEG),
-            "dropouts": dropouts(readings, high - low),
+            "stuck": stuck(take.time_s, readings, low, high, angles / REFERENCE_MOVES_DEG) | brief["stuck"],
+            "dropouts": dropouts(readings, high - low) | brief["dropouts"],
         }
         masks["dropouts"] &= ~masks["stuck"]
         masks["spikes"] = spikes(readings, high - low) & ~masks["dropouts"]
@@ -92,18 +101,47 @@ def _faults(takes: Sequence[Take], sensor: str, rotation: str) -> list[Finding]:
     ]
 
 
-def _without_faults(take: Take) -> Take:
-    own = {name: name for name in take.rotations if name in take.sensors}
-    found = SensorFault().find([take], own)
-    if not found:
-        return take
+def _short_faults(
+    takes: Sequence[Take], sensor: str, rotation: str, low: float, high: float
+) -> list[dict[str, np.ndarray]]:
+    """For each take a mask (N,) of each kind; empty where there are too few of that kind in all takes."""
+    columns = [take.readings[:, take.sensors.index(sensor)] for take in takes]
+    angles = [take.reference_at_frames([rotation])[:, 0] for take in takes]
+    expected, gain = expected_readings(np.concatenate(columns), np.concatenate(angles))
+    parts = np.split(expected, np.cumsum([len(column) for column in columns])[:-1])
+    found = []
+    for take, column, part in zip(takes, columns, parts, strict=True):
+        moving = _others_move(take, sensor)
+        held = shortly_stuck(take.time_s, column, low, high, part, gain, moving)
+        away = small_dropouts(take.time_s, column, high - low, part, moving)
+        found.append({"stuck": held, "dropouts": away})
+    for kind in ("stuck", "dropouts"):
+        masks = [each[kind] for each in found]
+        if sum(len(stretches_of(take, mask)) for take, mask in zip(takes, masks, strict=True)) < FEWEST:
+            for mask in masks:
+                mask[:] = False
+    return found
+
+
+def _others_move(take: Take, sensor: str) -> np.ndarray:
+    """(N,) whether half of the other sensors or more changed since the frame before; never without others."""
+    others = np.delete(take.readings, take.sensors.index(sensor), axis=1)
+    if not others.shape[1]:
+        return np.zeros(len(others), dtype=bool)
+    changed = np.diff(others, axis=0, prepend=others[:1]) != 0
+    return changed.mean(axis=1) >= 0.5
+
+
+def _without_faults(take: Take, found: Sequence[Finding]) -> Take:
     reference = take.reference_at_frames(take.rotations)
+    failed = np.zeros_like(reference, dtype=bool)
     for item in found:
         for name in item.where:
             if name in take.rotations:
-                for piece in item.stretches:
-                    inside = (take.time_s >= piece.start_s) & (take.time_s <= piece.end_s)
-                    reference[inside, take.rotations.index(name)] = np.nan
+                failed[:, take.rotations.index(name)] |= frames_inside(take, item.stretches)
+    if not failed.any():
+        return take
+    reference[failed] = np.nan
     return replace(take, reference_time_s=take.time_s, reference=reference)
 
 
@@ -117,7 +155,7 @@ def _finding(
     sentence = {
         "stuck": f"{sensor} stands still for {seconds:.1f} s while {rotation} moves ({names}); {first}.",
         "spikes": f"{sensor} has {many} spikes of a frame or two ({names}); {first}.",
-        "dropouts": f"{sensor} drops to a constant {many} times ({names}); {first}.",
+        "dropouts": f"{sensor} drops out for a moment {many} times ({names}); {first}.",
         "jump": f"{sensor} jumps in offset or gain by {size or 0.0:.1f} deg and stays so ({names}); {first}.",
     }[kind]
     evidence = {"stretches_count": float(many), "concerned_s": seconds, "concerned_frames": float(frames)}

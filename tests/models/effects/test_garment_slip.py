@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -59,6 +61,45 @@ def test_without_errors_or_with_short_takes_nothing_is_said(glove):
     takes = glove.takes(count=2, seconds=15, shape_counts=slipping(4.0))
     assert SLIP.find(takes, glove.sensor_of) == ()
     assert slip_of(takes, [error[:, 1] for error in glove.errors(takes)], "M_PIP") is None
+
+
+def between_takes(size_deg):
+    """Each take starts elsewhere and stays there."""
+
+    def start(counts, generator):
+        counts = every_glove(counts, generator)
+        counts[:, 1] += 2 * size_deg * generator.normal()
+        return counts
+
+    return start
+
+
+def test_a_slip_between_takes_is_found(glove):
+    takes = glove.takes(count=8, shape_counts=between_takes(1.5))
+    [finding] = SLIP.find(takes, glove.sensor_of, glove.errors(takes))
+    assert (finding.where, finding.kind) == (("M_PIP",), "between takes")
+    assert finding.size_deg == pytest.approx(1.5, rel=0.5)
+    assert finding.evidence["healthy_size_deg"] < 0.4
+
+
+def test_what_wearings_or_context_explain_is_no_slip(glove):
+    takes = glove.takes(count=8, shape_counts=between_takes(1.5))
+    means = np.array([error[:, 1].mean() for error in glove.errors(takes)])
+    warmth = [np.full(len(take.time_s), 30 + 2 * mean) for take, mean in zip(takes, means, strict=True)]
+    warmed = [
+        replace(take, context={"temperature_c": each}) for take, each in zip(takes, warmth, strict=True)
+    ]
+    assert SLIP.find(warmed, glove.sensor_of, glove.errors(warmed)) == ()
+    worn = [replace(take, wearing=f"w{number}") for number, take in enumerate(takes)]
+    assert SLIP.find(worn, glove.sensor_of, glove.errors(worn)) == ()
+
+
+def test_what_all_sensors_do_together_is_no_slip(glove):
+    def together(counts, generator):
+        return every_glove(counts, generator) + 3 * generator.normal()
+
+    takes = glove.takes(count=8, shape_counts=together)
+    assert SLIP.find(takes, glove.sensor_of, glove.errors(takes)) == ()
 
 
 def test_uncertainty_grows_from_the_last_known_pose():

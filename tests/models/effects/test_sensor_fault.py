@@ -69,6 +69,52 @@ def test_a_fault_is_found_where_it_is(glove, change, kind, first_s, frames):
         assert finding.size_deg == pytest.approx(8 if change is shifted else 11, abs=2.5)
 
 
+def briefly_stuck(readings):
+    """A third of a second in the middle of a quick movement, five times."""
+    moving = np.abs(readings[12:] - readings[:-12])
+    for place in (0, 360, 720, 1080, 1440):
+        start = place + int(moving[place : place + 300].argmax())
+        readings[start : start + 13] = readings[start]
+
+
+def briefly_away(readings):
+    """A tenth of the range lower for a tenth of a second, five times."""
+    for start in (200, 500, 800, 1100, 1500):
+        readings[start : start + 6] -= 18
+
+
+def spiked_often(readings):
+    readings[[*range(50, 1750, 11)]] += 30
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "times"), [(briefly_stuck, "stuck", 5), (briefly_away, "dropouts", 5)]
+)
+def test_short_faults_are_found_when_there_are_several(glove, change, kind, times):
+    takes = broken(glove, change)
+    [finding] = FAULT.find(takes, glove.sensor_of)
+    assert (finding.where, finding.kind) == (("I_PIP",), kind)
+    assert finding.count == pytest.approx(times, abs=1)
+    mended = FAULT.repaired(takes)
+    assert mended[1] is takes[1]
+    left_out = ~np.isfinite(mended[2].reference_at_frames(["I_PIP", "M_PIP"]))
+    assert left_out[:, 0].sum() == frames_inside(takes[2], finding.stretches).sum() > 0
+    assert not left_out[:, 1].any()
+
+
+def test_many_spikes_are_no_dropouts(glove):
+    [finding] = FAULT.find(broken(glove, spiked_often), glove.sensor_of)
+    assert finding.kind == "spikes"
+
+
+def test_frames_that_all_sensors_repeat_are_not_stuck(glove):
+    takes = []
+    for take in glove.takes():
+        held = np.arange(len(take.readings)) // 12 * 12
+        takes.append(replace(take, readings=take.readings[held]))
+    assert "stuck" not in [item.kind for item in FAULT.find(takes, glove.sensor_of)]
+
+
 def drift(counts, generator):
     return counts + np.linspace(0, 20, len(counts))[:, None]
 

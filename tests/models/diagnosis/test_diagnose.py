@@ -1,0 +1,98 @@
+"""The whole question on simulated sessions: names, silence, delays told apart, refusals."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.errors import BadInput, Cancelled
+from glovecal_models.layout import Layout
+from glovecal_models.simulation.causes.cause import Cause
+from glovecal_models.simulation.session import record_session
+from glovecal_models.simulation.session_plan import SessionPlan
+from glovecal_models.takes.take import Take
+
+SENSORS = ("I_MCP", "I_PIP")
+LAYOUT = Layout.from_columns("two", SENSORS, SENSORS)
+
+
+def session(seed: int, *causes: Cause) -> tuple[Take, ...]:
+    plan = SessionPlan(seed=seed, sensors=SENSORS, wearings=3, takes_per_wearing=3, take_s=20.0)
+    return record_session(plan, causes).takes
+
+
+@pytest.fixture(scope="module")
+def clean() -> tuple[Take, ...]:
+    return session(11)
+
+
+def test_a_clean_glove_is_left_alone(clean):
+    found = diagnose(clean, LAYOUT)
+    document = json.loads(json.dumps(found.to_document()))
+    assert document["named"] is None
+    assert not document["something_left"]["is_left"]
+    assert document["next_take"] is None
+    assert set(document["rotations"]) == set(SENSORS)
+    assert found.to_document() == diagnose(clean, LAYOUT).to_document(), "the same takes, the same answer"
+
+
+@pytest.mark.parametrize(
+    ("cause", "form"), [("hysteresis", "single_play"), ("lag", "one_pole"), ("donning_shift", "offset")]
+)
+def test_a_strong_cause_is_named_with_its_evidence(cause, form):
+    named = diagnose(session(12, Cause(cause, form, strength_deg=2.0)), LAYOUT).to_document()["named"]
+    assert named["effect"] == cause
+    assert named["verdict"] == "named"
+    assert named["saved_deg"] > 2 * max(named["decoy_saved_deg"], 0.0)
+
+
+def test_a_reference_ahead_of_its_sensor_is_no_lag(clean):
+    late = [replace(take, reference_time_s=take.reference_time_s + 0.06) for take in clean]
+    found = diagnose(late, LAYOUT)
+    assert found.naming.confidence_set == ("clock_offset",)
+    assert found.naming.ranked[0].shapes[0] == pytest.approx([-0.06], abs=0.006)
+
+
+def test_what_cannot_be_judged_is_said(clean):
+    bare = [replace(take, context={}, wearing="one") for take in clean]
+    why = {item.effect: item.why for item in diagnose(bare, LAYOUT).not_judgeable}
+    assert why["warmup_drift"] == "no context column c.power_on_s was recorded"
+    assert why["donning_shift"] == "all takes are of one wearing"
+
+
+def test_an_unfamiliar_column_is_called_by_its_name():
+    takes = session(13)
+    random = np.random.default_rng(1)
+    changed = []
+    for take in takes:
+        strap = np.sin(take.time_s / 3 + random.uniform(0, 6))
+        readings = take.readings + 6.0 * (strap**2)[:, None]
+        changed.append(replace(take, readings=readings, context={**take.context, "strap_n": strap}))
+    assert diagnose(changed, LAYOUT).naming.confidence_set[0] == "context:strap_n"
+
+
+def test_takes_without_reference_are_refused(clean):
+    bare = [
+        replace(take, rotations=(), reference_time_s=np.empty(0), reference=np.empty((0, 0)))
+        for take in clean
+    ]
+    with pytest.raises(BadInput, match="no take measured a rotation"):
+        diagnose(bare, LAYOUT)
+
+
+def test_it_can_be_cancelled_in_the_middle(clean):
+    asked = iter([False, False, False])
+    with pytest.raises(Cancelled):
+        diagnose(clean, LAYOUT, cancelled=lambda: next(asked, True))
+
+
+def test_a_few_seconds_are_too_little(clean):
+    short = replace(
+        clean[0], time_s=clean[0].time_s[:300], readings=clean[0].readings[:300],
+        reference_time_s=clean[0].time_s[:300], reference=clean[0].reference[:300],
+        context={name: values[:300] for name, values in clean[0].context.items()},
+    )  # fmt: skip
+    told = diagnose([short], LAYOUT).to_document()["sentences"]
+    assert any(sentence.startswith("Too little was recorded") for sentence in told)

@@ -1,0 +1,54 @@
+"""Sums of squares and products give what fitting each fold by itself gives."""
+
+import numpy as np
+import pytest
+
+from glovecal_models.diagnosis.held_out import ALIKE_ROWS, BaseProducts, Rows, held_out
+
+
+@pytest.fixture
+def units() -> list[Rows]:
+    random = np.random.default_rng(3)
+    found = []
+    for _ in range(5):
+        base = np.column_stack([np.ones(80), random.normal(size=(80, 2))])
+        found.append(Rows(base, base @ [1.0, 2.0, -1.0] + random.normal(size=80)))
+    return found
+
+
+def test_columns_of_zeros_change_nothing(units):
+    found = held_out(BaseProducts(units), [np.zeros((80, 2, 1))] * 5, np.ones(1))
+    assert found.saved == pytest.approx(0.0, abs=1e-12)
+    assert found.added == pytest.approx(found.base)
+
+
+def test_every_fold_is_the_ridge_fit_of_the_others(units):
+    random = np.random.default_rng(4)
+    columns = [random.normal(size=(80, 1, 2)) for _ in units]
+    products = BaseProducts(units)
+    prior = np.array([1.0, 0.5])
+    found = held_out(products, columns, prior)
+    variance = products.error.sum() / products.count.sum()
+    for left in range(5):
+        kept = [i for i in range(5) if i != left]
+        x = np.concatenate([np.column_stack([units[i].base, columns[i][:, 0]]) for i in kept])
+        y = np.concatenate([units[i].target for i in kept])
+        ridge = np.zeros((5, 5))
+        ridge[:3, :3] = products.ridge
+        ridge[3:, 3:] = np.diag(ALIKE_ROWS * variance / prior**2)
+        beta = np.linalg.solve(x.T @ x + ridge, x.T @ y)
+        own = np.column_stack([units[left].base, columns[left][:, 0]])
+        assert found.residual_added[left] == pytest.approx(units[left].target - own @ beta)
+
+
+def test_the_shape_is_chosen_by_training_error(units):
+    random = np.random.default_rng(5)
+    columns, targets = [], []
+    for unit in units:
+        each = random.normal(size=(80, 3, 1))
+        columns.append(each)
+        targets.append(Rows(unit.base, unit.target + 4.0 * each[:, 1, 0]))
+    found = held_out(BaseProducts(targets), columns, np.ones(1) * 10)
+    assert found.shape == 1
+    assert found.weights == pytest.approx([4.0], abs=0.3)
+    assert found.saved > 0.8
