@@ -61,8 +61,8 @@ def verdict(hidden: HiddenSession, found: Findings) -> list[str]:
         told.append("Right: nothing was named." if named is None else f"Wrong: {named} was named.")
         if named is None and found.diagnosis["something_left"]["is_left"]:
             told.append(
-                f"What was said to be left is the slip of any cloth, {hidden.session.plan.nuisance_deg:g} degrees "
-                "in this simulation; it has no cause that could be named."
+                f"What was said to be left is the slip of any cloth, {hidden.session.plan.nuisance_deg:g} "
+                "degrees in this simulation; it has no cause that could be named."
             )
         return told
     where = "all sensors" if len(truth.channels) == len(hidden.session.plan.sensors) else ""
