@@ -170,3 +170,15 @@ def test_a_result_that_went_with_its_process_is_not_waited_for_for_ever(
     wait_for(lambda: not cluster.scheduler.workers)
     with pytest.raises(workers.WorkersLost):
         workers.outcome(future, task)
+
+
+def test_another_job_may_replace_the_processes_between_announcement_and_fetching(
+    dispatched, ledger, tmp_path
+):
+    store, dispatcher = dispatched
+    [task] = CountingJob().plan(store, create(store, ledger, [2])).tasks
+    future = dispatcher.workers.submit(task, tmp_path / "fits", tmp_path / "cancel", tmp_path / "progress")
+    wait_for(future.done)
+    dispatcher.workers.reset(future.client)
+    with pytest.raises(workers.WorkersLost):
+        workers.outcome(future, task)

@@ -169,6 +169,10 @@ class Workers:
                     part.close(timeout=timeout_s)
 
 
+LOOP_IS_CLOSED = "IOLoop is closed"
+"""What Dask says of a client that was closed between the announcement of a result and its fetching."""
+
+
 def finished(futures: list[Future], timeout_s: float) -> list[Future]:
     """Those that are finished, after waiting ``timeout_s`` at most for the first.
 
@@ -190,6 +194,10 @@ def outcome(future: Future, task: Task) -> TaskOutcome:
         return future.result(timeout=FETCH_WITHIN_S)
     except (*CANCELLED, OSError, TimeoutError, ClosedClientError) as error:
         raise WorkersLost("the scheduler of the training processes was lost", future.client) from error
+    except RuntimeError as error:
+        if LOOP_IS_CLOSED not in str(error):  # a task's own error
+            raise
+        raise WorkersLost("another job has replaced the training processes", future.client) from error
     except KilledWorker as error:
         raise TaskKilledWorkers(
             f"{task.label}: every process that worked on it died (killed, or out of memory)"
