@@ -22,16 +22,14 @@ from glovecal_models.calibration.training_plan import task_for
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.diagnosis.base_features import BaseFeatures
 from glovecal_models.diagnosis.held_out import BaseProducts, Rows, held_out
-from glovecal_models.effects.effect import Signals
 from glovecal_models.errors import Cancelled
+from glovecal_models.improvement.effect_shape import EffectGroup, best_shape
 from glovecal_models.improvement.prepared_takes import PreparedTakes
 from glovecal_models.improvement.wanted_effect import ONE_BY_ONE, WantedEffect
 from glovecal_models.layout import Correspondence
 from glovecal_models.regression.regressor import Regressor
 
 TURNS = 2
-REFINEMENTS = 2
-"""Rounds of trying shapes between the best of a grid and its neighbours."""
 
 
 @dataclass(frozen=True)
@@ -125,16 +123,6 @@ def own_signals(
     return own, float(y.mean() - slope * x.mean())
 
 
-@dataclass(frozen=True)
-class _Group:
-    """Lanes of one effect that share settings."""
-
-    wanted: WantedEffect
-    lanes: tuple[str, ...]
-    signals: list[Signals]
-    settings: dict[str, object]
-
-
 def _fitted_effects(
     takes: PreparedTakes,
     columns: Mapping[str, Correspondence],
@@ -155,7 +143,7 @@ def _fitted_effects(
     shapes: list[np.ndarray] = []
     for group in groups:
         _stop_if(cancelled)
-        shape = _shape(group, rows, bases, extra, priors)
+        shape = best_shape(group, rows, bases, extra, priors)
         shapes.append(shape)
         found = [group.wanted.effect.columns(take, group.settings, shape) for take in group.signals]
         for lane, name in enumerate(group.lanes):
@@ -179,7 +167,7 @@ def _groups(
     item: WantedEffect,
     columns: Mapping[str, Correspondence],
     own: Mapping[str, tuple[list[np.ndarray], float]],
-) -> list[_Group]:
+) -> list[EffectGroup]:
     names = [name for name in item.rotations if name in own]
     sets = [(name,) for name in names] if item.name in ONE_BY_ONE else [tuple(names)]
     groups = []
@@ -187,7 +175,7 @@ def _groups(
         values = [np.column_stack(parts) for parts in zip(*(own[name][0] for name in lanes), strict=True)]
         without = frozenset(columns[lanes[0]].sensors) if item.name in ONE_BY_ONE else frozenset()
         signals = takes.signals(values, np.array([own[name][1] for name in lanes]), without)
-        groups.append(_Group(item, lanes, signals, item.effect.settle(signals)))
+        groups.append(EffectGroup(item, lanes, signals, item.effect.settle(signals)))
     return groups
 
 
@@ -200,75 +188,6 @@ def _base(
         Rows(features.columns(part[index]), target[index])
         for part, target, index in zip(inputs, takes.target(correspondence.rotation), rows, strict=True)
     ]
-
-
-def _shape(
-    group: _Group,
-    rows: Mapping[str, Sequence[np.ndarray]],
-    bases: Mapping[str, list[Rows]],
-    extra: Mapping[str, list[list[np.ndarray]]],
-    priors: Mapping[str, list[np.ndarray]],
-) -> np.ndarray:
-    """(L, P): the best of the effect's grid, then of finer ones around it."""
-    effect, settings = group.wanted.effect, group.settings
-    grid = effect.grid(group.signals, settings)
-    if grid.shape[0] == 1 or grid.shape[2] == 0:
-        return grid[0]
-    products = {
-        name: BaseProducts(
-            [
-                Rows(np.column_stack([unit.base, *(parts[u] for parts in extra[name])]), unit.target)
-                for u, unit in enumerate(bases[name])
-            ]
-        )
-        for name in group.lanes
-    }
-    prior = effect.prior_sd(settings)
-    best = np.zeros((len(group.lanes), grid.shape[2]))
-    for _ in range(1 + REFINEMENTS):
-        shapes, lanes, numbers = grid.shape
-        flat = grid.reshape(shapes * lanes, numbers)
-        found = [
-            effect.columns(_tiled(take, shapes), settings, flat).reshape(len(take), shapes, lanes, -1)
-            for take in group.signals
-        ]
-        for lane, name in enumerate(group.lanes):
-            mine = [part[index][:, :, lane] for part, index in zip(found, rows[name], strict=True)]
-            best[lane] = grid[held_out(products[name], mine, prior).shape, lane]
-        grid = _finer(grid, best)
-    return best
-
-
-def _tiled(take: Signals, times: int) -> Signals:
-    zero = None if take.zero_deg is None else np.tile(take.zero_deg, times)
-    return Signals(
-        take.time_s,
-        np.tile(take.own, (1, times)),
-        take.others,
-        take.context,
-        take.wearing,
-        take.take,
-        zero,
-    )
-
-
-def _finer(grid: np.ndarray, best: np.ndarray) -> np.ndarray:
-    """Shapes between the best and its neighbours in ``grid``, by ratios; (5, L, P)."""
-    result = np.empty((5, *best.shape))
-    for lane in range(best.shape[0]):
-        at = int(
-            np.argmin(
-                np.abs(np.log(np.maximum(grid[:, lane], 1e-9) / np.maximum(best[lane], 1e-9))).sum(axis=1)
-            )
-        )
-        low, high = grid[max(at - 1, 0), lane], grid[min(at + 1, len(grid) - 1), lane]
-        for row, share in enumerate((-2 / 3, -1 / 3, 0.0, 1 / 3, 2 / 3)):
-            end = high if share > 0 else low
-            result[row, lane] = best[lane] * (np.maximum(end, 1e-9) / np.maximum(best[lane], 1e-9)) ** abs(
-                share
-            )
-    order = np.argsort(result[:, :, :1].mean(axis=(1, 2)))
-    return result[order]
 
 
 def _weights(base: list[Rows], extra: list[list[np.ndarray]], priors: list[np.ndarray]) -> list[np.ndarray]:

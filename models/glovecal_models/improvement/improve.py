@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -29,6 +28,7 @@ from glovecal_models.improvement.add_effect import (
 )
 from glovecal_models.improvement.clocks import clock_settings, coarse_clock_settings
 from glovecal_models.improvement.held_out_check import HeldOutErrors, held_out_errors
+from glovecal_models.improvement.improvement import CLOCK, Improvement, Step, added_document
 from glovecal_models.improvement.known_effects import known_effects
 from glovecal_models.improvement.prepared_takes import PreparedTakes
 from glovecal_models.improvement.remove_effect import remove_effect, unneeded
@@ -40,75 +40,6 @@ FIRST_GAIN, LATER_GAIN = 0.05, 0.10
 AT_FLOOR = 1.15
 MOST_UNDONE = 2
 """After so many that did not help the walk ends."""
-CLOCK = "clock_offset"
-
-
-@dataclass(frozen=True)
-class Step:
-    """One model on the way."""
-
-    model: CalibrationModel
-    added: dict[str, Any] | None
-    rmse_deg: float
-    per_rotation: dict[str, float]
-    decoy_rmse_deg: float | None = None
-    """What the error would be with the effect's decoy instead: the share it saves, of the step before."""
-
-
-@dataclass(frozen=True)
-class Improvement:
-    """The whole walk."""
-
-    steps: tuple[Step, ...]
-    noise_floor: dict[str, NoiseFloor]
-    stopped: str
-    diagnosis: Diagnosis | None
-    """The last one: what is left, and what to record next."""
-    undone: tuple[Addition, ...]
-    baselines: dict[str, float] = field(default_factory=dict)
-    """Errors (deg) of simpler calibrations on the same takes, for scale."""
-    sentences: tuple[str, ...] = ()
-
-    @property
-    def models(self) -> tuple[CalibrationModel, ...]:
-        """One for each step."""
-        return tuple(step.model for step in self.steps)
-
-    def to_document(self, model_ids: Sequence[str | None] | None = None) -> dict[str, Any]:
-        """The JSON contract of ``glovecal improve``; ids are those under which the models were stored."""
-        ids = list(model_ids) if model_ids is not None else [None] * len(self.steps)
-        ambiguous = next(
-            (s.added for s in reversed(self.steps) if s.added and s.added["verdict"] == "ambiguous"), None
-        )
-        following = self.diagnosis.next_take if self.diagnosis else None
-        if following is None and ambiguous is not None:
-            following = ambiguous.get("next_take")
-        elif following is not None:
-            following = {
-                "what": following.what, "seconds": following.seconds, "separates": list(following.separates)
-            }  # fmt: skip
-        return {
-            "steps": [
-                {
-                    "model": id,
-                    "added": step.added,
-                    "rmse_deg": step.rmse_deg,
-                    "per_rotation": step.per_rotation,
-                    "decoy_rmse_deg": step.decoy_rmse_deg,
-                }
-                for id, step in zip(ids, self.steps, strict=True)
-            ],
-            "baselines": self.baselines,
-            "noise_floor_deg": {name: floor.floor_deg for name, floor in self.noise_floor.items()},
-            "noise_floor_interval_deg": {
-                name: [floor.low_deg, floor.high_deg] for name, floor in self.noise_floor.items()
-            },
-            "stopped": self.stopped,
-            "undone": [item.to_document() for item in self.undone],
-            "something_left": bool(self.diagnosis and self.diagnosis.left.is_left),
-            "next_take": following,
-            "sentences": list(self.sentences),
-        }
 
 
 def improve(
@@ -259,7 +190,7 @@ class _Walk:
             return False
         self.errors = self.errors.with_those_of(addition.after)
         model = self._pruned(addition)
-        self._step(model, _added_document(addition, clock, diagnosis), diagnosis)
+        self._step(model, added_document(addition, clock, diagnosis), diagnosis)
         return True
 
     def _pruned(self, addition: Addition) -> CalibrationModel:
@@ -333,7 +264,9 @@ class _Walk:
         per_rotation, over_all = self._errors(model)
         decoy = None
         if diagnosis is not None and diagnosis.naming.ranked:
-            before, _, with_decoy = errors_deg(diagnosis.naming.ranked[0])
+            assessed = {item.effect: item for item in diagnosis.naming.ranked}
+            first = diagnosis.naming.ranked[0]
+            before, _, with_decoy = errors_deg(assessed.get((added or {}).get("effect", ""), first))
             decoy = self.steps[-1].rmse_deg * min(with_decoy / max(before, 1e-12), 1.0)
             self.sentences.append(named_sentence(diagnosis))
         self.steps.append(Step(model, added, over_all, per_rotation, decoy))
@@ -378,29 +311,3 @@ class _Walk:
     def _say(self, text: str, share: float) -> None:
         if self.report:
             self.report(text, min(share, 1.0))
-
-
-def _added_document(
-    addition: Addition, clock: dict[str, Any] | None, diagnosis: Diagnosis | None
-) -> dict[str, Any]:
-    rivals = [addition.effect] if diagnosis is None else list(diagnosis.naming.confidence_set)
-    if addition.effect not in rivals:
-        rivals = [addition.effect]
-    parameters: dict[str, Any] = dict(addition.parameters)
-    if clock is not None and addition.effect != CLOCK:
-        parameters = clock
-    elif clock is not None:
-        parameters = {"offset_s": clock["offset_s"] if clock["per_take"] else clock["common_s"]}
-    document: dict[str, Any] = {
-        "effect": addition.effect,
-        "where": list((clock or {}).get("where", addition.rotations)),
-        "verdict": "named" if len(rivals) < 2 else "ambiguous",
-        "confidence_set": rivals,
-        "parameters": parameters,
-    }
-    if diagnosis is not None and diagnosis.next_take is not None and len(rivals) > 1:
-        following = diagnosis.next_take
-        document["next_take"] = {
-            "what": following.what, "seconds": following.seconds, "separates": list(following.separates)
-        }  # fmt: skip
-    return document
