@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,9 @@ LEAST_SESSION_CONTRAST = 0.12
 JOINT_PROBABILITY = 0.002
 POOLED_PROBABILITY = 0.001
 FEWEST_BLOCKS = 9
+SESSION_PROBABILITY = 0.007
+WEARING_PROBABILITY = 0.04
+"""Wearings have one way to be dealt, where context columns have many names: less is asked of them."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,6 @@ class Assessment:
     """(C,) of each joint."""
     probability: float | None = None
     """Of a session effect, from takes dealt in other ways; None: judged block by block."""
-
     numbers: tuple[str, ...] = ()
     """Names of the shape's numbers, units included."""
 
@@ -72,7 +75,7 @@ class Assessment:
         """The shape of one joint by its numbers' names."""
         return dict(zip(self.numbers, map(float, self.shapes[joint]), strict=False))
 
-    @property
+    @cached_property
     def touched(self) -> tuple[int, ...]:
         """Joints on which the effect saves error beyond chance."""
         most = WEARING_PROBABILITY if self.effect == "donning_shift" else SESSION_PROBABILITY
@@ -88,7 +91,7 @@ class Assessment:
         }
         together = [i for i, item in enumerate(self.errors) if item.contrast >= 0.5 * LEAST_CONTRAST]
         if len(together) > 1:
-            pooled = pooled_errors([self.errors[i] for i in range(len(self.errors))])
+            pooled = pooled_errors(self.errors)
             if pooled.contrast >= LEAST_CONTRAST and signed_rank(pooled.beyond_decoy) <= POOLED_PROBABILITY:
                 some.update(together)
         return tuple(sorted(some))
@@ -102,11 +105,6 @@ class Assessment:
                 for i in self.touched
             )
         )
-
-
-SESSION_PROBABILITY = 0.007
-WEARING_PROBABILITY = 0.04
-"""Wearings have one way to be dealt, where context columns have many names: less is asked of them."""
 
 
 def signed_rank(values: np.ndarray) -> float:

@@ -42,7 +42,6 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
         "reference_problems": list(diagnosis.reference_problems),
         "something_left": {
             "is_left": diagnosis.left.is_left,
-            "depends_on": list(diagnosis.left.depends_on),
             "sentence": diagnosis.left.sentence,
         },
         "next_take": None

@@ -1,14 +1,13 @@
-"""The two directions of a diagnosis: angle from sensors (inverse), sensor from angles (forward).
+"""What a diagnosis is fitted on: each joint's own sensor from the measured angles (forward).
 
-They lie in opposite ways about lag and clock: regressing a sensor on a noisy reference rewards any low pass,
-regressing an angle on noisy sensors punishes its inverse. Neither is trusted alone.
+A noisy reference rewards any low pass in this direction; strong smoothing and decoys take that away. The
+other direction, angle from sensors, is what adding an effect tries.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -20,16 +19,14 @@ from glovecal_models.diagnosis.left_out import are_short, pieces
 from glovecal_models.effects.effect import Signals
 from glovecal_models.layout import Correspondence, Layout
 
-DirectionName = Literal["inverse", "forward"]
 EVERY = 2
 """Of the even times: neighbours say nearly the same."""
 
 
 @dataclass(frozen=True)
 class Direction:
-    """All joints in one direction."""
+    """All joints, sensor from angles."""
 
-    name: DirectionName
     rotations: tuple[str, ...]
     signals: tuple[Signals, ...]
     """One for each take, own (N, R)."""
@@ -97,19 +94,18 @@ def forward(
         ]
         without = [_without(take, frozenset({rotation, *neighbours, *item.sensors})) for take in signals]
         extra = [found for each in known if (found := each.columns(without, column, rotation)) is not None]
-        units = []
         bases = [
             np.column_stack([features.columns(part[:, columns]), *(found[number] for found in extra)])
             for number, part in enumerate(filled)
         ]
-        for take, rows in zip(unit_take, index, strict=True):
-            units.append(Rows(bases[take][rows], sensor[column].values[take][rows]))
+        units = [
+            Rows(bases[take][rows], sensor[column].values[take][rows])
+            for take, rows in zip(unit_take, index, strict=True)
+        ]
         read.append(frozenset({rotation, *neighbours, *item.sensors}))
         used.append(tuple(index))
         products.append(BaseProducts(units))
-    return Direction(
-        "forward", tuple(rotations), signals, tuple(read), unit_take, tuple(used), tuple(products)
-    )
+    return Direction(tuple(rotations), signals, tuple(read), unit_take, tuple(used), tuple(products))
 
 
 def _read_beside(item: Correspondence, names: Sequence[str], layout: Layout) -> list[str]:

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 
 FAST = "fast"
 RAMPS = "ramps"
-CLAP = "clap"
 ONE_FINGER = "one_finger"
 CROSSED = "crossed"
 SHUFFLED = "shuffled"
-WEARINGS = "wearings"
 
 
 @dataclass(frozen=True)
@@ -48,7 +46,6 @@ _INSTRUCTIONS: dict[str, tuple[str, int]] = {
         " without switching off, switch off and on without taking it off; 40 s of free motion after each.",
         120,
     ),
-    WEARINGS: ("Take the glove off, put it on again and record 40 s of free motion, three times.", 120),
 }
 _RELATED: tuple[tuple[frozenset[str], str], ...] = (
     (frozenset({"lag", "clock_offset"}), FAST),
@@ -77,11 +74,6 @@ def next_take(rivals: Sequence[str]) -> NextTake | None:
     if len(_SESSION & set(rivals)) > 1:
         return _take(CROSSED, rivals)
     return _take(FAST, rivals)
-
-
-def for_wearings() -> NextTake:
-    """When there are too few wearings to judge them."""
-    return _take(WEARINGS, ("donning_shift",))
 
 
 def _take(motion: str, rivals: Sequence[str]) -> NextTake:

@@ -12,10 +12,10 @@ from glovecal_models.diagnosis.directions import Direction
 WINDOW_ROWS = 25
 """1 s of the rows that are fitted: what remains after averaging over it is slow."""
 SLOW_RATIO = 5.6
-"""Of 1 s means over what changes from row to row. Simulated gloves without a cause: 2.4 to 4.9, with a slow
-slip and a posture-dependent nuisance in them; with an unknown cause of 1 degree on all joints: 7 to 12."""
+"""Of 1 s means over what changes from row to row. 60 simulated gloves without a cause: 2.2 to 5.8, one
+above the limit; most with an unknown cause of 1 degree 7 to 12, a tilt on one joint from 5."""
 SHARED_RATIO = 12.0
-"""Without a cause 0.5 to 8.5, with a common one 18 and more."""
+"""Without a cause 0.5 to 8.5, with a common swing 18 and more."""
 SHIFTS = 60
 
 
@@ -25,14 +25,13 @@ class Left:
 
     is_left: bool
     slow: dict[str, float]
-    """For each joint: slow part of the held-out error over what its fast part would leave by chance."""
+    """For each joint: slow part of the held-out error over its noise from row to row."""
     shared: float
     """Correlation between joints' slow errors over what shifts in time give."""
-    depends_on: tuple[str, ...]
     sentence: str
 
 
-NOT_TOLD = Left(False, {}, 0.0, (), "Single poses do not tell whether something is left that lasts.")
+NOT_TOLD = Left(False, {}, 0.0, "Single poses do not tell whether something is left that lasts.")
 
 
 def something_left(direction: Direction, seed: int = 0) -> Left:
@@ -51,15 +50,13 @@ def something_left(direction: Direction, seed: int = 0) -> Left:
     is_slow = bool(slow) and slow[worst] > SLOW_RATIO
     is_shared = shared > SHARED_RATIO
     if not is_slow and not is_shared:
-        return Left(False, slow, shared, (), "What is left looks like noise.")
+        return Left(False, slow, shared, "What is left looks like noise.")
     why = []
     if is_slow:
         why.append(f"the error of {worst} lasts for seconds ({slow[worst]:.1f} times its noise)")
     if is_shared:
         why.append("the errors of several joints rise and fall together")
-    return Left(
-        True, slow, shared, (), f"Something is left that no known effect explains: {' and '.join(why)}."
-    )
+    return Left(True, slow, shared, f"Something is left that no known effect explains: {' and '.join(why)}.")
 
 
 def _means(residual: np.ndarray) -> np.ndarray:
@@ -68,7 +65,7 @@ def _means(residual: np.ndarray) -> np.ndarray:
 
 
 def _shared(series: Sequence[Sequence[np.ndarray]], generator: np.random.Generator) -> float:
-    """Mean absolute correlation between joints over that of shifted ones; 0 with a single joint."""
+    """Mean squared correlation between joints over that of shifted ones; 0 with a single joint."""
     if len(series) < 2:
         return 0.0
     takes = [

@@ -3,7 +3,7 @@
 With the effects' part taken from the reference the regressors are trained as ever; with the regressors'
 prediction as each joint's own signal the effects' shapes and weights are fitted, beside a static map of the
 same inputs, so that what the regressor can explain is not claimed by an effect. Two turns suffice: on
-simulated gloves a third changes the held-out error by less than 1 %.
+three simulated gloves (hysteresis, creep, donning) a third changed the error by less than 1 %.
 """
 
 from __future__ import annotations
@@ -51,25 +51,20 @@ def fit_with_effects(
     wanted: Sequence[WantedEffect],
     settings: TrainingSettings,
     *,
-    start: Mapping[str, Regressor] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> EffectFit:
-    """Train ``rotations`` with those of ``wanted`` that predict something. Raises NotTrainable, Cancelled.
-
-    ``start``: regressors trained on these takes without the newest effect; saves one training.
-    """
+    """Train ``rotations`` with those of ``wanted`` that predict something. Raises NotTrainable, Cancelled."""
     wanted = [item for item in wanted if item.has_columns and set(item.rotations) & set(rotations)]
     columns = {name: correspondence_for(takes, name, settings) for name in rotations}
     corrected: dict[str, list[np.ndarray]] = {}
     results: dict[str, FitResult] = {}
     effects: tuple[AddedEffect, ...] = ()
-    regressors = dict(start or {})
-    for turn in range(TURNS if wanted else 1):
-        if turn or any(name not in regressors for name in rotations) or not wanted:
-            for name in rotations:
-                _stop_if(cancelled)
-                results[name] = _trained(takes, columns[name], corrected.get(name), settings, cancelled)
-                regressors[name] = restore_regressor(results[name].arrays, results[name].settings)
+    regressors: dict[str, Regressor] = {}
+    for _ in range(TURNS if wanted else 1):
+        for name in rotations:
+            _stop_if(cancelled)
+            results[name] = _trained(takes, columns[name], corrected.get(name), settings, cancelled)
+            regressors[name] = restore_regressor(results[name].arrays, results[name].settings)
         if wanted:
             effects = _fitted_effects(takes, columns, regressors, wanted, settings, cancelled)
             corrected = _explained(takes, columns, regressors, effects)

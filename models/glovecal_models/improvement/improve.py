@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -99,13 +100,10 @@ class _Walk:
     def start(self) -> None:
         """The base model, its error and its floor."""
         self._say("training the base", 0.02)
-        fast = TrainingSettings(
-            self.settings.method, self.settings.samples, 0, self.settings.pseudo_inputs,
-            self.settings.iterations, self.settings.seed,
-        )  # fmt: skip
         model = train(
-            self.takes, self.layout, self.subject, fast, take_hashes=self.hashes, cancelled=self.cancelled
-        )
+            self.takes, self.layout, self.subject, replace(self.settings, folds=0),
+            take_hashes=self.hashes, cancelled=self.cancelled,
+        )  # fmt: skip
         self._say("measuring the base on takes left out", 0.1)
         self.errors = self._held_out(model)
         self._step(model, None)
@@ -199,14 +197,17 @@ class _Walk:
         for earlier in addition.wanted:
             if earlier.name == addition.effect or not earlier.has_columns:
                 continue
-            without = unneeded(model, self.takes, earlier.name, self._of(earlier.rotations), self.settings)
+            without = unneeded(
+                model, self.takes, earlier.name, self._of(earlier.rotations), self.settings, self.cancelled
+            )
             if without is not None:
                 self._say(f"taking {earlier.name} out again", 0.5)
                 self.errors = self.errors.with_those_of(without)
                 self.sentences.append(f"{earlier.name} is not needed any more beside {addition.effect}.")
                 model = remove_effect(
-                    model, self.takes, earlier.name, settings=self.settings, take_hashes=self.hashes
-                )
+                    model, self.takes, earlier.name, settings=self.settings, take_hashes=self.hashes,
+                    cancelled=self.cancelled,
+                )  # fmt: skip
         return model
 
     def _coarse_clocks(self) -> dict[str, Any] | None:
@@ -268,7 +269,8 @@ class _Walk:
             first = diagnosis.naming.ranked[0]
             before, _, with_decoy = errors_deg(assessed.get((added or {}).get("effect", ""), first))
             decoy = self.steps[-1].rmse_deg * min(with_decoy / max(before, 1e-12), 1.0)
-            self.sentences.append(named_sentence(diagnosis))
+            if added is not None and added["effect"] == first.effect:
+                self.sentences.append(named_sentence(diagnosis))
         self.steps.append(Step(model, added, over_all, per_rotation, decoy))
 
     def _errors(self, model: CalibrationModel) -> tuple[dict[str, float], float]:

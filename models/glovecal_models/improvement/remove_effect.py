@@ -25,12 +25,13 @@ def unneeded(
     name: str,
     now: HeldOutErrors,
     settings: TrainingSettings | None = None,
+    cancelled: Callable[[], bool] | None = None,
 ) -> HeldOutErrors | None:
     """The errors without effect ``name`` where it is not needed on the rotations of ``now``, else None."""
     settings = settings_of(model, settings)
     wanted = [item for item in wanted_of(model) if item.name != name]
     prepared = PreparedTakes.of(repaired_takes(takes, wanted), model.layout)
-    without = held_out_errors(prepared, tuple(now.square), wanted, settings)
+    without = held_out_errors(prepared, tuple(now.square), wanted, settings, cancelled=cancelled)
     return without if without.over_all_deg <= NEEDLESS * now.over_all_deg else None
 
 
