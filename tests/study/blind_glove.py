@@ -6,7 +6,7 @@ A diagnosis gets the takes and the layout. What is hidden stays here, for the ma
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -50,6 +50,8 @@ class BlindGlove:
     wearings: int = 3
     takes_per_wearing: int = 4
     take_s: float = 40.0
+    lead_s: float = 0.0
+    """So long the glove streams before the reference of each take begins."""
 
     @property
     def key(self) -> str:
@@ -68,7 +70,7 @@ class BlindGlove:
             nuisance=self.nuisance,
             wearings=self.wearings,
             takes_per_wearing=self.takes_per_wearing,
-            take_s=self.take_s,
+            take_s=self.lead_s + self.take_s,
         )
 
     @property
@@ -88,12 +90,12 @@ class BlindGlove:
     @property
     def takes(self) -> tuple[Take, ...]:
         """What the diagnosis sees."""
-        return self.session.takes
+        return tuple(_reference_from(take, self.lead_s) for take in self.session.takes)
 
     @property
     def clean_takes(self) -> tuple[Take, ...]:
         """The same glove and noise without causes."""
-        return self.session.clean
+        return tuple(_reference_from(take, self.lead_s) for take in self.session.clean)
 
     @property
     def floor_deg(self) -> float:
@@ -116,3 +118,9 @@ class BlindGlove:
             ],
             "floor_deg": round(self.floor_deg, 3),
         }
+
+
+def _reference_from(take: Take, begin_s: float) -> Take:
+    """The same frames with a reference that begins later."""
+    measured = take.reference_time_s >= take.time_s[0] + begin_s
+    return replace(take, reference_time_s=take.reference_time_s[measured], reference=take.reference[measured])

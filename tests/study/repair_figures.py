@@ -18,8 +18,9 @@ COVERED = {"saturation": 0.9, "garment_slip": None}
 def repair_figures(rows: Sequence[Row]) -> list[StudyFigure]:
     """Ratios by effect; open and set-aside forms come in runs of their own."""
     found = []
-    for effect in dict.fromkeys(glove.truth for glove, _ in rows):
-        some = [answer for glove, answer in rows if glove.truth == effect]
+    for effect, lead_s in dict.fromkeys((glove.truth, glove.lead_s) for glove, _ in rows):
+        some = [answer for glove, answer in rows if (glove.truth, glove.lead_s) == (effect, lead_s)]
+        led = f" (frames from {lead_s:g} s before the reference)" if lead_s else ""
         learned = [answer for answer in some if "after_deg" in answer]
         if effect in COVERED:
             covers = [answer["covered"] >= 0.9 for answer in learned]
@@ -28,9 +29,11 @@ def repair_figures(rows: Sequence[Row]) -> list[StudyFigure]:
         if effect in NO_RATIO:
             continue
         ratios = [error_after(answer) / answer["twin_deg"] for answer in learned]
-        label = f"{effect}: error after adding / clean twin"
+        label = f"{effect}: error after adding / clean twin{led}"
         found.append(StudyFigure.mean(label, ratios, at_most=MOST_OF.get(effect, MOST)))
-        found.append(StudyFigure.share(f"{effect}: kept, not undone", [answer["added"] for answer in some]))
+        found.append(
+            StudyFigure.share(f"{effect}: kept, not undone{led}", [answer["added"] for answer in some])
+        )
     return found
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from blind_glove import BlindGlove
 from diagnosis_answer import diagnosis_answer
@@ -25,6 +25,9 @@ from walk_answer import pair_answer, walk_answer
 from walk_figures import alarm_figures, false_alarm_figures, next_take_figures, pairs_figures
 
 LARGE_SIZE = 2.6
+REMEMBERING = ("creep", "hysteresis", "lag")
+LEAD_S = 30.0
+"""How long a glove streams before a reference begins, where it does."""
 PAIR_SIZES = (JUDGED_SIZE, LARGE_SIZE)
 UNKNOWN_SIZES = (JUDGED_SIZE, LARGE_SIZE)
 
@@ -65,7 +68,9 @@ def _sizes(choices: StudyChoices) -> list[BlindGlove]:
 
 
 def _repair(choices: StudyChoices) -> list[BlindGlove]:
-    return _single("repair", (LARGE_SIZE,), choices)
+    """Effects that remember twice: from the first frame on, and with frames before the reference."""
+    alone = _single("repair", (LARGE_SIZE,), choices)
+    return [*alone, *(replace(glove, lead_s=LEAD_S) for glove in alone if glove.truth in REMEMBERING)]
 
 
 def _single(part: str, sizes: Sequence[float], choices: StudyChoices) -> list[BlindGlove]:

@@ -76,8 +76,16 @@ class BaseProducts:
         return base @ self.whole
 
 
-def held_out(products: BaseProducts, columns: Sequence[np.ndarray], prior_sd: np.ndarray) -> HeldOut:
-    """``columns``: for each unit (N, G, C); ``prior_sd`` (C,) of their weights."""
+def held_out(
+    products: BaseProducts,
+    columns: Sequence[np.ndarray],
+    prior_sd: np.ndarray,
+    noise_variance: float | None = None,
+) -> HeldOut:
+    """``columns``: for each unit (N, G, C); ``prior_sd`` (C,) of their weights.
+
+    ``noise_variance``: what the columns leave, degrees squared, where known; else what the base leaves.
+    """
     size = products.gram.shape[1]
     shapes, added = columns[0].shape[1:]
     joint = np.zeros((len(columns), shapes, size + added, size + added))
@@ -95,7 +103,7 @@ def held_out(products: BaseProducts, columns: Sequence[np.ndarray], prior_sd: np
     ridge = np.zeros((shapes, size + added, size + added))
     ridge[:, :size, :size] = products.ridge
     diagonal = np.arange(size, size + added)
-    variance = products.error.sum() / products.count.sum()
+    variance = products.error.sum() / products.count.sum() if noise_variance is None else noise_variance
     ridge[:, diagonal, diagonal] = ALIKE_ROWS * variance / prior_sd**2
     beta = np.linalg.solve(total - joint + ridge, (total_right - right)[..., None])[..., 0]
     training = (products.square.sum() - products.square)[:, None] + _quadratic(

@@ -11,13 +11,15 @@ from glovecal_models.effects.effect import Decoy, InstantEffect, Settings, Signa
 from glovecal_models.effects.joint_units import in_joint_units, settle_joint_units
 
 PRIOR_DEG = 4.0
-SQUARE_PRIOR_DEG = 2.0
+SQUARE_PRIOR_DEG = 6.0
+BEYOND_SHARE = 0.3
+"""Of the range seen in training: so far a slope goes on, for the next take is seldom inside all others."""
 
 
 class ContextEffect(InstantEffect):
     """Columns h and h x joint, h a function of one context column, zero at that column's usual value.
 
-    Outside the range seen in training the column is held at the end of that range: no extrapolation.
+    Well outside the range seen in training the column is held: no far extrapolation.
     """
 
     decoy: ClassVar[Decoy] = "context of other takes"
@@ -45,11 +47,12 @@ class ContextEffect(InstantEffect):
         return np.concatenate([offsets, offsets * joint], axis=2)
 
     def clipped(self, take: Signals, settings: Settings) -> np.ndarray:
-        """The context column (N,), its usual value where unknown, held within what training saw."""
+        """The context column (N,), its usual value where unknown, held near what training saw."""
         value = take.context.get(self.column)
         value = np.full(len(take), settings["usual"]) if value is None else value
         value = np.where(np.isfinite(value), value, settings["usual"])
-        return np.clip(value, settings["low"], settings["high"])
+        beyond = BEYOND_SHARE * (settings["high"] - settings["low"])
+        return np.clip(value, settings["low"] - beyond, settings["high"] + beyond)
 
     def functions(self, value: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
         """(N, L, F) of the clipped context column (N,): its distance from the usual value, and the square."""

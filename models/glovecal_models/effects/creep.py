@@ -1,9 +1,9 @@
 """Creep: after each movement the reading goes on changing for seconds, as foam and glue give way.
 
-One to three relaxations (standard linear solid): x' = (joint - x) / tau; the columns are x of each time
-constant, in the ratio of a logarithmic grid. What came before a take is not known: the state starts where the
-hand is, as if it had rested there, and two columns that decay tell how much of the way from the usual posture
-it still has to go (learned; the best guess without a recording of the time before).
+Three relaxations (standard linear solid): x' = (joint - x) / tau; the columns are x of each time constant, in
+the ratio of a logarithmic grid. What came before a take is not known: the state starts where the hand is, as
+if it had rested there, and three columns that decay tell how much of the way from the usual posture it still
+has to go (learned; the best guess without a recording of the time before).
 """
 
 from __future__ import annotations
@@ -18,10 +18,11 @@ from glovecal_models.effects.history_effect import HistoryEffect
 from glovecal_models.effects.joint_units import on_lanes, settle_joint_units
 from glovecal_models.effects.relaxation import relax, relax_once
 
-LONG_TO_SHORT = 5.0
-SLOW_S = (4.0, 6.5, 10.0, 16.0, 25.0, 40.0)
-FOLLOWING = np.array([1.0, 1.0, 0.0, 0.0])
-"""Two states follow the joint, two decay to nothing."""
+RATIO = 4.0
+"""Between neighbouring time constants: close enough for a logarithmic or power law between them."""
+SLOW_S = (8.0, 12.0, 18.0, 26.0, 40.0)
+FOLLOWING = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+"""Three states follow the joint, three decay to nothing."""
 LONGEST_SHARE = 0.7
 """Of a take's length: a slower relaxation cannot be told from a constant."""
 
@@ -31,7 +32,8 @@ class Creep(HistoryEffect):
     explanation = "After a movement the reading goes on drifting for seconds although the joint is held."
     source = "standard linear solid, relaxations of 1 to 40 s: Springer 10.1007/978-3-030-25261-8_34"
     parameters: ClassVar = (
-        Parameter("fast_tau", "s", 0.5, 60.0, "1 to 60 s"),
+        Parameter("fast_tau", "s", 0.4, 60.0, "1 to 60 s"),
+        Parameter("middle_tau", "s", 0.5, 60.0, "1 to 60 s"),
         Parameter("slow_tau", "s", 0.5, 60.0, "1 to 60 s"),
     )
 
@@ -42,8 +44,8 @@ class Creep(HistoryEffect):
     def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
         longest = max(float(take.time_s[-1] - take.time_s[0]) for take in takes)
         slow = np.array([tau for tau in SLOW_S if tau <= LONGEST_SHARE * longest] or SLOW_S[:1])
-        pairs = np.column_stack([slow / LONG_TO_SHORT, slow])
-        return np.repeat(pairs[:, None, :], takes[0].own.shape[1], axis=1)
+        series = slow[:, None] / RATIO ** np.arange(2, -1, -1)
+        return np.repeat(series[:, None, :], takes[0].own.shape[1], axis=1)
 
     def settle(self, takes: Sequence[Signals]) -> Settings:
         return settle_joint_units(takes)
@@ -51,7 +53,7 @@ class Creep(HistoryEffect):
     def start(self, own: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
         usual = on_lanes(settings["own_centre_deg"], len(own)) if "own_centre_deg" in settings else own
         rested, away = own[:, None], (usual - own)[:, None]
-        return np.concatenate([rested, rested, away, away], axis=1)
+        return np.concatenate([rested, rested, rested, away, away, away], axis=1)
 
     def step(
         self, state: np.ndarray, elapsed_s: float, own: np.ndarray, settings: Settings, shape: np.ndarray
@@ -69,7 +71,9 @@ class Creep(HistoryEffect):
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         return (
             "fast_share_deg_per_deg",
+            "middle_share_deg_per_deg",
             "slow_share_deg_per_deg",
             "fast_start_deg_per_deg",
+            "middle_start_deg_per_deg",
             "slow_start_deg_per_deg",
         )

@@ -11,6 +11,8 @@ from glovecal_models.effects.context_effect import PRIOR_DEG, ContextEffect
 from glovecal_models.effects.effect import Parameter, Settings, Signals
 
 TAU_S = (45.0, 75.0, 120.0, 200.0, 330.0, 550.0, 900.0)
+COLDEST = 0.7
+"""In time constants: so much earlier than any take of the training the exponential may go on to rise."""
 
 
 class WarmupDrift(ContextEffect):
@@ -24,8 +26,8 @@ class WarmupDrift(ContextEffect):
         return np.repeat(np.array(TAU_S)[:, None, None], takes[0].own.shape[1], axis=1)
 
     def functions(self, value: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
-        cold = np.exp(-(value[:, None] - settings["low"]) / shape[None, :, 0])
-        return cold[:, :, None]
+        warm = np.maximum((value[:, None] - settings["low"]) / shape[None, :, 0], -COLDEST)
+        return np.exp(-warm)[:, :, None]
 
     def prior_sd(self, settings: Settings) -> np.ndarray:
         return np.full(2, PRIOR_DEG)

@@ -188,7 +188,10 @@ def _base(
 def _weights(base: list[Rows], extra: list[list[np.ndarray]], priors: list[np.ndarray]) -> list[np.ndarray]:
     """For each effect of one joint (C,), all fitted together."""
     together = [np.column_stack(parts)[:, None, :] for parts in zip(*extra, strict=True)]
-    found = held_out(BaseProducts(base), together, np.concatenate(priors)).weights
+    products, prior = BaseProducts(base), np.concatenate(priors)
+    # The base's error has the effects in it, as if they were noise: weights held by it stay too small.
+    first = held_out(products, together, prior)
+    found = held_out(products, together, prior, first.fitted / first.count.sum()).weights
     ends = np.cumsum([len(part) for part in priors])[:-1]
     return np.split(found, ends)
 

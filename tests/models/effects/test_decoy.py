@@ -14,7 +14,7 @@ from glovecal_models.errors import BadInput
 
 def test_reversed_in_time_is_the_operator_run_backwards(signals):
     creep = catalogue()["creep"]
-    shape = np.tile([1.0, 5.0], (3, 1))
+    shape = np.tile([1.0, 4.0, 16.0], (3, 1))
     take = signals[0]
     [twin] = decoy_columns(creep, [take], {}, shape, np.random.default_rng(0))
     turned = replace(take, time_s=-take.time_s[::-1], own=take.own[::-1])

@@ -330,7 +330,7 @@ def test_a_wearing_without_a_name_and_an_unknown_one_are_told_apart(signals: lis
 
 
 def test_creep_settles_with_its_slow_part_and_time_itself_needs_times() -> None:
-    assert catalogue()["creep"].settling_s(np.array([[2.0, 10.0], [5.0, 25.0]])) == 25.0
+    assert catalogue()["creep"].settling_s(np.array([[0.6, 2.5, 10.0], [1.6, 6.3, 25.0]])) == 25.0
     assert catalogue()["lag"].settling_s(np.array([[0.05]])) == 1.0
     assert [effect.needs_time for effect in DECLARED] == [False, True, True]
     assert [effect.has_memory for effect in DECLARED] == [False, True, False]
