@@ -25,7 +25,7 @@ CHANCE_SHARE = 0.55
 
 
 def may_be_slip(naming: Naming) -> bool:
-    """Whether nothing is ranked but what a slip brings about as well, and that explains about half at most."""
+    """Whether nothing is ranked but what a slip brings about too, and that explains about half at most."""
     if not naming.ranked:
         return True
     first = naming.ranked[0]
