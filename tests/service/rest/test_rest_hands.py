@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -56,3 +59,26 @@ def test_nobody_has_no_hand(shared: RestClient) -> None:
     with pytest.raises(Refused) as refused:
         shared.get("/subjects/anna/skeleton", {"hand": "both"})
     assert refused.value.status == 422
+
+
+def test_errors_in_mm_are_those_of_the_subjects_hand(
+    client: RestClient, write_table: Callable[..., Path]
+) -> None:
+    client.post("/subjects", {"name": "anna"})
+    takes = client.upload_takes(write_table(), subject="anna")["takes"]
+    body = {"subject": "anna", "layout": takes[0]["layout"], "method": "linear", "folds": 0}
+    job = client.wait_for_job(client.post("/models/train", {**body, "takes": [takes[0]["id"]]})["id"])
+    model, against = job["result"]["model"], {"takes": [takes[1]["id"]]}
+    assumed = client.post(f"/models/{model}/compare", against)["fingertips"]
+    assert (assumed["hand_length_mm"], assumed["is_assumed"]) == (190.0, True)
+    assert set(assumed["fingers"]) == {"index"}
+    assert assumed["fingers"]["index"]["taken_equal"] == ["I_DIP", "IM_ABD"]
+    assert assumed["thumb_index"] is None
+    client.put("/subjects/anna/hand", {"dimensions": {"hand_length": 95}, "hand": "left"})
+    own = client.post(f"/models/{model}/compare", against)["fingertips"]
+    assert own["is_assumed"] is False
+    assert own["over_all"]["rmse_mm"] == pytest.approx(assumed["over_all"]["rmse_mm"] / 2)
+    page = client.page(f"/models/{model}/report", against)
+    assert "How far off the fingertips are" in page
+    assert own["sentence"] in page
+    assert "farthest off, take b at" in page
