@@ -38,13 +38,15 @@ class TipErrors:
 
 @dataclass(frozen=True)
 class WorstTip:
-    """The frame in which a fingertip is farthest off."""
+    """The frame in which a fingertip is farthest off, and the two hands in it."""
 
     finger: str
     error_mm: float
     take: str
     time_s: float
     """Since the start of the take."""
+    measured_deg: dict[str, float]
+    predicted_deg: dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -76,10 +78,11 @@ def fingertip_errors(
     if poses is None:
         return None
     skeleton = hand_skeleton(dimensions)
-    always_mean = _always_mean(poses)
+    answers = (poses.measured, poses.predicted, _always_mean(poses))
+    measured, predicted, always_mean = (tips_mm(skeleton, angles) for angles in answers)
     carried = CarriedFloors(skeleton, poses, floors)
     counting = tuple(tip for tip in range(len(TIPS)) if poses.counts[:, tip].any())
-    off, mean_off = (distances_mm(skeleton, poses, answer) for answer in (poses.predicted, always_mean))
+    off, mean_off = (_distances(tips, measured, poses) for tips in (predicted, always_mean))
 
     def errors(tips: tuple[int, ...]) -> TipErrors:
         equal = _taken_equal(skeleton, poses, tips)
@@ -89,7 +92,7 @@ def fingertip_errors(
     over_all = errors(counting)
     thumb_index = None
     if (poses.counts[:, THUMB] & poses.counts[:, INDEX]).any():
-        gap, mean_gap = (_gap_error(skeleton, poses, answer) for answer in (poses.predicted, always_mean))
+        gap, mean_gap = (_gap_error(tips, measured, poses) for tips in (predicted, always_mean))
         equal = _taken_equal(skeleton, poses, (THUMB, INDEX))
         thumb_index = _errors(gap, mean_gap, carried.of_distance(THUMB, INDEX), equal)
     sizes = skeleton.dimensions
@@ -99,16 +102,14 @@ def fingertip_errors(
     )  # fmt: skip
 
 
-def distances_mm(skeleton: Skeleton, poses: HandPoses, answer: np.ndarray) -> np.ndarray:
-    """Of the fingertips with angles ``answer`` (N, R) from the measured ones, (N, 5); NaN: does not count."""
-    apart = tips_mm(skeleton, answer) - tips_mm(skeleton, poses.measured)
-    return np.where(poses.counts, np.linalg.norm(apart, axis=2), np.nan)
+def _distances(tips: np.ndarray, measured: np.ndarray, poses: HandPoses) -> np.ndarray:
+    """(N, 5), NaN where a fingertip does not count."""
+    return np.where(poses.counts, np.linalg.norm(tips - measured, axis=2), np.nan)
 
 
-def _gap_error(skeleton: Skeleton, poses: HandPoses, answer: np.ndarray) -> np.ndarray:
+def _gap_error(tips: np.ndarray, measured: np.ndarray, poses: HandPoses) -> np.ndarray:
     """(N,): how wrong the distance between thumb and index finger is, NaN where one does not count."""
-    both = (tips_mm(skeleton, angles) for angles in (answer, poses.measured))
-    gaps = [np.linalg.norm(tips[:, THUMB] - tips[:, INDEX], axis=1) for tips in both]
+    gaps = [np.linalg.norm(one[:, THUMB] - one[:, INDEX], axis=1) for one in (tips, measured)]
     return np.where(poses.counts[:, THUMB] & poses.counts[:, INDEX], np.abs(gaps[0] - gaps[1]), np.nan)
 
 
@@ -146,7 +147,12 @@ def _taken_equal(skeleton: Skeleton, poses: HandPoses, tips: Sequence[int]) -> t
 def _worst(off: np.ndarray, poses: HandPoses, found: Residuals) -> WorstTip:
     frame, tip = np.unravel_index(np.nanargmax(off), off.shape)
     take = found.takes[poses.take[frame]].take.name
-    return WorstTip(TIPS[tip], float(off[frame, tip]), take, float(poses.time_s[frame]))
+    measured, predicted = (
+        dict(zip(HAND_ROTATIONS, angles[frame].tolist(), strict=True))
+        for angles in (poses.measured, poses.predicted)
+    )
+    error, time = float(off[frame, tip]), float(poses.time_s[frame])
+    return WorstTip(TIPS[tip], error, take, time, measured, predicted)
 
 
 def _sentence(

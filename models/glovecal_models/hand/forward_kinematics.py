@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.rotations import HAND_ROTATIONS
-from glovecal_models.hand.skeleton import Joint, Skeleton
+from glovecal_models.hand.skeleton import Skeleton
 
 
 @dataclass(frozen=True)
@@ -40,13 +39,13 @@ def forward_kinematics(skeleton: Skeleton, angles_deg: np.ndarray) -> HandFrames
     count = len(angles)
     orientations = np.empty((count, len(skeleton.joints), 3, 3))
     places = np.empty((count, len(skeleton.joints), 3))
-    for index, (joint, parent) in enumerate(zip(skeleton.joints, skeleton.parents, strict=True)):
-        turned = _turned(joint, turns[:, index])
+    for index, parent in enumerate(skeleton.parents):
+        turned, offset = _turned(skeleton, index, turns[:, index]), skeleton.offsets_mm[index]
         if parent is None:
-            places[:, index], orientations[:, index] = joint.offset_mm, turned
+            places[:, index], orientations[:, index] = offset, turned
             continue
         carrier = orientations[:, parent]
-        places[:, index] = places[:, parent] + carrier @ np.array(joint.offset_mm)
+        places[:, index] = places[:, parent] + carrier @ offset
         orientations[:, index] = carrier @ turned
     last = list(skeleton.tip_joints)
     offsets = np.array([tip.offset_mm for tip in skeleton.tips])
@@ -54,10 +53,11 @@ def forward_kinematics(skeleton: Skeleton, angles_deg: np.ndarray) -> HandFrames
     return HandFrames(orientations, places, tips)
 
 
-def _turned(joint: Joint, angles: np.ndarray) -> np.ndarray:
+def _turned(skeleton: Skeleton, joint: int, angles: np.ndarray) -> np.ndarray:
     """Orientation in the parent's frame at ``angles`` (N,) radians, (N, 3, 3): Rodrigues' formula."""
-    x, y, z = joint.axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sine, rest = np.sin(angles)[:, None, None], (1 - np.cos(angles))[:, None, None]
-    oriented = Rotation.from_quat(joint.orientation, scalar_first=True).as_matrix()
-    return oriented @ (np.eye(3) + sine * cross + rest * (cross @ cross))
+    oriented, sine_part, cosine_part = skeleton.turns[joint]
+    return (
+        oriented
+        + np.sin(angles)[:, None, None] * sine_part
+        + (1 - np.cos(angles))[:, None, None] * cosine_part
+    )

@@ -13,7 +13,7 @@ def tip_jacobian(skeleton: Skeleton, frames: HandFrames) -> np.ndarray:
 
     A joint turns whatever hangs on it about its axis: a tip moves by axis x (tip - joint) per radian.
     """
-    axes = np.einsum("njab,jb->nja", frames.orientations, np.array([joint.axis for joint in skeleton.joints]))
+    axes = np.einsum("njab,jb->nja", frames.orientations, skeleton.axes)
     by_joint = np.zeros((len(axes), len(skeleton.tips), 3, len(skeleton.joints)))
     for tip, last in enumerate(skeleton.tip_joints):
         chain = list(skeleton.carrying(last))

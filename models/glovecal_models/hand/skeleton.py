@@ -20,6 +20,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS, WRIST
@@ -95,6 +96,24 @@ class Skeleton:
         """(J, R): joint angles are weights @ rotations."""
         rows = [[joint.rotations.get(name, 0.0) for name in HAND_ROTATIONS] for joint in self.joints]
         return np.array(rows)
+
+    @cached_property
+    def offsets_mm(self) -> np.ndarray:
+        """(J, 3)."""
+        return np.array([joint.offset_mm for joint in self.joints])
+
+    @cached_property
+    def axes(self) -> np.ndarray:
+        """(J, 3)."""
+        return np.array([joint.axis for joint in self.joints])
+
+    @cached_property
+    def turns(self) -> np.ndarray:
+        """(J, 3, 3, 3): a joint's turn is the first matrix + sin(angle) second + (1 - cos(angle)) third."""
+        quaternions = [joint.orientation for joint in self.joints]
+        oriented = Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
+        cross = np.cross(self.axes[:, None, :], np.eye(3)).swapaxes(1, 2)
+        return np.stack([oriented, oriented @ cross, oriented @ cross @ cross], axis=1)
 
     def carrying(self, joint: int) -> tuple[int, ...]:
         """Indices of the joints from the forearm to ``joint``, both ends in it."""

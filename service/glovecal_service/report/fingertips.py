@@ -9,9 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from glovecal_models.comparison.fingertips import FingertipErrors, TipErrors, distances_mm
-from glovecal_models.comparison.hand_poses import HandPoses, hand_poses
-from glovecal_models.comparison.residuals import Residuals
+from glovecal_models.comparison.fingertips import FingertipErrors, TipErrors
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.forward_kinematics import forward_kinematics
 from glovecal_models.hand.skeleton import hand_skeleton
@@ -29,17 +27,14 @@ SCALES = (
 VIEWS: tuple[View, ...] = get_args(View)
 
 
-def fingertips_part(
-    found: Residuals, errors: FingertipErrors | None, dimensions: HandDimensions | None
-) -> list[str]:
+def fingertips_part(errors: FingertipErrors | None, dimensions: HandDimensions | None) -> list[str]:
     """HTML; nothing where the layout is no hand."""
-    poses = hand_poses(found)
-    if errors is None or poses is None:
+    if errors is None:
         return []
     return [
         "<h2>How far off the fingertips are</h2>",
         f"<p>{escape(errors.sentence)}</p>",
-        figure(*_picture(poses, errors, dimensions)),
+        figure(*_picture(errors, dimensions)),
         _table(errors),
         f"<p>{escape(SCALES)}</p>",
     ]
@@ -68,13 +63,13 @@ def _floor(one: TipErrors) -> str:
     return f"{least}{one.floor.floor_mm:.2f} ({one.floor.low_mm:.2f}-{one.floor.high_mm:.2f})"
 
 
-def _picture(poses: HandPoses, errors: FingertipErrors, dimensions: HandDimensions | None) -> tuple[str, str]:
+def _picture(errors: FingertipErrors, dimensions: HandDimensions | None) -> tuple[str, str]:
     """Errors against their floors; beside them both hands in the worst frame."""
     worst = errors.worst
     skeleton = hand_skeleton(dimensions)
-    frame = int(np.nanargmax(np.nanmax(distances_mm(skeleton, poses, poses.predicted), axis=1)))
     measured, predicted = (
-        forward_kinematics(skeleton, angles[[frame]]) for angles in (poses.measured, poses.predicted)
+        forward_kinematics(skeleton, np.array([list(angles.values())]))
+        for angles in (worst.measured_deg, worst.predicted_deg)
     )
 
     def draw(page: Figure) -> None:

@@ -70,7 +70,7 @@ def report_page(
         "<h2>How far off, and how far it could be</h2>",
         figure(errors_and_floors(where), floors_sentence(where)),
         _table(numbers, where),
-        *fingertips_part(found, numbers.fingertips, dimensions),
+        *fingertips_part(numbers.fingertips, dimensions),
         "<h2>What the errors depend on</h2>",
         figure(heat_map(where), heat_sentence(where)),
     ]

@@ -29,6 +29,8 @@ class WorstTipView(BaseModel):
     error_mm: float | None
     take: str
     time_s: float = Field(description="Since the start of the take.")
+    measured_deg: dict[str, float] = Field(description="Every rotation of the hand in this frame.")
+    predicted_deg: dict[str, float]
 
 
 class FingertipsView(BaseModel):
