@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 from glovecal_models.errors import BadInput
 
@@ -60,7 +59,7 @@ class HandDimensions:
         _require_believable(measured_mm)
         sizes = _scaled(measured_mm.get("hand_length", ASSUMED_LENGTH_MM), measured_mm.get("hand_breadth"))
         sizes |= {name: float(value) for name, value in measured_mm.items()}
-        return cls(MappingProxyType(sizes), tuple(name for name in DIMENSIONS if name in measured_mm))
+        return cls(sizes, tuple(name for name in DIMENSIONS if name in measured_mm))
 
     @property
     def hand_length_mm(self) -> float:

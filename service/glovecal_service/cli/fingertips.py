@@ -36,17 +36,20 @@ def print_fingertips(found: dict[str, Any] | None, subject: str) -> None:
 
 
 def print_fingertips_beside(models: Mapping[str, dict[str, Any] | None], headings: Mapping[str, str]) -> None:
-    """RMSE of several models, a row a finger."""
+    """RMSE of several models, a row a finger, between the smallest of their floors and no model at all."""
     known = {name: {row["finger"]: row for row in _rows(one)} for name, one in models.items() if one}
-    fingers = dict.fromkeys(finger for of_model in known.values() for finger in of_model)
-    if not fingers:
-        return
-    out.print("")
-    rows = [
-        {"finger": finger, **{name: of[finger]["rmse_mm"] for name, of in known.items() if finger in of}}
-        for finger in fingers
-    ]
-    print_table(rows, {"finger": "fingertip RMSE (mm)", **headings}, empty="")
+    rows = []
+    for finger in dict.fromkeys(finger for of_model in known.values() for finger in of_model):
+        errors = {name: of_model[finger] for name, of_model in known.items() if finger in of_model}
+        floors = [one["floor"] for one in errors.values() if one["floor"] is not None]
+        least = min(floors, key=lambda one: (one["is_lower_bound"], one["floor_mm"]), default=None)
+        spread = next(iter(errors.values()))["baseline_mm"]
+        rmse = {name: one["rmse_mm"] for name, one in errors.items()}
+        rows.append({"finger": finger, **rmse, "floor": _interval(least), "spread": spread})
+    if rows:
+        out.print("")
+        columns = {"finger": "fingertip RMSE (mm)", **headings, "floor": "floor", "spread": "spread"}
+        print_table(rows, columns, empty="")
 
 
 def _rows(found: dict[str, Any]) -> list[dict[str, Any]]:

@@ -14,8 +14,9 @@ from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.forward_kinematics import HandFrames, forward_kinematics
 from glovecal_models.hand.jacobian import tip_jacobian
 from glovecal_models.hand.limits import LIMITS_DEG, clamped
-from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS, REST_DEG, completed
+from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS, REST_DEG, RULES, completed
 from glovecal_models.hand.skeleton import hand_skeleton
+from glovecal_models.layout import Layout
 from glovecal_models.simulation.postures import POSTURES
 
 RIGHT, LEFT = hand_skeleton(), hand_skeleton(hand="left")
@@ -161,6 +162,15 @@ def test_missing_rotations_follow_their_rule_or_rest() -> None:
     assert both[1]["I_DIP"] == pytest.approx(REST_DEG["I_PIP"] * 2 / 3)
     assert both[0]["T_VIR"] == pytest.approx(0.5 * 30.0 + 0.5 * REST_DEG["TI_ABD"])
     assert completed(["I_DIP"], np.array([[12.0]]))[0, HAND_ROTATIONS.index("I_DIP")] == 12.0
+
+
+def test_layouts_without_a_sensor_for_it_follow_the_same_rules() -> None:
+    layout = Layout.built_in("cyberglove18")
+    for rotation, weights in RULES.items():
+        simulated = layout.correspondence(rotation).simulated
+        assert simulated is not None
+        names = tuple(weights)
+        np.testing.assert_allclose(simulated.weights(names), [weights[name] for name in names])
 
 
 def test_the_relaxed_hand_keeps_the_limits_and_clamping_does() -> None:
