@@ -45,9 +45,9 @@ class CarriedFloors:
         self._counts = poses.counts
         self._floors = [floors.get(name) for name in HAND_ROTATIONS]
 
-    def of_tips(self, tips: tuple[int, ...]) -> FingertipFloor | None:
+    def of_tips(self, tips: list[int]) -> FingertipFloor | None:
         """Of some fingertips together; None when some joint's floor is unknown."""
-        squares = (self._slopes[:, list(tips)] ** 2).sum(axis=2)[self._counts[:, list(tips)]]
+        squares = (self._slopes[:, tips] ** 2).sum(axis=2)[self._counts[:, tips]]
         return self._floor(squares, lambda sizes: float(np.mean(squares @ sizes**2)))
 
     def of_distance(self, first: int, second: int) -> FingertipFloor | None:

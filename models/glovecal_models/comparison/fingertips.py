@@ -79,22 +79,17 @@ def fingertip_errors(
         return None
     skeleton = hand_skeleton(dimensions)
     answers = (poses.measured, poses.predicted, _always_mean(poses))
-    measured, predicted, always_mean = (tips_mm(skeleton, angles) for angles in answers)
+    tips = tuple(tips_mm(skeleton, angles) for angles in answers)
     carried = CarriedFloors(skeleton, poses, floors)
-    counting = tuple(tip for tip in range(len(TIPS)) if poses.counts[:, tip].any())
-    off, mean_off = (_distances(tips, measured, poses) for tips in (predicted, always_mean))
+    off, mean_off = (_distances(answer, tips[0], poses) for answer in tips[1:])
 
-    def errors(tips: tuple[int, ...]) -> TipErrors:
-        equal = _taken_equal(skeleton, poses, tips)
-        return _errors(off[:, list(tips)], mean_off[:, list(tips)], carried.of_tips(tips), equal)
+    def errors(chosen: list[int]) -> TipErrors:
+        equal = _taken_equal(skeleton, poses, chosen)
+        return _errors(off[:, chosen], mean_off[:, chosen], carried.of_tips(chosen), equal)
 
-    fingers = {TIPS[tip]: errors((tip,)) for tip in counting}
-    over_all = errors(counting)
-    thumb_index = None
-    if (poses.counts[:, THUMB] & poses.counts[:, INDEX]).any():
-        gap, mean_gap = (_gap_error(tips, measured, poses) for tips in (predicted, always_mean))
-        equal = _taken_equal(skeleton, poses, (THUMB, INDEX))
-        thumb_index = _errors(gap, mean_gap, carried.of_distance(THUMB, INDEX), equal)
+    counting = [tip for tip in range(len(TIPS)) if poses.counts[:, tip].any()]
+    fingers = {TIPS[tip]: errors([tip]) for tip in counting}
+    over_all, thumb_index = errors(counting), _thumb_index(skeleton, poses, tips, carried)
     sizes = skeleton.dimensions
     return FingertipErrors(
         sizes.hand_length_mm, sizes.is_assumed, over_all, fingers, thumb_index, _worst(off, poses, found),
@@ -102,15 +97,22 @@ def fingertip_errors(
     )  # fmt: skip
 
 
+def _thumb_index(
+    skeleton: Skeleton, poses: HandPoses, tips: Sequence[np.ndarray], carried: CarriedFloors
+) -> TipErrors | None:
+    """``tips``: measured, predicted, and those of the mean angles, each (N, 5, 3)."""
+    both = poses.counts[:, THUMB] & poses.counts[:, INDEX]
+    if not both.any():
+        return None
+    gap, *answers = (np.linalg.norm(one[both, THUMB] - one[both, INDEX], axis=1) for one in tips)
+    off, mean_off = (np.abs(answer - gap) for answer in answers)
+    equal = _taken_equal(skeleton, poses, (THUMB, INDEX))
+    return _errors(off, mean_off, carried.of_distance(THUMB, INDEX), equal)
+
+
 def _distances(tips: np.ndarray, measured: np.ndarray, poses: HandPoses) -> np.ndarray:
     """(N, 5), NaN where a fingertip does not count."""
     return np.where(poses.counts, np.linalg.norm(tips - measured, axis=2), np.nan)
-
-
-def _gap_error(tips: np.ndarray, measured: np.ndarray, poses: HandPoses) -> np.ndarray:
-    """(N,): how wrong the distance between thumb and index finger is, NaN where one does not count."""
-    gaps = [np.linalg.norm(one[:, THUMB] - one[:, INDEX], axis=1) for one in (tips, measured)]
-    return np.where(poses.counts[:, THUMB] & poses.counts[:, INDEX], np.abs(gaps[0] - gaps[1]), np.nan)
 
 
 def _always_mean(poses: HandPoses) -> np.ndarray:

@@ -61,7 +61,8 @@ def _of_take(index: int, item: TakeResiduals, rotations: tuple[str, ...]) -> tup
     predicted = np.full_like(measured, np.nan)
     for column, name in enumerate(HAND_ROTATIONS):
         if name in rotations:
-            predicted[:, column] = item.predicted[:, rotations.index(name)]
+            angle = item.predicted[:, rotations.index(name)]
+            predicted[:, column] = np.where(np.isfinite(angle), angle, np.nan)
     compared = np.isfinite(measured) & np.isfinite(predicted)
     compared[:, _WRIST] = False
     places = [[HAND_ROTATIONS.index(name) for name in NEEDED[finger]] for finger in FINGERS]
@@ -70,7 +71,7 @@ def _of_take(index: int, item: TakeResiduals, rotations: tuple[str, ...]) -> tup
     measured, predicted, compared = measured[rows], predicted[rows], compared[rows]
     whole = completed(HAND_ROTATIONS, np.where(np.isfinite(measured), measured, predicted))
     whole[:, _WRIST] = 0.0
-    time = item.take.time_s[rows] - item.take.time_s[0]
+    time = item.take.time_s[rows] - item.take.time_s[:1]
     return (
         np.where(compared, predicted, whole), whole, compared, counts[rows], np.full(len(time), index), time
     )  # fmt: skip

@@ -41,9 +41,9 @@ THUMB_ROLL_DEG = 50.0
 THUMB_BASE_DEPTH = 0.03
 """Of the thumb's base below the wrist's centre, in hand lengths.
 
-These four are ours: nobody measures them on a subject. With them the relaxed thumb is pronated by some 80
-degrees to the middle metacarpal, as its base is (Cooney et al. 1981, J. Bone Joint Surg. 63-A, 1371-1381),
-and the posture that the paper calls "ok" brings thumb and index finger together within 10 mm.
+These four are ours: nobody measures them on a subject. With them the relaxed thumb is pronated by 76 degrees
+to the middle metacarpal (its base by 80: Cooney et al. 1981, J. Bone Joint Surg. 63-A, 1371-1381), and the
+posture that the paper calls "ok" brings thumb and index finger together within 10 mm.
 """
 
 

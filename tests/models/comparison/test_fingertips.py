@@ -143,6 +143,18 @@ def test_hands_are_equal_wherever_they_are_not_compared() -> None:
     assert poses.counts[1::2, 2].all()
 
 
+def test_predictions_that_are_no_number_and_takes_without_frames_do_not_count() -> None:
+    measured, predicted = still(), still()
+    predicted["I_MCP"][0] = np.inf
+    predicted["T_VIR"][:], measured["T_VIR"][:] = -np.inf, np.nan
+    empty = item({name: np.empty(0) for name in FLAT}, {name: np.empty(0) for name in FLAT}, HAND_ROTATIONS)
+    both = Residuals(HAND_ROTATIONS, (empty, item(measured, predicted, HAND_ROTATIONS)))
+    errors = fingertip_errors(both, {}, HAND)
+    assert errors is not None
+    assert {name: one.count for name, one in errors.fingers.items()} == {**dict.fromkeys(TIPS, 3), "index": 2}
+    assert errors.over_all.rmse_mm == 0.0
+
+
 def test_errors_grow_with_the_hand() -> None:
     residuals = found(moving(50), moving(50, seed=1))
     small, large = (

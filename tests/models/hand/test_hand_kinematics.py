@@ -154,6 +154,20 @@ def test_postures_look_like_what_they_are_called() -> None:
     assert all(fist[finger][0] < rest[finger][0] < flat[finger][0] for finger in "IMRP")
 
 
+def test_the_relaxed_thumb_is_pronated_as_anatomy_says() -> None:
+    """80 degrees to the middle metacarpal at its base (Cooney et al. 1981, median of ten specimens)."""
+    names = [joint.name for joint in RIGHT.joints]
+    frame = forward_kinematics(RIGHT, posture("rest")).orientations[0, names.index("T_VIR")]
+    nail = frame[:, 2]
+    assert np.degrees(np.arctan2(nail[1], nail[2])) == pytest.approx(80, abs=10)
+
+
+def test_the_spread_thumb_turns_into_the_palm() -> None:
+    frames = forward_kinematics(RIGHT, posture("spread"))
+    slope = tip_jacobian(RIGHT, frames)[0, 0, :, HAND_ROTATIONS.index("T_TMC")]
+    assert slope[2] < 0 > slope[1]
+
+
 def test_missing_rotations_follow_their_rule_or_rest() -> None:
     angles = completed(["I_PIP", "T_TMC", "PALM_ARCH"], np.array([[60.0, 30.0, 9.0], [np.nan, 30.0, 9.0]]))
     both = [dict(zip(HAND_ROTATIONS, row, strict=True)) for row in angles]
