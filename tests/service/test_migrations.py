@@ -19,8 +19,8 @@ SECOND = """
 import sqlalchemy as sa
 from alembic import op
 
-revision = "0002"
-down_revision = "0001"
+revision = "0003"
+down_revision = "0002"
 
 
 def upgrade() -> None:
@@ -39,7 +39,7 @@ def second_schema(tmp_path, monkeypatch):
     def write(last: str) -> None:
         folder = tmp_path / "later"
         folder.mkdir(exist_ok=True)
-        (folder / "0002_later.py").write_text(SECOND.format(last=last))
+        (folder / "0003_later.py").write_text(SECOND.format(last=last))
         config = original()
         own = f"{config.get_main_option('script_location')}/versions"
         config.set_main_option("version_locations", f"{own}:{folder}")
@@ -68,12 +68,12 @@ def test_an_upgrade_keeps_the_rows_and_a_backup(store_settings, second_schema):
     second_schema("pass")
     with Store.open(store_settings) as store, store.database.read() as connection:
         assert connection.execute(text("SELECT name, notes FROM subjects")).all() == [("anna", "none")]
-    backups = list(store_settings.data.glob("*.before-0002"))
+    backups = list(store_settings.data.glob("*.before-0003"))
     assert len(backups) == (0 if store_settings.database else 1)
     for backup in backups:
         with closing(sqlite3.connect(backup)) as connection:
             assert connection.execute("SELECT name FROM subjects").fetchall() == [("anna",)]
-            assert connection.execute("SELECT version_num FROM alembic_version").fetchall() == [("0001",)]
+            assert connection.execute("SELECT version_num FROM alembic_version").fetchall() == [("0002",)]
 
 
 def test_an_upgrade_that_fails_leaves_everything_as_it_was(store_settings, second_schema, monkeypatch):

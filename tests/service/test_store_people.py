@@ -14,11 +14,11 @@ META = {"layout": "cyberglove18", "subject": "anna", "wearing": "first", "hand":
 
 
 def test_subjects_are_created_listed_and_removed(store):
-    anna = store.subjects.create("anna", title="Anna Müller 手", dimensions={"index_length": 72})
+    anna = store.subjects.create("anna", title="Anna Müller 手", dimensions={"hand_length": 182}, hand="left")
     ben = store.subjects.create("ben")
     assert store.subjects.list() == [anna, ben]
     assert store.subjects.get("anna") == anna
-    assert anna.dimensions == {"index_length": 72.0}
+    assert (anna.dimensions, anna.hand, ben.hand) == ({"hand_length": 182.0}, "left", "right")
     with pytest.raises(Conflict, match="already a subject 'anna'"):
         store.subjects.create("anna")
     store.subjects.remove("ben")
@@ -41,11 +41,24 @@ def test_a_subject_with_takes_or_models_stays(store):
 
 @pytest.mark.parametrize("dimension", [0, -1, float("nan"), float("inf"), "7", None, True])
 def test_wrong_dimensions_are_refused(sqlite_store, dimension):
-    with pytest.raises(BadInput, match="thumb"):
-        sqlite_store.subjects.create("anna", dimensions={"thumb": dimension})
-    with pytest.raises(BadInput, match="channel name"):
+    with pytest.raises(BadInput, match="T_distal"):
+        sqlite_store.subjects.create("anna", dimensions={"hand_length": 180, "T_distal": dimension})
+    with pytest.raises(BadInput, match=r"subject 'anna': a hand has no dimension '\.\./x'"):
         sqlite_store.subjects.create("anna", dimensions={"../x": 1})
     assert sqlite_store.subjects.list() == []
+
+
+def test_a_hand_is_measured_again(store):
+    anna = store.subjects.create("anna", dimensions={"hand_length": 182, "hand_breadth": 80})
+    again = store.subjects.measure("anna", {"hand_length": 176.5}, "left")
+    assert again == store.subjects.get("anna")
+    assert (again.dimensions, again.hand) == ({"hand_length": 176.5}, "left")
+    assert again.created_at == anna.created_at
+    with pytest.raises(BadInput, match="'both'; give right or left"):
+        store.subjects.measure("anna", {}, "both")
+    with pytest.raises(NotFound, match="'ben'"):
+        store.subjects.measure("ben", {}, "left")
+    assert store.subjects.get("anna") == again
 
 
 hostile = st.sampled_from(

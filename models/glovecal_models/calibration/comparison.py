@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.comparison.fingertips import FingertipErrors, fingertip_errors
 from glovecal_models.comparison.floor_estimate import NoiseFloor, joined
 from glovecal_models.comparison.residuals import Residuals, residuals
 from glovecal_models.comparison.rotation_noise import RotationNoise, rotation_noise
+from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.takes.take import Take
 
 WITHIN_ONE_SD = 0.6827
@@ -63,19 +65,31 @@ class Comparison:
     """Rotations of the model that no take measured."""
     not_predicted: tuple[str, ...]
     """Rotations the takes measured that the model does not predict."""
+    fingertips: FingertipErrors | None
+    """None where no finger's chain was predicted and measured."""
 
     def to_document(self) -> dict[str, Any]:
         """Plain JSON-able data."""
         return asdict(self)
 
 
-def compare(model: CalibrationModel, takes: Sequence[Take]) -> Comparison:
-    """Hold ``model`` against ``takes``. Raises LayoutMismatch, and BadInput when nothing was measured."""
-    return summed_up(residuals(model, takes))
+def compare(
+    model: CalibrationModel, takes: Sequence[Take], *, dimensions: HandDimensions | None = None
+) -> Comparison:
+    """Hold ``model`` against ``takes``. Raises LayoutMismatch, and BadInput when nothing was measured.
+
+    ``dimensions`` of the subject's hand, for the errors of fingertips.
+    """
+    return summed_up(residuals(model, takes), dimensions=dimensions)
 
 
-def summed_up(found: Residuals, noise: Mapping[str, RotationNoise] | None = None) -> Comparison:
-    """Residuals as numbers: over all, for each rotation, for each pose. ``noise`` spares its time."""
+def summed_up(
+    found: Residuals,
+    noise: Mapping[str, RotationNoise] | None = None,
+    *,
+    dimensions: HandDimensions | None = None,
+) -> Comparison:
+    """Residuals as numbers: over all, each rotation, each pose, fingertips. ``noise`` spares its time."""
     noise = rotation_noise(found) if noise is None else noise
     error, spread, reference = (found.stacked(name) for name in ("error", "sd", "measured"))
     measured = found.measured_rotations
@@ -90,6 +104,7 @@ def summed_up(found: Residuals, noise: Mapping[str, RotationNoise] | None = None
         poses=_pose_errors(error, np.concatenate([_poses(item.take) for item in found.takes])),
         not_measured=tuple(name for name in found.rotations if name not in measured),
         not_predicted=tuple(sorted(in_takes - set(found.rotations))),
+        fingertips=fingertip_errors(found, {name: noise[name].floor for name in measured}, dimensions),
     )
 
 

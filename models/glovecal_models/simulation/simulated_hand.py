@@ -2,7 +2,7 @@
 
 A hand is driven in the 17 rotations of ``DRIVEN``. The last finger joints follow the ones before them and
 the thumb's virtual joint follows the two at its base, by the rules of Wang & Neff 2013, section 3.3
-(DIP = 2/3 PIP, T_VIR = a T_TMC + b TI_ABD), but every person deviates a little, and not in a straight line.
+(``hand/rotations.py`` has them), but every person deviates a little, and not in a straight line.
 The palm arch rises as thumb and outer fingers close.
 """
 
@@ -12,6 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from glovecal_models.hand.rotations import DIP_SHARE, VIRTUAL_SHARES
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.simulation.stretch import bent_share
 
@@ -35,10 +36,11 @@ class SimulatedHand:
 
     def __init__(self, seed: int) -> None:
         random = np.random.default_rng([seed, 1])
-        self._dip_slope = 2 / 3 + DIP_SLOPE_SD * random.standard_normal(4)
+        self._dip_slope = DIP_SHARE + DIP_SLOPE_SD * random.standard_normal(4)
         self._dip_curve = DIP_CURVE_SD_DEG * random.standard_normal(4)
         self._dip_knuckle = DIP_KNUCKLE_SD_DEG * random.standard_normal(4)
-        self._virtual_share = 0.5 + VIRTUAL_SHARE_SD * random.standard_normal(2)
+        shares = [VIRTUAL_SHARES[name] for name in ("T_TMC", "TI_ABD")]
+        self._virtual_share = shares + VIRTUAL_SHARE_SD * random.standard_normal(2)
         self._virtual_curve = VIRTUAL_CURVE_SD_DEG * random.standard_normal()
 
     def complete(self, driven: Mapping[str, np.ndarray]) -> np.ndarray:

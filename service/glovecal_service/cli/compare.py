@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from glovecal_service.cli.connection import connect
+from glovecal_service.cli.fingertips import print_fingertips, print_fingertips_beside
 from glovecal_service.cli.held_out_takes import HeldOutTakes, held_out_takes, warn_trained_on
 from glovecal_service.cli.options import AsJson, Models
 from glovecal_service.cli.printing import err, out, print_json, print_table
@@ -75,6 +76,8 @@ def _print(
         rows = [{**row, "floor": _interval(row["floor"])} for row in _rows(next(iter(results.values())))]
         print_table(rows, COLUMNS, empty="Nothing was measured.")
         err.print(LEGEND)
+        [(name, result)] = results.items()
+        print_fingertips(result["fingertips"], documents[name]["subject"])
     else:
         _print_side_by_side(documents, results)
     if poses:
@@ -114,6 +117,7 @@ def _print_side_by_side(documents: dict[str, dict[str, Any]], results: dict[str,
     columns = {"rotation": "RMSE (deg)", **headings, "floor": "floor", "spread": "spread"}
     print_table(rows, columns, empty="Nothing was measured.")
     err.print(BESIDE_LEGEND)
+    print_fingertips_beside({name: result["fingertips"] for name, result in results.items()}, headings)
 
 
 def _warn(name: str, result: dict[str, Any], takes: list[dict[str, Any]]) -> None:

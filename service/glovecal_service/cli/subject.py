@@ -7,8 +7,9 @@ from typing import Annotated
 import typer
 
 from glovecal_service.cli.connection import connect
+from glovecal_service.cli.measured_hand import DimensionsFile, Hand, HandLength, measured_dimensions
 from glovecal_service.cli.options import AsJson, identifier
-from glovecal_service.cli.printing import moment, out, print_facts, print_json, print_table
+from glovecal_service.cli.printing import moment, out, print_facts, print_json, print_table, text
 
 app = typer.Typer(help="The people who wear gloves.", no_args_is_help=True)
 
@@ -19,11 +20,53 @@ Name = Annotated[str, typer.Argument(help="Short name: a-z, 0-9, _ and -.", call
 def add(
     name: Name,
     title: Annotated[str, typer.Option(help="The name as people write it.")] = "",
+    hand_length_mm: HandLength = None,
+    dimensions: DimensionsFile = None,
+    hand: Hand = None,
 ) -> None:
-    """Add a subject."""
+    """Add a subject; with the size of the hand, errors are told in mm too."""
+    measured = measured_dimensions(hand_length_mm, dimensions)
+    body = {"name": name, "title": title, "dimensions": measured, "hand": hand or "right"}
     with connect() as service:
-        service.post("/subjects", {"name": name, "title": title})
+        service.post("/subjects", body)
     out.print(f"Added subject {name}.")
+
+
+@app.command("measure")
+def measure(
+    name: Name,
+    hand_length_mm: HandLength = None,
+    dimensions: DimensionsFile = None,
+    hand: Hand = None,
+) -> None:
+    """Say how large a subject's hand is; replaces all that was measured before."""
+    if hand_length_mm is None and dimensions is None:
+        raise typer.BadParameter("give --hand-length-mm or --dimensions")
+    measured = measured_dimensions(hand_length_mm, dimensions)
+    with connect() as service:
+        hand = hand or service.get(f"/subjects/{name}")["hand"]
+        service.put(f"/subjects/{name}/hand", {"dimensions": measured, "hand": hand})
+    out.print(f"Subject {name}: {hand} hand, {text(measured)} mm.")
+
+
+@app.command("skeleton")
+def skeleton(name: Name, hand: Hand = None, as_json: AsJson = False) -> None:
+    """Show the sizes of a subject's hand; --json prints joints, axes and limits for a viewer."""
+    with connect() as service:
+        query = {"hand": hand} if hand is not None else None
+        document = service.get(f"/subjects/{name}/skeleton", query)
+    if as_json:
+        print_json(document)
+        return
+    sizes, measured = document["dimensions"]["sizes"], document["dimensions"]["measured"]
+    rows = [{"name": key, "mm": f"{mm:.1f}", "from": _origin(key, measured)} for key, mm in sizes.items()]
+    print_table(rows, {"name": f"{document['hand']} hand", "mm": "mm", "from": ""}, empty="")
+
+
+def _origin(dimension: str, measured: list[str]) -> str:
+    if dimension in measured:
+        return "measured"
+    return "from the hand length" if measured else "assumed"
 
 
 @app.command("list")
@@ -53,7 +96,8 @@ def show(name: Name, as_json: AsJson = False) -> None:
         {
             "subject": name,
             "name": document["title"] or None,
-            "hand (mm)": document["dimensions"],
+            "hand": document["hand"],
+            "measured (mm)": document["dimensions"],
             "added": moment(document["created_at"]),
             "takes": len(takes),
             "models": len(models),

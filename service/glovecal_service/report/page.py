@@ -11,12 +11,14 @@ from glovecal_models.comparison.floor_estimate import ORDER, NoiseFloor
 from glovecal_models.comparison.residuals import Residuals, residuals
 from glovecal_models.comparison.rotation_noise import RotationNoise, rotation_noise
 from glovecal_models.comparison.where_it_fails import RotationFindings, WhereItFails, where_it_fails
+from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.takes.take import Take
 from glovecal_service.report.closer_pictures import (
     error_by_wearing,
     measured_against_predicted,
     spectrum_of,
 )
+from glovecal_service.report.fingertips import fingertips_part
 from glovecal_service.report.html import figure, table, whole_page
 from glovecal_service.report.lineage_fall import lineage_fall
 from glovecal_service.report.pictures import error_against, errors_and_floors, heat_map, over_time
@@ -49,14 +51,16 @@ def report_page(
     *,
     ancestors: Sequence[CalibrationModel] = (),
     simpler: Mapping[str, CalibrationModel] | None = None,
+    dimensions: HandDimensions | None = None,
 ) -> str:
     """HTML, ``main`` looked at closely. Raises LayoutMismatch, and BadInput when nothing was measured.
 
     ``ancestors``, oldest first, and ``simpler`` calibrations show how the error fell down to ``main``.
+    ``dimensions`` of the subject's hand, for the errors of fingertips.
     """
     found = residuals(main.model, takes)
     noise = rotation_noise(found)
-    numbers, where = summed_up(found, noise), where_it_fails(found, noise=noise)
+    numbers, where = summed_up(found, noise, dimensions=dimensions), where_it_fails(found, noise=noise)
     parts = [
         f"<h1>Model {escape(main.id[:12])} against {counted(len(takes), 'take')}</h1>",
         _what(main, takes),
@@ -66,6 +70,7 @@ def report_page(
         "<h2>How far off, and how far it could be</h2>",
         figure(errors_and_floors(where), floors_sentence(where)),
         _table(numbers, where),
+        *fingertips_part(numbers.fingertips, dimensions),
         "<h2>What the errors depend on</h2>",
         figure(heat_map(where), heat_sentence(where)),
     ]

@@ -11,11 +11,13 @@ from glovecal_models.calibration.comparison import compare
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.comparison.where_it_fails import where_it_fails
+from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_service.plain import plain
 from glovecal_service.report.page import report_page
 from glovecal_service.report.reported_model import ReportedModel
 from glovecal_service.rest.answers import change_problems
 from glovecal_service.rest.dependencies import Parts, PartsNeeded
+from glovecal_service.rest.fingertip_view import FingertipsView
 from glovecal_service.rest.names import Id, ModelInPath, ModelReference
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.rest.versions_before import versions_before
@@ -87,6 +89,9 @@ class ComparisonView(BaseModel):
     poses: list[PoseErrors]
     not_measured: list[str]
     not_predicted: list[str]
+    fingertips: FingertipsView | None = Field(
+        description="Null where no finger's chain was predicted and measured."
+    )
     trained_on: list[str] = Field(description="Takes among those given that the model was trained on.")
 
 
@@ -151,9 +156,10 @@ class WhereView(BaseModel):
     responses=change_problems(409),
 )
 def compare_model(id: ModelInPath, body: Against, parts: PartsNeeded) -> dict[str, Any]:
-    """Errors in degrees over the takes given; `trained_on` says which of them it has seen before."""
+    """Errors in degrees, and of fingertips in mm; `trained_on` says which takes it has seen before."""
     record, model, wanted, seen = _chosen(id, body, parts)
-    comparison = compare(model, [parts.store.takes.load(take) for take in wanted])
+    takes = [parts.store.takes.load(take) for take in wanted]
+    comparison = compare(model, takes, dimensions=_hand_of(record, parts))
     return plain(comparison.to_document()) | {"model": record.id, "trained_on": seen}
 
 
@@ -199,6 +205,7 @@ def report_on_model(id: ModelInPath, body: AgainstBeside, parts: PartsNeeded) ->
         list(others.values()),
         ancestors=ancestors,
         simpler=simpler,
+        dimensions=_hand_of(record, parts),
     )
     return Response(page, media_type="text/html; charset=utf-8")
 
@@ -212,6 +219,10 @@ def _chosen(
     wanted = list(dict.fromkeys(body.takes))
     seen = _trained_on(parts.store, model, record)
     return record, model, wanted, [take for take in wanted if take in seen]
+
+
+def _hand_of(record: ModelRecord, parts: Parts) -> HandDimensions:
+    return parts.store.subjects.get(record.subject).skeleton().dimensions
 
 
 def _trained_on(store: Store, model: CalibrationModel, record: ModelRecord) -> set[str]:

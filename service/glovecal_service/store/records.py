@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any, Literal
 
+from glovecal_models.hand.dimensions import HandDimensions
+from glovecal_models.hand.skeleton import Handedness, Skeleton, hand_skeleton
+
 RecordingState = Literal["requested", "recording", "stopping", "done", "failed"]
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 
@@ -22,6 +25,11 @@ class SubjectRecord:
     dimensions: dict[str, float]
     """Hand dimensions in millimetres by name; empty if nobody measured them."""
     created_at: datetime
+    hand: Handedness = "right"
+
+    def skeleton(self, hand: Handedness | None = None) -> Skeleton:
+        """This person's hand, or the other one. Raises BadInput for dimensions that no hand has."""
+        return hand_skeleton(HandDimensions.from_measured(self.dimensions), hand or self.hand)
 
 
 @dataclass(frozen=True)

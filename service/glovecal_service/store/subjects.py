@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import get_args
 
 from sqlalchemy import Connection, Row, delete, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
 from glovecal_models.errors import BadInput
-from glovecal_models.names import check_channel_name, check_identifier
+from glovecal_models.hand.dimensions import HandDimensions
+from glovecal_models.hand.skeleton import Handedness
+from glovecal_models.names import check_identifier
 from glovecal_service.store import revision, tables
 from glovecal_service.store.clock import now
 from glovecal_service.store.database import Database
@@ -23,7 +26,12 @@ class Subjects:
         self._database = database
 
     def create(
-        self, name: str, *, title: str = "", dimensions: Mapping[str, float] | None = None
+        self,
+        name: str,
+        *,
+        title: str = "",
+        dimensions: Mapping[str, float] | None = None,
+        hand: Handedness = "right",
     ) -> SubjectRecord:
         """Add a person. Raises BadInput for a bad name or dimension, Conflict if the name is taken."""
         record = SubjectRecord(
@@ -31,6 +39,7 @@ class Subjects:
             check_text(title, f"title of subject {name!r}", empty=True),
             _dimensions(name, dimensions or {}),
             now(),
+            _hand(name, hand),
         )
         try:
             with self._database.write() as connection:
@@ -49,6 +58,15 @@ class Subjects:
         with self._database.read() as connection:
             rows = connection.execute(select(tables.subjects).order_by(tables.subjects.c.name))
             return [_record(row) for row in rows]
+
+    def measure(self, name: str, dimensions: Mapping[str, float], hand: Handedness) -> SubjectRecord:
+        """Replace what was measured of a person's hand. Raises NotFound, BadInput."""
+        values = {"dimensions": _dimensions(name, dimensions), "hand": _hand(name, hand)}
+        with self._database.write() as connection:
+            require_subject(connection, name)
+            changed = update(tables.subjects).where(tables.subjects.c.name == name)
+            connection.execute(changed.values(**values))
+            return require_subject(connection, name)
 
     def remove(self, name: str) -> None:
         """Forget a person. Raises NotFound, or Conflict while takes or models of theirs exist."""
@@ -78,8 +96,19 @@ def _record(row: Row) -> SubjectRecord:
 
 def _dimensions(subject: str, dimensions: Mapping[str, float]) -> dict[str, float]:
     for name, value in dimensions.items():
-        check_channel_name(name, f"dimension of subject {subject!r}")
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if not number or not math.isfinite(value) or value <= 0:
-            raise BadInput(f"dimension {name} of subject {subject!r} is {value!r}; give millimetres above 0")
+            raise BadInput(
+                f"dimension {name!r} of subject {subject!r} is {value!r}; give millimetres above 0"
+            )
+    try:
+        HandDimensions.from_measured(dimensions)
+    except BadInput as error:
+        raise BadInput(f"subject {subject!r}: {error}") from error
     return {name: float(value) for name, value in dimensions.items()}
+
+
+def _hand(subject: str, hand: Handedness) -> Handedness:
+    if hand not in get_args(Handedness):
+        raise BadInput(f"hand of subject {subject!r} is {hand!r}; give right or left")
+    return hand

@@ -59,6 +59,7 @@ subjects = Table(
     Column("title", Text, nullable=False),
     Column("dimensions", JSON, nullable=False),
     Column("created_at", UtcTime, nullable=False),
+    Column("hand", String(8), nullable=False, server_default="right"),
 )
 
 layouts = Table(

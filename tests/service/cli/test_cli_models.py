@@ -66,7 +66,14 @@ def test_models_are_compared_side_by_side_on_takes_they_have_not_seen(walked):
     floor = min(floors, key=lambda one: (one["is_lower_bound"], one["floor_deg"]))
     interval = f"{floor['low_deg']:.2f}-{floor['high_deg']:.2f}"
     assert everywhere[3] == (f">{floor['floor_deg']:.2f}" if floor["is_lower_bound"] else interval)
+    tips = [results[id]["fingertips"]["over_all"]["rmse_mm"] for id in ids]
+    assert tips[1] < 0.7 * tips[0]
+    in_mm = beside.out[beside.out.index("fingertip RMSE (mm)") :].splitlines()
+    assert in_mm[1].split()[:3] == ["all", f"{tips[0]:.2f}", f"{tips[1]:.2f}"]
     one = run("compare", ids[1], "--poses", "--take", "second")
+    assert "\nthumb to index" in one.out
+    assert results[ids[1]]["fingertips"]["sentence"] in one.err
+    assert "glovecal subject measure anna --hand-length-mm LENGTH" in one.err
     assert "fist" in one.out
     assert one.out.splitlines()[1].split()[:4] == ["rotation", "RMSE", "floor", "mean"]
     assert "NLPD" in one.out

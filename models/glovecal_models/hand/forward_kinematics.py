@@ -1,0 +1,63 @@
+"""Where joints and fingertips are: forward kinematics of many frames at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from glovecal_models.errors import BadInput
+from glovecal_models.hand.rotations import HAND_ROTATIONS
+from glovecal_models.hand.skeleton import Skeleton
+
+
+@dataclass(frozen=True)
+class HandFrames:
+    """N hands in the forearm's frame; joints and tips in the skeleton's order."""
+
+    orientations: np.ndarray
+    """(N, J, 3, 3): columns are the axes of each joint's frame, its own turn in it."""
+    joints_mm: np.ndarray
+    """(N, J, 3)."""
+    tips_mm: np.ndarray
+    """(N, 5, 3): thumb, index, middle, ring, pinky."""
+
+
+def forward_kinematics(skeleton: Skeleton, angles_deg: np.ndarray) -> HandFrames:
+    """The hands with ``angles_deg`` (N, R), in the order of ``HAND_ROTATIONS``.
+
+    Raises BadInput for another shape, and for angles that are not finite.
+    """
+    angles = np.asarray(angles_deg, dtype=float)
+    if angles.ndim != 2 or angles.shape[1] != len(HAND_ROTATIONS):
+        raise BadInput(f"angles have shape {angles.shape}, expected (N, {len(HAND_ROTATIONS)})")
+    if not np.isfinite(angles).all():
+        frame, rotation = np.argwhere(~np.isfinite(angles))[0]
+        value = angles[frame, rotation]
+        raise BadInput(f"{HAND_ROTATIONS[rotation]} is {value} in frame {frame}; a hand needs every angle")
+    turns = np.radians(angles) @ skeleton.weights.T
+    count = len(angles)
+    orientations = np.empty((count, len(skeleton.joints), 3, 3))
+    places = np.empty((count, len(skeleton.joints), 3))
+    for index, parent in enumerate(skeleton.parents):
+        turned, offset = _turned(skeleton, index, turns[:, index]), skeleton.offsets_mm[index]
+        if parent is None:
+            places[:, index], orientations[:, index] = offset, turned
+            continue
+        carrier = orientations[:, parent]
+        places[:, index] = places[:, parent] + carrier @ offset
+        orientations[:, index] = carrier @ turned
+    last = list(skeleton.tip_joints)
+    offsets = np.array([tip.offset_mm for tip in skeleton.tips])
+    tips = places[:, last] + np.einsum("nfij,fj->nfi", orientations[:, last], offsets)
+    return HandFrames(orientations, places, tips)
+
+
+def _turned(skeleton: Skeleton, joint: int, angles: np.ndarray) -> np.ndarray:
+    """Orientation in the parent's frame at ``angles`` (N,) radians, (N, 3, 3): Rodrigues' formula."""
+    oriented, sine_part, cosine_part = skeleton.turns[joint]
+    return (
+        oriented
+        + np.sin(angles)[:, None, None] * sine_part
+        + (1 - np.cos(angles))[:, None, None] * cosine_part
+    )

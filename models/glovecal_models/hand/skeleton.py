@@ -1,0 +1,220 @@
+"""The hand's skeleton: one definition, for computation and for every viewer.
+
+Frame of the right hand, palm down: origin at the wrist's centre, x along the middle metacarpal to the
+fingers, y towards the thumb, z out of the back of the hand. The left hand is the mirror image in y = 0. Each
+joint turns about one axis; its frame follows from that of its parent:
+
+    frame(joint) = frame(parent) . translate(offset) . orient(orientation) . turn(axis, angle)
+
+The first joint's parent is the forearm. A joint's angle is a weighted sum of rotations: the spread between
+ring and middle finger carries the pinky too, so the pinky's spread is ``MR_ABD`` + ``RP_ABD``. The middle
+finger is what the others spread from.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from glovecal_models.hand.dimensions import HandDimensions
+from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS, WRIST
+
+Handedness = Literal["right", "left"]
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+NO_TURN: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+THUMB_TILT_DEG = 8.0
+"""How far the closed thumb points out of the palm's plane."""
+THUMB_SLANT_DEG = 40.0
+"""Between the axis about which the thumb turns across the palm and the middle metacarpal."""
+THUMB_ROLL_DEG = 50.0
+"""How far the closed thumb's nail has turned from the back of the hand towards the side."""
+THUMB_BASE_DEPTH = 0.03
+"""Of the thumb's base below the wrist's centre, in hand lengths.
+
+These four are ours: nobody measures them on a subject. With them the relaxed thumb is pronated by 76 degrees
+to the middle metacarpal (its base by 80: Cooney et al. 1981, J. Bone Joint Surg. 63-A, 1371-1381), and the
+posture that the paper calls "ok" brings thumb and index finger together within 10 mm.
+"""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One axis. Offset and orientation are those in its parent's frame at angle 0."""
+
+    name: str
+    parent: str | None
+    offset_mm: Vector
+    orientation: Quaternion
+    """w, x, y, z."""
+    axis: Vector
+    """Unit vector in the oriented frame; positive angles turn by the right-hand rule."""
+    rotations: Mapping[str, float] = field(default_factory=dict)
+    """The joint's angle: the sum of weight times rotation."""
+
+
+@dataclass(frozen=True)
+class Tip:
+    finger: str
+    joint: str
+    """The last joint of the finger's chain."""
+    offset_mm: Vector
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    hand: Handedness
+    dimensions: HandDimensions
+    joints: tuple[Joint, ...]
+    """Parents before children."""
+    tips: tuple[Tip, ...]
+    """In the order of ``FINGERS``."""
+
+    @cached_property
+    def parents(self) -> tuple[int | None, ...]:
+        """Index of each joint's parent."""
+        places = {joint.name: index for index, joint in enumerate(self.joints)}
+        return tuple(None if joint.parent is None else places[joint.parent] for joint in self.joints)
+
+    @cached_property
+    def tip_joints(self) -> tuple[int, ...]:
+        """Index of each fingertip's joint."""
+        names = [joint.name for joint in self.joints]
+        return tuple(names.index(tip.joint) for tip in self.tips)
+
+    @cached_property
+    def weights(self) -> np.ndarray:
+        """(J, R): joint angles are weights @ rotations."""
+        rows = [[joint.rotations.get(name, 0.0) for name in HAND_ROTATIONS] for joint in self.joints]
+        return np.array(rows)
+
+    @cached_property
+    def offsets_mm(self) -> np.ndarray:
+        """(J, 3)."""
+        return np.array([joint.offset_mm for joint in self.joints])
+
+    @cached_property
+    def axes(self) -> np.ndarray:
+        """(J, 3)."""
+        return np.array([joint.axis for joint in self.joints])
+
+    @cached_property
+    def turns(self) -> np.ndarray:
+        """(J, 3, 3, 3): a joint's turn is the first matrix + sin(angle) second + (1 - cos(angle)) third."""
+        quaternions = [joint.orientation for joint in self.joints]
+        oriented = Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
+        cross = np.cross(self.axes[:, None, :], np.eye(3)).swapaxes(1, 2)
+        return np.stack([oriented, oriented @ cross, oriented @ cross @ cross], axis=1)
+
+    def carrying(self, joint: int) -> tuple[int, ...]:
+        """Indices of the joints from the forearm to ``joint``, both ends in it."""
+        chain = [joint]
+        while (parent := self.parents[chain[0]]) is not None:
+            chain.insert(0, parent)
+        return tuple(chain)
+
+    def chain(self, finger: str) -> tuple[str, ...]:
+        """The rotations that move a fingertip against the palm, from the palm to the tip."""
+        tip = list(FINGERS).index(finger)
+        joints = [self.joints[index] for index in self.carrying(self.tip_joints[tip])]
+        return tuple(name for joint in joints for name in joint.rotations if name not in WRIST)
+
+
+def hand_skeleton(dimensions: HandDimensions | None = None, hand: Handedness = "right") -> Skeleton:
+    """The skeleton of a hand; without ``dimensions`` that of an assumed one."""
+    dimensions = HandDimensions.from_measured({}) if dimensions is None else dimensions
+    joints = [*_wrist(), *_thumb(dimensions)]
+    for finger in "IMRP":
+        joints += _finger(finger, dimensions)
+    lasts = {"T": "T_IP", **{finger: f"{finger}_DIP" for finger in "IMRP"}}
+    tips = [
+        Tip(finger, last, (dimensions.sizes_mm[f"{finger}_distal"], 0.0, 0.0))
+        for finger, last in lasts.items()
+    ]
+    right = Skeleton("right", dimensions, tuple(joints), tuple(tips))
+    return right if hand == "right" else _mirrored(right)
+
+
+def _wrist() -> list[Joint]:
+    return [
+        Joint("W_ABD", None, (0.0, 0.0, 0.0), NO_TURN, Z, {"W_ABD": 1.0}),
+        Joint("W_FLEX", "W_ABD", (0.0, 0.0, 0.0), NO_TURN, Y, {"W_FLEX": 1.0}),
+    ]
+
+
+def _finger(finger: str, dimensions: HandDimensions) -> list[Joint]:
+    """Spread, then knuckle, middle and last joint."""
+    x, y = dimensions.knuckle_mm(finger)
+    axis, spread = _SPREADS[finger]
+    sizes = dimensions.sizes_mm
+    bends = [("MCP", (0.0, 0.0, 0.0)), ("PIP", (sizes[f"{finger}_proximal"], 0.0, 0.0))]
+    bends.append(("DIP", (sizes[f"{finger}_middle"], 0.0, 0.0)))
+    joints = [Joint(f"{finger}_ABD", "W_FLEX", (x, y, 0.0), NO_TURN, axis, spread)]
+    for joint, offset in bends:
+        name = f"{finger}_{joint}"
+        joints.append(Joint(name, joints[-1].name, offset, NO_TURN, Y, {name: 1.0}))
+    return joints
+
+
+_TOWARDS_PINKY = (0.0, 0.0, -1.0)
+_SPREADS: dict[str, tuple[Vector, dict[str, float]]] = {
+    "I": (Z, {"IM_ABD": 1.0}),
+    "M": (Z, {}),
+    "R": (_TOWARDS_PINKY, {"MR_ABD": 1.0}),
+    "P": (_TOWARDS_PINKY, {"MR_ABD": 1.0, "RP_ABD": 1.0}),
+}
+
+
+def _thumb(dimensions: HandDimensions) -> list[Joint]:
+    x, y = dimensions.thumb_base_mm()
+    base = (x, y, -THUMB_BASE_DEPTH * dimensions.hand_length_mm)
+    metacarpal, proximal = (
+        (dimensions.sizes_mm[f"T_{part}"], 0.0, 0.0) for part in ("metacarpal", "proximal")
+    )
+    here, roll = (0.0, 0.0, 0.0), (-1.0, 0.0, 0.0)
+    slant = math.radians(THUMB_SLANT_DEG)
+    across = (-math.cos(slant), math.sin(slant), 0.0)
+    return [
+        Joint("T_TMC", "W_FLEX", base, _turn(Y, THUMB_TILT_DEG), across, {"T_TMC": 1.0}),
+        Joint("TI_ABD", "T_TMC", here, NO_TURN, Z, {"TI_ABD": 1.0}),
+        Joint("T_VIR", "TI_ABD", here, _turn(roll, THUMB_ROLL_DEG), roll, {"T_VIR": 1.0}),
+        Joint("T_MCP", "T_VIR", metacarpal, NO_TURN, Y, {"T_MCP": 1.0}),
+        Joint("T_IP", "T_MCP", proximal, NO_TURN, Y, {"T_IP": 1.0}),
+    ]
+
+
+def _turn(axis: Vector, angle_deg: float) -> Quaternion:
+    half = math.radians(angle_deg) / 2
+    x, y, z = (math.sin(half) * part for part in axis)
+    return math.cos(half), x, y, z
+
+
+def _mirrored(right: Skeleton) -> Skeleton:
+    """In y = 0. An axis and its angle are mirrored so that the same rotation means the same motion."""
+
+    def place(vector: Vector) -> Vector:
+        return vector[0], -vector[1], vector[2]
+
+    def axis(vector: Vector) -> Vector:
+        return -vector[0], vector[1], -vector[2]
+
+    joints = [
+        replace(
+            joint,
+            offset_mm=place(joint.offset_mm),
+            orientation=(joint.orientation[0], *axis(joint.orientation[1:])),
+            axis=axis(joint.axis),
+        )
+        for joint in right.joints
+    ]
+    tips = [replace(tip, offset_mm=place(tip.offset_mm)) for tip in right.tips]
+    return Skeleton("left", right.dimensions, tuple(joints), tuple(tips))
