@@ -137,6 +137,17 @@ class EffectCorrection:
                 self.undefined[lanes] = True
         return total
 
+    def variance(self, time_s: np.ndarray, base: np.ndarray, wearing: str) -> np.ndarray | None:
+        """(N, R), degrees squared: what is not known of the corrections of ``base`` (N, R); None: nothing."""
+        total: np.ndarray | None = None
+        for effect, (item, lanes) in zip(self._effects, self._lanes, strict=True):
+            frames = Signals(time_s, base[:, lanes], wearing=wearing, zero_deg=item.zero_deg)
+            found = effect.variance(frames, item.settings, item.weights)
+            if found is not None:
+                total = np.zeros_like(base) if total is None else total
+                total[:, lanes] += found
+        return total
+
     def reset(self) -> None:
         """A new wearing, or frames were lost: effects with a memory start anew."""
         for stream in self._streams:

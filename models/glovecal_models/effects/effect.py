@@ -122,6 +122,10 @@ class Effect(ABC):
     def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
         """(N, L, C), degrees for a weight of one; ``shape`` is (L, P). Zero weight changes nothing."""
 
+    def variance(self, take: Signals, settings: Settings, weights: np.ndarray) -> np.ndarray | None:
+        """(N, L), degrees squared: what is not known of its correction, ``weights`` (L, C); None: nothing."""
+        return None
+
     @abstractmethod
     def stream(self, settings: Settings, shape: np.ndarray) -> Stream:
         """The same columns, frame by frame."""
