@@ -47,8 +47,6 @@ def pose_errors(
     """For each of ``poses``; ``units`` are the joints' own units (``own_centre_deg``, ``own_scale_deg``)."""
     predictor = GlovePredictor(model)
     predictions = {id(pose.take): _Predicted(predictor, pose.take, sensitivity) for pose in poses}
-    held_out = {item.rotation: item.held_out_rmse_deg or 0.0 for item in model.rotations}
-    least = np.array([held_out[name] ** 2 for name in sensitivity.rotations])
     found = []
     for pose in poses:
         take = predictions[id(pose.take)]
@@ -58,8 +56,9 @@ def pose_errors(
         angle = np.where(blind, np.nan, angle)
         predicted = take.mean[pose.frames].mean(axis=0)
         joint = in_joint_units(take.base[pose.frames].mean(axis=0)[None], units)[0]
-        model_variance = np.maximum((take.sd[pose.frames] ** 2).mean(axis=0), least)
-        witness = PoseError(angle - predicted, joint, model_variance + sd**2)
+        # Not divided by the frames: what the regressor is off by here it is off by in all of them.
+        variance = (take.sd[pose.frames] ** 2).mean(axis=0) + sd**2
+        witness = PoseError(angle - predicted, joint, variance)
         found.append(ObservedPose(pose, witness, predicted, angle, measured, saturated))
     return found
 

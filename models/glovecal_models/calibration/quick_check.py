@@ -33,6 +33,11 @@ from glovecal_models.errors import BadInput
 from glovecal_models.takes.take import Take
 
 EFFECT = DonningShift.name
+_SEEN = "wearing {!r} was in the model's training: whole takes tell more of it than a quick check could"
+_MIXED = (
+    "This model was trained on {} wearings without telling them apart: what differs between them stands in "
+    "its error, that of a full calibration included. Add the effect donning_shift first, then check again."
+)
 
 
 @dataclass(frozen=True)
@@ -66,17 +71,21 @@ def quick_check(
     *,
     known: PoseBook | None = None,
     poses: Sequence[HeldPose] | None = None,
+    trained_wearings: Sequence[str] = (),
     parent_id: str | None = None,
 ) -> QuickCheck:
     """Learn the shift of the one wearing that ``takes`` are of.
 
     ``known``: angles of named poses (default: flat, fist and spread of a usual hand), for rotations that a
-    take did not measure. ``poses``: stretches to use instead of those found held. Raises BadInput when the
-    takes are of several wearings or of one the model was trained on, when no pose is held or known, and when
-    the poses contradict the model or each other; LayoutMismatch.
+    take did not measure. ``poses``: stretches to use instead of those found held. ``trained_wearings``: of
+    the model's training takes, where that is known. Raises BadInput when the takes are of several wearings or
+    of one the model was trained on, when no pose is held or known, and when the poses contradict the model or
+    each other; LayoutMismatch.
     """
     known = known or usual_poses()
     wearing = _one_wearing(takes)
+    if wearing in trained_wearings:
+        raise BadInput(_SEEN.format(wearing))
     for take in takes:
         require_layout(take, model.layout)
     before = without_check(model, wearing)
@@ -99,6 +108,8 @@ def quick_check(
     shift = prior.after(item.witness for item in used)
     refused = (*(RefusedPose(item.label, item.reason) for item in missed), *contradicted)
     report = shift_report(before, sensitivity, prior, shift, used)
+    if len(set(trained_wearings)) > 1 and not any(item.name == EFFECT for item in model.effects):
+        report = replace(report, sentences=(*report.sentences, _MIXED.format(len(set(trained_wearings)))))
     child = _child(before, effect, wearing, prior, shift, parent_id, takes)
     return QuickCheck(wearing, sensitivity.rotations, prior, shift, used, refused, report, child)
 
@@ -108,10 +119,7 @@ def without_check(model: CalibrationModel, wearing: str) -> CalibrationModel:
     effects = []
     for item in model.effects:
         if item.name == EFFECT and wearing in trained_wearings(item.settings):
-            raise BadInput(
-                f"wearing {wearing!r} was in the model's training: its shift is known from whole takes, "
-                "a quick check has nothing to add"
-            )
+            raise BadInput(_SEEN.format(wearing))
         if item.name == EFFECT and wearing in item.settings["wearings"]:
             at, count = item.settings["wearings"].index(wearing), len(item.settings["wearings"])
             weights = item.weights.copy()
@@ -119,6 +127,11 @@ def without_check(model: CalibrationModel, wearing: str) -> CalibrationModel:
             item = replace(item, weights=weights)
         effects.append(item)
     return replace(model, effects=tuple(effects))
+
+
+def is_only_checked(item: AddedEffect) -> bool:
+    """Whether an effect of a model holds nothing but the shifts of quick checks."""
+    return item.name == EFFECT and not trained_wearings(item.settings)
 
 
 def _one_wearing(takes: Sequence[Take]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -102,11 +102,9 @@ def shift_report(
     rotations = _rotations(model, sensitivity, prior, shift)
     before = _rms([item.before_deg for item in poses])
     left = [item.left_out_deg for item in poses if item.left_out_deg is not None]
-    report = ShiftReport(
-        rotations, _sensors(sensitivity, prior, shift), before, _rms(left) if left else None, ()
-    )
-    sentences = tuple(_sentences(report, len(poses)))
-    return ShiftReport(rotations, report.sensors, before, report.poses_left_out_deg, sentences)
+    sensors = _sensors(sensitivity, prior, shift)
+    report = ShiftReport(rotations, sensors, before, _rms(left) if left else None, ())
+    return replace(report, sentences=tuple(_sentences(report, len(poses))))
 
 
 def _rotations(
