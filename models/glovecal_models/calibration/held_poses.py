@@ -18,7 +18,7 @@ STILL_SHARE = 0.05
 """Of a sensor's trained range: within it the sensor is still."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class HeldPose:
     """A stretch of one take in which the hand was still."""
 

@@ -21,7 +21,7 @@ REFERENCE_SD_DEG = 0.5
 """Of a measured angle's mean over a hold: what a reference is off by beside its noise."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ObservedPose:
     """One held pose with what is known of its angles; arrays are (L,) over the trained rotations, degrees."""
 

@@ -20,7 +20,7 @@ SHIFT_OF_RANGE = 0.04
 trained range, as a standard deviation. 3.5 degrees of a 90 degree joint (Gracia-Ibanez et al. 2016)."""
 GAIN_OF_OFFSET = 0.5
 """Default prior of the gain (degrees per standard deviation of the joint), as a share of the offset's."""
-OWN_SHARE = 0.25
+OWN_SHARE = 0.1
 """Of an offset's variance that is the rotation's own: its regressor is no straight line in the readings."""
 
 
