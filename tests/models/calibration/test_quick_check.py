@@ -56,18 +56,19 @@ def glove(seed: int, form: str, method: str = "linear") -> Glove:
     session = record_session(plan, [Cause("donning_shift", strength_deg=4, form=form)])
     layout = replace(Layout.from_columns("three", SENSORS, SENSORS), counts=(0.0, 255.0))
     training = list(session.takes)
-    new = [session.also(motion, 10, 3, repeat=again).take for motion, again in NEW_TAKES]
+    poses, natural, other = (
+        session.also("poses", 10, 3).take,
+        session.also("natural", 10, 3).take,
+        session.also("natural", 10, 3, repeat=1).take,
+    )
     settings = TrainingSettings(method=method, folds=2, samples=200)  # pyright: ignore[reportArgumentType]
     plain = train(training, layout, "anna", settings)
     model = add_effect(plain, training, "donning_shift", settings=settings, least_gain=-9).model
-    return Glove(layout, training, *new, plain, model)
+    return Glove(layout, training, poses, natural, other, plain, model)
 
 
 def curved() -> Glove:
     return glove(2, "offset_and_gain", "lmc_gpr")
-
-
-NEW_TAKES = (("poses", 0), ("natural", 0), ("natural", 1))
 
 
 def predicted(model: CalibrationModel, take: Take) -> GloveAngles:
