@@ -102,7 +102,7 @@ class GlovePredictor:
             return angles
         effects = self._model.correction()
         correction = effects.of_take(time_s, angles.mean, readings, context, wearing)
-        variance = effects.variance(time_s, angles.mean, wearing)
+        variance = effects.variance(angles.mean, wearing)
         return self.less_certain(self.corrected(angles, correction), variance)
 
     def less_certain(self, angles: GloveAngles, variance: np.ndarray | None) -> GloveAngles:

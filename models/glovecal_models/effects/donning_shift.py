@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.effect import Decoy, InstantEffect, Settings, Signals
+from glovecal_models.effects.effect import Decoy, InstantEffect, Settings, Signals, Uncertainty
 from glovecal_models.effects.joint_units import in_joint_units, settle_joint_units
 
 PRIOR_DEG = 3.5
@@ -61,13 +61,17 @@ class DonningShift(InstantEffect):
     def prior_sd(self, settings: Settings) -> np.ndarray:
         return np.full(2 * len(settings["wearings"]), PRIOR_DEG)
 
-    def variance(self, take: Signals, settings: Settings, weights: np.ndarray) -> np.ndarray | None:
-        covariance = shift_covariance(settings, weights, take.wearing)
+    def uncertainty(self, settings: Settings, weights: np.ndarray, wearing: str) -> Uncertainty | None:
+        covariance = shift_covariance(settings, weights, wearing)
         if covariance is None:
             return None
-        joint = in_joint_units(take.own, settings)
         offset, both, gain = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
-        return offset + 2 * joint * both + joint**2 * gain
+
+        def variance(own: np.ndarray) -> np.ndarray:
+            joint = in_joint_units(own, settings)
+            return offset + 2 * joint * both + joint**2 * gain
+
+        return variance
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         wearings = settings["wearings"]

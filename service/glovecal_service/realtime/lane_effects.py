@@ -69,7 +69,7 @@ class LaneEffects:
                 self._stream.reset()
             readings = frame.readings.astype(np.float64)
             degrees = self._stream.of_frame(time_s, base, readings, context, wearing)
-            variance = self._stream.variance(np.array([time_s]), base[None], wearing)
+            variance = self._stream.variance(base[None], wearing)
         except Exception as error:  # an effect may be somebody else's code; the poses must go on
             degrees = np.zeros_like(base)
             degrees[self._stream.rows] = np.nan
