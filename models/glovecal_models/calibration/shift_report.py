@@ -172,6 +172,8 @@ def _sentences(report: ShiftReport, poses: int) -> list[str]:
             f"Each pose predicted with what the others tell is off by {report.poses_left_out_deg:.1f} "
             f"degrees; without the check by {report.poses_before_deg:.1f}."
         )
+        if report.poses_left_out_deg > report.poses_before_deg:
+            told.append("They do not foretell each other: take one or two more, spread over the range.")
     if report.uninformed:
         names = ", ".join(report.uninformed[:MOST_NAMED])
         more = len(report.uninformed) - MOST_NAMED
