@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect
-from glovecal_models.effects.effect import Effect, Signals
+from glovecal_models.effects.effect import Effect, Signals, Uncertainty
 from glovecal_models.errors import BadInput
 
 LARGEST_CORRECTION_DEG = 360.0
@@ -49,6 +49,8 @@ class EffectCorrection:
             effect.stream(item.settings, item.shape)
             for effect, (item, _) in zip(self._effects, self._lanes, strict=True)
         ]
+        self._uncertain: tuple[str, list[tuple[np.ndarray, Uncertainty]]] | None = None
+        """Of the wearing asked about last."""
         self.undefined: np.ndarray | None = None
         """(R,) True for rotations that some effect could not correct in the last frame; None: no such."""
         self.context = tuple(dict.fromkeys(name for effect in self._effects for name in effect.context))
@@ -136,6 +138,24 @@ class EffectCorrection:
                     self.undefined = np.zeros(len(base), dtype=bool)
                 self.undefined[lanes] = True
         return total
+
+    def variance(self, base: np.ndarray, wearing: str) -> np.ndarray | None:
+        """(N, R), degrees squared: what is not known of the corrections of ``base`` (N, R); None: nothing."""
+        if self._uncertain is None or self._uncertain[0] != wearing:
+            self._uncertain = wearing, self._uncertain_in(wearing)
+        if not self._uncertain[1]:
+            return None
+        total = np.zeros_like(base)
+        for lanes, variance in self._uncertain[1]:
+            total[:, lanes] += variance(base[:, lanes])
+        return total
+
+    def _uncertain_in(self, wearing: str) -> list[tuple[np.ndarray, Uncertainty]]:
+        found = [
+            (lanes, effect.uncertainty(item.settings, item.weights, wearing))
+            for effect, (item, lanes) in zip(self._effects, self._lanes, strict=True)
+        ]
+        return [(lanes, variance) for lanes, variance in found if variance is not None]
 
     def reset(self) -> None:
         """A new wearing, or frames were lost: effects with a memory start anew."""

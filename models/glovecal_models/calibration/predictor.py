@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -100,8 +100,18 @@ class GlovePredictor:
         angles = self.predict(readings)
         if not self.has_effects or not len(angles.mean):
             return angles
-        correction = self._model.correction().of_take(time_s, angles.mean, readings, context, wearing)
-        return self.corrected(angles, correction)
+        effects = self._model.correction()
+        correction = effects.of_take(time_s, angles.mean, readings, context, wearing)
+        variance = effects.variance(angles.mean, wearing)
+        return self.less_certain(self.corrected(angles, correction), variance)
+
+    def less_certain(self, angles: GloveAngles, variance: np.ndarray | None) -> GloveAngles:
+        """``angles`` whose corrections have a ``variance`` of their own, (N, R), degrees squared."""
+        if variance is None:
+            return angles
+        for row, sources, weights in self._rules:
+            variance[:, row] = variance[:, sources] @ (weights * weights)
+        return replace(angles, sd=np.sqrt(angles.sd**2 + variance))
 
     def corrected(
         self, angles: GloveAngles, correction: np.ndarray, doubtful: np.ndarray | None = None

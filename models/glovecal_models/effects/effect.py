@@ -13,7 +13,7 @@ Lanes are joints (and, while a shape is searched, joints times shapes): everythi
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
@@ -23,6 +23,8 @@ Settings = dict[str, Any]
 """Constants an effect takes from its training takes: plain JSON-able data."""
 LEAST_SETTLING_S = 1.0
 """An effect with a memory counts as settled after this or, if longer, its longest time constant."""
+Uncertainty = Callable[[np.ndarray], np.ndarray]
+"""From the joints' own signal (N, L), degrees, to their correction's variance (N, L), degrees squared."""
 Side = Literal["sensor", "reference"]
 Decoy = Literal["reversed in time", "rolled in time", "context of other takes", "dealt wearings", "none"]
 
@@ -121,6 +123,10 @@ class Effect(ABC):
     @abstractmethod
     def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
         """(N, L, C), degrees for a weight of one; ``shape`` is (L, P). Zero weight changes nothing."""
+
+    def uncertainty(self, settings: Settings, weights: np.ndarray, wearing: str) -> Uncertainty | None:
+        """What is not known of its correction in a wearing, ``weights`` (L, C); None: nothing."""
+        return None
 
     @abstractmethod
     def stream(self, settings: Settings, shape: np.ndarray) -> Stream:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.quick_check import is_only_checked
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
 from glovecal_models.effects.catalogue import effect as known_effect
 from glovecal_models.effects.clock_scan import aligned
@@ -62,6 +63,8 @@ def wanted_of(model: CalibrationModel) -> tuple[WantedEffect, ...]:
     """The effects a model has, as they would be asked for again."""
     merged: dict[str, WantedEffect] = {}
     for item in model.effects:
+        if is_only_checked(item):
+            continue  # training takes tell nothing of a wearing that only a quick check saw
         before = merged.get(item.name)
         rotations = item.active if before is None else (*before.rotations, *item.active)
         settings = item.settings if not item.weights.shape[1] else {}

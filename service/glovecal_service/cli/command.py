@@ -26,6 +26,7 @@ from glovecal_service.cli import (
     improve,
     job,
     model,
+    quick_check,
     record,
     serve,
     subject,
@@ -57,6 +58,7 @@ app.add_typer(glove.app, name="glove")
 app.add_typer(take.app, name="take")
 app.command("train")(train.train)
 app.add_typer(model.app, name="model")
+app.command("quick-check")(quick_check.quick_check)
 app.command("compare")(compare.compare)
 app.command("where")(where.where)
 app.command("diagnose")(diagnose.diagnose)

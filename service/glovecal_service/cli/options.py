@@ -40,6 +40,13 @@ def _model_ids(value: str | list[str]) -> str | list[str]:
     return value
 
 
+def model_id(value: str | None) -> str | None:
+    """A typer callback: a model's id, where one may be left out."""
+    if value is not None:
+        _model_ids(value)
+    return value
+
+
 def _job_id(value: str) -> str:
     if not JOB_ID.match(value):
         raise typer.BadParameter(

@@ -27,6 +27,7 @@ def corrected(
         return angles, flags
     correction = np.zeros_like(angles.mean)
     undefined = np.zeros(correction.shape, dtype=bool)
+    variance = np.zeros_like(correction)
     finite: list[bool] = np.all(np.isfinite(angles.mean), axis=1).tolist()
     for row, (lane, frame, _) in enumerate(opened):
         # What is no number gets no pose, and must not get into a state either.
@@ -36,4 +37,7 @@ def corrected(
             correction[row], flags[row] = found.degrees, found.flags
             if found.undefined is not None:
                 undefined[row] = found.undefined
-    return model.predictor.corrected(angles, correction, undefined), flags
+            if found.variance is not None:
+                variance[row] = found.variance
+    angles = model.predictor.corrected(angles, correction, undefined)
+    return (model.predictor.less_certain(angles, variance) if variance.any() else angles), flags

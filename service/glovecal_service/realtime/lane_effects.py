@@ -35,6 +35,8 @@ class Correction(NamedTuple):
     """PoseFlag bits."""
     undefined: np.ndarray | None = None
     """(R,) True where an effect had no value and was left out; None: nowhere."""
+    variance: np.ndarray | None = None
+    """(R,), degrees squared: what is not known of the correction; None: nothing."""
 
 
 class LaneEffects:
@@ -67,16 +69,18 @@ class LaneEffects:
                 self._stream.reset()
             readings = frame.readings.astype(np.float64)
             degrees = self._stream.of_frame(time_s, base, readings, context, wearing)
+            variance = self._stream.variance(base[None], wearing)
         except Exception as error:  # an effect may be somebody else's code; the poses must go on
             degrees = np.zeros_like(base)
             degrees[self._stream.rows] = np.nan
+            variance = None
             self._give_up(str(error) or type(error).__name__)
         else:
             if not usable_correction(degrees).all():
                 self._give_up("a correction is no number, or more than a full turn")
             elif self._stream.undefined is not None:
                 self._count("an effect has no value for some readings")
-        return Correction(degrees, flags, self._stream.undefined)
+        return Correction(degrees, flags, self._stream.undefined, None if variance is None else variance[0])
 
     def status(self) -> dict[str, Any]:
         """For the status document: what is not corrected, and why."""

@@ -25,6 +25,7 @@ from glovecal_service.rest import (
     model_effects,
     models,
     predictions,
+    quick_checks,
     recordings,
     subjects,
     takes,
@@ -50,6 +51,7 @@ BODY_PATIENCE_S = 30.0
 ROUTERS = (
     *(subjects, gloves, clocks, takes, uploads, recordings),
     *(training, models, predictions, comparisons, diagnosis, model_effects, effects, improvements),
+    quick_checks,
     *(jobs, job_reports, health, metrics_page),
 )
 

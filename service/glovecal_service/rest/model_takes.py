@@ -37,8 +37,11 @@ def model_takes(store: Store, model: ModelRecord, wanted: Sequence[str] | None) 
     return takes_named(store, wanted, model.subject, model.layout)
 
 
-def takes_named(store: Store, wanted: Sequence[str], subject: str, layout: str) -> list[TakeRecord]:
-    """Takes of one subject and layout, each once, by id or name. Raises as ``model_takes``."""
+def takes_named(
+    store: Store, wanted: Sequence[str], subject: str, layout: str, *, measured: bool = True
+) -> list[TakeRecord]:
+    """Takes of one subject and layout, each once, by id or name; without ``measured`` also those that have
+    no reference. Raises as ``model_takes``."""
     every = store.takes.list()
     found = [_one(every, name, subject) for name in wanted]
     for take in found:
@@ -46,7 +49,7 @@ def takes_named(store: Store, wanted: Sequence[str], subject: str, layout: str) 
             raise Conflict(f"take {take.id} ({take.name!r}) is of subject {take.subject!r}, not {subject!r}")
         if take.layout != layout:
             raise LayoutMismatch(f"take {take.id} ({take.name!r}) has layout {take.layout!r}, not {layout!r}")
-        if not take.has_reference:
+        if measured and not take.has_reference:
             raise NotTrainable(
                 f"take {take.id} ({take.name!r}) has no reference angles; attach some with "
                 f"PUT /v1/takes/{take.id}/reference"
