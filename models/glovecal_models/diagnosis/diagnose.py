@@ -25,7 +25,7 @@ from glovecal_models.diagnosis.signatures import (
     may_be_slip,
     signature_findings,
 )
-from glovecal_models.diagnosis.something_left import NOT_TOLD, Left, something_left
+from glovecal_models.diagnosis.something_left import Left, not_told, something_left
 from glovecal_models.effects.catalogue import catalogue, effect
 from glovecal_models.effects.context_dependence import ContextDependence, unfamiliar_columns
 from glovecal_models.effects.effect import Effect
@@ -125,11 +125,12 @@ def diagnose(
         for name, products in zip(joints, direction.products, strict=True)
     }
     floors = {name: float(value) for name, value in (noise_floor_deg or {}).items()}
-    left = (
-        NOT_TOLD
-        if sparse
-        else something_left(_with_first(naming, even, direction, layout, joints, linear, known), seed)
-    )
+    said("looking at what is left", 0.95)
+    if sparse:
+        left = not_told("the frames are single poses, too far apart")
+    else:
+        rest = _with_first(naming, even, direction, layout, joints, linear, known)
+        left = something_left(rest, even, layout, seed)
     said("done", 1.0)
     following = next_take(naming.confidence_set)
     return Diagnosis(
