@@ -166,10 +166,14 @@ def _errors(direction: Direction, joint: int, means: Sequence[SecondMeans]) -> t
 def _columns(
     direction: Direction, even: Sequence[EvenTake], layout: Layout, joint: int
 ) -> Iterator[Covariate]:
-    """Everything but the joint's own sensors: their noise is in the error."""
+    """Everything but readings that the error may be in itself.
+
+    Those are the joint's own, which hold its noise, and those of other measured joints, which a cause common
+    to all sensors shifts alike: of these the angle is taken.
+    """
     rotation = direction.rotations[joint]
-    own = set(layout.correspondence(rotation).sensors)
-    sensors = tuple(name for name in layout.sensors if name not in own)
+    known = {*layout.correspondence(rotation).sensors, *direction.rotations}
+    sensors = tuple(name for name in layout.sensors if name not in known)
     takes = []
     for take, signals in zip(even, direction.signals, strict=True):
         readings = take.readings[:, [layout.sensors.index(name) for name in sensors]]
@@ -179,7 +183,7 @@ def _columns(
         takes.append(TakeResiduals(table, signals.own, signals.own, signals.own))
     yield from covariates(Residuals(direction.rotations, tuple(takes)), rotation)
     for other, name in enumerate(direction.rotations):
-        if other != joint and name not in sensors:
+        if other != joint:
             angles = tuple(take.own[:, other] for take in direction.signals)
             yield Covariate(f"joint {name}", "deg", f"the angle of {name}", angles)
     wearings = list(dict.fromkeys(take.wearing for take in direction.signals))

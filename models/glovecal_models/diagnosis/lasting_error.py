@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.stats import chi2
 
 from glovecal_models.diagnosis.second_means import SecondMeans
 
@@ -55,11 +55,16 @@ def lasting_error(takes: Sequence[SecondMeans], residual: Sequence[np.ndarray]) 
     if not products:
         return LastingError(0.0, 0.0, noise, 0)
     total, count = sum(weights), len(products)
-    square = sum(products) / total
+    square = max(sum(products) / total, 0.0)
     differing = np.array(products) - square * np.array(weights)
-    error = float(np.sqrt(count / max(count - 1, 1) * np.sum(differing**2))) / total
-    least = square - float(student.ppf(CONFIDENCE, max(count - 1, 1))) * error
-    return LastingError(_root(square), _root(least), noise, count)
+    variance = count / max(count - 1, 1) * float(np.sum(differing**2)) / total**2
+    return LastingError(_root(square), _root(_lower(square, variance, count)), noise, count)
+
+
+def _lower(square: float, variance: float, count: int) -> float:
+    """Of a mean square whose estimate varies so much: as of a scaled chi squared (Satterthwaite 1946)."""
+    freedom = min(2 * square**2 / max(variance, 1e-30), count - 1.0)
+    return square * freedom / float(chi2.ppf(CONFIDENCE, freedom)) if freedom > 0 else 0.0
 
 
 def _root(square: float) -> float:

@@ -30,6 +30,8 @@ SHARED_PROBABILITY = 0.01
 MOST_JOINTS = 6
 """So many of the worst are held against every column."""
 MOST_SAID = 3
+ENOUGH_STRETCHES = 20
+"""With so many a bound that is low is no lack of data."""
 
 
 @dataclass(frozen=True)
@@ -53,10 +55,18 @@ def not_told(why: str) -> Left:
     return Left(False, f"Whether something is left that lasts cannot be judged: {why}.", not_judgeable=why)
 
 
-def something_left(direction: Direction, even: Sequence[EvenTake], layout: Layout, seed: int = 0) -> Left:
+def something_left(
+    direction: Direction,
+    even: Sequence[EvenTake],
+    layout: Layout,
+    seed: int = 0,
+    *,
+    may_be: Sequence[str] = (),
+) -> Left:
     """Judge the held-out residuals of ``direction``, known effects included in its base.
 
-    ``even``: its takes, for their readings.
+    ``even``: its takes, for their readings. ``may_be``: effects that save much and that these takes cannot
+    decide; they are not in the base.
     """
     generator = np.random.default_rng(seed)
     means = [second_means(direction, joint) for joint in range(len(direction.rotations))]
@@ -84,9 +94,9 @@ def something_left(direction: Direction, even: Sequence[EvenTake], layout: Layou
         HEALTHY_SHARED_DEG, HEALTHY_WITHIN_NOISES * noise
     )
     if not lasts and not is_shared:
-        worst = max(judged, key=lambda item: item.size_deg).size_deg
-        sentence = f"What is left looks like noise: errors that last for seconds come to {worst:.1f} degrees."
-        return Left(False, sentence, lasting, within, shared)
+        unsure = _unsure(judged)
+        sentence = f"Something may be left: {unsure}." if unsure else _noise_sentence(judged)
+        return Left(False, sentence, lasting, within, shared, not_judgeable=unsure)
     chosen = sorted(lasts or range(len(found)), key=lambda i: -excess[i])[:MOST_JOINTS]
     columns = goes_with(direction, even, layout, chosen, means, generator)
     why = []
@@ -95,7 +105,10 @@ def something_left(direction: Direction, even: Sequence[EvenTake], layout: Layou
         why.append(_lasts_sentence(worst, lasting[worst], within[worst]))
     if is_shared:
         why.append(f"the errors of several joints rise and fall together by {shared.size_deg:.1f} degrees")
-    sentence = f"Something is left that no known effect explains: {' and '.join(why)}; {_told(columns)}."
+    known = "known effect" if not may_be else "effect these takes can decide"
+    sentence = f"Something is left that no {known} explains: {' and '.join(why)}; {_told(columns)}."
+    if may_be:
+        sentence += f" It may be {' or '.join(may_be)}."
     return Left(True, sentence, lasting, within, shared, columns)
 
 
@@ -122,6 +135,23 @@ def _lasts_sentence(joint: str, item: LastingError, within: LastingError) -> str
     return (
         f"an error of {joint} lasts {where} ({said.size_deg:.2f} degrees, surely more than"
         f" {said.at_least_deg:.2f}; of a healthy glove at most {allowed:.2f})"
+    )
+
+
+def _noise_sentence(judged: Sequence[LastingError]) -> str:
+    worst = max(item.size_deg for item in judged)
+    return f"What is left looks like noise: errors that last for seconds come to {worst:.1f} degrees."
+
+
+def _unsure(judged: Sequence[LastingError]) -> str | None:
+    """Why a large error may yet be a healthy glove's; None when it is small or there is enough of it."""
+    worst = max(judged, key=lambda item: item.size_deg)
+    if worst.size_deg <= _allowed(worst) or worst.stretches >= ENOUGH_STRETCHES:
+        return None
+    return (
+        f"errors that last for seconds come to {worst.size_deg:.1f} degrees, but {worst.stretches} stretches of"
+        f" seconds cannot tell them surely from the {_allowed(worst):.1f} of a healthy glove; record longer"
+        " takes"
     )
 
 
