@@ -183,7 +183,7 @@ def _as_known(item: NotJudgeable, candidates: Sequence[Effect]) -> KnownEffect:
 
 
 def _deciding(impossible: Sequence[NotJudgeable], left: Left) -> NextTake | None:
-    """The recording that lets an effect be judged which may well be there, or a wearing if anything may be."""
+    """The recording that lets an effect be judged which may well be there, or a wearing if any may."""
     asked = [item for item in impossible if item.record is not None]
     likely = sorted((item for item in asked if item.saves_much), key=lambda item: -item.saved_square)
     unexplained = left.is_left or left.not_judgeable is not None

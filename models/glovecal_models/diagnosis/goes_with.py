@@ -3,7 +3,8 @@
 Columns that change within takes are judged by shifting the error in time, as ``glovecal where`` does; those
 that change from take to take, and the wearing, by dealing the takes in other ways. Each shift and deal is
 the same for all columns and joints, so that the largest of them by chance is known too (Westfall and Young
-1993, single-step maxT).
+1993, single-step maxT). The two kinds are corrected apart, each at half the probability: the few ways to deal
+takes would be lost among the many to shift them.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ STEPS_AT_MOST = 1000
 """Of a take; what lasts for seconds needs no more."""
 LEAST_WEIGHT = 0.3
 """Where the base guesses, its error says nothing of a column."""
-SELDOM = 0.01
+SELDOM = 0.02
 """Probability, all columns counted, above which nothing is listed."""
 LEAST_SHARE = 0.04
 """Of the mean squared error that a column must explain."""
@@ -35,6 +36,7 @@ MOST = 5
 MOSTLY_WITHIN = 0.5
 """Share of a column's variance inside takes above which takes need not be dealt to test it."""
 TAKES_PER_BIN = 3
+KINDS = 2
 
 
 @dataclass(frozen=True)
@@ -70,27 +72,53 @@ def goes_with(
     """
     shares = generator.random((DRAWS, len(even)))
     deals = np.array([generator.permutation(len(even)) for _ in range(DRAWS)])
-    tried: list[tuple[str, Covariate, float]] = []
-    explained = []
+    tried: list[_Tried] = []
     for joint in joints:
         errors = _errors(direction, joint, means[joint])
         square = float(np.nanmean(np.concatenate(errors) ** 2))
         for column in _columns(direction, even, layout, joint):
-            found = _explained(errors, column, shares, deals)
+            is_dealt = column.name == "wearing" or not _changes_within_takes(column)
+            found = (
+                _explained_when_dealt(errors, column, deals)
+                if is_dealt
+                else explained_when_shifted(errors, column, shares, STEPS_AT_MOST)
+            )
             if found is not None:
-                tried.append((direction.rotations[joint], column, square))
-                explained.append(found)
-    if not tried:
-        return ()
-    every = np.array(explained)
-    probability = _corrected(every)
-    size = np.sqrt(np.maximum(every[:, 0] ** 2 - np.mean(every[:, 1:] ** 2, axis=1), 0.0))
+                tried.append(_Tried(direction.rotations[joint], column, square, is_dealt, found))
     listed = [
-        GoesWith(rotation, column.name, _phrase(column), float(degrees), float(chance))
-        for (rotation, column, square), degrees, chance in zip(tried, size, probability, strict=True)
-        if chance <= SELDOM and degrees**2 >= LEAST_SHARE * square
+        *_listed([each for each in tried if each.is_dealt]),
+        *_listed([each for each in tried if not each.is_dealt]),
     ]
     return tuple(sorted(listed, key=lambda item: -item.size_deg)[:MOST])
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """One column held against the error of one rotation."""
+
+    rotation: str
+    column: Covariate
+    square: float
+    """Mean squared error, degrees squared."""
+    is_dealt: bool
+    explained: np.ndarray
+    """(1 + D,), degrees: as it is, then by chance."""
+
+    @property
+    def size_deg(self) -> float:
+        """What it explains beyond chance."""
+        return float(np.sqrt(max(self.explained[0] ** 2 - np.mean(self.explained[1:] ** 2), 0.0)))
+
+
+def _listed(tried: Sequence[_Tried]) -> Iterator[GoesWith]:
+    if not tried:
+        return
+    corrected = _corrected(np.array([item.explained for item in tried]))
+    for item, probability in zip(tried, np.minimum(KINDS * corrected, 1.0), strict=True):
+        if probability <= SELDOM and item.size_deg**2 >= LEAST_SHARE * item.square:
+            yield GoesWith(
+                item.rotation, item.column.name, _phrase(item.column), item.size_deg, float(probability)
+            )
 
 
 def _corrected(explained: np.ndarray) -> np.ndarray:
@@ -105,15 +133,6 @@ def _corrected(explained: np.ndarray) -> np.ndarray:
     largest = score.max(axis=0)
     largest[0] = np.inf
     return np.mean(largest[None, :] >= score[:, :1], axis=1)
-
-
-def _explained(
-    errors: tuple[np.ndarray, ...], column: Covariate, shares: np.ndarray, deals: np.ndarray
-) -> np.ndarray | None:
-    """(1 + D,), degrees: as it is, then by chance."""
-    if column.name == "wearing" or not _changes_within_takes(column):
-        return _explained_when_dealt(errors, column, deals)
-    return explained_when_shifted(errors, column, shares, STEPS_AT_MOST)
 
 
 def _changes_within_takes(column: Covariate) -> bool:

@@ -7,7 +7,7 @@ is worn, and its calibration is unsure where it has seen little. Only what surel
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from glovecal_models.diagnosis.directions import Direction
 from glovecal_models.diagnosis.evened import EvenTake
 from glovecal_models.diagnosis.goes_with import GoesWith, goes_with
 from glovecal_models.diagnosis.lasting_error import FEWEST_STRETCHES, SHORTEST_S, LastingError, lasting_error
-from glovecal_models.diagnosis.second_means import second_means, without_drift
+from glovecal_models.diagnosis.second_means import SecondMeans, second_means, without_drift
 from glovecal_models.diagnosis.shared_error import NOTHING_SHARED, SharedError, shared_error
 from glovecal_models.layout import Layout
 
@@ -70,46 +70,64 @@ def something_left(
     """
     generator = np.random.default_rng(seed)
     means = [second_means(direction, joint) for joint in range(len(direction.rotations))]
-    found = [
-        lasting_error(takes, products.residual)
-        for takes, products in zip(means, direction.products, strict=True)
-    ]
-    wandering = [
-        lasting_error([without_drift(take) for take in takes], products.residual)
-        for takes, products in zip(means, direction.products, strict=True)
-    ]
-    lasting = dict(zip(direction.rotations, found, strict=True))
-    within = dict(zip(direction.rotations, wandering, strict=True))
+    found = _lasting(direction, means)
+    wandering = _lasting(direction, [[without_drift(take) for take in takes] for takes in means])
     judged = [item for item in found if item.is_judgeable]
     if not judged:
-        most = max((item.stretches for item in found), default=0)
-        return not_told(
-            f"{most} stretches of {SHORTEST_S} s or more were measured, {FEWEST_STRETCHES} are needed"
-        )
-    shared = shared_error(means, generator)
-    excess = [_excess(*items) for items in zip(found, wandering, strict=True)]
-    lasts = [i for i, item in enumerate(excess) if item > 1]
-    noise = float(np.median([item.noise_deg for item in judged]))
-    is_shared = shared.probability <= SHARED_PROBABILITY and shared.size_deg > max(
-        HEALTHY_SHARED_DEG, HEALTHY_WITHIN_NOISES * noise
+        return not_told(_too_little(found))
+    left = Left(
+        False,
+        "",
+        dict(zip(direction.rotations, found, strict=True)),
+        dict(zip(direction.rotations, wandering, strict=True)),
+        shared_error(means, generator),
     )
+    excess = [_excess(*items) for items in zip(found, wandering, strict=True)]
+    lasts = sorted((i for i, item in enumerate(excess) if item > 1), key=lambda i: -excess[i])
+    is_shared = _is_shared(left.shared, judged)
     if not lasts and not is_shared:
         unsure = _unsure(judged)
         sentence = f"Something may be left: {unsure}." if unsure else _noise_sentence(judged)
-        return Left(False, sentence, lasting, within, shared, not_judgeable=unsure)
-    chosen = sorted(lasts or range(len(found)), key=lambda i: -excess[i])[:MOST_JOINTS]
+        return replace(left, sentence=sentence, not_judgeable=unsure)
+    chosen = (lasts or list(range(len(found))))[:MOST_JOINTS]
     columns = goes_with(direction, even, layout, chosen, means, generator)
+    worst = direction.rotations[lasts[0]] if lasts else None
+    return replace(
+        left, is_left=True, goes_with=columns, sentence=_sentence(left, worst, is_shared, columns, may_be)
+    )
+
+
+def _lasting(direction: Direction, means: Sequence[Sequence[SecondMeans]]) -> list[LastingError]:
+    return [
+        lasting_error(takes, products.residual)
+        for takes, products in zip(means, direction.products, strict=True)
+    ]
+
+
+def _too_little(found: Sequence[LastingError]) -> str:
+    most = max((item.stretches for item in found), default=0)
+    return f"{most} stretches of {SHORTEST_S} s or more were measured, {FEWEST_STRETCHES} are needed"
+
+
+def _is_shared(shared: SharedError, judged: Sequence[LastingError]) -> bool:
+    noise = float(np.median([item.noise_deg for item in judged]))
+    allowed = max(HEALTHY_SHARED_DEG, HEALTHY_WITHIN_NOISES * noise)
+    return shared.probability <= SHARED_PROBABILITY and shared.size_deg > allowed
+
+
+def _sentence(
+    left: Left, worst: str | None, is_shared: bool, columns: Sequence[GoesWith], may_be: Sequence[str]
+) -> str:
     why = []
-    if lasts:
-        worst = direction.rotations[chosen[0]]
-        why.append(_lasts_sentence(worst, lasting[worst], within[worst]))
+    if worst is not None:
+        why.append(_lasts_sentence(worst, left.lasting[worst], left.within_takes[worst]))
     if is_shared:
-        why.append(f"the errors of several joints rise and fall together by {shared.size_deg:.1f} degrees")
+        why.append(
+            f"the errors of several joints rise and fall together by {left.shared.size_deg:.1f} degrees"
+        )
     known = "known effect" if not may_be else "effect these takes can decide"
     sentence = f"Something is left that no {known} explains: {' and '.join(why)}; {_told(columns)}."
-    if may_be:
-        sentence += f" It may be {' or '.join(may_be)}."
-    return Left(True, sentence, lasting, within, shared, columns)
+    return f"{sentence} It may be {' or '.join(may_be)}." if may_be else sentence
 
 
 def _excess(item: LastingError, within: LastingError) -> float:
@@ -149,8 +167,8 @@ def _unsure(judged: Sequence[LastingError]) -> str | None:
     if worst.size_deg <= _allowed(worst) or worst.stretches >= ENOUGH_STRETCHES:
         return None
     return (
-        f"errors that last for seconds come to {worst.size_deg:.1f} degrees, but {worst.stretches} stretches of"
-        f" seconds cannot tell them surely from the {_allowed(worst):.1f} of a healthy glove; record longer"
+        f"errors that last for seconds come to {worst.size_deg:.1f} degrees, but {worst.stretches} stretches"
+        f" of time cannot tell them surely from the {_allowed(worst):.1f} of a healthy glove; record longer"
         " takes"
     )
 
