@@ -51,7 +51,7 @@ def _few_wearings(takes: Sequence[Signals], effect: Effect) -> Undecidable | Non
     following = ORDINALS[len(wearings)] if len(wearings) < len(ORDINALS) else f"{len(wearings) + 1}th"
     many = NUMBERS[len(wearings)] if len(wearings) < len(NUMBERS) else str(len(wearings))
     why = (
-        f"{many} wearings cannot tell a donning shift from chance ({_ways(ways)} to deal the takes,"
+        f"{many} wearings cannot tell a {effect.name.replace('_', ' ')} from chance ({_ways(ways)} to deal the takes,"
         f" {needed} are needed): record a {following} wearing, {each} takes each"
     )
     what = (
@@ -62,7 +62,7 @@ def _few_wearings(takes: Sequence[Signals], effect: Effect) -> Undecidable | Non
 
 
 def _few_takes(takes: Sequence[Signals], effect: Effect) -> Undecidable | None:
-    column = effect.context[0]
+    column = max(effect.context, key=lambda name: _arrangements(_levels(takes, name)))
     levels = _levels(takes, column)
     ways, needed = _arrangements(levels), ceil(1 / SESSION_PROBABILITY)
     if ways >= needed:
