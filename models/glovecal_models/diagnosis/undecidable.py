@@ -51,8 +51,9 @@ def _few_wearings(takes: Sequence[Signals], effect: Effect) -> Undecidable | Non
     following = ORDINALS[len(wearings)] if len(wearings) < len(ORDINALS) else f"{len(wearings) + 1}th"
     many = NUMBERS[len(wearings)] if len(wearings) < len(NUMBERS) else str(len(wearings))
     why = (
-        f"{many} wearings cannot tell a {effect.name.replace('_', ' ')} from chance ({_ways(ways)} to deal the takes,"
-        f" {needed} are needed): record a {following} wearing, {each} takes each"
+        f"{many} wearings cannot tell a {effect.name.replace('_', ' ')} from chance"
+        f" ({_ways(ways)} to deal the takes, {needed} are needed):"
+        f" record a {following} wearing, {each} takes each"
     )
     what = (
         f"Take the glove off, put it on again and record {each} takes with the same motions as before;"
