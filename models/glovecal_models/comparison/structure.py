@@ -48,14 +48,11 @@ def dependence(
     errors: tuple[np.ndarray, ...], covariate: Covariate, generator: np.random.Generator
 ) -> Dependence | None:
     """``errors``: for each take (N,), degrees. None when the covariate takes fewer than two values."""
-    usable = [np.isfinite(e) & np.isfinite(v) for e, v in zip(errors, covariate.values, strict=True)]
-    pairs = [(e[u], v[u]) for e, v, u in zip(errors, covariate.values, usable, strict=True) if u.any()]
-    if not pairs:
-        return None
-    error, value = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
-    edges = np.unique(np.quantile(value, np.linspace(0, 1, BINS + 1)))
+    pairs = _known_pairs(errors, covariate)
+    edges = _edges(pairs)
     if len(edges) < 2:
         return None
+    error, value = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
     bins = len(edges) - 1
     where = _bin(value, edges)
     count = np.bincount(where, minlength=bins)
@@ -68,13 +65,52 @@ def dependence(
     )
 
 
+def explained_when_shifted(
+    errors: tuple[np.ndarray, ...], covariate: Covariate, shares: np.ndarray, steps_at_most: int
+) -> np.ndarray | None:
+    """What the covariate explains as it is, then with the errors shifted in time; (1 + S,), degrees.
+
+    ``shares`` (S, takes), 0 to 1, say how far each take is shifted, so that several columns can be held
+    against the same shifts. Takes longer than ``steps_at_most`` are averaged to that. None when the covariate
+    takes fewer than two values or no take is long enough.
+    """
+    pairs = _known_pairs(errors, covariate)
+    edges = _edges(pairs)
+    if len(edges) < 2:
+        return None
+    centre = float(np.concatenate([e for e, _ in pairs]).mean())
+    series = [_thinned(e - centre, _bin(v, edges), steps_at_most) for e, v in pairs]
+    tested = [(number, item) for number, item in enumerate(series) if len(item[0]) >= FEWEST_STEPS]
+    if not tested:
+        return None
+    shifts = [_least_shift(len(e)) + (shares[:, n] * _shift_span(len(e))).astype(int) for n, (e, _) in tested]
+    sums, counts = _sums_when_shifted([item for _, item in tested], len(edges) - 1, shifts)
+    return np.sqrt(np.sum(sums**2 / np.maximum(counts, 1), axis=1) / counts.sum())
+
+
+def _known_pairs(errors: tuple[np.ndarray, ...], covariate: Covariate) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Error and covariate of each take where both are known; takes without such frames are left out."""
+    usable = [np.isfinite(e) & np.isfinite(v) for e, v in zip(errors, covariate.values, strict=True)]
+    return [(e[u], v[u]) for e, v, u in zip(errors, covariate.values, usable, strict=True) if u.any()]
+
+
+def _edges(pairs: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """Edges of bins that hold about equally many frames; fewer than two when the covariate never changes."""
+    if not pairs:
+        return np.empty(0)
+    value = np.concatenate([v for _, v in pairs])
+    return np.unique(np.quantile(value, np.linspace(0, 1, BINS + 1)))
+
+
 def _bin(value: np.ndarray, edges: np.ndarray) -> np.ndarray:
     return np.clip(np.searchsorted(edges, value, side="right") - 1, 0, len(edges) - 2)
 
 
-def _thinned(error: np.ndarray, where: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _thinned(
+    error: np.ndarray, where: np.ndarray, steps_at_most: int = STEPS_AT_MOST
+) -> tuple[np.ndarray, np.ndarray]:
     """Means over neighbouring frames of a long take, with the bin of the middle one."""
-    step = -(-len(error) // STEPS_AT_MOST)
+    step = -(-len(error) // steps_at_most)
     length = len(error) // step * step
     return error[:length].reshape(-1, step).mean(axis=1), where[step // 2 : length : step]
 
@@ -86,19 +122,36 @@ def _against_shifts(
     tested = [item for item in series if len(item[0]) >= FEWEST_STEPS]
     if not tested:
         return np.full(bins, np.nan), 1.0
-    sums, counts = np.zeros((SHIFTS + 1, bins)), np.zeros(bins)
-    for error, where in tested:
-        shifts = np.append(0, _random_shifts(len(error), generator))
-        sums += _shifted_sums(error, where, bins)[:, shifts].T
-        counts += np.bincount(where, minlength=bins)
+    shifts = [_random_shifts(len(error), generator) for error, _ in tested]
+    sums, counts = _sums_when_shifted(tested, bins, shifts)
     spread = np.sum(sums**2 / np.maximum(counts, 1), axis=1)
     chance = np.percentile(np.abs(sums[1:] / np.maximum(counts, 1)), 95, axis=0)
     return chance, float((1 + np.count_nonzero(spread[1:] >= spread[0])) / (SHIFTS + 1))
 
 
+def _sums_when_shifted(
+    series: list[tuple[np.ndarray, np.ndarray]], bins: int, shifts: list[np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """(1 + S, bins) sums of the errors in each bin, unshifted first, and how many steps a bin has (bins,)."""
+    sums, counts = np.zeros((1 + len(shifts[0]), bins)), np.zeros(bins)
+    for (error, where), of_take in zip(series, shifts, strict=True):
+        sums += _shifted_sums(error, where, bins)[:, np.append(0, of_take)].T
+        counts += np.bincount(where, minlength=bins)
+    return sums, counts
+
+
 def _random_shifts(length: int, generator: np.random.Generator) -> np.ndarray:
-    least = max(1, round(SHORTEST_SHIFT * length))
-    return generator.integers(least, length - least + 1, SHIFTS)
+    least = _least_shift(length)
+    return generator.integers(least, least + _shift_span(length), SHIFTS)
+
+
+def _least_shift(length: int) -> int:
+    return max(1, round(SHORTEST_SHIFT * length))
+
+
+def _shift_span(length: int) -> int:
+    """How many shifts there are, the least one and its mirror image included."""
+    return length - 2 * _least_shift(length) + 1
 
 
 def _shifted_sums(error: np.ndarray, where: np.ndarray, bins: int) -> np.ndarray:

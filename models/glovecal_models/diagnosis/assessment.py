@@ -17,7 +17,7 @@ LEAST_SESSION_CONTRAST = 0.12
 JOINT_PROBABILITY = 0.002
 POOLED_PROBABILITY = 0.001
 FEWEST_BLOCKS = 9
-SESSION_PROBABILITY = 0.014
+SESSION_PROBABILITY = 0.01
 WEARING_PROBABILITY = 0.04
 """Wearings have one way to be dealt, where context columns have many names: less is asked of them."""
 

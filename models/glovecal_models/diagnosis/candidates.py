@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,13 +11,16 @@ from glovecal_models.diagnosis.assessment import LEAST_SESSION_CONTRAST, Assessm
 from glovecal_models.diagnosis.delay_verdict import clock_choice
 from glovecal_models.diagnosis.delays import block_starts, delay_errors
 from glovecal_models.diagnosis.directions import Direction
+from glovecal_models.diagnosis.next_take import NextTake
 from glovecal_models.diagnosis.screening import Evidence, screen
 from glovecal_models.diagnosis.session_chance import session_probability
+from glovecal_models.diagnosis.undecidable import undecidable
 from glovecal_models.effects.columnless_effect import ColumnlessEffect
 from glovecal_models.effects.effect import Effect
 
 BLOCK_ROWS = 125
 """5 s of the rows that are fitted."""
+DEALS_TRIED = 5
 SESSION_DECOYS = ("context of other takes", "dealt wearings")
 
 
@@ -27,6 +30,31 @@ class NotJudgeable:
 
     effect: str
     why: str
+    record: NextTake | None = None
+    """The recording after which they could."""
+    would_save: Assessment | None = None
+    """What it saves on takes left out, by itself or by chance."""
+
+    @property
+    def joints_saved(self) -> tuple[int, ...]:
+        """Joints on which it saves as much as a session effect must."""
+        if self.would_save is None:
+            return ()
+        errors = self.would_save.errors
+        return tuple(i for i, item in enumerate(errors) if item.saved >= LEAST_SESSION_CONTRAST)
+
+    @property
+    def saves_much(self) -> bool:
+        """Whether it may well be there."""
+        return bool(self.joints_saved)
+
+    @property
+    def saved_square(self) -> float:
+        """Squared degrees per row, summed over those joints."""
+        if self.would_save is None:
+            return 0.0
+        some = [self.would_save.errors[i] for i in self.joints_saved]
+        return float(sum((item.base.sum() - item.added.sum()) / item.rows for item in some))
 
 
 def assessed(
@@ -49,33 +77,57 @@ def assessed(
             report(f"trying {effect.name}", number / len(effects))
         why = effect.missing(direction.signals)
         if why is not None:
-            impossible.append(NotJudgeable(effect.name, why))
+            impossible.append(NotJudgeable(effect.name, _with_advice(effect, why)))
         elif effect.name == "lag":
             found.extend(item for item in _delays(direction) if item.effect not in without)
         else:
-            found.append(_assessed(direction, effect, generator))
+            item = _assessed(direction, effect, generator)
+            if isinstance(item, Assessment):
+                found.append(item)
+            else:
+                impossible.append(item)
     return found, impossible
 
 
-def _assessed(direction: Direction, effect: Effect, generator: np.random.Generator) -> Assessment:
-    evidence = screen(direction, effect, generator)
+def _with_advice(effect: Effect, why: str) -> str:
+    if effect.context and "never changes" in why:
+        return f"{why}; record takes in which it differs"
+    return why
+
+
+def _assessed(
+    direction: Direction, effect: Effect, generator: np.random.Generator
+) -> Assessment | NotJudgeable:
+    evidence = _screened(direction, effect, generator)
     errors = tuple(_joint_errors(item, np.array(direction.unit_take)) for item in evidence)
-    probability = None
-    if effect.decoy in SESSION_DECOYS:
-        some = [i for i, item in enumerate(errors) if item.contrast >= LEAST_SESSION_CONTRAST]
-        probability = 1.0
-        if some:
-            found = session_probability(direction, effect, generator)
-            probability = 1.0 if found is None else found
-    return Assessment(
+    found = Assessment(
         effect.name,
         direction.rotations,
         errors,
         tuple(item.shape for item in evidence),
         tuple(item.true.weights for item in evidence),
-        probability,
+        None,
         tuple(f"{item.name}_{item.unit}" for item in effect.parameters),
     )
+    if effect.decoy not in SESSION_DECOYS:
+        return found
+    few = undecidable(direction.signals, effect)
+    if few is not None:
+        return NotJudgeable(effect.name, few.why, few.record, found)
+    some = any(item.contrast >= LEAST_SESSION_CONTRAST for item in errors)
+    return replace(found, probability=session_probability(direction, effect, generator) if some else 1.0)
+
+
+def _screened(direction: Direction, effect: Effect, generator: np.random.Generator) -> tuple[Evidence, ...]:
+    """With one decoy; of dealt wearings the typical of several: one deal may nearly be the true one."""
+    if effect.decoy != "dealt wearings":
+        return screen(direction, effect, generator)
+    tried = [screen(direction, effect, generator) for _ in range(DEALS_TRIED)]
+    middle = [
+        sorted(items, key=lambda item: item.decoy.saved)[DEALS_TRIED // 2]
+        for items in zip(*tried, strict=True)
+    ]
+    return tuple(middle)
 
 
 def _joint_errors(evidence: Evidence, take: np.ndarray) -> JointErrors:

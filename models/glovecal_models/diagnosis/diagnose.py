@@ -25,7 +25,7 @@ from glovecal_models.diagnosis.signatures import (
     may_be_slip,
     signature_findings,
 )
-from glovecal_models.diagnosis.something_left import NOT_TOLD, Left, something_left
+from glovecal_models.diagnosis.something_left import Left, not_told, something_left
 from glovecal_models.effects.catalogue import catalogue, effect
 from glovecal_models.effects.context_dependence import ContextDependence, unfamiliar_columns
 from glovecal_models.effects.effect import Effect
@@ -116,8 +116,17 @@ def diagnose(
     lasting = [item for item in candidates if sparse and (item.has_memory or item.name in DELAYS)]
     candidates = [item for item in candidates if item not in lasting]
     found, impossible = assessed(direction, candidates, np.random.default_rng(seed), has, said)
+    naming, beside, screened = named(found), tuple(known), direction
+    likelier = _likelier(impossible, naming)
+    if likelier:
+        # What may well be there is not to get another's name: the others are judged beside it.
+        beside = (*known, *(_as_known(item, candidates) for item in likelier))
+        others = [item for item in candidates if item.name not in {each.effect for each in impossible}]
+        screened = _direction(even, SMOOTHING, layout, joints, linear, beside)
+        found, _ = assessed(screened, others, np.random.default_rng(seed), has, said)
+        naming = named(found)
     impossible += [NotJudgeable(item.name, "the frames are single poses, too far apart") for item in lasting]
-    naming = _delay_told(named(found), even, direction, layout, joints, linear, known)
+    naming = _delay_told(naming, even, screened, layout, joints, linear, beside)
     findings = tuple(signature_findings(takes, layout, joints, naming, found)) if signatures else ()
     naming = jump_beside_curve(naming, takes, findings)
     errors = {
@@ -125,13 +134,14 @@ def diagnose(
         for name, products in zip(joints, direction.products, strict=True)
     }
     floors = {name: float(value) for name, value in (noise_floor_deg or {}).items()}
-    left = (
-        NOT_TOLD
-        if sparse
-        else something_left(_with_first(naming, even, direction, layout, joints, linear, known), seed)
-    )
+    said("looking at what is left", 0.95)
+    if sparse:
+        left = not_told("the frames are single poses, too far apart")
+    else:
+        rest = _with_first(naming, even, direction, layout, joints, linear, known)
+        left = something_left(rest, even, layout, seed, may_be=[i.effect for i in impossible if i.saves_much])
     said("done", 1.0)
-    following = next_take(naming.confidence_set)
+    following = next_take(naming.confidence_set) or _deciding(impossible, left)
     return Diagnosis(
         tuple(joints),
         errors,
@@ -154,6 +164,31 @@ def _candidates(direction: Direction, effects: Sequence[Effect] | None) -> list[
     familiar = {name for item in known for name in item.context}
     unfamiliar = unfamiliar_columns(direction.signals, sorted(familiar))
     return [*known, *(ContextDependence.of(name, direction.signals) for name in unfamiliar)]
+
+
+def _likelier(impossible: Sequence[NotJudgeable], naming: Naming) -> list[NotJudgeable]:
+    """Effects that these takes cannot decide, and that would save more than the one that is to be named."""
+    if not naming.ranked:
+        return []
+    return [item for item in impossible if item.saved_square > naming.ranked[0].saved_square]
+
+
+def _as_known(item: NotJudgeable, candidates: Sequence[Effect]) -> KnownEffect:
+    """On the joints where it saves much."""
+    found = item.would_save
+    assert found is not None
+    effect = next(each for each in candidates if each.name == item.effect)
+    where = tuple(found.joints[i] for i in item.joints_saved)
+    return KnownEffect(effect, where, tuple(found.shapes[i] for i in item.joints_saved))
+
+
+def _deciding(impossible: Sequence[NotJudgeable], left: Left) -> NextTake | None:
+    """The recording that lets an effect be judged which may well be there, or a wearing if any may."""
+    asked = [item for item in impossible if item.record is not None]
+    likely = sorted((item for item in asked if item.saves_much), key=lambda item: -item.saved_square)
+    unexplained = left.is_left or left.not_judgeable is not None
+    wearing = [item for item in asked if item.effect == "donning_shift" and unexplained]
+    return next((item.record for item in (*likely, *wearing)), None)
 
 
 def _with_first(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,6 +44,8 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
         "something_left": {
             "is_left": diagnosis.left.is_left,
             "sentence": diagnosis.left.sentence,
+            "not_judgeable": diagnosis.left.not_judgeable,
+            "goes_with": [asdict(item) for item in diagnosis.left.goes_with],
         },
         "next_take": None
         if diagnosis.next_take is None

@@ -10,6 +10,8 @@ RAMPS = "ramps"
 ONE_FINGER = "one_finger"
 CROSSED = "crossed"
 SHUFFLED = "shuffled"
+MORE_WEARINGS = "more_wearings"
+MORE_TAKES = "more_takes"
 
 
 @dataclass(frozen=True)
@@ -20,6 +22,7 @@ class NextTake:
     what: str
     seconds: int
     separates: tuple[str, ...]
+    """Effects; "chance" where the takes are too few to tell an effect from it."""
 
 
 _INSTRUCTIONS: dict[str, tuple[str, int]] = {

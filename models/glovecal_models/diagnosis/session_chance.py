@@ -19,19 +19,16 @@ from glovecal_models.effects.history_effect import LONGEST_GAP_S
 
 DEALS = 299
 ROWS_PER_TAKE = 80
-FEWEST_DEALS = 19
-"""With fewer no answer can be better than one in twenty."""
 
 
-def session_probability(direction: Direction, effect: Effect, generator: np.random.Generator) -> float | None:
-    """Share of deals that explain as much, of all joints together or of one; None when there are too few.
+def session_probability(direction: Direction, effect: Effect, generator: np.random.Generator) -> float:
+    """Share of deals that explain as much, of all joints together or of one.
 
-    The smaller of the two shares counts twice.
+    The smaller of the two shares is held against the smaller of each deal's own, so that choosing between
+    them gains nothing.
     """
     joints = range(len(direction.rotations))
     deals = _deals(direction, effect, generator)
-    if deals is None:
-        return None
     settings = effect.settle(direction.signals)
     grid = effect.grid(direction.signals, settings)
     rows = [_thinned(take.time_s) for take in direction.signals]
@@ -48,35 +45,46 @@ def session_probability(direction: Direction, effect: Effect, generator: np.rand
             ]
         )
 
-    true = explained(thin)
-    others = np.array([explained(_dealt(thin, deal, effect)) for deal in deals])
-    together = np.mean([*(others.sum(axis=1) >= true.sum() * (1 - 1e-9)), True])
-    single = np.mean([*(others.max(axis=1) >= true.max() * (1 - 1e-9)), True])
-    return float(min(1.0, 2 * min(together, single)))
+    every = np.array([explained(thin), *(explained(_dealt(thin, deal, effect)) for deal in deals)])
+    shares = np.minimum(_shares_as_large(every.sum(axis=1)), _shares_as_large(every.max(axis=1)))
+    return float(np.mean(shares <= shares[0] * (1 + 1e-9)))
 
 
-def _deals(direction: Direction, effect: Effect, generator: np.random.Generator) -> list[np.ndarray] | None:
-    count = len(direction.signals)
+def _shares_as_large(values: np.ndarray) -> np.ndarray:
+    """For each of (D,): the share of all that are as large."""
+    return np.mean(values[None, :] >= values[:, None] * (1 - 1e-9), axis=1)
+
+
+def wearing_deals(takes: Sequence[Signals], generator: np.random.Generator) -> list[np.ndarray]:
+    """Other ways to deal takes to wearings, among takes of the same motion where names tell motions."""
+    names = [take.wearing for take in takes]
+    order = list(dict.fromkeys(names))
+    owners = np.array([order.index(name) for name in names])
+    groups = _motion_groups(owners, motions_of(takes))
+    if groups:
+        return _within_motions(owners, groups, generator)
+    return other_deals(owners, DEALS, generator)
+
+
+def _deals(direction: Direction, effect: Effect, generator: np.random.Generator) -> list[np.ndarray]:
     if effect.decoy == "dealt wearings":
-        names = [take.wearing for take in direction.signals]
-        order = list(dict.fromkeys(names))
-        owners = np.array([order.index(name) for name in names])
-        deals = _within_motions(owners, motions_of(direction.signals), generator)
-        if not deals:
-            deals = other_deals(owners, DEALS, generator)
-        return deals if len(deals) >= FEWEST_DEALS else None
-    if count < 5:
-        return None
-    return [generator.permutation(count) for _ in range(DEALS)]
+        return wearing_deals(direction.signals, generator)
+    return [generator.permutation(len(direction.signals)) for _ in range(DEALS)]
+
+
+def _motion_groups(owners: np.ndarray, motions: Sequence[str]) -> list[np.ndarray]:
+    """Takes of one motion each that was done in several wearings; none when names tell few such motions."""
+    groups = [np.flatnonzero([m == motion for m in motions]) for motion in dict.fromkeys(motions)]
+    dealt = [group for group in groups if len(set(owners[group].tolist())) > 1]
+    if len(groups) < 2 or 2 * sum(map(len, dealt)) < len(owners):
+        return []
+    return dealt
 
 
 def _within_motions(
-    owners: np.ndarray, motions: Sequence[str], generator: np.random.Generator
+    owners: np.ndarray, groups: Sequence[np.ndarray], generator: np.random.Generator
 ) -> list[np.ndarray]:
-    """Distinct deals that move takes only among takes of the same motion; none when names tell no motions."""
-    groups = [np.flatnonzero([m == motion for m in motions]) for motion in dict.fromkeys(motions)]
-    if len(groups) < 2 or any(len(set(owners[group].tolist())) < 2 for group in groups):
-        return []
+    """Distinct deals that move takes only within their group."""
     found: dict[tuple[int, ...], np.ndarray] = {}
     for _ in range(20 * DEALS):
         dealt = owners.copy()

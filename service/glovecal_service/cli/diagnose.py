@@ -26,6 +26,12 @@ CANDIDATES = {
     "rmse_decoy_deg": "with its decoy",
     "passes": "beyond chance",
 }
+GOES_WITH = {
+    "phrase": "what is left goes with",
+    "rotation": "rotation",
+    "size_deg": "explains, degrees",
+    "probability": "chance, all columns counted",
+}
 LEGEND = (
     "Degrees, on takes left out, readings and reference smoothed alike. A decoy has the same freedom as its "
     "effect and cannot be right: what it saves, flexibility saves."
@@ -85,6 +91,8 @@ def print_diagnosis(found: Mapping[str, Any]) -> None:
     left, following = found.get("something_left") or {}, found.get("next_take")
     if left.get("sentence"):
         out.print(f"\n{left['sentence']}")
+    if left.get("goes_with"):
+        print_table(left["goes_with"], GOES_WITH, empty="")
     if following:
         rivals = " and ".join(following.get("separates") or ())
         out.print(f"\nTo tell {rivals} apart record {following['seconds']} s: {following['what']}")

@@ -15,6 +15,9 @@ from glovecal_service.report.html import figure, listed, table, whole_page
 from glovecal_service.report.sentences import counted
 
 HEADS = ("effect", "where", "error before", "with it", "with its decoy", "beyond chance")
+LEFT_HEADS = (
+    "what is left goes with", "rotation", "explains, degrees", "probability by chance, all columns counted",
+)  # fmt: skip
 SCALE = (
     "Degrees, on takes left out, readings and reference smoothed alike. A decoy has the same freedom as its "
     "effect and cannot be right: what it saves, flexibility saves."
@@ -35,7 +38,7 @@ def diagnosis_page(found: Mapping[str, Any]) -> str:
         *_warned("Found in the recording", [item["sentence"] for item in found.get("findings") or ()]),
         f"<p><strong>{escape(headline)}</strong></p>",
         _next_take(found.get("next_take")),
-        f"<p>{escape((found.get('something_left') or {}).get('sentence', ''))}</p>",
+        *_left(found.get("something_left") or {}),
     ]
     if candidates:
         parts += ["<h2>What was tried</h2>", figure(*saved_beside_decoys(candidates))]
@@ -62,6 +65,16 @@ def _next_take(following: Mapping[str, Any] | None) -> str:
     rivals = " and ".join(following.get("separates") or ())
     text = f"To tell {rivals} apart record {following['seconds']} s: {following['what']}"
     return f'<p class="note">{escape(text)}</p>'
+
+
+def _left(left: Mapping[str, Any]) -> list[str]:
+    """Whether something is left, and the columns it goes with."""
+    parts = [f"<p>{escape(left.get('sentence', ''))}</p>"]
+    rows = [
+        (item["phrase"], item["rotation"], _degrees(item["size_deg"]), f"{item['probability']:.3f}")
+        for item in left.get("goes_with") or ()
+    ]
+    return [*parts, table(LEFT_HEADS, rows)] if rows else parts
 
 
 def _table(candidates: list[Mapping[str, Any]]) -> str:

@@ -1,4 +1,4 @@
-"""The loop on real recordings: clocks first, nothing invented, rivals left as rivals."""
+"""The loop on real recordings: clocks first, nothing invented, rivals left as rivals, wearings asked for."""
 
 from __future__ import annotations
 
@@ -65,3 +65,31 @@ def test_single_poses_of_a_robot_thumb_judge_nothing_that_lasts():
     why = {item.effect: item.why for item in found.not_judgeable}
     assert {"lag", "clock_offset", "creep", "hysteresis"} <= set(why)
     assert why["creep"] == "the frames are single poses, too far apart"
+
+
+@pytest.mark.parametrize("person", ["P301", "P304"])
+def test_three_placements_of_an_ankle_are_a_donning_shift(person):
+    takes, layout = recorded(f"ankle/{person}-placement?-*.frames.csv")
+    found = improve(takes, layout, person, TrainingSettings(method="linear"), max_steps=2)
+    document = found.to_document()
+    added = [step["added"] for step in document["steps"] if step["added"]]
+    assert [item["effect"] for item in added] == ["clock_offset", "donning_shift"]
+    assert added[1]["verdict"] == "named"
+    assert document["something_left"]
+
+
+@pytest.mark.parametrize("person", ["P300", "P301"])
+def test_two_placements_cannot_decide(person):
+    takes, layout = recorded(f"ankle/{person}-placement[23]-*.frames.csv")
+    found = improve(takes, layout, person, TrainingSettings(method="linear"), max_steps=2)
+    document = found.to_document()
+    added = {step["added"]["effect"] for step in document["steps"] if step["added"]}
+    assert added <= {"clock_offset", "nonlinearity"}
+    assert any(
+        sentence.startswith("donning_shift cannot be judged: two wearings cannot tell")
+        and "record a third wearing, 4 takes each" in sentence
+        for sentence in document["sentences"]
+    )
+    assert document["next_take"]["separates"] == ["donning_shift", "chance"]
+    assert "put it on again" in document["next_take"]["what"]
+    assert document["something_left"]

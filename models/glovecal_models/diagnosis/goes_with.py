@@ -1,0 +1,216 @@
+"""What an unexplained error goes with: every recorded column held against it, corrected for how many.
+
+Columns that change within takes are judged by shifting the error in time, as ``glovecal where`` does; those
+that change from take to take, and the wearing, by dealing the takes in other ways. Each shift and deal is
+the same for all columns and joints, so that the largest of them by chance is known too (Westfall and Young
+1993, single-step maxT). The two kinds are corrected apart, each at half the probability: the few ways to deal
+takes would be lost among the many to shift them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from glovecal_models.comparison.covariates import Covariate, covariates
+from glovecal_models.comparison.residuals import Residuals, TakeResiduals
+from glovecal_models.comparison.structure import explained_when_shifted
+from glovecal_models.diagnosis.directions import Direction
+from glovecal_models.diagnosis.evened import EvenTake
+from glovecal_models.diagnosis.second_means import SecondMeans
+from glovecal_models.layout import Layout
+from glovecal_models.takes.take import Take
+
+DRAWS = 999
+STEPS_AT_MOST = 1000
+"""Of a take; what lasts for seconds needs no more."""
+LEAST_WEIGHT = 0.3
+"""Where the base guesses, its error says nothing of a column."""
+SELDOM = 0.02
+"""Probability, all columns counted, above which nothing is listed."""
+LEAST_SHARE = 0.04
+"""Of the mean squared error that a column must explain."""
+MOST = 5
+MOSTLY_WITHIN = 0.5
+"""Share of a column's variance inside takes above which takes need not be dealt to test it."""
+TAKES_PER_BIN = 3
+KINDS = 2
+
+
+@dataclass(frozen=True)
+class GoesWith:
+    """A column that an unexplained error of one rotation depends on."""
+
+    rotation: str
+    column: str
+    """As in ``glovecal where``: "angle", "sensor I_PIP", "context grip_n", "wearing"."""
+    phrase: str
+    size_deg: float
+    """Root mean square that the column explains, beyond what chance does."""
+    probability: float
+    """That chance makes any column of any rotation stand out so far."""
+
+    def told(self) -> str:
+        """Such as "c.grip_n (0.8 degrees of I_PIP, chance 1 in 200)"."""
+        chance = f"chance 1 in {round(1 / self.probability)}"
+        return f"{self.phrase} ({self.size_deg:.1f} degrees of {self.rotation}, {chance})"
+
+
+def goes_with(
+    direction: Direction,
+    even: Sequence[EvenTake],
+    layout: Layout,
+    joints: Sequence[int],
+    means: Sequence[Sequence[SecondMeans]],
+    generator: np.random.Generator,
+) -> tuple[GoesWith, ...]:
+    """Up to five columns that the errors of ``joints`` go with, the one that explains most first.
+
+    ``even``: the takes of the direction, for their readings; ``means``: of all joints.
+    """
+    shares = generator.random((DRAWS, len(even)))
+    deals = np.array([generator.permutation(len(even)) for _ in range(DRAWS)])
+    tried: list[_Tried] = []
+    for joint in joints:
+        errors = _errors(direction, joint, means[joint])
+        square = float(np.nanmean(np.concatenate(errors) ** 2))
+        for column in _columns(direction, even, layout, joint):
+            is_dealt = column.name == "wearing" or not _changes_within_takes(column)
+            found = (
+                _explained_when_dealt(errors, column, deals)
+                if is_dealt
+                else explained_when_shifted(errors, column, shares, STEPS_AT_MOST)
+            )
+            if found is not None:
+                tried.append(_Tried(direction.rotations[joint], column, square, is_dealt, found))
+    listed = [
+        *_listed([each for each in tried if each.is_dealt]),
+        *_listed([each for each in tried if not each.is_dealt]),
+    ]
+    return tuple(sorted(listed, key=lambda item: -item.size_deg)[:MOST])
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """One column held against the error of one rotation."""
+
+    rotation: str
+    column: Covariate
+    square: float
+    """Mean squared error, degrees squared."""
+    is_dealt: bool
+    explained: np.ndarray
+    """(1 + D,), degrees: as it is, then by chance."""
+
+    @property
+    def size_deg(self) -> float:
+        """What it explains beyond chance."""
+        return float(np.sqrt(max(self.explained[0] ** 2 - np.mean(self.explained[1:] ** 2), 0.0)))
+
+
+def _listed(tried: Sequence[_Tried]) -> Iterator[GoesWith]:
+    if not tried:
+        return
+    corrected = _corrected(np.array([item.explained for item in tried]))
+    for item, probability in zip(tried, np.minimum(KINDS * corrected, 1.0), strict=True):
+        if probability <= SELDOM and item.size_deg**2 >= LEAST_SHARE * item.square:
+            yield GoesWith(
+                item.rotation, item.column.name, _phrase(item.column), item.size_deg, float(probability)
+            )
+
+
+def _corrected(explained: np.ndarray) -> np.ndarray:
+    """(K,): for each row (1 + D,) the share of draws in which the largest of all rows stands out so far.
+
+    The two-thirds power makes a mean of squares nearly normal (Wilson and Hilferty 1931), so that rows of
+    different freedom can be compared.
+    """
+    score = explained ** (2 / 3)
+    centre, spread = score[:, 1:].mean(axis=1), np.maximum(score[:, 1:].std(axis=1), 1e-12)
+    score = (score - centre[:, None]) / spread[:, None]
+    largest = score.max(axis=0)
+    largest[0] = np.inf
+    return np.mean(largest[None, :] >= score[:, :1], axis=1)
+
+
+def _changes_within_takes(column: Covariate) -> bool:
+    known = [values[np.isfinite(values)] for values in column.values]
+    known = [values for values in known if len(values)]
+    if not known:
+        return False
+    within = sum(float(np.sum((values - values.mean()) ** 2)) for values in known)
+    every = np.concatenate(known)
+    return within > MOSTLY_WITHIN * float(np.sum((every - every.mean()) ** 2))
+
+
+def _explained_when_dealt(
+    errors: tuple[np.ndarray, ...], column: Covariate, deals: np.ndarray
+) -> np.ndarray | None:
+    """Mean errors of takes in bins of the column's mean, as they are and dealt in other ways."""
+    if any(not np.isfinite(values).any() for values in column.values):
+        return None
+    level = np.array([np.nanmean(values) for values in column.values])
+    if column.name == "wearing":
+        bin_of = np.unique(level, return_inverse=True)[1]
+    else:
+        edges = np.quantile(level, np.linspace(0, 1, max(2, len(level) // TAKES_PER_BIN) + 1)[1:-1])
+        bin_of = np.unique(np.searchsorted(edges, level, side="right"), return_inverse=True)[1]
+    bins = int(bin_of.max()) + 1
+    if bins < 2 or bins == len(level):
+        return None
+    known = [values[np.isfinite(values)] for values in errors]
+    centre = float(np.concatenate(known).mean())
+    total = np.array([np.sum(values - centre) for values in known])
+    count = np.array([len(values) for values in known], dtype=float)
+    member = np.eye(bins)[bin_of[np.concatenate([np.arange(len(level))[None, :], deals])]]
+    sums, counts = (np.einsum("t,dtb->db", values, member) for values in (total, count))
+    return np.sqrt(np.sum(sums**2 / np.maximum(counts, 1.0), axis=1) / count.sum())
+
+
+def _errors(direction: Direction, joint: int, means: Sequence[SecondMeans]) -> tuple[np.ndarray, ...]:
+    """For each take (N,), degrees: sensor minus what the base says, NaN where not fitted or unfamiliar."""
+    found = [np.full(len(take.time_s), np.nan) for take in direction.signals]
+    for (take, rows), residual in zip(
+        direction.units(joint), direction.products[joint].residual, strict=True
+    ):
+        found[take][rows] = residual
+    for values, take, seconds in zip(found, direction.signals, means, strict=True):
+        at = np.minimum((take.time_s - take.time_s[:1]).astype(int), len(seconds.weight))
+        values[np.append(seconds.weight, 0.0)[at] < LEAST_WEIGHT] = np.nan
+    return tuple(found)
+
+
+def _columns(
+    direction: Direction, even: Sequence[EvenTake], layout: Layout, joint: int
+) -> Iterator[Covariate]:
+    """Everything but readings that the error may be in itself.
+
+    Those are the joint's own, which hold its noise, and those of other measured joints, which a cause common
+    to all sensors shifts alike: of these the angle is taken.
+    """
+    rotation = direction.rotations[joint]
+    known = {*layout.correspondence(rotation).sensors, *direction.rotations}
+    sensors = tuple(name for name in layout.sensors if name not in known)
+    takes = []
+    for take, signals in zip(even, direction.signals, strict=True):
+        readings = take.readings[:, [layout.sensors.index(name) for name in sensors]]
+        table = Take(
+            signals.take, signals.wearing, sensors, signals.time_s, readings, context=signals.context
+        )
+        takes.append(TakeResiduals(table, signals.own, signals.own, signals.own))
+    yield from covariates(Residuals(direction.rotations, tuple(takes)), rotation)
+    for other, name in enumerate(direction.rotations):
+        if other != joint:
+            angles = tuple(take.own[:, other] for take in direction.signals)
+            yield Covariate(f"joint {name}", "deg", f"the angle of {name}", angles)
+    wearings = list(dict.fromkeys(take.wearing for take in direction.signals))
+    at = tuple(np.full(len(take), float(wearings.index(take.wearing))) for take in direction.signals)
+    if len(wearings) > 1:
+        yield Covariate("wearing", "", "the wearing", at)
+
+
+def _phrase(column: Covariate) -> str:
+    name = column.name.removeprefix("context ")
+    return column.phrase if name == column.name else f"c.{name}"

@@ -1,0 +1,111 @@
+"""Causes that change from take to take need takes that could have been dealt in many ways.
+
+With two wearings, or few takes, or a context that hardly differs, even a cause that is there explains no more
+than a deal by chance may; then what to record is said instead of a verdict.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil, factorial, prod
+
+import numpy as np
+
+from glovecal_models.diagnosis.assessment import SESSION_PROBABILITY, WEARING_PROBABILITY
+from glovecal_models.diagnosis.next_take import MORE_TAKES, MORE_WEARINGS, NextTake
+from glovecal_models.diagnosis.session_chance import wearing_deals
+from glovecal_models.effects.effect import Effect, Signals
+
+ALIKE = 0.02
+"""Share of a context column's range within which takes count as alike."""
+FEWEST_TAKES_OF_A_WEARING = 3
+"""Three wearings of two takes each can be dealt in 15 ways only."""
+NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
+ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
+
+
+@dataclass(frozen=True)
+class Undecidable:
+    """Why takes cannot decide, and the recording after which they can."""
+
+    why: str
+    record: NextTake
+
+
+def undecidable(takes: Sequence[Signals], effect: Effect) -> Undecidable | None:
+    """None when enough deals are possible for the effect to be told from chance."""
+    if effect.decoy == "dealt wearings":
+        return _few_wearings(takes, effect)
+    return _few_takes(takes, effect) if effect.context else None
+
+
+def _few_wearings(takes: Sequence[Signals], effect: Effect) -> Undecidable | None:
+    ways = 1 + len(wearing_deals(takes, np.random.default_rng(0)))
+    needed = ceil(1 / WEARING_PROBABILITY)
+    if ways >= needed:
+        return None
+    names = [take.wearing for take in takes]
+    wearings = list(dict.fromkeys(names))
+    each = max(FEWEST_TAKES_OF_A_WEARING, max(names.count(name) for name in wearings))
+    following = ORDINALS[len(wearings)] if len(wearings) < len(ORDINALS) else f"{len(wearings) + 1}th"
+    many = NUMBERS[len(wearings)] if len(wearings) < len(NUMBERS) else str(len(wearings))
+    why = (
+        f"{many} wearings cannot tell a {effect.name.replace('_', ' ')} from chance"
+        f" ({_ways(ways)} to deal the takes, {needed} are needed):"
+        f" record a {following} wearing, {each} takes each"
+    )
+    what = (
+        f"Take the glove off, put it on again and record {each} takes with the same motions as before;"
+        f" name it as a {following} wearing."
+    )
+    return Undecidable(why, NextTake(MORE_WEARINGS, what, _seconds(takes, each), (effect.name, "chance")))
+
+
+def _few_takes(takes: Sequence[Signals], effect: Effect) -> Undecidable | None:
+    column = max(effect.context, key=lambda name: _arrangements(_levels(takes, name)))
+    levels = _levels(takes, column)
+    ways, needed = _arrangements(levels), ceil(1 / SESSION_PROBABILITY)
+    if ways >= needed:
+        return None
+    more = 1
+    while _arrangements([*levels, *([1] * more)]) < needed:
+        more += 1
+    count = sum(levels)
+    takes_so_far = (
+        f"{count} take{'s' if count != 1 else ''} with {len(levels)} value{'s' * (len(levels) != 1)}"
+    )
+    more_takes = f"{more} more take{'s' if more > 1 else ''}"
+    why = (
+        f"{takes_so_far} of c.{column} cannot tell {effect.name} from chance ({_ways(ways)} to deal them,"
+        f" {needed} are needed): record {more_takes}, each at another value of c.{column}"
+    )
+    what = f"Record {more_takes} in free motion, each at another value of c.{column} than all before."
+    return Undecidable(why, NextTake(MORE_TAKES, what, _seconds(takes, more), (effect.name, "chance")))
+
+
+def _levels(takes: Sequence[Signals], column: str) -> list[int]:
+    """How many takes are alike in the column's mean, for each value of it."""
+    means = [float(np.nanmean(take.context[column])) for take in takes if _is_known(take, column)]
+    every = np.concatenate([take.context[column] for take in takes if _is_known(take, column)])
+    width = max(ALIKE * float(np.nanmax(every) - np.nanmin(every)), 1e-12)
+    steps = np.cumsum(np.append(0, np.diff(np.sort(means)) > width))
+    return np.bincount(steps).tolist()
+
+
+def _is_known(take: Signals, column: str) -> bool:
+    return column in take.context and bool(np.isfinite(take.context[column]).any())
+
+
+def _arrangements(levels: Sequence[int]) -> int:
+    return factorial(sum(levels)) // prod(factorial(count) for count in levels)
+
+
+def _ways(count: int) -> str:
+    return f"{count} way{'s' if count != 1 else ''}"
+
+
+def _seconds(takes: Sequence[Signals], count: int) -> int:
+    """So many takes as long as those before, in all."""
+    each = float(np.median([take.time_s[-1] - take.time_s[0] for take in takes if len(take)]))
+    return max(count, round(count * each))

@@ -1,0 +1,105 @@
+"""Too few wearings or takes to tell a cause from chance: said, with the recording that decides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.diagnosis.undecidable import Undecidable, undecidable
+from glovecal_models.effects.catalogue import catalogue
+from glovecal_models.effects.effect import Signals
+from glovecal_models.layout import Layout
+from glovecal_models.simulation.causes.cause import Cause
+from glovecal_models.simulation.session import record_session
+from glovecal_models.simulation.session_plan import SessionPlan
+from glovecal_models.takes.take import Take
+
+SENSORS = ("I_MCP", "I_PIP")
+LAYOUT = Layout.from_columns("two", SENSORS, SENSORS)
+
+
+def signals(wearings: Sequence[str], temperatures: Sequence[float] = (), motions: str = "") -> list[Signals]:
+    """Takes of 30 s, told by wearing, temperature and motion ("" for none) alone."""
+    time = np.linspace(0, 30, 4)
+    values = temperatures or [20.0] * len(wearings)
+    return [
+        Signals(
+            time, np.zeros((4, 1)), context={"temperature_c": np.full(4, value)}, wearing=wearing,
+            take=f"{wearing}-{motion}",
+        )
+        for wearing, value, motion in zip(wearings, values, motions or [""] * len(wearings), strict=True)
+    ]  # fmt: skip
+
+
+def why_not(takes: Sequence[Signals], name: str) -> Undecidable:
+    found = undecidable(takes, catalogue()[name])
+    assert found is not None
+    return found
+
+
+@pytest.fixture(scope="module")
+def shifted() -> tuple[Take, ...]:
+    plan = SessionPlan(seed=12, sensors=SENSORS, wearings=3, takes_per_wearing=3, take_s=20.0)
+    return record_session(plan, (Cause("donning_shift", "offset", strength_deg=3.0),)).takes
+
+
+def test_two_wearings_of_four_motions_ask_for_a_third():
+    found = why_not(signals("aaaabbbb", motions="klmnklmn"), "donning_shift")
+    assert found.why == (
+        "two wearings cannot tell a donning shift from chance (8 ways to deal the takes, 25 are needed):"
+        " record a third wearing, 4 takes each"
+    )
+    assert found.record.seconds == 120
+    assert found.record.separates == ("donning_shift", "chance")
+    assert "put it on again and record 4 takes" in found.record.what
+
+
+def test_what_is_asked_for_is_enough():
+    three = signals("aaaabbbbcccc", motions="klmnklmnklmn")
+    assert undecidable(three, catalogue()["donning_shift"]) is None
+    assert undecidable(signals("aaabbbccc"), catalogue()["donning_shift"]) is None
+    assert "a third wearing, 3 takes each" in why_not(signals("aabb"), "donning_shift").why
+
+
+@pytest.mark.parametrize(
+    ("degrees", "ways", "more"),
+    [((20, 25), 2, 4), ((20, 22, 24, 26, 28), 120, 1), ((20,) * 9 + (30,), 10, 2)],
+)
+def test_few_takes_of_a_context_ask_for_other_values(degrees, ways, more):
+    takes = signals("a" * len(degrees), degrees)
+    found = why_not(takes, "temperature")
+    assert f"({ways} ways to deal them, 143 are needed)" in found.why
+    assert f"record {more} more take" in found.why
+    added = [*degrees, *(40.0 + 5 * number for number in range(more))]
+    assert undecidable(signals("a" * len(added), added), catalogue()["temperature"]) is None
+
+
+def test_a_shift_between_two_wearings_is_no_verdict_but_a_next_take(shifted):
+    found = diagnose(shifted[:6], LAYOUT)
+    document = found.to_document()
+    assert document["named"] is None
+    assert "donning_shift" not in {item["effect"] for item in document["candidates"]}
+    why = {item["effect"]: item["why"] for item in document["not_judgeable"]}["donning_shift"]
+    assert why.startswith("two wearings cannot tell a donning shift from chance (10 ways")
+    assert document["next_take"]["separates"] == ["donning_shift", "chance"]
+    assert document["next_take"]["seconds"] == 60
+    assert "It may be donning_shift." in document["something_left"]["sentence"]
+
+
+def test_the_third_wearing_decides(shifted):
+    found = diagnose(shifted, LAYOUT)
+    assert found.naming.confidence_set == ("donning_shift",)
+    assert "donning_shift" not in {item.effect for item in found.not_judgeable}
+
+
+def test_a_constant_column_says_what_to_record(shifted):
+    takes = [
+        replace(take, context={**take.context, "temperature_c": np.full(len(take.time_s), 21.0)})
+        for take in shifted[:2]
+    ]
+    why = {item.effect: item.why for item in diagnose(takes, LAYOUT).not_judgeable}
+    assert why["temperature"].endswith("never changes (21); record takes in which it differs")

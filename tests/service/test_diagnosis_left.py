@@ -1,0 +1,51 @@
+"""What is left and what it goes with, on the page and on the command line, from a real diagnosis."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.layout import Layout
+from glovecal_models.simulation.session import record_session
+from glovecal_models.simulation.session_plan import SessionPlan
+from glovecal_service.cli.diagnose import print_diagnosis
+from glovecal_service.report.diagnosis_page import diagnosis_page
+
+SENSORS = ("I_MCP", "I_PIP")
+
+
+@pytest.fixture(scope="module")
+def found() -> dict[str, Any]:
+    """A strap pulls at one sensor, by turns; two wearings."""
+    plan = SessionPlan(seed=31, sensors=SENSORS, wearings=2, takes_per_wearing=3, take_s=25.0)
+    takes = []
+    for number, take in enumerate(record_session(plan, ()).takes):
+        pull = np.sin(take.time_s * (0.9 + 0.1 * number) + number)
+        readings = take.readings + 5.0 * pull[:, None] * np.array([0.0, 1.0])
+        takes.append(replace(take, readings=readings, context={"strap_n": pull}))
+    return diagnose(takes, Layout.from_columns("two", SENSORS, SENSORS), effects=[]).to_document()
+
+
+def test_the_document_tells_size_and_chance(found):
+    first = found["something_left"]["goes_with"][0]
+    assert (first["rotation"], first["column"]) == ("I_PIP", "context strap_n")
+    assert first["size_deg"] > 0.5
+    assert first["probability"] <= 0.02
+
+
+def test_the_page_shows_the_columns(found):
+    page = diagnosis_page(found)
+    assert "what is left goes with</th>" in page
+    assert "c.strap_n" in page
+
+
+def test_the_command_line_shows_the_columns(found, capsys):
+    print_diagnosis(found)
+    told = capsys.readouterr().out
+    assert "Something is left that no known effect explains" in told
+    assert "what is left goes with" in told
+    assert "c.strap_n" in told
