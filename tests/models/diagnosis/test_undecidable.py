@@ -67,12 +67,12 @@ def test_what_is_asked_for_is_enough():
 
 @pytest.mark.parametrize(
     ("degrees", "ways", "more"),
-    [((20, 25), 2, 4), ((20, 22, 24, 26, 28), 120, 1), ((20,) * 9 + (30,), 10, 2)],
+    [((20, 25), 2, 3), ((20, 22, 24, 26), 24, 1), ((20,) * 9 + (30,), 10, 1)],
 )
 def test_few_takes_of_a_context_ask_for_other_values(degrees, ways, more):
     takes = signals("a" * len(degrees), degrees)
     found = why_not(takes, "temperature")
-    assert f"({ways} ways to deal them, 143 are needed)" in found.why
+    assert f"({ways} ways to deal them, 100 are needed)" in found.why
     assert f"record {more} more take" in found.why
     added = [*degrees, *(40.0 + 5 * number for number in range(more))]
     assert undecidable(signals("a" * len(added), added), catalogue()["temperature"]) is None
