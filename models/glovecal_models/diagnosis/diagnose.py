@@ -15,9 +15,12 @@ from glovecal_models.diagnosis.delays import SMOOTHING, delay_errors
 from glovecal_models.diagnosis.diagnosis_document import document
 from glovecal_models.diagnosis.directions import Direction, forward
 from glovecal_models.diagnosis.evened import EvenTake, evened, shifted, smoothed
+from glovecal_models.diagnosis.hold_drift import HoldDrift, hold_drift
+from glovecal_models.diagnosis.hold_drift_document import hold_next_take
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.naming import Naming, named
 from glovecal_models.diagnosis.next_take import NextTake, next_take
+from glovecal_models.diagnosis.pose_labels import WHY_NOT_JUDGEABLE, are_pose_labels
 from glovecal_models.diagnosis.reference_problems import reference_problems
 from glovecal_models.diagnosis.signatures import (
     AFTER_ALL,
@@ -35,6 +38,9 @@ from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
 DELAYS = ("lag", "clock_offset")
+POSES_DO_NOT_TELL = replace(
+    NOT_TOLD, sentence="Without a measured angle nothing tells whether something else is left."
+)
 
 
 @dataclass(frozen=True)
@@ -54,6 +60,8 @@ class Diagnosis:
     """What is known by a signature in the recording."""
     left: Left
     next_take: NextTake | None
+    hold_drift: HoldDrift | None = None
+    """Where the reference only names poses: what the readings do while one is held."""
 
     @property
     def signature(self) -> tuple[Finding, ...]:
@@ -108,6 +116,8 @@ def diagnose(
     problems = reference_problems(takes, layout)
     even = [evened(take, layout.sensors, joints) for take in takes]
     direction = _direction(even, SMOOTHING, layout, joints, linear, known)
+    if are_pose_labels(takes):
+        return _of_pose_labels(takes, layout, direction, _candidates(direction, effects), problems, seed)
     has = {item.effect.name for item in known}
     if has & set(DELAYS):
         has |= set(DELAYS)  # what is left of one looks like the other; a shifted reference would hide a delay
@@ -120,10 +130,7 @@ def diagnose(
     naming = _delay_told(named(found), even, direction, layout, joints, linear, known)
     findings = tuple(signature_findings(takes, layout, joints, naming)) if signatures else ()
     naming = jump_beside_curve(naming, takes, findings)
-    errors = {
-        name: float(np.sqrt(products.error.sum() / max(products.count.sum(), 1)))
-        for name, products in zip(joints, direction.products, strict=True)
-    }
+    errors = _held_out_errors(direction)
     floors = {name: float(value) for name, value in (noise_floor_deg or {}).items()}
     left = (
         NOT_TOLD
@@ -143,6 +150,38 @@ def diagnose(
         findings,
         left,
         following,
+    )
+
+
+def _held_out_errors(direction: Direction) -> dict[str, float]:
+    return {
+        name: float(np.sqrt(products.error.sum() / max(products.count.sum(), 1)))
+        for name, products in zip(direction.rotations, direction.products, strict=True)
+    }
+
+
+def _of_pose_labels(
+    takes: Sequence[Take],
+    layout: Layout,
+    direction: Direction,
+    candidates: Sequence[Effect],
+    problems: tuple[str, ...],
+    seed: int,
+) -> Diagnosis:
+    """No effect can be judged by the names of poses; what readings do while one is held can."""
+    drift = hold_drift(takes, layout.sensors, seed=seed)
+    return Diagnosis(
+        tuple(direction.rotations),
+        _held_out_errors(direction),
+        {},
+        Naming((), ()),
+        (),
+        tuple(NotJudgeable(item.name, WHY_NOT_JUDGEABLE) for item in candidates if item.name != "no_effect"),
+        problems,
+        (),
+        POSES_DO_NOT_TELL,
+        hold_next_take(drift),
+        drift,
     )
 
 

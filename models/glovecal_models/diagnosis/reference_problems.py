@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from glovecal_models.diagnosis.pose_labels import are_pose_labels
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
@@ -19,7 +20,9 @@ FEWEST_ROWS = 30
 
 
 def reference_problems(takes: Sequence[Take], layout: Layout) -> tuple[str, ...]:
-    """Sentences; none when the reference looks right."""
+    """Sentences; none when the reference looks right, or names poses and measures no angle."""
+    if are_pose_labels(takes):
+        return ()
     problems: list[str] = []
     for rotation in layout.rotations:
         measured = [(take, take.reference_at_frames([rotation])[:, 0]) for take in takes]

@@ -27,6 +27,8 @@ class FileSubject:
     service: RestClient
     name: str
     layout: str | None
+    spread: bool = False
+    """Whether frames stamped in batches are spread up to the next batch."""
     tell: bool = True
     """Whether the files' warnings are printed."""
     _told: set[str] = field(default_factory=set)
@@ -39,6 +41,7 @@ class FileSubject:
         *,
         subject: str | None,
         layout: str | None,
+        spread: bool = False,
         tell: bool = True,
     ) -> FileSubject:
         """``subject``, else whoever has one of the files already, else a new one named after the first."""
@@ -48,7 +51,7 @@ class FileSubject:
         subject = subject or next(iter(owners), PREFIX + hashes[0][:8])
         if subject not in {row["name"] for row in service.get("/subjects")}:
             service.post("/subjects", {"name": subject, "title": f"Takes of {files[0].name}"})
-        return cls(service, subject, layout, tell)
+        return cls(service, subject, layout, spread, tell)
 
     def take_ids(self, files: Sequence[Path]) -> list[str]:
         """Ids of the takes in ``files``, imported unless they were. Raises Refusal that names the file."""
@@ -58,7 +61,11 @@ class FileSubject:
         self._require_layout(file)
         try:
             answer = self.service.upload_takes(
-                file, subject=self.name, layout=self.layout, reference=reference_beside(file)
+                file,
+                subject=self.name,
+                layout=self.layout,
+                reference=reference_beside(file),
+                **({"equal_times": "spread"} if self.spread else {}),
             )
         except ServiceError as error:
             if exit_code_of(error) != 1:

@@ -109,6 +109,8 @@ def _layout_of_columns(store: Store, takes: list[Take]) -> Layout:
     """
     sensors = takes[0].sensors
     rotations = list(dict.fromkeys(name for take in takes for name in take.rotations))
+    if not rotations and any(take.poses is not None for take in takes):
+        rotations = list(sensors)
     for record in store.layouts.list():
         if record.built_in or record.name.startswith(MADE_OF_COLUMNS):
             layout = Layout.from_document(record.document)
