@@ -24,6 +24,7 @@ from glovecal_models.diagnosis.pose_labels import WHY_NOT_JUDGEABLE, are_pose_la
 from glovecal_models.diagnosis.reference_problems import reference_problems
 from glovecal_models.diagnosis.signatures import (
     AFTER_ALL,
+    are_held_levels,
     jump_beside_curve,
     may_be_slip,
     signature_findings,
@@ -134,7 +135,7 @@ def diagnose(
     floors = {name: float(value) for name, value in (noise_floor_deg or {}).items()}
     left = (
         NOT_TOLD
-        if sparse
+        if sparse or are_held_levels(takes)
         else something_left(_with_first(naming, even, direction, layout, joints, linear, known), seed)
     )
     said("done", 1.0)

@@ -26,7 +26,9 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
             name: {"rmse_deg": value, "noise_floor_deg": diagnosis.noise_floor_deg.get(name)}
             for name, value in diagnosis.rmse_deg.items()
         },
-        "named": _signature(signature) if signature else _named_or_held(diagnosis, named),
+        "named": _signature(signature, diagnosis.naming.confidence_set)
+        if signature
+        else _named_or_held(diagnosis, named),
         "candidates": [_candidate(item) for item in diagnosis.by_gain],
         "not_judgeable": [{"effect": item.effect, "why": item.why} for item in diagnosis.not_judgeable],
         "findings": [
@@ -68,7 +70,7 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     elif diagnosis.hold_drift is not None:
         told += [hold_sentence(diagnosis.hold_drift), UNITS]
     elif not diagnosis.findings:
-        told.append(_nothing_named(diagnosis))
+        told.append(nothing_named_sentence(diagnosis))
     if diagnosis.next_take is not None:
         rivals = " and ".join(diagnosis.next_take.separates)
         told.append(
@@ -86,7 +88,8 @@ def not_judgeable_sentences(items: Sequence[NotJudgeable]) -> list[str]:
     return [f"{', '.join(effects)} cannot be judged: {why}." for why, effects in reasons.items()]
 
 
-def _nothing_named(diagnosis: Diagnosis) -> str:
+def nothing_named_sentence(diagnosis: Diagnosis) -> str:
+    """Because nothing beats its decoy, or because too little was recorded to tell."""
     blocks = max((len(e.base) for item in diagnosis.assessments for e in item.errors), default=0)
     if blocks < FEWEST_BLOCKS:
         needed = f"{blocks} pieces of 5 s, {FEWEST_BLOCKS} are needed"
@@ -140,13 +143,14 @@ def _named(diagnosis: Diagnosis, item: Assessment) -> dict[str, Any]:
     }
 
 
-def _signature(findings: Sequence[Finding]) -> dict[str, Any]:
+def _signature(findings: Sequence[Finding], rivals: Sequence[str]) -> dict[str, Any]:
     first = findings[0]
+    rivals = rivals if first.effect in rivals else (first.effect,)
     return {
         "effect": first.effect,
         "where": sorted({name for item in findings for name in item.where}),
-        "verdict": "named",
-        "confidence_set": [first.effect],
+        "verdict": "named" if len(rivals) < 2 else "ambiguous",
+        "confidence_set": list(rivals),
         "parameters": dict(first.evidence),
         "saved_deg": None,
         "decoy_saved_deg": None,

@@ -77,9 +77,9 @@ class HoldDrift:
     probability: float
     """That holds whose drift has either sign drift so much alike."""
     elsewhere: float | None
-    """How fast readings drift in poses far from the first, as a share of how fast they do there: warm-up goes on
-    (1), a sensor or hand that goes back turns around (negative). None when there is no such pose, or when its
-    holds differ too much to decide."""
+    """How fast readings drift in poses far from the first, as a share of how fast they do there: warm-up goes
+    on (1), a sensor or hand that goes back turns around (negative). None when there is no such pose, or when
+    its holds differ too much to decide."""
     far: tuple[str, ...]
     """Those poses."""
     recovery: float | None

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from glovecal_models.diagnosis.contradictions import contradictions
 from glovecal_models.diagnosis.pose_labels import are_pose_labels
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
@@ -34,6 +35,8 @@ def reference_problems(takes: Sequence[Take], layout: Layout) -> tuple[str, ...]
                 own.input_columns(_in_order(take, layout), layout.sensors)[:, 0] for take, _ in measured
             ]
             problems.extend(_of_rotation(rotation, measured, inputs, has_own))
+            if has_own:
+                problems.extend(contradictions(rotation, measured, inputs))
     spans = _largest_span(takes)
     if spans is not None and LEAST_RADIANS < spans <= LARGEST_RADIANS:
         problems.insert(

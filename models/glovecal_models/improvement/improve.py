@@ -19,6 +19,7 @@ from glovecal_models.diagnosis.diagnosis_document import (
     errors_deg,
     named_sentence,
     not_judgeable_sentences,
+    nothing_named_sentence,
 )
 from glovecal_models.diagnosis.hold_drift_document import hold_sentence
 from glovecal_models.diagnosis.pose_labels import UNITS, are_pose_labels
@@ -40,6 +41,8 @@ from glovecal_models.improvement.known_effects import known_effects
 from glovecal_models.improvement.living_sensors import dead_sensors_sentence, without_dead_sensors
 from glovecal_models.improvement.prepared_takes import PreparedTakes
 from glovecal_models.improvement.remove_effect import remove_effect, unneeded
+from glovecal_models.improvement.take_warnings import only_take_sentence, take_warnings
+from glovecal_models.improvement.what_stays import repeats_sentence, what_stays
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
@@ -98,7 +101,12 @@ class _Walk:
         self.cancelled, self.report = cancelled, report
         self.steps: list[Step] = []
         self.undone: list[Addition] = []
-        self.sentences = [dead_sensors_sentence(dead)] if dead else []
+        alone = only_take_sentence(self.takes)
+        self.sentences = [
+            *take_warnings(self.takes),
+            *([dead_sensors_sentence(dead)] if dead else ()),
+            *([alone] if alone and not holdout else ()),
+        ]
         self.stopped = "nothing_named"
         self.diagnosis: Diagnosis | None = None
         self.floors: dict[str, NoiseFloor] = {}
@@ -162,20 +170,35 @@ class _Walk:
         last = next((s.added for s in reversed(self.steps) if s.added is not None), None)
         if self.stopped != "noise_floor" and last is not None and last["verdict"] == "ambiguous":
             self.stopped = "ambiguous"
+        if (
+            self.stopped == "nothing_named"
+            and self.diagnosis
+            and len(self.diagnosis.naming.confidence_set) > 1
+        ):
+            self.stopped = "ambiguous"
         if self.diagnosis is not None:
-            self.sentences += list(self.diagnosis.reference_problems)
+            self.sentences[:0] = self.diagnosis.reference_problems
             held = self.diagnosis.hold_drift
             if held is not None:
                 self.sentences += [hold_sentence(held), UNITS]
                 self.stopped = "ambiguous" if len(held.confidence_set) > 1 else "nothing_named"
             self.sentences += [item.sentence for item in self.diagnosis.findings]
+            if held is None and not self.diagnosis.findings and not self.diagnosis.naming.ranked:
+                self.sentences.append(nothing_named_sentence(self.diagnosis))
             self.sentences += not_judgeable_sentences(self.diagnosis.not_judgeable)
             self.sentences.append(self.diagnosis.left.sentence)
+            if held is None:
+                self.sentences += self._what_stays()
         self._say("done", 1.0)
         return Improvement(
             tuple(self.steps), self.floors, self.stopped, self.diagnosis, tuple(self.undone),
             self._baselines(), tuple(self.sentences),
         )  # fmt: skip
+
+    def _what_stays(self) -> list[str]:
+        repeats = repeats_sentence(self.floors)
+        stays = what_stays(self.steps[-1].per_rotation, self.floors)
+        return [stays] if repeats is None else [repeats, stays]
 
     def _add(
         self, name: str, where: list[str] | None, clock: dict[str, Any] | None, diagnosis: Diagnosis | None
@@ -300,6 +323,8 @@ class _Walk:
         return each, float(np.sqrt(np.nanmean(error**2)))
 
     def _is_at_floor(self) -> bool:
+        if self.diagnosis is not None and self.diagnosis.reference_problems:
+            return False  # errors against a wrong reference, and its floor, mean nothing
         last = self.steps[-1].per_rotation
         floors = [(last[name], floor) for name, floor in self.floors.items() if name in last]
         return bool(floors) and all(

@@ -98,9 +98,8 @@ def improve(
         require_place(report, overwrite=overwrite)
     with connect() as service:
         chosen = _chosen(
-            service, takes or [], holdout or [], take or [], subject, layout,
-            spread=spread_equal_times, tell=not as_json,
-        )  # fmt: skip
+            service, takes or [], holdout or [], take or [], subject, layout, spread=spread_equal_times
+        )
         options = {"method": method, "samples": samples, "max_steps": max_steps, "seed": seed}
         job = service.post("/improve", {**chosen, **options, "activate": activate})["id"]
         result = wait_for_job(service, job, quiet=as_json)["result"]
@@ -122,7 +121,6 @@ def _chosen(
     layout: str | None,
     *,
     spread: bool,
-    tell: bool,
 ) -> dict[str, Any]:
     """The takes to learn from and to hold out, imported where they are files."""
     layout = layout_named(service, layout)
@@ -135,7 +133,7 @@ def _chosen(
         service.get(f"/subjects/{subject}")
     learned, held = [], []
     if every:
-        of_files = FileSubject.of(service, every, subject=subject, layout=layout, spread=spread, tell=tell)
+        of_files = FileSubject.of(service, every, subject=subject, layout=layout, spread=spread)
         subject = of_files.name
         learned, held = of_files.take_ids(files), of_files.take_ids(held_files)
         layout = of_files.layout

@@ -118,8 +118,8 @@ def _layout_of_columns(store: Store, takes: list[Take]) -> Layout:
                 return layout
     if not rotations:
         raise BadInput(
-            f"the file has no r.ROTATION columns and no known layout has the sensors {', '.join(sensors)}: "
-            "name a layout, so that its rotations are known"
+            "the file has no r.ROTATION columns (reference angles in degrees, which a model is learned from) "
+            f"and no known layout has the sensors {', '.join(sensors)}: name a layout to import it all the same"
         )
     digest = hashlib.sha256(" ".join([*sensors, "", *rotations]).encode()).hexdigest()
     layout = Layout.from_columns(MADE_OF_COLUMNS + digest[:8], sensors, rotations)

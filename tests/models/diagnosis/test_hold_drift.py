@@ -53,7 +53,7 @@ def _take(kind: str, random: np.random.Generator, number: int, poses: Sequence[s
     noise = 0.01 * random.standard_normal((len(time), 3))
     wander = 0.003 * np.cumsum(random.standard_normal((len(time), 3)), axis=0) / np.sqrt(RATE_HZ)
     shape = (closed + again)[:, None] - size * drift[:, None] + noise + wander
-    names = tuple(poses[i] for i in hold.tolist())
+    names = tuple(str(poses[i]) for i in hold.tolist())
     return Take(f"t{number}", "w", SENSORS, time, 200 + 100 * GAIN * shape, poses=names)
 
 
