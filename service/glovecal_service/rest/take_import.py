@@ -119,7 +119,8 @@ def _layout_of_columns(store: Store, takes: list[Take]) -> Layout:
     if not rotations:
         raise BadInput(
             "the file has no r.ROTATION columns (reference angles in degrees, which a model is learned from) "
-            f"and no known layout has the sensors {', '.join(sensors)}: name a layout to import it all the same"
+            f"and no known layout has the sensors {', '.join(sensors)}: name a layout to import it all the "
+            "same"
         )
     digest = hashlib.sha256(" ".join([*sensors, "", *rotations]).encode()).hexdigest()
     layout = Layout.from_columns(MADE_OF_COLUMNS + digest[:8], sensors, rotations)
