@@ -177,6 +177,8 @@ def _doubt(drift: HoldDrift) -> str:
         return "It is there around a rigid form too, where the hand cannot relax: the sensors creep."
     if drift.confidence_set == ("hand_relaxing",):
         return "Around a rigid form, where the hand cannot relax, it is not there: the sensors do not creep."
+    if "hand_relaxing" in drift.confidence_set and drift.deg_of_span:
+        return "Where an angle was measured glovecal diagnose can tell them apart; else hold a rigid form."
     if "hand_relaxing" in drift.confidence_set:
         return (
             "Without a measured angle these cannot be told apart; hold a rigid form for 20 s, several times,"

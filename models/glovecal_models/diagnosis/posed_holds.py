@@ -8,9 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.diagnosis.pose_labels import labels_at_frames
+from glovecal_models.diagnosis.pose_labels import are_pose_labels, labels_at_frames
+from glovecal_models.diagnosis.signatures import own_sensors
+from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
+OUTERMOST_PCT = (2, 98)
 BIN_S = 0.25
 SHORTEST_HOLD_S = 8.0
 """A shorter one does not show whether a drift slows down."""
@@ -41,10 +44,22 @@ class PosedHold:
 
 
 def sensor_spans(takes: Sequence[Take], sensors: Sequence[str]) -> np.ndarray:
-    """(S,) what each sensor covers in these takes, raw; without the outermost 2 % at either end."""
+    """(S,) what each sensor covers in these takes, raw, but for the outermost 2 % at either end; 1 for none."""
     every = np.concatenate([_readings(take, sensors) for take in takes])
-    low, high = np.percentile(every, [2, 98], axis=0)
-    return high - low
+    low, high = np.percentile(every, OUTERMOST_PCT, axis=0)
+    return np.where(high > low, high - low, 1.0)
+
+
+def degrees_of_spans(takes: Sequence[Take], layout: Layout) -> dict[str, float]:
+    """For sensors whose own rotation was measured what their span stands for, degrees."""
+    found = {}
+    for rotation, sensor in own_sensors(layout, layout.rotations).items():
+        angles = np.concatenate([take.reference_at_frames([rotation])[:, 0] for take in takes])
+        angles = angles[np.isfinite(angles)]
+        if len(angles) and not are_pose_labels(takes):
+            low, high = np.percentile(angles, OUTERMOST_PCT)
+            found[sensor] = float(high - low)
+    return found
 
 
 def posed_holds(takes: Sequence[Take], sensors: Sequence[str]) -> list[PosedHold]:
@@ -52,7 +67,7 @@ def posed_holds(takes: Sequence[Take], sensors: Sequence[str]) -> list[PosedHold
 
     Takes without pose names are searched for still stretches; those with like readings share a name.
     """
-    spans = np.maximum(sensor_spans(takes, sensors), 1e-12)
+    spans = sensor_spans(takes, sensors)
     found: list[PosedHold] = []
     for take in takes:
         labels = labels_at_frames(take)

@@ -9,6 +9,7 @@ from pydantic import BaseModel, Field
 
 from glovecal_models.diagnosis.hold_drift import hold_drift
 from glovecal_models.diagnosis.hold_drift_document import hold_document, hold_next_take
+from glovecal_models.diagnosis.posed_holds import degrees_of_spans
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.take import Take
 from glovecal_service.plain import plain
@@ -67,9 +68,11 @@ class HoldsView(BaseModel):
 )
 def examine_holds(body: Examined, store: StoreNeeded) -> dict[str, Any]:
     """Poses by their names, else by a reference of 0 and 1, else by still stretches with like readings."""
-    takes = [store.takes.load(id) for id in dict.fromkeys(body.takes)]
+    wanted = list(dict.fromkeys(body.takes))
+    takes = [store.takes.load(id) for id in wanted]
     _require_like_sensors(takes)
-    drift = hold_drift(takes, takes[0].sensors)
+    layout = store.layouts.get(store.takes.get(wanted[0]).layout)
+    drift = hold_drift(takes, layout.sensors, deg_of_span=degrees_of_spans(takes, layout))
     following = hold_next_take(drift)
     told = None
     if following is not None:

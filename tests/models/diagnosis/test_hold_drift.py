@@ -13,7 +13,7 @@ from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.hold_drift import hold_drift
 from glovecal_models.diagnosis.hold_drift_document import hold_document, hold_next_take, hold_sentence
-from glovecal_models.diagnosis.posed_holds import posed_holds
+from glovecal_models.diagnosis.posed_holds import degrees_of_spans, posed_holds
 from glovecal_models.improvement.improve import improve
 from glovecal_models.layout import Layout
 from glovecal_models.takes.table import read_takes
@@ -154,10 +154,36 @@ def test_a_reference_of_0_and_1_names_poses_and_blames_no_effect():
 
 
 def test_known_angles_give_the_drift_in_degrees():
-    found = hold_drift(held_poses("creep"), SENSORS, deg_of_span={"I_FLEX": 90.0})
-    fist = hold_document(found)["poses"][0]["sensors"]
-    assert fist["I_FLEX"]["change_deg"] == pytest.approx(0.9 * fist["I_FLEX"]["change_pct"])
+    known = [
+        replace(
+            take,
+            rotations=("I_FLEX",),
+            reference=np.array([[80.0 if pose == "fist" else 5.0] for pose in take.poses or ()]),
+            reference_time_s=take.time_s.copy(),
+        )
+        for take in held_poses("creep")
+    ]
+    layout = Layout.from_columns("flex", SENSORS, ["I_FLEX"])
+    spans = degrees_of_spans(known, layout)
+    assert spans == {"I_FLEX": 75.0}
+    assert degrees_of_spans([named_by_numbers(take) for take in known], layout) == {}
+    drift = hold_drift(known, SENSORS, deg_of_span=spans)
+    fist = hold_document(drift)["poses"][0]["sensors"]
+    assert fist["I_FLEX"]["change_deg"] == pytest.approx(0.75 * fist["I_FLEX"]["change_pct"])
     assert fist["M_FLEX"]["change_deg"] is None
+    assert "degrees)" in hold_sentence(drift)
+
+
+def test_a_sensor_that_never_changes_disturbs_nothing():
+    takes = [
+        replace(
+            take,
+            sensors=(*SENSORS, "DEAD"),
+            readings=np.column_stack([take.readings, np.full(len(take.time_s), 0.6)]),
+        )
+        for take in held_poses("creep")
+    ]
+    assert hold_drift(takes, (*SENSORS, "DEAD")).confidence_set == ("creep", "hand_relaxing")
 
 
 @pytest.mark.needs_shared_data
