@@ -44,7 +44,7 @@ class PosedHold:
 
 
 def sensor_spans(takes: Sequence[Take], sensors: Sequence[str]) -> np.ndarray:
-    """(S,) what each sensor covers in these takes, raw, but for the outermost 2 % at each end; 1 if nothing."""
+    """(S,) what each sensor covers in these takes, raw, but for the outermost 2 %; 1 if it covers nothing."""
     every = np.concatenate([_readings(take, sensors) for take in takes])
     low, high = np.percentile(every, OUTERMOST_PCT, axis=0)
     return np.where(high > low, high - low, 1.0)
