@@ -7,7 +7,8 @@ from typing import Any
 from blind_glove import BlindGlove
 
 from glovecal_models.diagnosis.assessment import Assessment
-from glovecal_models.diagnosis.diagnose import Diagnosis, diagnose
+from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.diagnosis.diagnosis import Diagnosis
 
 NOTHING = "nothing"
 

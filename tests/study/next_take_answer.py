@@ -6,7 +6,8 @@ from typing import Any, cast, get_args
 
 from blind_glove import BlindGlove
 
-from glovecal_models.diagnosis.diagnose import Diagnosis, diagnose
+from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.next_take import NextTake
 from glovecal_models.simulation.session_plan import TakeMotion
 from glovecal_models.takes.take import Take

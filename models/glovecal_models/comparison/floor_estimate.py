@@ -8,8 +8,10 @@ from typing import Literal
 
 import numpy as np
 
-How = Literal["still hand", "still joint", "repeated poses", "spectrum", "frame to frame"]
-ORDER: tuple[How, ...] = ("still hand", "still joint", "repeated poses", "spectrum", "frame to frame")
+How = Literal["still hand", "still joint", "repeated poses", "spectrum", "frame to frame", "near readings"]
+ORDER: tuple[How, ...] = (
+    "still hand", "still joint", "repeated poses", "spectrum", "frame to frame", "near readings",
+)  # fmt: skip
 """The best first; ``noise_floor.py`` says why."""
 LOWER_BOUNDS: tuple[How, ...] = ("spectrum", "frame to frame")
 RESAMPLES = 500

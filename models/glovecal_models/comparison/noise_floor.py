@@ -1,6 +1,6 @@
 """How small an error can get on these measurements: what repeats by itself no better than this.
 
-Five estimates; the best that the takes allow counts, the others stay beside it. In this order, from the one
+Six estimates; the best that the takes allow counts, the others stay beside it. In this order, from the one
 that holds the least a better model could still take away:
 
 * still hand: while the whole hand is held the error should not move; its spread around each hold's line is
@@ -10,8 +10,9 @@ that holds the least a better model could still take away:
   and how exactly the pose was taken; recordings of one frame a pose have nothing better.
 * spectrum: the plateau of the error's spectrum at high frequencies, a lower bound: noise with a memory is
   not in it.
-* frame to frame: second differences, a lower bound likewise, from the shortest recordings. A table of single
-  poses without their names has none of these: its floor is unknown.
+* frame to frame: second differences, a lower bound likewise, from the shortest recordings.
+* near readings: only for a table of single poses without their names, which has none of the others: how far
+  the reference differs between frames that read nearly the same.
 
 The floor is that of this model: one that follows its sensors too closely magnifies their noise. How much of
 the floor is the prediction's own jitter is told beside it.
@@ -26,6 +27,7 @@ import numpy as np
 from glovecal_models.comparison.error_spectrum import ErrorSpectrum, error_spectrum
 from glovecal_models.comparison.floor_estimate import How, NoiseFloor, pooled
 from glovecal_models.comparison.holds import Hold, holds
+from glovecal_models.comparison.near_readings import from_near_readings
 from glovecal_models.comparison.repeated_poses import from_repeated_poses
 from glovecal_models.comparison.residuals import Residuals
 
@@ -60,7 +62,11 @@ def noise_floors(
         spectrum.plateau if spectrum is not None else None,
         _from_differences(found, column, generator),
     )
-    return tuple(one for one in estimates if one is not None)
+    some = tuple(one for one in estimates if one is not None)
+    if some or any(_has_neighbours(item.take.time_s) for item in found.takes):
+        return some
+    single = from_near_readings(found.takes, column, generator)
+    return () if single is None else (single,)
 
 
 def _from_holds(held: Sequence[Hold], how: How, generator: np.random.Generator) -> NoiseFloor | None:

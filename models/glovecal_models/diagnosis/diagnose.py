@@ -3,81 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from glovecal_models.diagnosis.assessment import Assessment
-from glovecal_models.diagnosis.candidates import BLOCK_ROWS, NotJudgeable, assessed
-from glovecal_models.diagnosis.delay_verdict import MIDDLE, SHAPE_SMOOTHING, delay_kind
-from glovecal_models.diagnosis.delays import SMOOTHING, delay_errors
-from glovecal_models.diagnosis.diagnosis_document import document
-from glovecal_models.diagnosis.directions import Direction, forward
-from glovecal_models.diagnosis.evened import EvenTake, evened, shifted, smoothed
+from glovecal_models.diagnosis.candidates import NotJudgeable, assessed
+from glovecal_models.diagnosis.delays_told import DELAYS, delays_told
+from glovecal_models.diagnosis.diagnosis import Diagnosis
+from glovecal_models.diagnosis.directions import Direction
+from glovecal_models.diagnosis.ground import Ground
+from glovecal_models.diagnosis.hold_drift import hold_drift
+from glovecal_models.diagnosis.hold_drift_document import hold_next_take
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.naming import Naming, named
-from glovecal_models.diagnosis.next_take import NextTake, next_take
+from glovecal_models.diagnosis.next_take import next_take
+from glovecal_models.diagnosis.pose_labels import WHY_NOT_JUDGEABLE, are_pose_labels
 from glovecal_models.diagnosis.reference_problems import reference_problems
-from glovecal_models.diagnosis.signatures import (
-    AFTER_ALL,
-    jump_beside_curve,
-    may_be_slip,
-    signature_findings,
-)
-from glovecal_models.diagnosis.something_left import Left, not_told, something_left
-from glovecal_models.effects.catalogue import catalogue, effect
+from glovecal_models.diagnosis.signatures import are_held_levels, jump_beside_curve, signature_findings
+from glovecal_models.diagnosis.something_left import not_told, something_left
+from glovecal_models.diagnosis.undecided import as_known, deciding, likelier
+from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.effects.context_dependence import ContextDependence, unfamiliar_columns
 from glovecal_models.effects.effect import Effect
-from glovecal_models.effects.signature_effect import Finding
-from glovecal_models.errors import BadInput, Cancelled
+from glovecal_models.errors import Cancelled
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
-DELAYS = ("lag", "clock_offset")
-
-
-@dataclass(frozen=True)
-class Diagnosis:
-    """Ranked evidence for effects that a model does not know yet."""
-
-    joints: tuple[str, ...]
-    rmse_deg: dict[str, float]
-    """Held-out error of each joint without any further effect, on smoothed signals."""
-    noise_floor_deg: dict[str, float]
-    naming: Naming
-    assessments: tuple[Assessment, ...]
-    """Every effect that could be judged."""
-    not_judgeable: tuple[NotJudgeable, ...]
-    reference_problems: tuple[str, ...]
-    findings: tuple[Finding, ...]
-    """What is known by a signature in the recording."""
-    left: Left
-    next_take: NextTake | None
-
-    @property
-    def signature(self) -> tuple[Finding, ...]:
-        """Findings of the effect that is to be named by its signature, before any ranking; mostly none."""
-        for name in ("repeated_samples", "sensor_fault"):
-            found = tuple(item for item in self.findings if item.effect == name)
-            if found and name not in self.naming.confidence_set:
-                return found
-        if self.naming.ranked:
-            slips = tuple(item for item in self.findings if item.effect in AFTER_ALL)
-            return slips if may_be_slip(self.naming) else ()
-        return tuple(item for item in self.findings if item.effect == self.findings[0].effect)
-
-    @property
-    def by_gain(self) -> list[Assessment]:
-        """All assessments, those that pass first, then by how much they save."""
-        return sorted(
-            self.assessments,
-            key=lambda item: (not item.touched, -item.saved_square, -max(e.contrast for e in item.errors)),
-        )
-
-    def to_document(self) -> dict[str, Any]:
-        """Plain JSON-able data with sentences."""
-        return document(self)
+SINGLE_POSES = "the frames are single poses, too far apart"
 
 
 def diagnose(
@@ -94,9 +45,6 @@ def diagnose(
     report: Callable[[str, float], None] | None = None,
 ) -> Diagnosis:
     """``known``: effects the model has already; they are part of the base. Raises BadInput, Cancelled."""
-    joints = measured_joints(takes, layout)
-    if not joints:
-        raise BadInput("no take measured a rotation of this layout; a diagnosis needs r.ROTATION columns")
 
     def said(text: str, share: float) -> None:
         if cancelled and cancelled():
@@ -105,55 +53,55 @@ def diagnose(
             report(text, share)
 
     said("looking at the reference", 0.0)
+    ground = Ground.of(takes, layout, linear, known)
     problems = reference_problems(takes, layout)
-    even = [evened(take, layout.sensors, joints) for take in takes]
-    direction = _direction(even, SMOOTHING, layout, joints, linear, known)
-    has = {item.effect.name for item in known}
-    if has & set(DELAYS):
-        has |= set(DELAYS)  # what is left of one looks like the other; a shifted reference would hide a delay
+    direction = ground.direction()
     candidates = _candidates(direction, effects)
-    sparse = all(take.is_sparse for take in even)
-    lasting = [item for item in candidates if sparse and (item.has_memory or item.name in DELAYS)]
+    if are_pose_labels(takes):
+        return _of_pose_labels(takes, layout, direction, candidates, problems, seed)
+    lasting = [item for item in candidates if ground.is_sparse and (item.has_memory or item.name in DELAYS)]
     candidates = [item for item in candidates if item not in lasting]
+    has = _has(known)
     found, impossible = assessed(direction, candidates, np.random.default_rng(seed), has, said)
-    naming, beside, screened = named(found), tuple(known), direction
-    likelier = _likelier(impossible, naming)
-    if likelier:
+    naming, screened, beside = named(found), direction, ground
+    undecided = likelier(impossible, naming)
+    if undecided:
         # What may well be there is not to get another's name: the others are judged beside it.
-        beside = (*known, *(_as_known(item, candidates) for item in likelier))
+        beside = ground.beside(*(as_known(item, candidates) for item in undecided))
         others = [item for item in candidates if item.name not in {each.effect for each in impossible}]
-        screened = _direction(even, SMOOTHING, layout, joints, linear, beside)
+        screened = beside.direction()
         found, _ = assessed(screened, others, np.random.default_rng(seed), has, said)
         naming = named(found)
-    impossible += [NotJudgeable(item.name, "the frames are single poses, too far apart") for item in lasting]
-    naming = _delay_told(naming, even, screened, layout, joints, linear, beside)
-    findings = tuple(signature_findings(takes, layout, joints, naming, found)) if signatures else ()
+    impossible += [NotJudgeable(item.name, SINGLE_POSES) for item in lasting]
+    naming = delays_told(naming, beside, screened)
+    findings = tuple(signature_findings(takes, layout, ground.joints, naming, found)) if signatures else ()
     naming = jump_beside_curve(naming, takes, findings)
-    errors = {
-        name: float(np.sqrt(products.error.sum() / max(products.count.sum(), 1)))
-        for name, products in zip(joints, direction.products, strict=True)
-    }
-    floors = {name: float(value) for name, value in (noise_floor_deg or {}).items()}
     said("looking at what is left", 0.95)
-    if sparse:
-        left = not_told("the frames are single poses, too far apart")
+    if ground.is_sparse or are_held_levels(takes):
+        left = not_told(SINGLE_POSES)
     else:
-        rest = _with_first(naming, even, direction, layout, joints, linear, known)
-        left = something_left(rest, even, layout, seed, may_be=[i.effect for i in impossible if i.saves_much])
+        rest = ground.with_first(naming).direction()
+        may_be = [item.effect for item in impossible if item.saves_much]
+        left = something_left(rest, ground.even, layout, seed, may_be=may_be)
     said("done", 1.0)
-    following = next_take(naming.confidence_set) or _deciding(impossible, left)
     return Diagnosis(
-        tuple(joints),
-        errors,
-        floors,
+        ground.joints,
+        _held_out_errors(direction),
+        {name: float(value) for name, value in (noise_floor_deg or {}).items()},
         naming,
         tuple(found),
         tuple(impossible),
         problems,
         findings,
         left,
-        following,
+        next_take(naming.confidence_set) or deciding(impossible, left),
     )
+
+
+def _has(known: Sequence[KnownEffect]) -> set[str]:
+    """What is left of one delay looks like the other, and a shifted reference would hide it."""
+    names = {item.effect.name for item in known}
+    return names | set(DELAYS) if names & set(DELAYS) else names
 
 
 def _candidates(direction: Direction, effects: Sequence[Effect] | None) -> list[Effect]:
@@ -166,100 +114,33 @@ def _candidates(direction: Direction, effects: Sequence[Effect] | None) -> list[
     return [*known, *(ContextDependence.of(name, direction.signals) for name in unfamiliar)]
 
 
-def _likelier(impossible: Sequence[NotJudgeable], naming: Naming) -> list[NotJudgeable]:
-    """Effects that these takes cannot decide, and that would save more than the one that is to be named."""
-    if not naming.ranked:
-        return []
-    return [item for item in impossible if item.saved_square > naming.ranked[0].saved_square]
+def _held_out_errors(direction: Direction) -> dict[str, float]:
+    return {
+        name: float(np.sqrt(products.error.sum() / max(products.count.sum(), 1)))
+        for name, products in zip(direction.rotations, direction.products, strict=True)
+    }
 
 
-def _as_known(item: NotJudgeable, candidates: Sequence[Effect]) -> KnownEffect:
-    """On the joints where it saves much."""
-    found = item.would_save
-    assert found is not None
-    effect = next(each for each in candidates if each.name == item.effect)
-    where = tuple(found.joints[i] for i in item.joints_saved)
-    return KnownEffect(effect, where, tuple(found.shapes[i] for i in item.joints_saved))
-
-
-def _deciding(impossible: Sequence[NotJudgeable], left: Left) -> NextTake | None:
-    """The recording that lets an effect be judged which may well be there, or a wearing if any may."""
-    asked = [item for item in impossible if item.record is not None]
-    likely = sorted((item for item in asked if item.saves_much), key=lambda item: -item.saved_square)
-    unexplained = left.is_left or left.not_judgeable is not None
-    wearing = [item for item in asked if item.effect == "donning_shift" and unexplained]
-    return next((item.record for item in (*likely, *wearing)), None)
-
-
-def _with_first(
-    naming: Naming,
-    even: Sequence[EvenTake],
+def _of_pose_labels(
+    takes: Sequence[Take],
+    layout: Layout,
     direction: Direction,
-    layout: Layout,
-    joints: Sequence[str],
-    linear: bool,
-    known: Sequence[KnownEffect],
-) -> Direction:
-    """The direction with the first of the ranking in its base: what is left after it."""
-    if not naming.ranked:
-        return direction
-    first = naming.ranked[0]
-    if first.effect == "clock_offset":
-        delay = np.broadcast_to(first.shapes[0], (len(even),))
-        moved = [shifted(take, float(by)) for take, by in zip(even, delay, strict=True)]
-        return _direction(moved, SMOOTHING, layout, joints, linear, known)
-    where = tuple(first.joints[i] for i in first.touched)
-    added = KnownEffect(effect(first.effect), where, tuple(first.shapes[i] for i in first.touched))
-    return _direction(even, SMOOTHING, layout, joints, linear, (*known, added))
-
-
-def measured_joints(takes: Sequence[Take], layout: Layout) -> tuple[str, ...]:
-    """Rotations of the layout that some take measured, and that move."""
-    return tuple(
-        name
-        for name in layout.rotations
-        if any(
-            name in take.rotations and np.isfinite(take.reference[:, take.rotations.index(name)]).sum() > 1
-            for take in takes
-        )
-    )
-
-
-def _direction(
-    even: Sequence[EvenTake],
-    smoothing: int,
-    layout: Layout,
-    joints: Sequence[str],
-    linear: bool,
-    known: Sequence[KnownEffect],
-) -> Direction:
-    return forward([smoothed(take, smoothing) for take in even], layout, joints, linear=linear, known=known)
-
-
-def _delay_told(
-    naming: Naming,
-    even: Sequence[EvenTake],
-    direction: Direction,
-    layout: Layout,
-    joints: Sequence[str],
-    linear: bool,
-    known: Sequence[KnownEffect],
-) -> Naming:
-    """Put the delays that lead a ranking in the right order."""
-    if not naming.ranked or naming.ranked[0].effect not in DELAYS:
-        return naming
-    strong = _direction(even, SHAPE_SMOOTHING, layout, joints, linear, known)
-    kind, score = delay_kind(delay_errors(direction, BLOCK_ROWS), delay_errors(strong, BLOCK_ROWS))
-    first = kind if kind != "either" else "lag" if score > MIDDLE else "clock_offset"
-    delays = [item for item in naming.ranked if item.effect in DELAYS]
-    if first not in {item.effect for item in delays}:
-        return naming
-    delays.sort(key=lambda item: item.effect != first)
-    others = [item for item in naming.ranked if item.effect not in DELAYS]
-    kept = [name for name in naming.confidence_set if name not in DELAYS]
-    told = DELAYS if kind == "either" else (first,)
-    return replace(
-        naming,
-        ranked=(*delays, *others),
-        confidence_set=(first, *(name for name in told if name != first), *kept),
+    candidates: Sequence[Effect],
+    problems: tuple[str, ...],
+    seed: int,
+) -> Diagnosis:
+    """No effect can be judged by the names of poses; what readings do while one is held can."""
+    drift = hold_drift(takes, layout.sensors, seed=seed)
+    return Diagnosis(
+        direction.rotations,
+        _held_out_errors(direction),
+        {},
+        Naming((), ()),
+        (),
+        tuple(NotJudgeable(item.name, WHY_NOT_JUDGEABLE) for item in candidates if item.name != "no_effect"),
+        problems,
+        (),
+        not_told("no angle was measured"),
+        hold_next_take(drift),
+        drift,
     )

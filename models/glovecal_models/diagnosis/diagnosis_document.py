@@ -9,10 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from glovecal_models.diagnosis.assessment import FEWEST_BLOCKS, Assessment
+from glovecal_models.diagnosis.candidates import NotJudgeable
+from glovecal_models.diagnosis.hold_drift_document import hold_document, hold_named, hold_sentence
+from glovecal_models.diagnosis.pose_labels import UNITS
 from glovecal_models.effects.signature_effect import Finding
 
 if TYPE_CHECKING:
-    from glovecal_models.diagnosis.diagnose import Diagnosis
+    from glovecal_models.diagnosis.diagnosis import Diagnosis
 
 
 def document(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -24,7 +27,9 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
             name: {"rmse_deg": value, "noise_floor_deg": diagnosis.noise_floor_deg.get(name)}
             for name, value in diagnosis.rmse_deg.items()
         },
-        "named": _signature(signature) if signature else None if named is None else _named(diagnosis, named),
+        "named": _signature(signature, diagnosis.naming.confidence_set)
+        if signature
+        else _named_or_held(diagnosis, named),
         "candidates": [_candidate(item) for item in diagnosis.by_gain],
         "not_judgeable": [{"effect": item.effect, "why": item.why} for item in diagnosis.not_judgeable],
         "findings": [
@@ -41,6 +46,7 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
             for item in diagnosis.findings
         ],
         "reference_problems": list(diagnosis.reference_problems),
+        "hold_drift": None if diagnosis.hold_drift is None else hold_document(diagnosis.hold_drift),
         "something_left": {
             "is_left": diagnosis.left.is_left,
             "sentence": diagnosis.left.sentence,
@@ -64,19 +70,29 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     told += [item.sentence for item in diagnosis.findings]
     if diagnosis.naming.ranked:
         told.append(named_sentence(diagnosis))
+    elif diagnosis.hold_drift is not None:
+        told += [hold_sentence(diagnosis.hold_drift), UNITS]
     elif not diagnosis.findings:
-        told.append(_nothing_named(diagnosis))
+        told.append(nothing_named_sentence(diagnosis))
     if diagnosis.next_take is not None:
         rivals = " and ".join(diagnosis.next_take.separates)
         told.append(
             f"To tell {rivals} apart record {diagnosis.next_take.seconds} s: {diagnosis.next_take.what}"
         )
     told.append(diagnosis.left.sentence)
-    told += [f"{item.effect} cannot be judged: {item.why}." for item in diagnosis.not_judgeable]
-    return told
+    return told + not_judgeable_sentences(diagnosis.not_judgeable)
 
 
-def _nothing_named(diagnosis: Diagnosis) -> str:
+def not_judgeable_sentences(items: Sequence[NotJudgeable]) -> list[str]:
+    """One for each reason."""
+    reasons: dict[str, list[str]] = {}
+    for item in items:
+        reasons.setdefault(item.why, []).append(item.effect)
+    return [f"{', '.join(effects)} cannot be judged: {why}." for why, effects in reasons.items()]
+
+
+def nothing_named_sentence(diagnosis: Diagnosis) -> str:
+    """Because nothing beats its decoy, or because too little was recorded to tell."""
     blocks = max((len(e.base) for item in diagnosis.assessments for e in item.errors), default=0)
     if blocks < FEWEST_BLOCKS:
         needed = f"{blocks} pieces of 5 s, {FEWEST_BLOCKS} are needed"
@@ -110,6 +126,12 @@ def errors_deg(item: Assessment) -> tuple[float, float, float]:
     return before, after, decoy
 
 
+def _named_or_held(diagnosis: Diagnosis, first: Assessment | None) -> dict[str, Any] | None:
+    if first is not None:
+        return _named(diagnosis, first)
+    return None if diagnosis.hold_drift is None else hold_named(diagnosis.hold_drift)
+
+
 def _named(diagnosis: Diagnosis, item: Assessment) -> dict[str, Any]:
     before, after, decoy = errors_deg(item)
     return {
@@ -124,13 +146,14 @@ def _named(diagnosis: Diagnosis, item: Assessment) -> dict[str, Any]:
     }
 
 
-def _signature(findings: Sequence[Finding]) -> dict[str, Any]:
+def _signature(findings: Sequence[Finding], rivals: Sequence[str]) -> dict[str, Any]:
     first = findings[0]
+    rivals = rivals if first.effect in rivals else (first.effect,)
     return {
         "effect": first.effect,
         "where": sorted({name for item in findings for name in item.where}),
-        "verdict": "named",
-        "confidence_set": [first.effect],
+        "verdict": "named" if len(rivals) < 2 else "ambiguous",
+        "confidence_set": list(rivals),
         "parameters": dict(first.evidence),
         "saved_deg": None,
         "decoy_saved_deg": None,

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from glovecal_models.diagnosis.contradictions import contradictions
+from glovecal_models.diagnosis.pose_labels import are_pose_labels
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
@@ -19,7 +21,9 @@ FEWEST_ROWS = 30
 
 
 def reference_problems(takes: Sequence[Take], layout: Layout) -> tuple[str, ...]:
-    """Sentences; none when the reference looks right."""
+    """Sentences; none when the reference looks right, or names poses and measures no angle."""
+    if are_pose_labels(takes):
+        return ()
     problems: list[str] = []
     for rotation in layout.rotations:
         measured = [(take, take.reference_at_frames([rotation])[:, 0]) for take in takes]
@@ -31,6 +35,8 @@ def reference_problems(takes: Sequence[Take], layout: Layout) -> tuple[str, ...]
                 own.input_columns(_in_order(take, layout), layout.sensors)[:, 0] for take, _ in measured
             ]
             problems.extend(_of_rotation(rotation, measured, inputs, has_own))
+            if has_own:
+                problems.extend(contradictions(rotation, measured, inputs))
     spans = _largest_span(takes)
     if spans is not None and LEAST_RADIANS < spans <= LARGEST_RADIANS:
         problems.insert(

@@ -56,7 +56,7 @@ def signature_findings(
         return
     if are_held_levels(takes):
         faults = _found("sensor_fault", takes, sensor_of, None)
-        yield from (item for item in faults if item.kind == "jump")
+        yield from (_between_levels(item, takes, sensor_of) for item in faults if item.kind == "jump")
         return
     for name in BEFORE_ALL:
         yield from _found(name, takes, sensor_of, None)
@@ -74,9 +74,31 @@ def are_held_levels(takes: Sequence[Take]) -> bool:
 def jump_beside_curve(naming: Naming, takes: Sequence[Take], findings: Sequence[Finding]) -> Naming:
     """One pass over known angles cannot tell a curve from a sensor that moved half-way: both are named."""
     first = naming.ranked[0].effect if naming.ranked else None
-    if first != "nonlinearity" or not findings or not are_held_levels(takes):
+    if not findings or not are_held_levels(takes):
+        return naming
+    if first is None:
+        return replace(naming, confidence_set=("sensor_fault", "nonlinearity"))
+    if first != "nonlinearity":
         return naming
     return replace(naming, confidence_set=(*naming.confidence_set, "sensor_fault"))
+
+
+def _between_levels(item: Finding, takes: Sequence[Take], sensor_of: dict[str, str]) -> Finding:
+    """The jump, with the known angles it lies between, and what it cannot be told from."""
+    at = item.stretches[0]
+    take = next(take for take in takes if take.name == at.take)
+    rotation = next(name for name, sensor in sensor_of.items() if sensor in item.where)
+    angle = take.reference_at_frames([rotation])[:, 0]
+    row = int(np.searchsorted(take.time_s, at.start_s))
+    before = angle[:row][angle[:row] != angle[row]]
+    if not len(before):
+        return item
+    sentence = (
+        f"{item.where[0]} may jump between {before[-1]:g} and {angle[row]:g} degrees of {rotation}, by"
+        f" {item.size_deg or 0.0:.0f} degrees: one pass over known angles cannot tell that from a curved"
+        " sensor."
+    )
+    return replace(item, sentence=sentence)
 
 
 def _found(

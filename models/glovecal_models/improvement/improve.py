@@ -14,8 +14,16 @@ from glovecal_models.calibration.training_settings import Report, TrainingSettin
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.comparison.rotation_noise import rotation_noise
-from glovecal_models.diagnosis.diagnose import Diagnosis, diagnose
-from glovecal_models.diagnosis.diagnosis_document import errors_deg, named_sentence
+from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.diagnosis.diagnosis import Diagnosis
+from glovecal_models.diagnosis.diagnosis_document import (
+    errors_deg,
+    named_sentence,
+    not_judgeable_sentences,
+    nothing_named_sentence,
+)
+from glovecal_models.diagnosis.hold_drift_document import hold_sentence
+from glovecal_models.diagnosis.pose_labels import UNITS, are_pose_labels
 from glovecal_models.diagnosis.signatures import are_held_levels, own_sensors
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.effects.saturation import saturated_bands
@@ -31,8 +39,11 @@ from glovecal_models.improvement.clocks import clock_settings, coarse_clock_sett
 from glovecal_models.improvement.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.improvement.improvement import CLOCK, Improvement, Step, added_document
 from glovecal_models.improvement.known_effects import known_effects
+from glovecal_models.improvement.living_sensors import dead_sensors_sentence, without_dead_sensors
 from glovecal_models.improvement.prepared_takes import PreparedTakes
 from glovecal_models.improvement.remove_effect import remove_effect, unneeded
+from glovecal_models.improvement.take_warnings import only_take_sentence, take_warnings
+from glovecal_models.improvement.what_stays import repeats_sentence, what_stays
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
@@ -85,12 +96,18 @@ class _Walk:
         cancelled: Callable[[], bool] | None,
         report: Report | None,
     ) -> None:
-        self.takes, self.layout, self.subject, self.settings = list(takes), layout, subject, settings
+        self.takes, self.subject, self.settings = list(takes), subject, settings
+        self.layout, dead = without_dead_sensors(layout, takes)
         self.holdout, self.seed, self.hashes = holdout, seed, hashes
         self.cancelled, self.report = cancelled, report
         self.steps: list[Step] = []
         self.undone: list[Addition] = []
-        self.sentences: list[str] = []
+        alone = only_take_sentence(self.takes)
+        self.sentences = [
+            *take_warnings(self.takes),
+            *([dead_sensors_sentence(dead)] if dead else ()),
+            *([alone] if alone and not holdout else ()),
+        ]
         self.stopped = "nothing_named"
         self.diagnosis: Diagnosis | None = None
         self.floors: dict[str, NoiseFloor] = {}
@@ -154,18 +171,35 @@ class _Walk:
         last = next((s.added for s in reversed(self.steps) if s.added is not None), None)
         if self.stopped != "noise_floor" and last is not None and last["verdict"] == "ambiguous":
             self.stopped = "ambiguous"
+        if (
+            self.stopped == "nothing_named"
+            and self.diagnosis
+            and len(self.diagnosis.naming.confidence_set) > 1
+        ):
+            self.stopped = "ambiguous"
         if self.diagnosis is not None:
-            self.sentences += list(self.diagnosis.reference_problems)
+            self.sentences[:0] = self.diagnosis.reference_problems
+            held = self.diagnosis.hold_drift
+            if held is not None:
+                self.sentences += [hold_sentence(held), UNITS]
+                self.stopped = "ambiguous" if len(held.confidence_set) > 1 else "nothing_named"
             self.sentences += [item.sentence for item in self.diagnosis.findings]
-            self.sentences += [
-                f"{item.effect} cannot be judged: {item.why}." for item in self.diagnosis.not_judgeable
-            ]
+            if held is None and not self.diagnosis.findings and not self.diagnosis.naming.ranked:
+                self.sentences.append(nothing_named_sentence(self.diagnosis))
+            self.sentences += not_judgeable_sentences(self.diagnosis.not_judgeable)
             self.sentences.append(self.diagnosis.left.sentence)
+            if held is None:
+                self.sentences += self._what_stays()
         self._say("done", 1.0)
         return Improvement(
             tuple(self.steps), self.floors, self.stopped, self.diagnosis, tuple(self.undone),
             self._baselines(), tuple(self.sentences),
         )  # fmt: skip
+
+    def _what_stays(self) -> list[str]:
+        repeats = repeats_sentence(self.floors)
+        stays = what_stays(self.steps[-1].per_rotation, self.floors)
+        return [stays] if repeats is None else [repeats, stays]
 
     def _add(
         self, name: str, where: list[str] | None, clock: dict[str, Any] | None, diagnosis: Diagnosis | None
@@ -215,6 +249,8 @@ class _Walk:
         if self.clocks_scanned:
             return None
         self.clocks_scanned = True
+        if are_pose_labels(self.takes):
+            return None
         return coarse_clock_settings(self.takes)
 
     def _add_repairs(self) -> bool:
@@ -223,7 +259,7 @@ class _Walk:
         has = {item.name for item in wanted_of(model)} | {item.effect for item in self.undone}
         takes = repaired_takes(self.takes, wanted_of(model))
         sensor_of = own_sensors(self.layout, trained_rotations(model))
-        if not sensor_of or are_held_levels(takes):
+        if not sensor_of or are_held_levels(takes) or are_pose_labels(takes):
             return False
         for name in ("repeated_samples", "sensor_fault"):
             effect = catalogue()[name]
@@ -240,6 +276,8 @@ class _Walk:
         model = self.steps[-1].model
         sensor_of = own_sensors(self.layout, trained_rotations(model))
         if "saturation" in {item.name for item in wanted_of(model)} or not sensor_of:
+            return False
+        if are_pose_labels(self.takes):
             return False
         bands = saturated_bands(repaired_takes(self.takes, wanted_of(model)), sensor_of)
         if not bands:
@@ -286,6 +324,8 @@ class _Walk:
         return each, float(np.sqrt(np.nanmean(error**2)))
 
     def _is_at_floor(self) -> bool:
+        if self.diagnosis is not None and self.diagnosis.reference_problems:
+            return False  # errors against a wrong reference, and its floor, mean nothing
         last = self.steps[-1].per_rotation
         floors = [(last[name], floor) for name, floor in self.floors.items() if name in last]
         return bool(floors) and all(

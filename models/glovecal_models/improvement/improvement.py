@@ -8,7 +8,8 @@ from typing import Any
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.floor_estimate import NoiseFloor
-from glovecal_models.diagnosis.diagnose import Diagnosis
+from glovecal_models.diagnosis.diagnosis import Diagnosis
+from glovecal_models.diagnosis.hold_drift_document import hold_document
 from glovecal_models.diagnosis.next_take import NextTake
 from glovecal_models.improvement.add_effect import Addition
 
@@ -75,10 +76,15 @@ class Improvement:
             },
             "stopped": self.stopped,
             "undone": [item.to_document() for item in self.undone],
+            "hold_drift": self._hold_drift(),
             "something_left": bool(self.diagnosis and self.diagnosis.left.is_left),
             "next_take": following,
             "sentences": list(self.sentences),
         }
+
+    def _hold_drift(self) -> dict[str, Any] | None:
+        held = self.diagnosis.hold_drift if self.diagnosis else None
+        return None if held is None else hold_document(held)
 
 
 def added_document(

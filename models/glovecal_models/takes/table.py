@@ -163,7 +163,9 @@ def _require_increasing_time(table: RawTable) -> None:
 
 def _time_hint(equal: bool, take: str | None) -> str:
     if equal:
-        return " (frames stamped in batches? equal times can be spread)"
+        return (
+            " (frames stamped in batches? --spread-equal-times, over REST equal_times=spread, spreads them)"
+        )
     return " (several takes in one file need a column take)" if take is None else ""
 
 

@@ -84,9 +84,12 @@ def print_diagnosis(found: Mapping[str, Any]) -> None:
     out.print()
     rows = [{"rotation": name, **values} for name, values in rotations.items()]
     print_table(rows, ROTATIONS, empty="Nothing was measured.")
-    _print_named(found.get("named"))
+    if found.get("hold_drift"):
+        out.print(f"\n{found['hold_drift']['sentence']}")
+    else:
+        _print_named(found.get("named"))
     _print_candidates(found.get("candidates") or ())
-    why = [f"{item['effect']}: {item['why']}" for item in found.get("not_judgeable") or ()]
+    why = reasons(found.get("not_judgeable") or ())
     _say("Cannot be judged from these takes:", why)
     left, following = found.get("something_left") or {}, found.get("next_take")
     if left.get("sentence"):
@@ -96,6 +99,14 @@ def print_diagnosis(found: Mapping[str, Any]) -> None:
     if following:
         rivals = " and ".join(following.get("separates") or ())
         out.print(f"\nTo tell {rivals} apart record {following['seconds']} s: {following['what']}")
+
+
+def reasons(not_judgeable: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Effects and why they cannot be judged, those with the same reason together."""
+    by_why: dict[str, list[str]] = {}
+    for item in not_judgeable:
+        by_why.setdefault(item["why"], []).append(item["effect"])
+    return [f"{', '.join(effects)}: {why}" for why, effects in by_why.items()]
 
 
 def _print_named(named: Mapping[str, Any] | None) -> None:

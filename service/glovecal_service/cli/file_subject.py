@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from glovecal_client.errors import ServiceError
-from glovecal_service.cli.printing import err
 from glovecal_service.cli.refusal import Refusal, exit_code_of, sentence_of
 from glovecal_service.cli.two_tables import frames_among, reference_beside
 
@@ -27,9 +26,8 @@ class FileSubject:
     service: RestClient
     name: str
     layout: str | None
-    tell: bool = True
-    """Whether the files' warnings are printed."""
-    _told: set[str] = field(default_factory=set)
+    spread: bool = False
+    """Whether frames stamped in batches are spread up to the next batch."""
 
     @classmethod
     def of(
@@ -39,7 +37,7 @@ class FileSubject:
         *,
         subject: str | None,
         layout: str | None,
-        tell: bool = True,
+        spread: bool = False,
     ) -> FileSubject:
         """``subject``, else whoever has one of the files already, else a new one named after the first."""
         hashes = [_sha256(file) for file in files]
@@ -48,7 +46,7 @@ class FileSubject:
         subject = subject or next(iter(owners), PREFIX + hashes[0][:8])
         if subject not in {row["name"] for row in service.get("/subjects")}:
             service.post("/subjects", {"name": subject, "title": f"Takes of {files[0].name}"})
-        return cls(service, subject, layout, tell)
+        return cls(service, subject, layout, spread)
 
     def take_ids(self, files: Sequence[Path]) -> list[str]:
         """Ids of the takes in ``files``, imported unless they were. Raises Refusal that names the file."""
@@ -58,17 +56,17 @@ class FileSubject:
         self._require_layout(file)
         try:
             answer = self.service.upload_takes(
-                file, subject=self.name, layout=self.layout, reference=reference_beside(file)
+                file,
+                subject=self.name,
+                layout=self.layout,
+                reference=reference_beside(file),
+                **({"equal_times": "spread"} if self.spread else {}),
             )
         except ServiceError as error:
             if exit_code_of(error) != 1:
                 raise
             raise Refusal(f"{file}: {sentence_of(error)}") from error
         self.layout = answer["layout"]
-        for sentence in answer["warnings"]:
-            if self.tell and sentence not in self._told:
-                self._told.add(sentence)
-                err.print(f"{file}: {sentence}", style="yellow")
         return answer["takes"]
 
     def _require_layout(self, file: Path) -> None:

@@ -79,6 +79,10 @@ def improve(
     samples: Annotated[int, typer.Option(min=10, max=5000, help="Most samples for one rotation.")] = 2000,
     max_steps: Annotated[int, typer.Option(min=0, max=20, help="Effects to add at most.")] = 6,
     seed: Annotated[int, typer.Option(min=0, help="Of what is chosen at random.")] = 0,
+    spread_equal_times: Annotated[
+        bool,
+        typer.Option("--spread-equal-times", help="Frames stamped in batches: spread each up to the next."),
+    ] = False,
     activate: Annotated[bool, typer.Option("--activate", help="Predict live with the last model.")] = False,
     report: Report = None,
     overwrite: Overwrite = False,
@@ -93,7 +97,9 @@ def improve(
     if report is not None:
         require_place(report, overwrite=overwrite)
     with connect() as service:
-        chosen = _chosen(service, takes or [], holdout or [], take or [], subject, layout, tell=not as_json)
+        chosen = _chosen(
+            service, takes or [], holdout or [], take or [], subject, layout, spread=spread_equal_times
+        )
         options = {"method": method, "samples": samples, "max_steps": max_steps, "seed": seed}
         job = service.post("/improve", {**chosen, **options, "activate": activate})["id"]
         result = wait_for_job(service, job, quiet=as_json)["result"]
@@ -114,7 +120,7 @@ def _chosen(
     subject: str | None,
     layout: str | None,
     *,
-    tell: bool,
+    spread: bool,
 ) -> dict[str, Any]:
     """The takes to learn from and to hold out, imported where they are files."""
     layout = layout_named(service, layout)
@@ -127,7 +133,7 @@ def _chosen(
         service.get(f"/subjects/{subject}")
     learned, held = [], []
     if every:
-        of_files = FileSubject.of(service, every, subject=subject, layout=layout, tell=tell)
+        of_files = FileSubject.of(service, every, subject=subject, layout=layout, spread=spread)
         subject = of_files.name
         learned, held = of_files.take_ids(files), of_files.take_ids(held_files)
         layout = of_files.layout
@@ -144,11 +150,17 @@ def _chosen(
     if not learned:
         raise Refusal(
             f"subject {subject} has no take with reference angles to learn from; import some with glovecal "
-            "take import, or name files with --takes"
+            f"take import, or name files with --takes{_poses_instead(rows, subject)}"
         )
     if len(layouts) > 1:
         raise Refusal(f"the takes have layouts {', '.join(layouts)}; choose one with --layout")
     return {"subject": subject, "layout": layout or layouts[0], "takes": learned, "holdout": held or None}
+
+
+def _poses_instead(rows: Sequence[Mapping[str, Any]], subject: str | None) -> str:
+    if not rows:
+        return ""
+    return f"; glovecal take holds --subject {subject} shows what readings do in held poses"
 
 
 def _print(subject: str, method: str, result: Mapping[str, Any], *, active: bool) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from glovecal_client.errors import ServiceError
-from glovecal_service.cli import take_clocks, take_import
+from glovecal_service.cli import take_clocks, take_holds, take_import
 from glovecal_service.cli.connection import connect
 from glovecal_service.cli.options import AsJson, OnlyLayout, OnlySubject, Take
 from glovecal_service.cli.printing import err, moment, out, print_facts, print_json, print_table
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 app = typer.Typer(help="Takes: recordings with or without reference angles.", no_args_is_help=True)
 app.command("import")(take_import.import_takes)
 app.command("clocks")(take_clocks.clocks)
+app.command("holds")(take_holds.holds)
 
 CONFLICT = 409
 """The service's answer when a take is two tables."""

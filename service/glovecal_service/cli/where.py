@@ -21,6 +21,7 @@ FLOORS = {
     "repeated poses": "repeated poses",
     "spectrum": "> spectrum",
     "frame to frame": "> frame to frame",
+    "near readings": "near readings",
     "slow": "slow",
 }
 FLOORS_LEGEND = (

@@ -11,6 +11,7 @@ from glovecal_service.report.diagnosis_pictures import (
     heat_of_candidates,
     saved_beside_decoys,
 )
+from glovecal_service.report.hold_table import hold_table
 from glovecal_service.report.html import figure, listed, table, whole_page
 from glovecal_service.report.sentences import counted
 
@@ -31,6 +32,9 @@ def diagnosis_page(found: Mapping[str, Any]) -> str:
     named, rotations = found.get("named"), found.get("rotations") or {}
     candidates = found.get("candidates") or []
     headline = named["sentence"] if named else "No known effect saves more than its decoy and chance do."
+    held = found.get("hold_drift")
+    if held:
+        headline = held["sentence"]
     parts = [
         f"<h1>What model {escape(model[:12])} lacks, by {counted(len(takes), 'take')}</h1>",
         f"<p>Takes: {escape(names)}.</p>" if names else "",
@@ -45,7 +49,9 @@ def diagnosis_page(found: Mapping[str, Any]) -> str:
         heat = heat_of_candidates(candidates)
         parts += [figure(*heat)] if heat is not None else []
         parts += [_table(candidates), f"<p>{escape(SCALE)}</p>"]
-    if rotations:
+    if held and held["poses"]:
+        parts += ["<h2>What readings do while a pose is held</h2>", hold_table(held)]
+    if rotations and not held:
         parts += ["<h2>How far off each rotation is</h2>", figure(*errors_beside_floors(rotations))]
     why = [f"{item['effect']}: {item['why']}" for item in found.get("not_judgeable") or ()]
     if why:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from glovecal_service.report.error_fall import Fall, FloorBand, error_fall
+from glovecal_service.report.hold_table import hold_table
 from glovecal_service.report.html import figure, listed, table, whole_page
 
 STOPPED = {
@@ -39,6 +40,9 @@ def improvement_page(found: Mapping[str, Any], method: str, subject: str) -> str
         rivals = " and ".join(following.get("separates") or ())
         text = f"To tell {rivals} apart record {following['seconds']} s: {following['what']}"
         parts.append(f'<p class="note">{escape(text)}</p>')
+    held = found.get("hold_drift")
+    if held and held["poses"]:
+        parts += ["<h2>What readings do while a pose is held</h2>", hold_table(held)]
     if found.get("sentences"):
         parts += ["<h2>What was found on the way</h2>", listed(found["sentences"])]
     return whole_page(f"improvement of {subject}", parts)

@@ -46,7 +46,8 @@ class Floor(BaseModel):
     high_deg: float | None
     prediction_deg: float | None = Field(description="What of it is the prediction's own jitter.")
     how: str = Field(
-        description="still hand, still joint, repeated poses, spectrum or frame to frame; the best first."
+        description="still hand, still joint, repeated poses, spectrum, frame to frame or near readings; the "
+        "best first."
     )
     pieces: int = Field(description="Holds, repeats or blocks of time that it was pooled from.")
     is_lower_bound: bool = Field(description="Noise with a memory is not in it.")

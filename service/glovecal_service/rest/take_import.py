@@ -109,6 +109,8 @@ def _layout_of_columns(store: Store, takes: list[Take]) -> Layout:
     """
     sensors = takes[0].sensors
     rotations = list(dict.fromkeys(name for take in takes for name in take.rotations))
+    if not rotations and any(take.poses is not None for take in takes):
+        rotations = list(sensors)
     for record in store.layouts.list():
         if record.built_in or record.name.startswith(MADE_OF_COLUMNS):
             layout = Layout.from_document(record.document)
@@ -116,8 +118,9 @@ def _layout_of_columns(store: Store, takes: list[Take]) -> Layout:
                 return layout
     if not rotations:
         raise BadInput(
-            f"the file has no r.ROTATION columns and no known layout has the sensors {', '.join(sensors)}: "
-            "name a layout, so that its rotations are known"
+            "the file has no r.ROTATION columns (reference angles in degrees, which a model is learned from) "
+            f"and no known layout has the sensors {', '.join(sensors)}: name a layout to import it all the "
+            "same"
         )
     digest = hashlib.sha256(" ".join([*sensors, "", *rotations]).encode()).hexdigest()
     layout = Layout.from_columns(MADE_OF_COLUMNS + digest[:8], sensors, rotations)

@@ -1,0 +1,77 @@
+"""The ground that all candidates are judged on: evened takes, joints, base and the effects known already."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from glovecal_models.diagnosis.delays import SMOOTHING
+from glovecal_models.diagnosis.directions import Direction, forward
+from glovecal_models.diagnosis.evened import EvenTake, evened, shifted, smoothed
+from glovecal_models.diagnosis.known_effect import KnownEffect
+from glovecal_models.diagnosis.naming import Naming
+from glovecal_models.effects.catalogue import effect
+from glovecal_models.errors import BadInput
+from glovecal_models.layout import Layout
+from glovecal_models.takes.take import Take
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Everything a direction is made of but the smoothing."""
+
+    even: tuple[EvenTake, ...]
+    layout: Layout
+    joints: tuple[str, ...]
+    linear: bool
+    known: tuple[KnownEffect, ...]
+
+    @classmethod
+    def of(cls, takes: Sequence[Take], layout: Layout, linear: bool, known: Sequence[KnownEffect]) -> Ground:
+        """Raises BadInput when no take measured a joint of the layout."""
+        joints = measured_joints(takes, layout)
+        if not joints:
+            raise BadInput("no take measured a rotation of this layout; a diagnosis needs r.ROTATION columns")
+        even = tuple(evened(take, layout.sensors, joints) for take in takes)
+        return cls(even, layout, joints, linear, tuple(known))
+
+    @property
+    def is_sparse(self) -> bool:
+        """Whether the frames are single poses."""
+        return all(take.is_sparse for take in self.even)
+
+    def direction(self, smoothing: int = SMOOTHING) -> Direction:
+        """Readings from angles, on signals smoothed over so many rows."""
+        even = [smoothed(take, smoothing) for take in self.even]
+        return forward(even, self.layout, self.joints, linear=self.linear, known=self.known)
+
+    def beside(self, *effects: KnownEffect) -> Ground:
+        """The same with further effects in the base."""
+        return replace(self, known=(*self.known, *effects))
+
+    def with_first(self, naming: Naming) -> Ground:
+        """The same with the first of the ranking in the base: what is left after it."""
+        if not naming.ranked:
+            return self
+        first = naming.ranked[0]
+        if first.effect == "clock_offset":
+            delay = np.broadcast_to(first.shapes[0], (len(self.even),))
+            moved = [shifted(take, float(by)) for take, by in zip(self.even, delay, strict=True)]
+            return replace(self, even=tuple(moved))
+        where = tuple(first.joints[i] for i in first.touched)
+        shapes = tuple(first.shapes[i] for i in first.touched)
+        return self.beside(KnownEffect(effect(first.effect), where, shapes))
+
+
+def measured_joints(takes: Sequence[Take], layout: Layout) -> tuple[str, ...]:
+    """Rotations of the layout that some take measured, and that move."""
+    return tuple(
+        name
+        for name in layout.rotations
+        if any(
+            name in take.rotations and np.isfinite(take.reference[:, take.rotations.index(name)]).sum() > 1
+            for take in takes
+        )
+    )
