@@ -13,6 +13,7 @@ from glovecal_service.jobs.finished_tasks import FinishedTasks
 from glovecal_service.jobs.job_kind import JobKind
 from glovecal_service.jobs.job_run import JobRun
 from glovecal_service.jobs.owner import Owner
+from glovecal_service.jobs.registry import KINDS
 from glovecal_service.jobs.workers import Workers
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
@@ -27,8 +28,7 @@ JOBS_AT_ONCE = 2
 class Dispatcher:
     """``start()`` once, ``stop()`` once; both return soon. Also a context manager."""
 
-    def __init__(self, store: Store, settings: Settings, kinds: Mapping[str, JobKind] | None = None) -> None:
-        """``kinds``: by default all of ``registry.py``, whose mathematics is imported with the first job."""
+    def __init__(self, store: Store, settings: Settings, kinds: Mapping[str, JobKind] = KINDS) -> None:
         self.workers = Workers(settings)
         self._store = store
         self._folder = settings.fits_folder
@@ -89,10 +89,9 @@ class Dispatcher:
                 self._stopping.wait(1.0)
 
     def _begin(self, job: JobRecord) -> None:
-        kinds = self._kinds or _all_kinds()
-        kind = kinds.get(job.kind)
+        kind = self._kinds.get(job.kind)
         if kind is None:
-            known = ", ".join(sorted(kinds))
+            known = ", ".join(sorted(self._kinds))
             self._store.jobs.fail(job.id, job.attempt, f"no job of kind {job.kind!r}; there are {known}")
             return
         run = JobRun(self._store, job, kind, self.workers, self._folder)
@@ -103,9 +102,3 @@ class Dispatcher:
     def _name(self) -> str:
         assert self._owner is not None
         return self._owner.name
-
-
-def _all_kinds() -> Mapping[str, JobKind]:
-    from glovecal_service.jobs.registry import KINDS
-
-    return KINDS
