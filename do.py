@@ -40,6 +40,7 @@ def run(*command: str, groups: tuple[str, ...] = (), dev: bool = False) -> int:
         options += ["--group", group]
     quiet = ["--quiet"] if (ROOT / ".venv").is_dir() else []
     environment = {**os.environ, **ONE_THREAD, "UV_PYTHON_PREFERENCE": "only-system"}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # every process would compile all packages anew
     return subprocess.run([*uv(), *quiet, *options, *command], cwd=ROOT, env=environment).returncode
 
 
