@@ -12,6 +12,7 @@ import asyncio
 import logging
 import os
 import sys
+import tempfile
 import threading
 import time
 from concurrent.futures import CancelledError
@@ -41,6 +42,8 @@ _CONFIG = {
     "distributed.worker.http.routes": [],
 }
 _FORKED = {"distributed.worker.multiprocessing-method": "forkserver"}
+_LONGEST_FOLDER = 75
+"""Bytes: the name of a socket in the folder for temporary files has to fit into 107."""
 _IMPORTED_ONCE = ["distributed", "distributed.nanny", "glovecal_service.jobs.registry"]
 
 
@@ -138,7 +141,7 @@ class Workers:
         with self._lock:
             if self._client is None:
                 configure(_CONFIG)
-                if sys.platform == "linux":
+                if sys.platform == "linux" and len(os.fsencode(tempfile.gettempdir())) <= _LONGEST_FOLDER:
                     _import_once()
                 try:
                     address = self._settings.scheduler or self._local_cluster()
