@@ -57,7 +57,9 @@ def glovecal(arguments: list[str]) -> int:
 
 
 def test(arguments: list[str]) -> int:
-    return run("pytest", *arguments, dev=True)
+    """Two files at a time: many tests wait for a glove, a cable or a process."""
+    two = ("-n", "2", "--dist", "loadfile", "--no-loadscope-reorder")
+    return run("pytest", *two, *arguments, dev=True)
 
 
 def check(arguments: list[str]) -> int:
