@@ -40,6 +40,7 @@ def run(*command: str, groups: tuple[str, ...] = (), dev: bool = False) -> int:
         options += ["--group", group]
     quiet = ["--quiet"] if (ROOT / ".venv").is_dir() else []
     environment = {**os.environ, **ONE_THREAD, "UV_PYTHON_PREFERENCE": "only-system"}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # every process would compile all packages anew
     return subprocess.run([*uv(), *quiet, *options, *command], cwd=ROOT, env=environment).returncode
 
 
@@ -56,7 +57,9 @@ def glovecal(arguments: list[str]) -> int:
 
 
 def test(arguments: list[str]) -> int:
-    return run("pytest", *arguments, dev=True)
+    """Two files at a time: many tests wait for a glove, a cable or a process."""
+    two = ("-n", "2", "--dist", "loadfile", "--no-loadscope-reorder")
+    return run("pytest", *two, *arguments, dev=True)
 
 
 def check(arguments: list[str]) -> int:

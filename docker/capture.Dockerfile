@@ -9,7 +9,7 @@ COPY pyproject.toml uv.lock ./
 COPY models/pyproject.toml models/
 COPY service/pyproject.toml service/
 COPY client client
-ENV UV_PROJECT_ENVIRONMENT=/opt/glovecal UV_LINK_MODE=copy
+ENV UV_PROJECT_ENVIRONMENT=/opt/glovecal UV_LINK_MODE=copy UV_COMPILE_BYTECODE=1
 RUN uv sync --frozen --no-default-groups --no-editable --package glovecal-client --extra capture
 
 FROM python:3.11-slim-bookworm

@@ -7,7 +7,7 @@ COPY pyproject.toml uv.lock ./
 COPY models models
 COPY client client
 COPY service service
-ENV UV_PROJECT_ENVIRONMENT=/opt/glovecal UV_LINK_MODE=copy
+ENV UV_PROJECT_ENVIRONMENT=/opt/glovecal UV_LINK_MODE=copy UV_COMPILE_BYTECODE=1
 RUN uv sync --frozen --no-default-groups --no-editable --package glovecal-service --extra postgres
 
 FROM python:3.11-slim-bookworm

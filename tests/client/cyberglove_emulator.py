@@ -76,7 +76,7 @@ class CyberGloveEmulator:
     def __exit__(self, *_: object) -> None:
         self._running = False
         self._wake()
-        self._thread.join(timeout=10)
+        self._thread.join(timeout=120)
         self.unplug()
         os.close(self._wake_read)
         os.close(self._wake_write)

@@ -17,7 +17,7 @@ def free_endpoint() -> str:
         return f"tcp/127.0.0.1:{listener.getsockname()[1]}"
 
 
-def eventually(condition: Callable[[], Value | None], what: str, deadline_s: float = 20.0) -> Value:
+def eventually(condition: Callable[[], Value | None], what: str, deadline_s: float = 120.0) -> Value:
     """The first true value of ``condition``; fails with ``what`` after the deadline."""
     end = time.monotonic() + deadline_s
     while not (value := condition()):

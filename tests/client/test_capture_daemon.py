@@ -60,13 +60,13 @@ class RunningCapture:
 
     def finish(self) -> CaptureSummary:
         self._stop.set()
-        self._thread.join(20)
+        self._thread.join(120)
         assert self.error is None, self.error
         assert self.summary is not None
         return self.summary
 
     def fail(self) -> BaseException:
-        self._thread.join(20)
+        self._thread.join(120)
         assert self.error is not None
         return self.error
 
@@ -80,7 +80,7 @@ def capturing(
         yield running
     finally:
         running._stop.set()
-        running._thread.join(20)
+        running._thread.join(120)
 
 
 class Wire:

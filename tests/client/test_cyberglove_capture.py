@@ -47,7 +47,7 @@ def test_a_cyberglove_is_captured_and_comes_back_after_its_cable_was_pulled(emul
             eventually(lambda: len(frames) > before + 50, "frames came again")
         finally:
             stop.set()
-            daemon.join(20)
+            daemon.join(120)
         subscriber.undeclare()
     summary = outcome[0]
     sent = {tuple(in_layout_order(record, 22)) for record in emulator.box.records}

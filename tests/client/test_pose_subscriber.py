@@ -167,7 +167,7 @@ def test_slow_and_failing_callback_gets_the_newest_pose_and_blocks_nobody(
     def on_pose(item: Pose) -> None:
         seen.append(item.sequence)
         entered.set()
-        assert go_on.wait(20)
+        assert go_on.wait(120)
         if item.sequence == 0:
             raise RuntimeError("the tool's own mistake")
 
@@ -210,7 +210,7 @@ def test_closing_ends_the_iteration(service: Service, client: zenoh.Session) -> 
     reader.start()
     eventually(lambda: service.put(pose(0)) or poses.counts.received, "a pose")
     poses.close()
-    reader.join(20)
+    reader.join(120)
     assert not reader.is_alive()
     assert set(seen) <= {0}
     poses.close()

@@ -50,7 +50,7 @@ def free_endpoint() -> str:
         return f"tcp/127.0.0.1:{listener.getsockname()[1]}"
 
 
-def eventually(condition: Callable[[], Value | None], what: str, deadline_s: float = 30.0) -> Value:
+def eventually(condition: Callable[[], Value | None], what: str, deadline_s: float = 120.0) -> Value:
     """The first true value of ``condition``; fails with ``what`` after the deadline."""
     end = time.monotonic() + deadline_s
     while not (value := condition()):
@@ -66,11 +66,11 @@ def part_of_service(work: Work, settings: Settings) -> Iterator[SpawnProcess]:
     process = _SPAWN.Process(target=run_part, args=(work, settings, ready, os.getpid()))
     process.start()
     try:
-        assert ready.wait(60), "the process did not get ready"
+        assert ready.wait(120), "the process did not get ready"
         yield process
     finally:
         process.terminate()
-        process.join(15)
+        process.join(60)
         if process.is_alive():
             process.kill()
             process.join()

@@ -54,7 +54,7 @@ def test_the_scheduler_listens_on_this_computer_only_and_shows_nothing(dispatche
     for port in {sock.getsockname() for sock in http._sockets.values()}:
         assert port[0] == "127.0.0.1"
         with pytest.raises(urllib.error.HTTPError, match="404"):
-            urllib.request.urlopen(f"http://127.0.0.1:{port[1]}/info/main/workers.html", timeout=5)
+            urllib.request.urlopen(f"http://127.0.0.1:{port[1]}/info/main/workers.html", timeout=60)
 
 
 def test_what_was_computed_once_is_not_computed_again(dispatched, ledger):
@@ -170,6 +170,7 @@ def test_a_result_that_went_with_its_process_is_not_waited_for_for_ever(
     wait_for(lambda: not cluster.scheduler.workers)
     with pytest.raises(workers.WorkersLost):
         workers.outcome(future, task)
+    dispatcher.workers.reset()  # or the next job would wait for LONGEST_ABSENCE_S
 
 
 def test_another_job_may_replace_the_processes_between_announcement_and_fetching(

@@ -7,12 +7,13 @@ from contextlib import closing
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
 from sqlalchemy import text
 
 from glovecal_service.settings import Settings
-from glovecal_service.store import Store, schema
+from glovecal_service.store import Store, migrate, schema
 from glovecal_service.store.database import Database
-from glovecal_service.store.schema import NewerSchema
+from glovecal_service.store.migrate import NewerSchema
 from glovecal_service.store.tables import metadata
 
 SECOND = """
@@ -34,7 +35,7 @@ def upgrade() -> None:
 @pytest.fixture
 def second_schema(tmp_path, monkeypatch):
     """Adds a later migration to the ones there are; called with its last line."""
-    original = schema._config
+    original = migrate._config
 
     def write(last: str) -> None:
         folder = tmp_path / "later"
@@ -43,7 +44,8 @@ def second_schema(tmp_path, monkeypatch):
         config = original()
         own = f"{config.get_main_option('script_location')}/versions"
         config.set_main_option("version_locations", f"{own}:{folder}")
-        monkeypatch.setattr(schema, "_config", lambda: config)
+        monkeypatch.setattr(migrate, "_config", lambda: config)
+        monkeypatch.setattr(schema, "newest_revision", lambda: "0002")
 
     return write
 
@@ -52,6 +54,11 @@ def test_migrations_build_exactly_the_tables_of_the_code(store):
     with store.database.read() as connection:
         context = MigrationContext.configure(connection, opts={"compare_type": True})
         assert compare_metadata(context, metadata) == []
+
+
+def test_the_newest_revision_is_that_of_alembic():
+    scripts = ScriptDirectory.from_config(migrate._config())
+    assert schema.newest_revision() == scripts.get_current_head()
 
 
 def test_opening_again_changes_nothing(store_settings):
@@ -79,11 +86,9 @@ def test_an_upgrade_keeps_the_rows_and_a_backup(store_settings, second_schema):
 def test_an_upgrade_that_fails_leaves_everything_as_it_was(store_settings, second_schema, monkeypatch):
     with Store.open(store_settings) as store:
         store.subjects.create("anna")
-    before = schema._config
     second_schema('raise ArithmeticError("half-way")')
     with pytest.raises(ArithmeticError, match="half-way"):
         Store.open(store_settings)
-    monkeypatch.setattr(schema, "_config", before)
     monkeypatch.undo()
     with Store.open(store_settings) as store, store.database.read() as connection:
         assert [record.name for record in store.subjects.list()] == ["anna"]

@@ -7,19 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from effect_models import (
-    CREEP,
-    HYSTERESIS,
-    LAG,
-    UNITS,
-    LoopByHand,
-    added,
-    as_take,
-    assert_published,
-    degrees,
-    model_with,
-    moving_frames,
-)
+from effect_models import HYSTERESIS, LAG, MODEL, UNITS, added, model_with
+from loop_by_hand import LoopByHand, as_take, assert_published, degrees, moving_frames
 from realtime_support import LAYOUT
 
 from glovecal_client.wire.frame import encode_frame
@@ -31,7 +20,6 @@ from glovecal_service.realtime.recording_take import read_take
 from glovecal_service.realtime.served_model import ServedModel
 from glovecal_service.realtime.worn_gloves import WornGlove
 
-MODEL = model_with(HYSTERESIS, CREEP, LAG)
 SETTLING_S = 2.5
 
 
@@ -42,10 +30,9 @@ def test_a_stream_gives_what_the_recorded_take_gives() -> None:
         for frame in frames
     ]
     base = GlovePredictor(MODEL).predict(np.array([frame.readings for frame in frames]))
-    by_hand = LoopByHand()
-    by_hand.serve("g1", MODEL)
+    by_hand = LoopByHand.serving(MODEL)
     by_hand.say("g1")
-    by_hand.send([("g1", frame) for frame in frames + late], together=7)
+    by_hand.stream(frames + late, together=7)
     expected = as_take(MODEL, frames + late)
     assert_published(by_hand.poses["g1"], expected)
     assert np.abs(expected[:400] - base.mean).max() > 1.0
@@ -63,8 +50,7 @@ def test_before_it_is_rounded_for_the_wire_it_agrees_to_1e_9() -> None:
 
 
 def test_two_gloves_on_one_model_have_states_of_their_own() -> None:
-    by_hand = LoopByHand()
-    by_hand.serve("g1", MODEL)
+    by_hand = LoopByHand.serving(MODEL)
     by_hand.models.put("g2", by_hand.models.of("g1"))
     one, two = moving_frames(200, seed=1), moving_frames(200, seed=2, run_id=2)
     by_hand.send([item for pair in zip(one, two, strict=True) for item in (("g1", pair[0]), ("g2", pair[1]))])
@@ -75,18 +61,16 @@ def test_two_gloves_on_one_model_have_states_of_their_own() -> None:
 def test_a_restarted_service_begins_anew() -> None:
     frames = moving_frames(120)
     for part in (frames[:70], frames[70:]):
-        by_hand = LoopByHand()
-        by_hand.serve("g1", MODEL)
-        by_hand.send([("g1", frame) for frame in part])
+        by_hand = LoopByHand.serving(MODEL)
+        by_hand.stream(part)
         assert_published(by_hand.poses["g1"], as_take(MODEL, part))
         assert [pose.sequence for pose in by_hand.poses["g1"] if pose.state_reset] == [part[0].sequence]
 
 
 def test_skipped_frames_are_a_hole_in_the_take() -> None:
     frames = [frame for frame in moving_frames(300) if frame.sequence % 7 < 4]
-    by_hand = LoopByHand()
-    by_hand.serve("g1", MODEL)
-    by_hand.send([("g1", frame) for frame in frames])
+    by_hand = LoopByHand.serving(MODEL)
+    by_hand.stream(frames)
     assert_published(by_hand.poses["g1"], as_take(MODEL, frames))
 
 
@@ -96,9 +80,8 @@ def test_a_pose_says_when_its_effects_begin_anew_and_when_they_have_settled() ->
         replace(frame, sequence=600 + frame.sequence, monotonic_ns=frame.monotonic_ns + 10**10)
         for frame in frames[:20]
     ]
-    by_hand = LoopByHand()
-    by_hand.serve("g1", MODEL)
-    by_hand.send([("g1", frame) for frame in frames + gap])
+    by_hand = LoopByHand.serving(MODEL)
+    by_hand.stream(frames + gap)
     poses = by_hand.poses["g1"]
     assert [pose.sequence for pose in poses if pose.state_reset] == [0, 600]
     start_ns = frames[0].monotonic_ns
@@ -109,24 +92,22 @@ def test_a_pose_says_when_its_effects_begin_anew_and_when_they_have_settled() ->
 
 def test_a_model_without_memory_never_settles() -> None:
     shift = added("donning_shift", (), (3.0, 0.0), settings={"wearings": ["w"], **UNITS})
-    by_hand = LoopByHand()
-    by_hand.serve("g1", model_with(shift))
+    by_hand = LoopByHand.serving(model_with(shift))
     by_hand.say("g1")
-    by_hand.send([("g1", frame) for frame in moving_frames(20)])
+    by_hand.stream(moving_frames(20))
     assert not any(pose.settling or pose.state_reset for pose in by_hand.poses["g1"])
 
 
 def test_a_new_run_and_another_model_begin_anew() -> None:
     first, second = moving_frames(150), moving_frames(150, run_id=2, start_s=1001.0)
-    by_hand = LoopByHand()
-    by_hand.serve("g1", MODEL)
-    by_hand.send([("g1", frame) for frame in first])
+    by_hand = LoopByHand.serving(MODEL)
+    by_hand.stream(first)
     time.sleep(1.1 * TAKEOVER_AFTER_NS / 1e9)
     by_hand.poses.clear()
-    by_hand.send([("g1", frame) for frame in second[:80]])
+    by_hand.stream(second[:80])
     by_hand.serve("g1", model_with(LAG, HYSTERESIS), number=2)
-    by_hand.send([("g1", frame) for frame in second[80:]])
-    poses = [pose for pose in by_hand.poses["g1"] if not pose.stale]
+    by_hand.stream(second[80:])
+    poses = by_hand.poses["g1"]
     assert_published(poses[:80], as_take(MODEL, second[:80]))
     assert_published(poses[80:], as_take(model_with(LAG, HYSTERESIS), second[80:]))
     assert [pose.sequence for pose in poses if pose.state_reset] == [0, 80]
@@ -134,13 +115,12 @@ def test_a_new_run_and_another_model_begin_anew() -> None:
 
 def test_a_new_wearing_begins_anew_but_the_name_may_come_late() -> None:
     frames = moving_frames(90)
-    by_hand = LoopByHand()
-    by_hand.serve("g1", MODEL)
-    by_hand.send([("g1", frame) for frame in frames[:30]])
+    by_hand = LoopByHand.serving(MODEL)
+    by_hand.stream(frames[:30])
     by_hand.say("g1", wearing="monday")
-    by_hand.send([("g1", frame) for frame in frames[30:60]])
+    by_hand.stream(frames[30:60])
     by_hand.say("g1", wearing="tuesday")
-    by_hand.send([("g1", frame) for frame in frames[60:]])
+    by_hand.stream(frames[60:])
     assert [pose.sequence for pose in by_hand.poses["g1"] if pose.state_reset] == [0, 60]
     assert_published(by_hand.poses["g1"][60:], as_take(MODEL, frames[60:]))
 
@@ -148,15 +128,14 @@ def test_a_new_wearing_begins_anew_but_the_name_may_come_late() -> None:
 def test_the_wearing_of_an_earlier_run_is_not_that_of_a_new_one() -> None:
     shift = added("donning_shift", (), (3.0, 0.0), settings={"wearings": ["monday"], **UNITS})
     model, frames = model_with(shift), moving_frames(4, run_id=7)
-    by_hand = LoopByHand()
-    by_hand.serve("g1", model)
+    by_hand = LoopByHand.serving(model)
     by_hand.say("g1", run_id=6, wearing="monday")
-    by_hand.send([("g1", frame) for frame in frames[:2]])
+    by_hand.stream(frames[:2])
     assert by_hand.status("g1")["effects"]["sentences"] == [
         "nobody said which wearing this is: donning_shift is not corrected"
     ]
     by_hand.say("g1", run_id=7, wearing="monday")
-    by_hand.send([("g1", frame) for frame in frames[2:]])
+    by_hand.stream(frames[2:])
     assert by_hand.status("g1")["effects"]["sentences"] == []
     base = as_take(model, frames, "?")
     np.testing.assert_allclose(
@@ -169,8 +148,7 @@ def test_context_goes_with_the_frame_and_what_is_not_sent_is_said() -> None:
         "warmup_drift", (100.0,), (10.0, 0.0), settings={"low": 0.0, "high": 900.0, "usual": 900.0, **UNITS}
     )
     model, frames = model_with(warm), moving_frames(3)
-    by_hand = LoopByHand()
-    by_hand.serve("g1", model)
+    by_hand = LoopByHand.serving(model)
     by_hand.say("g1", context=("supply_v",))
     by_hand.send([("g1", replace(frames[0], context=np.array([4.9], np.float32)))])
     assert by_hand.status("g1")["effects"]["sentences"] == [
@@ -196,9 +174,8 @@ def test_a_recording_read_back_gives_what_was_live(tmp_path: Path) -> None:
         file.add(frame, encode_frame(frame))
     file.close()
     take = read_take(tmp_path / "r.glog", name="r", wearing="w").take
-    by_hand = LoopByHand()
-    by_hand.serve("g1", MODEL)
+    by_hand = LoopByHand.serving(MODEL)
     by_hand.say("g1")
-    by_hand.send([("g1", frame) for frame in frames])
+    by_hand.stream(frames)
     replayed = GlovePredictor(MODEL).predict_take(take.time_s, take.readings, take.context, take.wearing)
     assert_published(by_hand.poses["g1"], replayed.mean)

@@ -6,19 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from effect_models import (
-    CREEP,
-    HYSTERESIS,
-    LAG,
-    UNITS,
-    LoopByHand,
-    added,
-    as_take,
-    assert_published,
-    degrees,
-    model_with,
-    moving_frames,
-)
+from effect_models import HYSTERESIS, MODEL, UNITS, added, model_with
+from loop_by_hand import LoopByHand, as_take, assert_published, degrees, moving_frames
 
 from glovecal_client.wire.pose import RotationFlag
 from glovecal_models.calibration.predictor import GlovePredictor
@@ -26,17 +15,14 @@ from glovecal_models.effects.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
 from glovecal_service.realtime.served_model import ServedModel
 
-MODEL = model_with(HYSTERESIS, CREEP, LAG)
-
 
 @pytest.mark.parametrize("columns", ["1e300 * exp(t * 100)", "400 + 0 * own"])
 def test_an_absurd_correction_leaves_the_base_flagged_and_counted(columns: str) -> None:
     document = ExpressionEffect.parse(f"name = wild; columns = {columns}").declaration.to_document()
     wild = added("wild", (), (1.0,), ("I_PIP",), settings={"declaration": document, "context": {}, **UNITS})
     model, frames = model_with(HYSTERESIS, wild), moving_frames(50)
-    by_hand = LoopByHand()
-    by_hand.serve("g1", model)
-    by_hand.send([("g1", frame) for frame in frames])
+    by_hand = LoopByHand.serving(model)
+    by_hand.stream(frames)
     base = GlovePredictor(model).predict(np.array([frame.readings for frame in frames])).mean
     poses = by_hand.poses["g1"]
     np.testing.assert_allclose(degrees(poses)[:, 1], base[:, 1], rtol=1e-6)
@@ -47,8 +33,7 @@ def test_an_absurd_correction_leaves_the_base_flagged_and_counted(columns: str) 
 
 
 def test_an_effect_that_raises_does_not_stop_the_poses(monkeypatch: pytest.MonkeyPatch) -> None:
-    by_hand = LoopByHand()
-    by_hand.serve("g1", MODEL)
+    by_hand = LoopByHand.serving(MODEL)
     served = by_hand.models.of("g1")
     assert served is not None
     stream = served.predictor.stream()
@@ -59,13 +44,13 @@ def test_an_effect_that_raises_does_not_stop_the_poses(monkeypatch: pytest.Monke
     monkeypatch.setattr(stream, "of_frame", broken)
     monkeypatch.setattr(served.predictor, "stream", lambda: stream)
     frames = moving_frames(5)
-    by_hand.send([("g1", frame) for frame in frames])
+    by_hand.stream(frames)
     base = GlovePredictor(MODEL).predict(np.array([frame.readings for frame in frames])).mean
     assert_published(by_hand.poses["g1"], base)
     assert all(pose.too_uncertain for pose in by_hand.poses["g1"])
     monkeypatch.undo()
     more = [replace(frame, sequence=frame.sequence + 5) for frame in moving_frames(30, start_s=1000.2)]
-    by_hand.send([("g1", frame) for frame in more])
+    by_hand.stream(more)
     assert_published(by_hand.poses["g1"][5:], as_take(MODEL, more))
 
 
@@ -86,11 +71,10 @@ def test_a_declared_effect_without_a_value_is_left_out_and_flagged() -> None:
     )
     model, frames = model_with(HYSTERESIS, strap), moving_frames(60)
     tension = np.where(np.arange(60) % 5 == 0, 0.0, 2.0).astype(np.float32)
-    by_hand = LoopByHand()
-    by_hand.serve("g1", model)
+    by_hand = LoopByHand.serving(model)
     by_hand.say("g1", context=("strap_n",))
     sent = [replace(frame, context=tension[at : at + 1]) for at, frame in enumerate(frames)]
-    by_hand.send([("g1", frame) for frame in sent])
+    by_hand.stream(sent)
     time_s = np.array([frame.monotonic_ns for frame in frames]) / 1e9
     readings = np.array([frame.readings for frame in frames], dtype=np.float64)
     context = {"strap_n": tension.astype(np.float64)}

@@ -305,6 +305,6 @@ def test_status_and_liveliness_tell_that_the_service_is_there(
 ) -> None:
     status = service_status(session, settings)
     assert status["database"] == ""
-    tokens = [reply.ok for reply in session.liveliness().get(all_services(settings.site), timeout=5)]
+    tokens = [reply.ok for reply in session.liveliness().get(all_services(settings.site), timeout=60)]
     assert [str(token.key_expr).split("/")[3] for token in tokens if token] == [status["instance"]]
     assert (settings.data / "realtime.alive").exists()

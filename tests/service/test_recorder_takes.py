@@ -52,7 +52,7 @@ def capturing(settings: Settings, data: Path) -> Iterator[None]:
         yield
     finally:
         stop.set()
-        thread.join(10)
+        thread.join(120)
 
 
 @contextmanager
@@ -67,7 +67,7 @@ def recording_thread(settings: Settings) -> Iterator[Recorder]:
             yield it
         finally:
             stop.set()
-            thread.join(15)
+            thread.join(120)
 
 
 def frames(store: Store, id: str, at_least: int) -> Callable[[], RecordingRecord | None]:

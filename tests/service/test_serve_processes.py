@@ -50,7 +50,7 @@ def serving(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], str, int]]:
     finally:
         if process.poll() is None:
             process.kill()
-        process.communicate(timeout=20)
+        process.communicate(timeout=120)
 
 
 def children(process: subprocess.Popen[str]) -> list[int]:
@@ -103,18 +103,16 @@ def test_each_part_survives_the_death_of_the_others(serving: tuple[subprocess.Po
 
     os.kill(web, signal.SIGKILL)
     assert answers(endpoint) == first
-    eventually(lambda: is_ready(port), "web is back", 90.0)
+    eventually(lambda: is_ready(port), "web is back")
 
     os.kill(first, signal.SIGKILL)
     assert is_ready(port)
-    eventually(lambda: answers(endpoint) not in (0, first), "real time is back", 90.0)
+    eventually(lambda: answers(endpoint) not in (0, first), "real time is back")
 
     all_children = children(process)
     process.send_signal(signal.SIGTERM)
-    assert process.wait(20) == 0
-    eventually(
-        lambda: not any(Path(f"/proc/{child}").exists() for child in all_children), "nothing is left", 60.0
-    )
+    assert process.wait(120) == 0
+    eventually(lambda: not any(Path(f"/proc/{child}").exists() for child in all_children), "nothing is left")
 
 
 @pytest.mark.parametrize("taken", ["REST", "zenoh"])
@@ -125,7 +123,7 @@ def test_a_taken_port_is_one_sentence(tmp_path: Path, taken: str) -> None:
         port = other.getsockname()[1]
         endpoint = f"tcp/127.0.0.1:{port}" if taken == "zenoh" else free_endpoint()
         process = start(tmp_path, endpoint, port if taken == "REST" else free_port())
-        said, complained = process.communicate(timeout=60)
+        said, complained = process.communicate(timeout=120)
     assert process.returncode == 1
     assert said == ""
     assert len(complained.strip().splitlines()) == 1

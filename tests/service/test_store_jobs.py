@@ -99,6 +99,16 @@ def test_a_service_that_stops_loses_nothing(timed):
         assert timed.jobs.release(job.id, attempt).state == "queued"
 
 
+def test_a_service_that_stops_cancels_what_was_to_be_cancelled(timed):
+    job = timed.jobs.create("train", {})
+    timed.jobs.claim("polite")
+    timed.jobs.request_cancel(job.id)
+    released = timed.jobs.release(job.id, 1)
+    assert (released.state, released.sentence) == ("cancelled", "cancelled")
+    assert timed.jobs.events(job.id)[-1].state == "cancelled"
+    assert timed.jobs.claim("next") is None
+
+
 def test_a_cancelled_job_whose_runner_died_is_cancelled(timed, clock):
     job = timed.jobs.create("train", {})
     timed.jobs.claim("doomed")

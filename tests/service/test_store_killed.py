@@ -106,7 +106,7 @@ def test_a_killed_service_repeats_only_the_fits_in_flight(sqlite_settings, tmp_p
         process = start("jobs_process.py", sqlite_settings)
         try:
             assert result_of(store, job.id)["sums"] == [1, 3, 6, 10, 15, 21]
-            assert process.wait(30) == 0
+            assert process.wait(120) == 0
         finally:
             process.kill()
             process.wait()

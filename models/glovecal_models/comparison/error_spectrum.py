@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import dct, idct
-from scipy.signal import detrend
 
 from glovecal_models.comparison.floor_estimate import RESAMPLES, NoiseFloor, pooled
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
@@ -119,7 +118,13 @@ def _share(shares: np.ndarray, generator: np.random.Generator) -> tuple[float, f
 def _periodogram(values: np.ndarray) -> np.ndarray:
     """Of white noise its variance, at every frequency; tapered, so that what is slow stays slow."""
     taper = np.hanning(len(values))
-    return np.abs(np.fft.rfft(detrend(values) * taper)) ** 2 / float(taper @ taper)
+    return np.abs(np.fft.rfft(_detrended(values) * taper)) ** 2 / float(taper @ taper)
+
+
+def _detrended(values: np.ndarray) -> np.ndarray:
+    """Without their least-squares line."""
+    time = np.arange(len(values)) - (len(values) - 1) / 2
+    return values - values.mean() - (time @ values) / (time @ time) * time
 
 
 def _plateau(values: np.ndarray) -> float:

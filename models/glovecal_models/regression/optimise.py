@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import OptimizeResult, minimize
 
 from glovecal_models.errors import Cancelled
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 Objective = Callable[[np.ndarray], tuple[float, np.ndarray]]
 """Parameters (P,) -> value and gradient (P,). May raise LinAlgError where it cannot be computed."""
@@ -42,6 +45,8 @@ def minimise(
     ``cancelled`` is asked before every evaluation (raises Cancelled); ``on_evaluation`` gets the number
     of evaluations so far, over all starts. Raises LinAlgError if no start could be evaluated at all.
     """
+    from scipy.optimize import minimize  # here, because what only predicts need not wait for it
+
     count = 0
     best_value, best_parameters, last_value = np.inf, np.empty(0), np.inf
 

@@ -9,7 +9,6 @@ from typing import Any
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_service.jobs.child_record import artifact_array, keep_child
 from glovecal_service.jobs.declared_effects import declared, declared_in, known_by_name
-from glovecal_service.jobs.effect_constants import effect_constants, saturated_rotations
 from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult
 from glovecal_service.jobs.model_work import ModelWork, takes_of, text_in
 from glovecal_service.jobs.task_key import task_key
@@ -77,6 +76,8 @@ class AddEffectJob:
 
 def run(work: AdditionWork, cancelled: Callable[[], bool], report: Report) -> TaskResult:
     """In a worker. Raises BadInput, NotTrainable, Cancelled."""
+    from glovecal_service.jobs.effect_constants import effect_constants, saturated_rotations  # heavy
+
     on, model = work.on, work.on.model
     with known_by_name([*declared_in(model), *declared(work.declaration)]):
         known = model.error_estimate.get("rmse_deg")

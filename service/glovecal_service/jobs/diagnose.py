@@ -9,7 +9,6 @@ from typing import Any
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.comparison.rotation_noise import rotation_noise
-from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.effects.expression_effect import ExpressionEffect
 from glovecal_models.improvement.add_effect import repaired_takes, wanted_of
 from glovecal_models.improvement.known_effects import known_effects
@@ -61,6 +60,8 @@ class DiagnoseJob:
 
 def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> TaskResult:
     """In a worker. Raises BadInput, Cancelled."""
+    from glovecal_models.diagnosis.diagnose import diagnose  # heavy, and many commands run no job
+
     model = work.on.model
     report("measuring the noise floors", 0.0)
     floors = floors_deg(model, work.on.takes, work.seed)

@@ -16,12 +16,10 @@ from glovecal_models.improvement.add_effect import repaired_takes, trained_rotat
 from glovecal_models.improvement.clocks import clock_settings, coarse_clock_settings
 from glovecal_models.improvement.known_effects import known_effects
 from glovecal_models.takes.take import Take
+from glovecal_service.jobs.added_by_signature import ADDED_BY_SIGNATURE, CLOCK, SATURATION
 
-CLOCK, SATURATION = "clock_offset", "saturation"
 LAG = "lag"
 """Judging a lag, the only other delay, judges the clocks too."""
-ADDED_BY_SIGNATURE = (CLOCK, "repeated_samples", "sensor_fault", SATURATION)
-"""Effects without columns that a model can have."""
 
 
 def effect_constants(

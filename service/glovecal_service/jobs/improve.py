@@ -11,7 +11,6 @@ import numpy as np
 from glovecal_models.calibration.artifact import dump, load
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput
-from glovecal_models.improvement.improve import improve
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 from glovecal_service.jobs.child_record import keep_child
@@ -76,6 +75,8 @@ class ImproveJob:
 
 def run(work: ImprovementWork, cancelled: Callable[[], bool], report: Report) -> TaskResult:
     """In a worker. Raises BadInput, NotTrainable, Cancelled."""
+    from glovecal_models.improvement.improve import improve  # heavy, and many commands run no job
+
     found = improve(
         work.takes,
         work.layout,

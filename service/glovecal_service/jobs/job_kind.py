@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from glovecal_service.store import Store
-from glovecal_service.store.records import JobRecord
+if TYPE_CHECKING:
+    from glovecal_service.store import Store
+    from glovecal_service.store.records import JobRecord
 
 Cancelled = Callable[[], bool]
 Report = Callable[[str, float], None]

@@ -51,7 +51,6 @@ class JobRun:
         self._ended = threading.Event()
         self._stopped = threading.Event()
         self._released = False
-        self._cancel_requested = False
 
     def stop(self) -> None:
         """The service stops: leave the job to the next start."""
@@ -81,7 +80,7 @@ class JobRun:
             result = self._result()
             return lambda: jobs.finish(id, attempt, result)
         except Cancelled:
-            if self._released and not self._cancel_requested:
+            if self._released:
                 return lambda: jobs.release(id, attempt)
             return lambda: jobs.cancelled(id, attempt)
         except Conflict as error:
@@ -221,7 +220,6 @@ class JobRun:
                     self._store.jobs.heartbeat(self._job.id, self._job.attempt)
                 self._tell_on()
                 if self._store.jobs.get(self._job.id).cancel_requested:
-                    self._cancel_requested = True
                     self._cancel()
             except StoreUnavailable as error:
                 log.warning("job cannot be watched now", job=self._job.id, reason=str(error))

@@ -11,6 +11,8 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import sys
+import tempfile
 import threading
 import time
 from concurrent.futures import CancelledError
@@ -39,6 +41,10 @@ _CONFIG = {
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],
 }
+_FORKED = {"distributed.worker.multiprocessing-method": "forkserver"}
+_LONGEST_FOLDER = 75
+"""Bytes: the name of a socket in the folder for temporary files has to fit into 107."""
+_IMPORTED_ONCE = ["distributed", "distributed.nanny", "glovecal_service.jobs.registry"]
 
 
 class WorkersLost(GlovecalError):
@@ -135,6 +141,8 @@ class Workers:
         with self._lock:
             if self._client is None:
                 configure(_CONFIG)
+                if sys.platform == "linux" and len(os.fsencode(tempfile.gettempdir())) <= _LONGEST_FOLDER:
+                    _import_once()
                 try:
                     address = self._settings.scheduler or self._local_cluster()
                     self._client = Client(address, timeout=START_TIMEOUT_S, set_as_default=False)
@@ -202,6 +210,19 @@ def outcome(future: Future, task: Task) -> TaskOutcome:
         raise TaskKilledWorkers(
             f"{task.label}: every process that worked on it died (killed, or out of memory)"
         ) from error
+
+
+def _import_once() -> None:
+    """Workers are forked from one process that has imported what they need, and nothing else.
+
+    Each would import it anew otherwise, also after a crash; they share the memory, too. Only on Linux:
+    elsewhere the system's own libraries do not survive a fork.
+    """
+    from dask.config import set as configure
+    from distributed.utils import get_mp_context
+
+    configure(_FORKED)
+    get_mp_context().set_forkserver_preload(_IMPORTED_ONCE)
 
 
 def _pid() -> int:

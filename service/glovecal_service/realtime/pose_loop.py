@@ -53,8 +53,16 @@ class PoseLoop:
     """Frames in, poses out. ``lanes`` may be read, by copying it, from any thread."""
 
     def __init__(
-        self, arrivals: Arrivals, models: ServedModels, publish: PublishPose, worn: WornGloves
+        self,
+        arrivals: Arrivals,
+        models: ServedModels,
+        publish: PublishPose,
+        worn: WornGloves,
+        *,
+        oldest_ns: int = OLDEST_NS,
+        round_budget_s: float = ROUND_BUDGET_S,
     ) -> None:
+        self._oldest_ns, self._round_budget_s = oldest_ns, round_budget_s
         self._arrivals = arrivals
         self._models = models
         self._publish = publish
@@ -131,7 +139,7 @@ class PoseLoop:
                 self._serve_uncalibrated(lane)
             return
         share = len(lanes) / len(self._pending)  # so that all models have had a turn within the budget
-        allowed = model.pace.frames_within(ROUND_BUDGET_S * share)
+        allowed = model.pace.frames_within(self._round_budget_s * share)
         lanes = lanes[:allowed]
         served = self._serve(model, lanes, allowed // len(lanes))
         model.pace.observe(served, time.perf_counter() - started)
@@ -172,7 +180,7 @@ class PoseLoop:
     def _open(self, lane: GloveLane, model: ServedModel | None, limit: int) -> list[tuple[Frame, int]]:
         self._pending.pop(lane)
         opened = []
-        for waiting in lane.newest(limit, time.monotonic_ns() - OLDEST_NS):
+        for waiting in lane.newest(limit, time.monotonic_ns() - self._oldest_ns):
             frame = _checked(lane, waiting, model)
             if frame is not None:
                 opened.append((frame, waiting.received_ns))

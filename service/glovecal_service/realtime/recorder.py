@@ -127,7 +127,7 @@ class Recorder:
 
     def _create(self, store: Store, record: RecordingRecord, keys: GloveKeys, path: Path) -> RecordingFile:
         try:
-            capture = ask_json(self._session, keys.meta, timeout_s=1.0)
+            capture = ask_json(self._session, keys.meta, timeout_s=5.0)
         except NoAnswer:
             capture = _stored_meta(store, record.glove)
         meta = {"recording": record.id, "name": record.name, "glove": record.glove, "capture": capture}

@@ -13,7 +13,6 @@ from glovecal_models.comparison.residuals import residuals
 from glovecal_models.comparison.where_it_fails import where_it_fails
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_service.plain import plain
-from glovecal_service.report.page import report_page
 from glovecal_service.report.reported_model import ReportedModel
 from glovecal_service.rest.answers import change_problems
 from glovecal_service.rest.dependencies import Parts, PartsNeeded
@@ -192,6 +191,8 @@ def where_model_fails(id: ModelInPath, body: Against, parts: PartsNeeded) -> dic
 )
 def report_on_model(id: ModelInPath, body: AgainstBeside, parts: PartsNeeded) -> Response:
     """Errors, where they are, what they depend on; each picture with a sentence that says what it shows."""
+    from glovecal_service.report.page import report_page  # it draws, and few requests ask for that
+
     record, model, wanted, seen = _chosen(id, body, parts)
     takes = [parts.store.takes.load(take) for take in wanted]
     others = {}

@@ -12,7 +12,7 @@ from glovecal_models.effects.catalogue import GROUP, catalogue, effect
 from glovecal_models.effects.columnless_effect import ColumnlessEffect
 from glovecal_models.effects.effect import Effect
 from glovecal_models.errors import BadInput
-from glovecal_service.jobs.effect_constants import ADDED_BY_SIGNATURE
+from glovecal_service.jobs.added_by_signature import ADDED_BY_SIGNATURE
 from glovecal_service.plain import plain
 from glovecal_service.rest.answers import problems
 from glovecal_service.rest.names import ONE_LINE

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Response
 
-from glovecal_service.report.diagnosis_page import diagnosis_page
-from glovecal_service.report.improvement_page import improvement_page
 from glovecal_service.rest.answers import problems
 from glovecal_service.rest.dependencies import StoreNeeded
 from glovecal_service.rest.names import IdInPath
@@ -38,7 +36,11 @@ def report_on_job(id: IdInPath, store: StoreNeeded) -> Response:
     if job.result is None:
         raise Conflict(f"job {id} is {job.state}; it has a page once it is done")
     if job.kind == "diagnose":
+        from glovecal_service.report.diagnosis_page import diagnosis_page  # draws: few requests need it
+
         page = diagnosis_page(job.result)
     else:
+        from glovecal_service.report.improvement_page import improvement_page
+
         page = improvement_page(job.result, job.payload["method"], job.payload["subject"])
     return Response(page, media_type="text/html; charset=utf-8")

@@ -123,10 +123,16 @@ class Jobs:
         return self._end(id, attempt, "cancelled", "cancelled")
 
     def release(self, id: str, attempt: int) -> JobRecord:
-        """Give an unfinished job back, as a service does that stops; that is no loss."""
+        """Give an unfinished job back, as a service does that stops; that is no loss.
+
+        One that was to be cancelled is cancelled. Raises Conflict if the attempt is over.
+        """
+        table = tables.jobs
         values = {"state": "queued", "owner": None, "sentence": "waiting for the service to start again"}
         with self._database.write() as connection:
             self._write(connection, id, attempt, {**values, "lease_until": None})
+            if _require(connection, id).cancel_requested:
+                connection.execute(update(table).where(table.c.id == id).values(**_cancelled()))
             return _noted(connection, id)
 
     def request_cancel(self, id: str) -> JobRecord:
@@ -221,7 +227,7 @@ def _plain(sentence: str) -> str:
 def _after_loss(row: Row) -> dict[str, Any]:
     """What becomes of a running job whose runner died."""
     if row.cancel_requested:
-        return {"state": "cancelled", "sentence": "cancelled", "finished_at": now(), "lease_until": None}
+        return _cancelled()
     losses = row.losses + 1
     if losses >= MOST_LOSSES:
         sentence = f"given up: the process that ran it died {losses} times"
@@ -240,6 +246,10 @@ def _after_loss(row: Row) -> dict[str, Any]:
         "lease_until": None,
         "sentence": "waiting again: the process that ran it died",
     }
+
+
+def _cancelled() -> dict[str, Any]:
+    return {"state": "cancelled", "sentence": "cancelled", "finished_at": now(), "lease_until": None}
 
 
 def _noted(connection: Connection, id: str) -> JobRecord:

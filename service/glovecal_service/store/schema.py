@@ -1,80 +1,40 @@
-"""Brings a database to the schema of this software, with a backup of an SQLite file first."""
+"""Is the database of the schema that this software wants? Migrates it when it is not."""
 
 from __future__ import annotations
 
-import sqlite3
-from contextlib import closing
 from importlib import resources
-from pathlib import Path
+from importlib.resources.abc import Traversable
 
-from alembic import command
-from alembic.config import Config
-from alembic.runtime.migration import MigrationContext
-from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, text
+from sqlalchemy import Connection, inspect, text
 
-from glovecal_service.store.blobs import full_disk_named
-from glovecal_service.store.clock import now
 from glovecal_service.store.database import Database
-from glovecal_service.store.errors import StoreError
-
-ADVISORY_LOCK = 0x676C6F7665
-"""Two services that start at once on one PostgreSQL upgrade it one after the other."""
-
-
-class NewerSchema(StoreError):
-    """The database was written by a newer Glovecal; nothing was changed."""
 
 
 def upgrade(database: Database) -> None:
-    """Upgrade to the newest schema in one transaction. Raises NewerSchema, StorageFull, StoreDamaged."""
-    config = _config()
-    known = ScriptDirectory.from_config(config)
-    newest = known.get_current_head()
+    """Upgrade to the newest schema in one transaction. Raises NewerSchema, StorageFull, StoreDamaged.
+
+    Alembic is imported only when there is something to do: every command of a user comes through here.
+    """
     with database.read() as connection:
-        present = _present(connection)
-    if present == newest:
-        return
-    _refuse_newer(known, present, database)
-    if present is not None and database.file is not None:
-        backup(database.file, database.file.with_name(f"{database.file.name}.before-{newest}"))
-    with database.write() as connection:
-        if not database.is_sqlite:
-            connection.execute(text(f"SELECT pg_advisory_xact_lock({ADVISORY_LOCK})"))
-        _refuse_newer(known, _present(connection), database)
-        config.attributes["connection"] = connection
-        command.upgrade(config, "head")
+        if _present(connection) == newest_revision():
+            return
+    from glovecal_service.store.migrate import migrate
+
+    migrate(database)
 
 
-def backup(source: Path, target: Path) -> None:
-    """Copy an SQLite file that may be in use (https://sqlite.org/backup.html). Raises StorageFull."""
-    if target.exists():
-        target = target.with_name(f"{target.name}-{now():%Y%m%dT%H%M%S%f}")
-    with (
-        full_disk_named(target.parent),
-        closing(sqlite3.connect(source)) as original,
-        closing(sqlite3.connect(target)) as copy,
-    ):
-        original.backup(copy)
+def newest_revision() -> str:
+    """A migration's file is named after its revision: ``0001_first_schema.py``."""
+    files = [entry.name for entry in (migrations() / "versions").iterdir() if entry.name.endswith(".py")]
+    return max(name.partition("_")[0] for name in files)
 
 
-def _config() -> Config:
-    config = Config()
-    folder = resources.files("glovecal_service.store") / "migrations"
-    config.set_main_option("script_location", str(folder).replace("%", "%%"))
-    config.set_main_option("path_separator", "os")
-    return config
+def migrations() -> Traversable:
+    """The folder of Alembic's scripts."""
+    return resources.files("glovecal_service.store") / "migrations"
 
 
 def _present(connection: Connection) -> str | None:
-    return MigrationContext.configure(connection).get_current_revision()
-
-
-def _refuse_newer(known: ScriptDirectory, present: str | None, database: Database) -> None:
-    if present is None or present in {script.revision for script in known.walk_revisions()}:
-        return
-    raise NewerSchema(
-        f"the database {database.name} has schema {present!r}, which this version of Glovecal does not know"
-        f" (its newest is {known.get_current_head()!r}); install the newer Glovecal that wrote it, or restore"
-        " a backup"
-    )
+    if not inspect(connection).has_table("alembic_version"):
+        return None
+    return connection.scalar(text("SELECT version_num FROM alembic_version"))

@@ -28,7 +28,11 @@ MODELS = [
     (LinearMean(), LinearArd() + SquaredExponentialArd()),
     (LinearMean(), Polynomial(2) + SquaredExponential()),
 ]
-every_model = pytest.mark.parametrize(("mean", "covariance"), MODELS, ids=lambda part: repr(part))
+every_model = pytest.mark.parametrize(
+    ("mean", "covariance"),
+    MODELS,
+    ids=lambda part: type(part).__name__ if isinstance(part, Mean) else repr(part),
+)
 
 
 def some_likelihood(mean: Mean, covariance: Covariance) -> tuple[FitcLikelihood, np.ndarray]:

@@ -62,9 +62,7 @@ def ports_listening(leader: int) -> set[int]:
 
 def ports_while_streaming(process: subprocess.Popen[str]) -> set[int]:
     """The ports of the demo's service, once its first capture runs."""
-    eventually(
-        lambda: any("capture" in command for command in session(process.pid).values()), "it captures", 60
-    )
+    eventually(lambda: any("capture" in command for command in session(process.pid).values()), "it captures")
     return ports_listening(process.pid)
 
 
@@ -88,12 +86,12 @@ def check_nothing_is_left(process: subprocess.Popen[str], folder: Path, ports: s
 
 
 @linux
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(1200)
 def test_the_demo_keeps_its_promises(tmp_path):
     process = start(tmp_path, "--json", "--seed", "2", "--effect", "hysteresis")
     try:
         ports = ports_while_streaming(process)
-        said, complaints = process.communicate(timeout=280)
+        said, complaints = process.communicate(timeout=1100)
     finally:
         process.kill()
     assert process.returncode == 0, complaints
@@ -136,7 +134,7 @@ def test_a_demo_that_is_interrupted_leaves_nothing(tmp_path, number, signal_all)
         ports = ports_while_streaming(process)
         time.sleep(0.5)
         (os.killpg if signal_all else os.kill)(process.pid, number)
-        _, complaints = process.communicate(timeout=40)
+        _, complaints = process.communicate(timeout=120)
     finally:
         process.kill()
     assert process.returncode == {signal.SIGINT: 130, signal.SIGTERM: 143}[number]

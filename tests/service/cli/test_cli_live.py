@@ -44,7 +44,7 @@ def _end(process: subprocess.Popen[str], number: int = signal.SIGINT) -> tuple[s
     if process.poll() is None:
         process.send_signal(number)
     try:
-        return process.communicate(timeout=30)
+        return process.communicate(timeout=120)
     finally:
         process.kill()
 
@@ -101,7 +101,8 @@ def test_a_recorded_take_becomes_a_model_that_predicts_live(live, recorded):
 
         def is_calibrated() -> bool:
             answer = run("watch", GLOVE, "--json", "--seconds", 0.5)
-            poses[:] = [json.loads(line) for line in answer.out.splitlines()]
+            told = [json.loads(line) for line in answer.out.splitlines()]
+            poses[:] = [pose for pose in told if "stale" not in pose["state"]]  # or of the recording before
             return bool(poses) and poses[-1]["model"] == model["id"]
 
         eventually(is_calibrated, "poses of the new model")
@@ -152,7 +153,7 @@ def test_interrupted_training_leaves_nothing(anna_of_its_own, number):
     """The job is cancelled, the workers are gone, nothing but a sentence is said."""
     settings = anna_of_its_own
     process = start(settings, "train", "-s", "anna")
-    eventually(lambda: len(_session(process.pid)) > 3, "workers have started", 60)
+    eventually(lambda: len(_session(process.pid)) > 3, "workers have started")
     time.sleep(1.0)
     said, complaints = _end(process, number)
     assert process.returncode == {signal.SIGINT: 130, signal.SIGTERM: 143}[number]

@@ -68,7 +68,7 @@ def serve() -> Iterator[Callable[..., str]]:
         thread = threading.Thread(target=server.run, args=([listener],))
         thread.start()
         running.append((server, thread))
-        until = time.monotonic() + 20
+        until = time.monotonic() + 120
         while not server.started and time.monotonic() < until:
             time.sleep(0.01)
         assert server.started
@@ -78,7 +78,7 @@ def serve() -> Iterator[Callable[..., str]]:
     for server, _ in running:
         server.should_exit = True
     for _, thread in running:
-        thread.join(20)
+        thread.join(120)
         assert not thread.is_alive()
 
 

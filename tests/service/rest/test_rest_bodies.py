@@ -41,7 +41,7 @@ def process(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, psu
         yield url, psutil.Process(running.pid), data
     finally:
         running.terminate()
-        running.wait(20)
+        running.wait(120)
 
 
 def test_a_gigabyte_is_refused_without_memory(process: tuple[str, psutil.Process, Path]) -> None:
@@ -57,7 +57,7 @@ def test_a_gigabyte_is_refused_without_memory(process: tuple[str, psutil.Process
                 most = max(most, server.memory_info().rss)
             yield block
 
-    with httpx.Client(base_url=f"{url}/v1", timeout=60, trust_env=False) as http:
+    with httpx.Client(base_url=f"{url}/v1", timeout=120, trust_env=False) as http:
         headers = {"Content-Type": "text/csv"}
         answer = http.post("/takes", params={"subject": "anna"}, content=endless(), headers=headers)
         assert answer.status_code == 413, answer.text
@@ -72,7 +72,7 @@ def test_a_gigabyte_is_refused_without_memory(process: tuple[str, psutil.Process
 def test_a_declared_gigabyte_is_refused_before_it_is_sent(process: tuple[str, psutil.Process, Path]) -> None:
     url, _, data = process
     host, port = url.removeprefix("http://").split(":")
-    with socket.create_connection((host, int(port)), timeout=10) as raw:
+    with socket.create_connection((host, int(port)), timeout=120) as raw:
         raw.sendall(
             b"POST /v1/takes?subject=anna HTTP/1.1\r\nHost: localhost\r\nContent-Type: text/csv\r\n"
             b"Expect: 100-continue\r\nContent-Length: 1000000000\r\n\r\n"
@@ -128,7 +128,7 @@ def test_slow_bodies_and_headers_are_ended(
 def test_many_slow_connections_do_not_keep_others_out(serve: Callable[..., str], tmp_path: Path) -> None:
     url = serve(Settings(data=tmp_path / "data"))
     host, port = url.removeprefix("http://").split(":")
-    slow = [socket.create_connection((host, int(port)), timeout=10) for _ in range(200)]
+    slow = [socket.create_connection((host, int(port)), timeout=120) for _ in range(200)]
     try:
         for number, connection in enumerate(slow):
             half = b"POST /v1/uploads HTTP/1.1\r\nHost: localhost\r\nContent-Type: text/csv\r\n"
@@ -148,13 +148,13 @@ def test_a_connection_that_ends_within_the_body_leaves_nothing(
 ) -> None:
     url = serve(Settings(data=tmp_path / "data"))
     host, port = url.removeprefix("http://").split(":")
-    with socket.create_connection((host, int(port)), timeout=10) as raw:
+    with socket.create_connection((host, int(port)), timeout=120) as raw:
         raw.sendall(
             b"POST /v1/uploads HTTP/1.1\r\nHost: localhost\r\nContent-Type: text/csv\r\n"
             b"Content-Length: 100000\r\n\r\n" + b"x" * 50_000
         )
     uploads = tmp_path / "data" / "uploads"
-    until = time.monotonic() + 5
+    until = time.monotonic() + 120
     while list(uploads.iterdir()) and time.monotonic() < until:
         time.sleep(0.01)
     assert list(uploads.iterdir()) == []
@@ -162,13 +162,13 @@ def test_a_connection_that_ends_within_the_body_leaves_nothing(
 
 def _exchange(url: str, request: bytes) -> bytes:
     host, port = url.removeprefix("http://").split(":")
-    with socket.create_connection((host, int(port)), timeout=10) as raw:
+    with socket.create_connection((host, int(port)), timeout=120) as raw:
         raw.sendall(request)
         return b"".join(iter(lambda: raw.recv(65536), b""))
 
 
 def _wait_until_live(url: str, running: subprocess.Popen[bytes]) -> None:
-    until = time.monotonic() + 30
+    until = time.monotonic() + 120
     while time.monotonic() < until:
         assert running.poll() is None
         try:

@@ -75,7 +75,7 @@ def connection(
 ) -> Iterator[HTTPConnection]:
     """Real HTTP, by a client that sends paths as they stand (httpx would resolve ``..`` by itself)."""
     url = serve(Settings(data=tmp_path_factory.mktemp("names") / "data"))
-    connection = HTTPConnection(url.removeprefix("http://"), timeout=10)
+    connection = HTTPConnection(url.removeprefix("http://"), timeout=120)
     yield connection
     connection.close()
 
@@ -98,7 +98,7 @@ def test_no_route_takes_the_name(connection: HTTPConnection, name: str) -> None:
     [b"/v1/subjects/\xff\xfe", b"/v1/subjects/a\x00b", b"/v1/../v1/subjects", b"//v1//subjects", b"*"],
 )
 def test_raw_bytes_in_the_request_line(connection: HTTPConnection, target: bytes) -> None:
-    with socket.create_connection((connection.host, connection.port), timeout=10) as raw:
+    with socket.create_connection((connection.host, connection.port), timeout=120) as raw:
         raw.sendall(b"GET " + target + b" HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
         answer = b"".join(iter(lambda: raw.recv(65536), b""))
     assert answer.startswith((b"HTTP/1.1 400", b"HTTP/1.1 404")), answer

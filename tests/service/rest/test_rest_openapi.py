@@ -50,7 +50,7 @@ def test_schemathesis(
         client.post("/subjects", {"name": "anna"})
         answer = client.upload_takes(write_table(), subject="anna")
         body = {"subject": "anna", "layout": answer["layout"], "method": "linear"}
-        job = client.wait_for_job(client.post("/models/train", body)["id"], patience_s=60)
+        job = client.wait_for_job(client.post("/models/train", body)["id"], patience_s=300)
     config = settings.data / "schemathesis.toml"
     config.write_text(CONFIG.format(take=answer["imported"][0], model=job["result"]["model"], job=job["id"]))
     run = subprocess.run(
@@ -66,14 +66,14 @@ def test_schemathesis(
             "--max-examples=3",
             "--generation-deterministic",
             "--continue-on-failure",
-            "--request-timeout=10",
+            "--request-timeout=60",
             "--warnings=off",
             "--no-color",
         ],
         cwd=settings.data,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=300,
         check=False,
     )
     summary = run.stdout[run.stdout.find("FAILURES") :]

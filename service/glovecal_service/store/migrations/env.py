@@ -1,4 +1,4 @@
-"""Runs the migrations on the connection that ``store/schema.py`` opened, inside its transaction."""
+"""Runs the migrations on the connection that ``store/migrate.py`` opened, inside its transaction."""
 
 from alembic import context
 

@@ -1,0 +1,6 @@
+"""Effects that a model can have though they add no columns: each is looked for in the takes instead."""
+
+from __future__ import annotations
+
+CLOCK, SATURATION = "clock_offset", "saturation"
+ADDED_BY_SIGNATURE = (CLOCK, "repeated_samples", "sensor_fault", SATURATION)
