@@ -10,7 +10,7 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.diagnosis.diagnose import Diagnosis
 from glovecal_models.diagnosis.next_take import NextTake
-from glovecal_models.improvement.add_effect import Addition
+from glovecal_models.improvement.addition import Addition
 
 CLOCK = "clock_offset"
 
@@ -99,6 +99,8 @@ def added_document(
         "confidence_set": rivals,
         "parameters": parameters,
     }
+    if addition.claim is not None:
+        document["claim"] = addition.claim.to_document()
     if diagnosis is not None and diagnosis.next_take is not None and len(rivals) > 1:
         document["next_take"] = next_take_document(diagnosis.next_take)
     return document
