@@ -56,7 +56,7 @@ class FaultHold:
         if self._last is None or not fails.any():
             self._last = base
             return Held(base, readings, np.zeros(len(base)), np.zeros(len(base), dtype=bool), ())
-        is_faulty = (self._reads & fails).any(axis=1)
+        is_faulty = np.any(self._reads & fails, axis=1)
         self._last = np.where(is_faulty, self._last, base)
         variance = np.zeros(len(base))
         for row in np.flatnonzero(is_faulty):

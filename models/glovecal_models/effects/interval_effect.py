@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -26,6 +27,8 @@ class LeftOutErrors:
     """(n,), since the first frame of the take."""
     error: np.ndarray
     """(n,), predicted minus measured, degrees."""
+    measured: np.ndarray
+    """(n,), degrees."""
     variance: np.ndarray
     """(n,), claimed, measurement noise included, degrees squared."""
     noise: float
@@ -50,6 +53,9 @@ class Interval(ABC):
 class IntervalEffect(SignatureEffect):
     """Implement what is learned, and the variance that follows from it."""
 
+    shows_later: ClassVar[bool] = False
+    """Whether it grows beyond what takes of usual length show: it stays if the claim on them is no worse."""
+
     @abstractmethod
     def learned(self, left_out: Sequence[LeftOutErrors], found: Settings) -> Settings:
         """Constants for the rotations of ``left_out``; ``found`` are those that the takes themselves gave."""
@@ -59,6 +65,10 @@ class IntervalEffect(SignatureEffect):
         self, settings: Settings, rotations: Sequence[str], sensors: Sequence[str], noise: np.ndarray
     ) -> Interval:
         """For L ``rotations`` whose measurement noise has the variance ``noise`` (L,), degrees squared."""
+
+    def widens(self, settings: Settings, rotations: Sequence[str]) -> bool:
+        """Whether it found anything that makes any of ``rotations`` less sure."""
+        return True
 
     @abstractmethod
     def sentence(self, settings: Settings, rotations: Sequence[str]) -> str:

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from glovecal_models.calibration.effect_correction import SENSOR_FAULT
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
+from glovecal_models.diagnosis.signatures import own_sensors
 from glovecal_models.effects.catalogue import effect as known_effect
 from glovecal_models.effects.clock_scan import aligned
 from glovecal_models.effects.effect import Signals
@@ -19,8 +21,10 @@ from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_interval import add_interval
 from glovecal_models.improvement.addition import Addition, total_rmse_deg
 from glovecal_models.improvement.child_model import child_model
+from glovecal_models.improvement.decoy_share import share_left_by_decoy
 from glovecal_models.improvement.effect_fit import fit_with_effects
 from glovecal_models.improvement.held_out_check import HeldOutErrors, held_out_errors
+from glovecal_models.improvement.live_faults import live_faults
 from glovecal_models.improvement.prepared_takes import PreparedTakes
 from glovecal_models.improvement.relearned import columnless_effects, kept_lanes
 from glovecal_models.improvement.wanted_effect import WantedEffect
@@ -75,6 +79,7 @@ def add_effect(
     before: HeldOutErrors | None = None,
     judged: Sequence[str] | None = None,
     least_gain: float = LEAST_GAIN,
+    decoy_share: float | None = None,
     parent_id: str | None = None,
     take_hashes: Sequence[str] = (),
     cancelled: Callable[[], bool] | None = None,
@@ -83,7 +88,8 @@ def add_effect(
     """Learn ``model`` anew with effect ``name`` on ``rotations`` (default: all measured ones).
 
     ``takes`` are the training takes. ``constants``: settings of an effect without columns, such as the
-    clocks' offsets. ``before`` saves measuring the parent. Undone, with the reason, unless the held-out RMSE
+    clocks' offsets. ``before`` saves measuring the parent, ``decoy_share`` (of the error, that is left with
+    the effect's decoy instead) screening it. Undone, with the reason, unless the held-out RMSE
     of the ``judged`` rotations (default: all chosen) falls by ``least_gain``. Raises BadInput for an unknown
     effect or rotation, or when the takes cannot carry it; Cancelled.
     """
@@ -96,6 +102,12 @@ def add_effect(
     if unknown:
         raise BadInput(f"no rotation {unknown[0]!r} is trained in this model; it has {', '.join(every)}")
     fresh = WantedEffect(name, chosen, dict(constants or {}))
+    faults = None
+    if name == SENSOR_FAULT:
+        others = repaired_takes(takes, [item for item in has if item.name != name])
+        faults = live_faults(model, others, own_sensors(model.layout, every), cancelled)
+        live = {} if faults.live is None else {"live": faults.live}
+        fresh = replace(fresh, settings=fresh.settings | live)
     wanted = (*(item for item in has if item.name != name), _joined(has, fresh))
     prepared = PreparedTakes.of(repaired_takes(takes, wanted), model.layout)
     if isinstance(effect, IntervalEffect):
@@ -120,6 +132,8 @@ def add_effect(
     judged = tuple(judged or chosen)
     gain = 1.0 - total_rmse_deg(after, judged) / max(total_rmse_deg(before, judged), 1e-12)
     sentence = _sentence(name, judged, before, after, gain, least_gain)
+    if faults is not None:
+        sentence = f"{sentence} {faults.sentence}"
     if gain < least_gain:
         return Addition(name, chosen, False, sentence, before, after, model, has)
     if report:
@@ -129,12 +143,18 @@ def add_effect(
         "rmse_before_deg": total_rmse_deg(before, chosen),
         "rmse_after_deg": total_rmse_deg(after, chosen),
     }
-    fitted = [replace(item, evidence=evidence) if item.name == name else item for item in fit.effects]
-    effects = [*kept_lanes(model.effects, chosen), *fitted, *columnless_effects(wanted)]
+    if decoy_share is None and fresh.has_columns:
+        decoy_share = share_left_by_decoy(model, repaired_takes(takes, has), effect, chosen, cancelled)
+    if decoy_share is not None:
+        evidence["rmse_decoy_deg"] = decoy_share * evidence["rmse_before_deg"]
+    if faults is not None:
+        evidence |= faults.to_document()
+    effects = [*kept_lanes(model.effects, chosen), *fit.effects, *columnless_effects(wanted, model.effects)]
+    effects = [replace(item, evidence=evidence) if item.name == name else item for item in effects]
     whole = before.with_those_of(after)
     child = child_model(model, parent_id, prepared, fit, effects, whole, settings, take_hashes)
     described = {
-        key: value for item in fitted if item.name == name for key, value in item.described().items()
+        key: value for item in fit.effects if item.name == name for key, value in item.described().items()
     }
     return Addition(name, chosen, True, sentence, before, after, child, tuple(wanted), described)
 

@@ -11,8 +11,8 @@ from glovecal_models.effects.effect import Settings
 from glovecal_models.effects.interval_effect import IntervalEffect, LeftOutErrors
 
 PARTS = 3
-LEAST_FALL = 0.005
-"""Nats by which the NLPD must fall: a claim that is half of what it should be costs 0.8."""
+LEAST_FALL, MOST_RISE = 0.005, 0.02
+"""Nats by which the NLPD must fall, or may rise: a claim that is half of what it should be costs 0.8."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,10 @@ class ClaimCheck:
     @property
     def is_truer(self) -> bool:
         return self.before.nlpd - self.after.nlpd >= LEAST_FALL
+
+    @property
+    def is_no_worse(self) -> bool:
+        return self.after.nlpd - self.before.nlpd <= MOST_RISE
 
     def to_document(self) -> dict[str, float]:
         """Plain JSON-able data."""

@@ -69,8 +69,8 @@ def _errors_of(
             error = mean[known, column] - target[known]
             found.append(
                 LeftOutErrors(
-                    take.name, name, since[known], error, variance[known, column], float(noise[column]),
-                    takes.layout.sensors, readings[known],
+                    take.name, name, since[known], error, target[known], variance[known, column],
+                    float(noise[column]), takes.layout.sensors, readings[known],
                 )
             )  # fmt: skip
     return found

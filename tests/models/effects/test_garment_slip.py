@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from glovecal_models.effects.garment_slip import GarmentSlip, slip_of, slip_sd
+from glovecal_models.effects.garment_slip import GarmentSlip
 
 SLIP = GarmentSlip()
 
