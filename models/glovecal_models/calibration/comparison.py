@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -63,6 +63,8 @@ class Comparison:
     """Rotations of the model that no take measured."""
     not_predicted: tuple[str, ...]
     """Rotations the takes measured that the model does not predict."""
+    left_out: dict[str, int] = field(default_factory=dict)
+    """Measured frames, by rotation, that are not compared: faulty sensors, repeated frames."""
 
     def to_document(self) -> dict[str, Any]:
         """Plain JSON-able data."""
@@ -90,6 +92,7 @@ def summed_up(found: Residuals, noise: Mapping[str, RotationNoise] | None = None
         poses=_pose_errors(error, np.concatenate([_poses(item.take) for item in found.takes])),
         not_measured=tuple(name for name in found.rotations if name not in measured),
         not_predicted=tuple(sorted(in_takes - set(found.rotations))),
+        left_out=found.left_out,
     )
 
 

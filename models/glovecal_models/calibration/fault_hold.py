@@ -54,7 +54,7 @@ class FaultHold:
         good, age_s = self._watch.frame(time_s, readings)
         fails = age_s > 0.0
         if self._last is None or not fails.any():
-            self._last = base
+            self._last = base.copy()
             return Held(base, readings, np.zeros(len(base)), np.zeros(len(base), dtype=bool), ())
         is_faulty = np.any(self._reads & fails, axis=1)
         self._last = np.where(is_faulty, self._last, base)

@@ -118,7 +118,7 @@ def diagnose(
     found, impossible = assessed(direction, candidates, np.random.default_rng(seed), has, said)
     impossible += [NotJudgeable(item.name, "the frames are single poses, too far apart") for item in lasting]
     naming = _delay_told(named(found), even, direction, layout, joints, linear, known)
-    findings = tuple(signature_findings(takes, layout, joints, naming)) if signatures else ()
+    findings = tuple(signature_findings(takes, layout, joints, naming, has)) if signatures else ()
     naming = jump_beside_curve(naming, takes, findings)
     errors = {
         name: float(np.sqrt(products.error.sum() / max(products.count.sum(), 1)))

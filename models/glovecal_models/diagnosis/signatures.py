@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import replace
 
 import numpy as np
@@ -37,9 +37,13 @@ def own_sensors(layout: Layout, joints: Sequence[str]) -> dict[str, str]:
 
 
 def signature_findings(
-    takes: Sequence[Take], layout: Layout, joints: Sequence[str], naming: Naming
+    takes: Sequence[Take],
+    layout: Layout,
+    joints: Sequence[str],
+    naming: Naming,
+    without: Set[str] = frozenset(),
 ) -> Iterator[Finding]:
-    """Largest first within each effect."""
+    """Largest first within each effect; ``without`` names effects that the model has already."""
     sensor_of = own_sensors(layout, joints)
     if not sensor_of:
         return
@@ -47,11 +51,11 @@ def signature_findings(
         faults = _found("sensor_fault", takes, sensor_of, None)
         yield from (item for item in faults if item.kind == "jump")
         return
-    for name in BEFORE_ALL:
+    for name in (name for name in BEFORE_ALL if name not in without):
         yield from _found(name, takes, sensor_of, None)
     if may_be_slip(naming):
-        for name in AFTER_ALL:
-            yield from _found(name, takes, sensor_of, _static_errors(takes, sensor_of))
+        for name in (name for name in AFTER_ALL if name not in without):
+            yield from _found(name, takes, sensor_of, static_errors(takes, sensor_of))
 
 
 def are_held_levels(takes: Sequence[Take]) -> bool:
@@ -74,7 +78,7 @@ def _found(
     return effect.find(takes, sensor_of, errors) if isinstance(effect, SignatureEffect) else ()
 
 
-def _static_errors(takes: Sequence[Take], sensor_of: dict[str, str]) -> list[np.ndarray]:
+def static_errors(takes: Sequence[Take], sensor_of: dict[str, str]) -> list[np.ndarray]:
     """For each take (N, joints): what a smooth curve of each joint's own sensor leaves, degrees."""
     result = [np.full((len(take.time_s), len(sensor_of)), np.nan) for take in takes]
     for column, (rotation, sensor) in enumerate(sensor_of.items()):

@@ -9,7 +9,7 @@ from typing import Any
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_service.jobs.child_record import artifact_array, keep_child
 from glovecal_service.jobs.declared_effects import declared, declared_in, known_by_name
-from glovecal_service.jobs.effect_constants import effect_constants, saturated_rotations
+from glovecal_service.jobs.effect_constants import effect_constants, widened_rotations
 from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult
 from glovecal_service.jobs.model_work import ModelWork, takes_of, text_in
 from glovecal_service.jobs.task_key import task_key
@@ -87,7 +87,7 @@ def run(work: AdditionWork, cancelled: Callable[[], bool], report: Report) -> Ta
             model,
             on.takes,
             work.effect,
-            rotations=saturated_rotations(constants) or work.rotations,
+            rotations=widened_rotations(model, on.takes, work.effect, constants, work.rotations),
             constants=constants,
             settings=on.settings,
             parent_id=on.id,

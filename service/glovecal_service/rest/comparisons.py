@@ -87,6 +87,9 @@ class ComparisonView(BaseModel):
     poses: list[PoseErrors]
     not_measured: list[str]
     not_predicted: list[str]
+    left_out: dict[str, int] = Field(
+        description="Measured frames, by rotation, that are not compared: faulty sensors, repeated frames."
+    )
     trained_on: list[str] = Field(description="Takes among those given that the model was trained on.")
 
 
