@@ -27,7 +27,7 @@ LIMITS = FaultLimits(
     move_deg=((0.5, 5.0, 30.0),) * len(LAYOUT.rotations),
     reads=tuple((LAYOUT.correspondence(name).sensors[0],) for name in LAYOUT.rotations),
 )
-WALK = {"rate_deg_per_sqrt_min": 6.0, "right_at_s": 1.0}
+WALK = {"rate_deg_per_sqrt_min": 6.0}
 SLIP = added("garment_slip", (), (), settings={"rotations": dict.fromkeys(LAYOUT.rotations, WALK)})
 FAULT = added("sensor_fault", (), (), settings={"where": ["I_MCP"], "live": LIMITS.to_settings()})
 MODEL = model_with(HYSTERESIS, CREEP, SLIP, FAULT)

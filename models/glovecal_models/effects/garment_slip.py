@@ -73,7 +73,7 @@ class GarmentSlip(IntervalEffect):
     def interval(
         self, settings: Settings, rotations: Sequence[str], sensors: Sequence[str], noise: np.ndarray
     ) -> SlipInterval:
-        return SlipInterval([SlipGrowth(**settings["rotations"][name]) for name in rotations], noise)
+        return SlipInterval([SlipGrowth(**settings["rotations"][name]) for name in rotations])
 
     def widens(self, settings: Settings, rotations: Sequence[str]) -> bool:
         return any(settings["rotations"][name]["rate_deg_per_sqrt_min"] > 0 for name in rotations)

@@ -11,7 +11,7 @@ from glovecal_models.effects.effect import Settings
 from glovecal_models.effects.interval_effect import IntervalEffect, LeftOutErrors
 
 PARTS = 3
-LEAST_FALL, MOST_RISE = 0.005, 0.02
+LEAST_FALL, MOST_RISE = 0.005, 0.01
 """Nats by which the NLPD must fall, or may rise: a claim that is half of what it should be costs 0.8."""
 
 

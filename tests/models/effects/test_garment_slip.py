@@ -106,12 +106,12 @@ def test_what_all_sensors_do_together_is_no_slip(glove):
     assert SLIP.find(takes, glove.sensor_of, glove.errors(takes)) == ()
 
 
-def test_the_claimed_variance_grows_with_time_and_is_right_where_training_was():
-    interval = SlipInterval([SlipGrowth(2.0, 20.0), SlipGrowth(0.0, 20.0)], np.array([1.0, 3.0]))
-    ages = np.array([0.0, 20.0, 80.0, 260.0, 1e6, 1e9])
+def test_the_claimed_variance_grows_in_proportion_to_the_time():
+    interval = SlipInterval([SlipGrowth(2.0), SlipGrowth(0.0)])
+    ages = np.array([-1.0, 0.0, 60.0, 240.0, 1e6, 1e9])
     added = interval.added_variance(ages, np.zeros((6, 2)))
-    assert added[:4, 0] == pytest.approx([-0.7, 0.0, 4.0, 16.0])
-    assert added[4, 0] == added[5, 0] == pytest.approx((GROWS_S - 20.0) / 60.0 * 4.0)
+    assert added[:4, 0] == pytest.approx([0.0, 0.0, 4.0, 16.0])
+    assert added[4, 0] == added[5, 0] == pytest.approx(GROWS_S / 60.0 * 4.0)
     assert not added[:, 1].any()
 
 
@@ -126,7 +126,6 @@ def test_the_rate_of_the_growth_is_that_of_the_walk(glove):
     ]  # fmt: skip
     growth = slip_growth(left_out)
     assert growth.rate_deg_per_sqrt_min == pytest.approx(4.0, rel=0.4)
-    assert growth.right_at_s == pytest.approx(30.0, abs=1.0)
     settings = SLIP.learned(left_out, {})
     assert "in the first minute" in SLIP.sentence(settings, ["M_PIP"])
     assert SLIP.described_on(settings, "M_PIP")["rate_deg_per_sqrt_min"] == growth.rate_deg_per_sqrt_min

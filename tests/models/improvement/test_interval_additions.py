@@ -1,4 +1,4 @@
-"""Effects that are recognised rather than fitted, as steps: claims become true, faults are left out and told."""
+"""Effects that are recognised, not fitted, as steps: claims become true, faults are left out and told."""
 
 from __future__ import annotations
 
@@ -28,8 +28,10 @@ LAYOUT = Layout.from_columns("three", SENSORS, SENSORS)
 SETTINGS = TrainingSettings(samples=200, folds=3)
 
 
-def recorded(seed: int, *causes: Cause) -> RecordedSession:
-    plan = SessionPlan(seed=seed, sensors=SENSORS, wearings=2, takes_per_wearing=3, take_s=40.0, bits=12)
+def recorded(seed: int, *causes: Cause, takes: int = 3, take_s: float = 40.0) -> RecordedSession:
+    plan = SessionPlan(
+        seed=seed, sensors=SENSORS, wearings=2, takes_per_wearing=takes, take_s=take_s, bits=12
+    )
     return record_session(plan, causes)
 
 
@@ -49,7 +51,7 @@ def test_the_interval_at_the_rail_covers_the_truth(size_deg):
     assert "NLPD falls" in added.sentence
     new = [session.also("natural", 40.0, wearing) for wearing in (0, 1, 2)]
     covered = []
-    for each, before in ((added.model, False), (model, True)):
+    for each in (added.model, model):
         found = residuals(each, [item.take for item in new])
         column, inside = found.column("I_PIP"), []
         for one, item in zip(found.takes, new, strict=True):
@@ -60,28 +62,30 @@ def test_the_interval_at_the_rail_covers_the_truth(size_deg):
 
 
 def test_a_slip_makes_long_sessions_claim_what_is_true():
-    session = recorded(3, Cause("garment_slip", "random_walk", 2.0))
-    model = trained(session)
-    added = add_effect(model, session.takes, "garment_slip", settings=SETTINGS, parent_id="p")
-    assert added.added
-    assert added.model.parent == "p"
-    assert added.after == added.before, "the angles stay"
-    assert added.claim is not None
-    assert added.claim.after.nlpd <= added.claim.before.nlpd + 0.02
-    assert all(numbers["rate_deg_per_sqrt_min"] > 0 for numbers in added.parameters.values())
-    long = [session.also("natural", 300.0, 2).take]
-    before, after = (compare(each, long).over_all for each in (model, added.model))
-    assert after.rmse_deg == before.rmse_deg
-    assert after.nlpd is not None
-    assert before.nlpd is not None
-    assert after.nlpd < before.nlpd
-    assert abs(after.coverage - 0.68) < abs(before.coverage - 0.68)
-    again = load(dump(added.model))
-    assert compare(again, long).over_all == after
+    """One walk may happen to stay near its start: the law is asked of the mean over gloves and wearings."""
+    nlpd, coverage = [], []
+    for seed in (20, 21, 22):
+        session = recorded(seed, Cause("garment_slip", "random_walk", 2.0))
+        model = trained(session)
+        added = add_effect(model, session.takes, "garment_slip", settings=SETTINGS, parent_id="p")
+        assert added.added
+        assert added.model.parent == "p"
+        assert added.after == added.before, "the angles stay"
+        assert added.claim is not None
+        assert added.claim.after.nlpd < added.claim.before.nlpd, "on takes left out"
+        assert all(numbers["rate_deg_per_sqrt_min"] > 0 for numbers in added.parameters.values())
+        long = [session.also("natural", 300.0, wearing).take for wearing in (2, 3)]
+        pair = [compare(each, long).over_all for each in (model, load(dump(added.model)))]
+        assert pair[0].rmse_deg == pair[1].rmse_deg
+        nlpd.append([one.nlpd for one in pair])
+        coverage.append([one.coverage for one in pair])
+    assert np.diff(np.mean(nlpd, axis=0)) < 0
+    before, after = np.abs(np.mean(coverage, axis=0) - 0.68)
+    assert after < before
 
 
 def test_a_claim_that_becomes_no_truer_is_undone_and_few_takes_are_refused():
-    session = recorded(5)
+    session = recorded(5, takes=2, take_s=20.0)
     model = trained(session)
     undone = add_effect(
         model, session.takes, "saturation", rotations=["I_PIP"], constants={"bands": []}, settings=SETTINGS
@@ -94,7 +98,7 @@ def test_a_claim_that_becomes_no_truer_is_undone_and_few_takes_are_refused():
 
 
 def test_a_fault_is_left_out_told_and_served_live():
-    session = recorded(7, Cause("sensor_fault", "spikes", 2.0, ("I_PIP",)))
+    session = recorded(7, Cause("sensor_fault", "spikes", 2.0, ("I_PIP",)), takes=2, take_s=20.0)
     found = improve(session.takes, LAYOUT, "anna", SETTINGS, max_steps=1)
     document = json.loads(json.dumps(found.to_document()))
     step = document["steps"][1]
@@ -116,7 +120,7 @@ def test_a_fault_is_left_out_told_and_served_live():
 
 
 def test_the_decoys_error_is_kept_with_the_effect():
-    session = recorded(9, Cause("hysteresis", "single_play", 3.0, ("I_PIP",)))
+    session = recorded(9, Cause("hysteresis", "single_play", 3.0, ("I_PIP",)), takes=2, take_s=20.0)
     added = add_effect(trained(session), session.takes, "hysteresis", rotations=["I_PIP"], settings=SETTINGS)
     assert added.added
     evidence = added.model.effects[0].evidence
