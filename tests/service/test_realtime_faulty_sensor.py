@@ -72,22 +72,21 @@ def test_the_last_good_angle_is_kept_flagged_and_counted() -> None:
     by_hand.send([("g1", frame) for frame in frames[: DROPPED.stop]])
     assert any("sensor" in said and "fails" in said for said in by_hand.status("g1")["effects"]["sentences"])
     by_hand.send([("g1", frame) for frame in frames[DROPPED.stop :]])
-    poses, fails = by_hand.poses["g1"], np.zeros(300, dtype=bool)
-    fails[DROPPED] = True
+    poses = by_hand.poses["g1"]
+    served = np.array([pose.sequence for pose in poses])  # a busy computer may have skipped some
+    fails = (served >= DROPPED.start) & (served < DROPPED.stop)
     row = next(i for i, read in enumerate(LIMITS.reads) if read == (LAYOUT.sensors[0],))
     flagged = np.array([bool(pose.rotation_flags[row] & RotationFlag.FAULTY_SENSOR) for pose in poses])
     np.testing.assert_array_equal(flagged, fails)
     assert [bool(pose.flags & PoseFlag.FAULTY_SENSOR) for pose in poses] == fails.tolist()
     sound = as_take(moving_frames(300)).mean[:, row]
     kept = np.array([pose.degrees[row] for pose in poses])
-    assert np.abs(kept[DROPPED] - sound[DROPPED.start - 1]).max() < 5.0, (
-        "not where a reading of zero would be"
-    )
+    assert np.abs(kept[fails] - sound[DROPPED.start - 1]).max() < 5.0, "not where a reading of zero would be"
     spread = np.array([pose.deviations[row] for pose in poses])
-    assert (np.diff(spread[DROPPED]) > 0).all()
-    assert spread[DROPPED.stop] < spread[DROPPED.start]
+    assert (np.diff(spread[fails]) > 0).all()
+    assert spread[served >= DROPPED.stop][0] < spread[fails][0]
     status = by_hand.status("g1")["effects"]
-    assert status["faulty_frames"] == {LAYOUT.sensors[0]: 10}
+    assert status["faulty_frames"] == {LAYOUT.sensors[0]: int(fails.sum())}
     assert not any("fails" in said for said in status["sentences"])
 
 
@@ -106,5 +105,6 @@ def test_a_slip_makes_the_claim_grow_from_the_start_of_a_wearing() -> None:
     by_hand.send([("g1", frame) for frame in frames])
     by_hand.say("g1", wearing="two")
     by_hand.send([("g1", frame) for frame in later])
-    before, after = (by_hand.poses["g1"][at].deviations for at in (0, 400))
+    poses = by_hand.poses["g1"]
+    before, after = poses[0].deviations, next(pose for pose in poses if pose.sequence >= 400).deviations
     np.testing.assert_allclose(after, before, rtol=0.01)

@@ -89,8 +89,9 @@ def add_effect(
 
     ``takes`` are the training takes. ``constants``: settings of an effect without columns, such as the
     clocks' offsets. ``before`` saves measuring the parent, ``decoy_share`` (of the error, that is left with
-    the effect's decoy instead) screening it. Undone, with the reason, unless the held-out RMSE
-    of the ``judged`` rotations (default: all chosen) falls by ``least_gain``. Raises BadInput for an unknown
+    the effect's decoy instead) screening it. Undone, with the reason, unless the held-out RMSE of the
+    ``judged`` rotations (default: all chosen) falls by ``least_gain``; an effect that widens the interval
+    is judged by its claim (``add_interval``). Raises BadInput for an unknown
     effect or rotation, or when the takes cannot carry it; Cancelled.
     """
     effect = known_effect(name)
@@ -139,16 +140,9 @@ def add_effect(
     if report:
         report(f"learning {name} from all takes", 0.85)
     fit = fit_with_effects(prepared, chosen, wanted, settings, cancelled=cancelled)
-    evidence = {
-        "rmse_before_deg": total_rmse_deg(before, chosen),
-        "rmse_after_deg": total_rmse_deg(after, chosen),
-    }
     if decoy_share is None and fresh.has_columns:
         decoy_share = share_left_by_decoy(model, repaired_takes(takes, has), effect, chosen, cancelled)
-    if decoy_share is not None:
-        evidence["rmse_decoy_deg"] = decoy_share * evidence["rmse_before_deg"]
-    if faults is not None:
-        evidence |= faults.to_document()
+    evidence = _evidence(before, after, chosen, decoy_share) | (faults.to_document() if faults else {})
     effects = [*kept_lanes(model.effects, chosen), *fit.effects, *columnless_effects(wanted, model.effects)]
     effects = [replace(item, evidence=evidence) if item.name == name else item for item in effects]
     whole = before.with_those_of(after)
@@ -157,6 +151,15 @@ def add_effect(
         key: value for item in fit.effects if item.name == name for key, value in item.described().items()
     }
     return Addition(name, chosen, True, sentence, before, after, child, tuple(wanted), described)
+
+
+def _evidence(
+    before: HeldOutErrors, after: HeldOutErrors, rotations: Sequence[str], decoy_share: float | None
+) -> dict[str, float]:
+    """The held-out errors of ``rotations`` without the effect, with it, and with its decoy."""
+    rmse_before = total_rmse_deg(before, rotations)
+    found = {"rmse_before_deg": rmse_before, "rmse_after_deg": total_rmse_deg(after, rotations)}
+    return found if decoy_share is None else found | {"rmse_decoy_deg": decoy_share * rmse_before}
 
 
 def _joined(has: Sequence[WantedEffect], fresh: WantedEffect) -> WantedEffect:
