@@ -61,6 +61,15 @@ def test_golden_settling_pose_is_read_and_written_to_the_byte() -> None:
     assert encode_pose(Pose(**(values | {name: np.array(values[name]) for name in ARRAYS}))) == message
 
 
+def test_golden_pose_of_a_faulty_sensor_is_read_and_written_to_the_byte() -> None:
+    message = (GOLDEN / "pose_v1_faulty.bin").read_bytes()
+    values = json.loads((GOLDEN / "pose_v1_faulty.json").read_text())
+    pose = decode_pose(message)
+    assert (pose.faulty_sensor, pose.too_uncertain, pose.settling) == (True, True, False)
+    assert [bool(flags & RotationFlag.FAULTY_SENSOR) for flags in pose.rotation_flags] == [True, False, True]
+    assert encode_pose(Pose(**(values | {name: np.array(values[name]) for name in ARRAYS}))) == message
+
+
 @given(poses())
 def test_what_is_written_is_read_back(pose: Pose) -> None:
     message = encode_pose(pose)
@@ -114,5 +123,5 @@ def test_values_outside_the_format_are_refused(change: dict, sentence: str) -> N
 
 
 def test_flag_bits_are_those_of_the_document() -> None:
-    assert [int(flag) for flag in PoseFlag] == [1, 2, 4, 8, 16, 32, 64]
-    assert [int(flag) for flag in RotationFlag] == [1, 2, 4]
+    assert [int(flag) for flag in PoseFlag] == [1, 2, 4, 8, 16, 32, 64, 128]
+    assert [int(flag) for flag in RotationFlag] == [1, 2, 4, 8]

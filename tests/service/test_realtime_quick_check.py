@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from effect_models import LoopByHand, assert_published, moving_frames
+from loop_by_hand import LoopByHand, assert_published, moving_frames
 from realtime_support import LAYOUT, linear_model
 
 from glovecal_models.calibration.predictor import GloveAngles, GlovePredictor

@@ -31,6 +31,7 @@ class PoseFlag(IntFlag):
     STATE_RESET = 16
     SIMULATED = 32
     SETTLING = 64
+    FAULTY_SENSOR = 128
 
 
 class RotationFlag(IntFlag):
@@ -39,6 +40,7 @@ class RotationFlag(IntFlag):
     EXTRAPOLATING = 1
     TOO_UNCERTAIN = 2
     BY_RULE = 4
+    FAULTY_SENSOR = 8
 
 
 def _no_values() -> np.ndarray:
@@ -100,6 +102,11 @@ class Pose:
     def settling(self) -> bool:
         """An effect with a memory runs for shorter than its longest time constant; it corrects less well."""
         return bool(self.flags & PoseFlag.SETTLING)
+
+    @property
+    def faulty_sensor(self) -> bool:
+        """Some rotation's sensor fails now: that rotation keeps its last good angle."""
+        return bool(self.flags & PoseFlag.FAULTY_SENSOR)
 
     @property
     def simulated(self) -> bool:

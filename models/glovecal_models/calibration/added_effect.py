@@ -10,6 +10,7 @@ import numpy as np
 
 from glovecal_models.effects.catalogue import stored_effect
 from glovecal_models.effects.effect import Effect, Settings
+from glovecal_models.effects.interval_effect import IntervalEffect
 from glovecal_models.errors import BadInput
 
 
@@ -53,8 +54,11 @@ class AddedEffect:
 
     def described(self) -> dict[str, dict[str, float]]:
         """For each rotation the learned numbers, units in their names."""
+        effect = self.effect
+        if isinstance(effect, IntervalEffect):
+            return {name: effect.described_on(self.settings, name) for name in self.rotations}
         return {
-            name: self.effect.described(self.settings, shape, weights)
+            name: effect.described(self.settings, shape, weights)
             for name, shape, weights in zip(self.rotations, self.shape, self.weights, strict=True)
             if name in self.active
         }

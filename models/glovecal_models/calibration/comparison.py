@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -67,6 +67,8 @@ class Comparison:
     """Rotations the takes measured that the model does not predict."""
     fingertips: FingertipErrors | None
     """None where no finger's chain was predicted and measured."""
+    left_out: dict[str, int] = field(default_factory=dict)
+    """Measured frames, by rotation, that are not compared: faulty sensors, repeated frames."""
 
     def to_document(self) -> dict[str, Any]:
         """Plain JSON-able data."""
@@ -105,6 +107,7 @@ def summed_up(
         not_measured=tuple(name for name in found.rotations if name not in measured),
         not_predicted=tuple(sorted(in_takes - set(found.rotations))),
         fingertips=fingertip_errors(found, {name: noise[name].floor for name in measured}, dimensions),
+        left_out=found.left_out,
     )
 
 

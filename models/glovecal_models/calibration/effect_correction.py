@@ -7,11 +7,16 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect
+from glovecal_models.calibration.doubt import Doubt
+from glovecal_models.calibration.fault_hold import FaultHold
+from glovecal_models.calibration.widening import Widening
 from glovecal_models.effects.effect import Effect, Signals, Uncertainty
 from glovecal_models.errors import BadInput
 
 LARGEST_CORRECTION_DEG = 360.0
 """No effect turns a joint by more than this; what is larger, or no number, is an effect gone wrong."""
+
+SENSOR_FAULT = "sensor_fault"
 
 
 def usable_correction(correction: np.ndarray) -> np.ndarray:
@@ -33,8 +38,15 @@ class SignalScale:
 class EffectCorrection:
     """All effects of one model together."""
 
-    def __init__(self, effects: Sequence[AddedEffect], rotations: Sequence[str], scale: SignalScale) -> None:
-        """``rotations``: the columns of the base's prediction.
+    def __init__(
+        self,
+        effects: Sequence[AddedEffect],
+        rotations: Sequence[str],
+        scale: SignalScale,
+        noise: np.ndarray | None = None,
+    ) -> None:
+        """``rotations``: the columns of the base's prediction; ``noise`` (R,) degrees squared, claimed for
+        their measurement, which effects that widen the interval build on.
 
         Raises BadInput for an effect that this machine does not have, or has in another version.
         """
@@ -51,6 +63,14 @@ class EffectCorrection:
         ]
         self._uncertain: tuple[str, list[tuple[np.ndarray, Uncertainty]]] | None = None
         """Of the wearing asked about last."""
+        measured = np.zeros(len(rotations)) if noise is None else noise
+        self._widening = Widening(effects, rotations, scale.sensors, measured)
+        self._hold = _fault_hold(effects, rotations, scale.sensors)
+        self._started_s: float | None = None
+        self.doubt: Doubt | None = None
+        """Of the last frame, or of the last take's frames; None: the claim stays as it is."""
+        self.faulty_sensors: tuple[str, ...] = ()
+        """Those that fail in the last frame."""
         self.undefined: np.ndarray | None = None
         """(R,) True for rotations that some effect could not correct in the last frame; None: no such."""
         self.context = tuple(dict.fromkeys(name for effect in self._effects for name in effect.context))
@@ -66,12 +86,17 @@ class EffectCorrection:
 
     @property
     def is_empty(self) -> bool:
-        return not self._lanes
+        return not self._lanes and not self._doubts
+
+    @property
+    def _doubts(self) -> bool:
+        return self._hold is not None or not self._widening.is_empty
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Effects that correct something, in their order."""
-        return tuple(item.name for item, _ in self._lanes)
+        """Effects that act on poses: those that correct something, in their order, then those that doubt."""
+        correcting = tuple(item.name for item, _ in self._lanes)
+        return (*correcting, *self._widening.names, *((SENSOR_FAULT,) if self._hold else ()))
 
     @property
     def rows(self) -> np.ndarray:
@@ -85,7 +110,9 @@ class EffectCorrection:
     @property
     def needing_time(self) -> tuple[str, ...]:
         """Names of the effects whose columns depend on when the frames were."""
-        return tuple(effect.name for effect in self._effects if effect.needs_time)
+        effects = (*self._effects, *self._widening.effects)
+        names = tuple(effect.name for effect in effects if effect.needs_time)
+        return (*names, SENSOR_FAULT) if self._hold else names
 
     def silent(self, context: Collection[str], wearing: str) -> tuple[str, ...]:
         """A sentence for each effect that corrects nothing for want of something it is not told.
@@ -107,12 +134,18 @@ class EffectCorrection:
         wearing: str,
     ) -> np.ndarray:
         """(N, R) degrees to add to ``base`` (N, R); ``readings`` (N, S) raw counts."""
-        total = np.zeros_like(base)
+        first, self.doubt = base, None
+        if self._doubts and len(base):
+            base, readings = self._doubted(time_s, base, readings)
+        total = base - first
         others = self._scale.others(readings) if self._lanes else {}
         for item, lanes in self._lanes:
             take = Signals(time_s, base[:, lanes], others, context, wearing, zero_deg=item.zero_deg)
             columns = item.effect.columns(take, item.settings, item.shape)
             total[:, lanes] += np.einsum("nlc,lc->nl", columns, item.weights)
+        unknown = self._unknown_variance(base, wearing)
+        if unknown is not None:
+            self.doubt = Doubt.more(self.doubt, unknown)
         return total
 
     def of_frame(
@@ -124,7 +157,12 @@ class EffectCorrection:
         wearing: str,
     ) -> np.ndarray:
         """(R,) degrees to add to ``base`` (R,), the next frame of a stream; the same as in a take."""
-        total, self.undefined = np.zeros_like(base), None
+        first, self.undefined, self.doubt, self.faulty_sensors = base, None, None, ()
+        if self._doubts:
+            if self._started_s is None:
+                self._started_s = time_s
+            base, readings = self._doubted_frame(time_s, base, readings)
+        total = base - first
         if not self._lanes:
             return total
         others = self._scale.others(readings[None, :])
@@ -137,9 +175,12 @@ class EffectCorrection:
                 if self.undefined is None:
                     self.undefined = np.zeros(len(base), dtype=bool)
                 self.undefined[lanes] = True
+        unknown = self._unknown_variance(base[None], wearing)
+        if unknown is not None:
+            self.doubt = Doubt.more(self.doubt, unknown[0])
         return total
 
-    def variance(self, base: np.ndarray, wearing: str) -> np.ndarray | None:
+    def _unknown_variance(self, base: np.ndarray, wearing: str) -> np.ndarray | None:
         """(N, R), degrees squared: what is not known of the corrections of ``base`` (N, R); None: nothing."""
         if self._uncertain is None or self._uncertain[0] != wearing:
             self._uncertain = wearing, self._uncertain_in(wearing)
@@ -157,10 +198,51 @@ class EffectCorrection:
         ]
         return [(lanes, variance) for lanes, variance in found if variance is not None]
 
+    def _doubted(
+        self, time_s: np.ndarray, base: np.ndarray, readings: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The take without what failing sensors say; sets ``doubt`` for all its frames."""
+        variance = self._widening.added_variance(time_s - time_s[0], readings)
+        if self._hold is None:
+            self.doubt = Doubt(variance, np.zeros(base.shape, dtype=bool))
+            return base, readings
+        self._hold.reset()
+        held = [self._hold.frame(*frame) for frame in zip(time_s, base, readings, strict=True)]
+        variance += np.stack([item.variance for item in held])
+        self.doubt = Doubt(variance, np.stack([item.is_faulty for item in held]))
+        return np.stack([item.base for item in held]), np.stack([item.readings for item in held])
+
+    def _doubted_frame(
+        self, time_s: float, base: np.ndarray, readings: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The next frame without what failing sensors say; sets ``doubt``."""
+        since = np.array([time_s - (self._started_s or 0.0)])
+        variance = self._widening.added_variance(since, readings[None, :])[0]
+        if self._hold is None:
+            self.doubt = Doubt(variance, np.zeros(len(base), dtype=bool))
+            return base, readings
+        held = self._hold.frame(time_s, base, readings)
+        self.doubt = Doubt(variance + held.variance, held.is_faulty)
+        self.faulty_sensors = held.sensors
+        return held.base, held.readings
+
     def reset(self) -> None:
         """A new wearing, or frames were lost: effects with a memory start anew."""
         for stream in self._streams:
             stream.reset()
+        self._started_s = None
+        if self._hold is not None:
+            self._hold.reset()
+
+
+def _fault_hold(
+    effects: Sequence[AddedEffect], rotations: Sequence[str], sensors: Sequence[str]
+) -> FaultHold | None:
+    """For a model that knows what its sensors do when they are sound."""
+    live = [
+        item.settings["live"] for item in effects if item.name == SENSOR_FAULT and "live" in item.settings
+    ]
+    return FaultHold(live[-1], rotations, sensors) if live else None
 
 
 def _fitting(added: AddedEffect) -> Effect:

@@ -84,7 +84,10 @@ class CalibrationModel:
         nothing = np.zeros(len(sensors))
         centre = nothing if self.sensor_centre is None else self.sensor_centre
         spread = nothing + 1 if self.sensor_scale is None else self.sensor_scale
-        return EffectCorrection(self.effects, self.rotation_names, SignalScale(sensors, centre, spread))
+        noise = np.array([item.regressor.noise_variance for item in self.rotations])
+        return EffectCorrection(
+            self.effects, self.rotation_names, SignalScale(sensors, centre, spread), noise
+        )
 
     @property
     def rotation_names(self) -> tuple[str, ...]:

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from glovecal_models.calibration.doubt import Doubt
 from glovecal_models.calibration.effect_correction import EffectCorrection, usable_correction
 from glovecal_models.calibration.fused_processes import FusedProcesses, grouped_by_nodes, is_fusible
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
-from glovecal_models.effects.saturation import SaturatedBand
 from glovecal_models.errors import BadInput
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.regression.rule_regressor import RuleRegressor
 
-EXTRAPOLATING, TOO_UNCERTAIN, BY_RULE = 1, 2, 4
+EXTRAPOLATING, TOO_UNCERTAIN, BY_RULE, FAULTY_SENSOR = 1, 2, 4, 8
 RANGE_MARGIN = 0.05
 """An input this share of its training range outside that range is extrapolating."""
+LEAST_VARIANCE = 1e-4
+"""Degrees squared: no reference repeats itself better."""
 FLOATS_AT_ONCE = 2_000_000
 """Long recordings are predicted in blocks with work arrays of about this size."""
 
@@ -31,7 +33,7 @@ class GloveAngles:
     sd: np.ndarray
     """Standard deviation of a measurement of the rotation: its own uncertainty plus noise, shape (N, R)."""
     flags: np.ndarray
-    """uint8, shape (N, R): 1 extrapolating, 2 too uncertain to use, 4 by rule."""
+    """uint8, shape (N, R): 1 extrapolating, 2 too uncertain to use, 4 by rule, 8 faulty sensor."""
 
 
 class GlovePredictor:
@@ -52,7 +54,6 @@ class GlovePredictor:
         self._groups, self._others = _split(model, measured)
         self._rules = _ordered_rules(model)
         self._model = model
-        self._bands = _saturated_bands(model)
         self.has_effects = not model.correction().is_empty
         items = model.rotations
         self._noise = np.array([[item.regressor.noise_variance] for item in items])
@@ -102,25 +103,22 @@ class GlovePredictor:
             return angles
         effects = self._model.correction()
         correction = effects.of_take(time_s, angles.mean, readings, context, wearing)
-        variance = effects.variance(angles.mean, wearing)
-        return self.less_certain(self.corrected(angles, correction), variance)
-
-    def less_certain(self, angles: GloveAngles, variance: np.ndarray | None) -> GloveAngles:
-        """``angles`` whose corrections have a ``variance`` of their own, (N, R), degrees squared."""
-        if variance is None:
-            return angles
-        for row, sources, weights in self._rules:
-            variance[:, row] = variance[:, sources] @ (weights * weights)
-        return replace(angles, sd=np.sqrt(angles.sd**2 + variance))
+        return self.corrected(angles, correction, doubt=effects.doubt)
 
     def corrected(
-        self, angles: GloveAngles, correction: np.ndarray, doubtful: np.ndarray | None = None
+        self,
+        angles: GloveAngles,
+        correction: np.ndarray,
+        doubtful: np.ndarray | None = None,
+        doubt: Doubt | None = None,
     ) -> GloveAngles:
         """``angles`` with the effects' ``correction`` (N, R) added; rules follow the rotations they read.
 
         Where the correction is unusable the rotation stays as it was. There, and where ``doubtful`` (N, R)
-        says so, it is flagged too uncertain.
+        says so, it is flagged too uncertain. ``doubt`` is of all N frames.
         """
+        if doubt is not None:
+            angles = self._doubted(angles, doubt)
         usable = usable_correction(correction)
         mean, flags = angles.mean + np.where(usable, correction, 0.0), angles.flags
         bad = ~usable if doubtful is None else ~usable | doubtful
@@ -132,6 +130,17 @@ class GlovePredictor:
             if any_bad:
                 flags[:, row] |= np.bitwise_or.reduce(flags[:, sources] & TOO_UNCERTAIN, axis=1)
         return GloveAngles(mean, angles.sd, flags)
+
+    def _doubted(self, angles: GloveAngles, doubt: Doubt) -> GloveAngles:
+        """With the variance and the flags that the effects' doubt asks for."""
+        variance = np.maximum(angles.sd**2 + doubt.variance, LEAST_VARIANCE)
+        flags = np.where(doubt.is_faulty, angles.flags | FAULTY_SENSOR, angles.flags).astype(np.uint8)
+        is_old = doubt.is_faulty & (doubt.variance > self._largest_variance.T)
+        np.bitwise_or(flags, TOO_UNCERTAIN, out=flags, where=is_old)
+        for row, sources, weights in self._rules:
+            variance[:, row] = variance[:, sources] @ (weights * weights)
+            flags[:, row] |= np.bitwise_or.reduce(flags[:, sources], axis=1)
+        return GloveAngles(angles.mean, np.sqrt(variance), flags)
 
     def stream(self) -> EffectCorrection:
         """The effects' state for one glove's frames, to be used with ``corrected``."""
@@ -148,8 +157,6 @@ class GlovePredictor:
         flags = self._range.flags(columns, len(mean))
         np.bitwise_or(flags, TOO_UNCERTAIN, out=flags, where=variance > self._largest_variance)
         variance += self._noise
-        for row, sensor, band in self._bands:
-            variance[row] += band.extra_sd(readings[:, sensor]) ** 2
         for row, sources, weights in self._rules:
             mean[row] = weights @ mean[sources]
             variance[row] = (weights * weights) @ variance[sources]
@@ -180,17 +187,6 @@ class _Range:
         outside = (inputs < self._low) | (inputs > self._high)
         flags[self._rows] = np.logical_or.reduceat(outside, self._starts, axis=0)
         return flags
-
-
-def _saturated_bands(model: CalibrationModel) -> list[tuple[int, int, SaturatedBand]]:
-    """(row, sensor, band) where a sensor stops responding: the angle may be anything beyond it."""
-    sensors = model.layout.sensors
-    return [
-        (model.rotation_names.index(band.rotation), sensors.index(band.sensor), band)
-        for item in model.effects
-        if item.name == "saturation"
-        for band in (SaturatedBand(**document) for document in item.settings["bands"])
-    ]
 
 
 _Predict = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]

@@ -26,6 +26,8 @@ class TakeResiduals:
     """Claimed standard deviation of a measurement, (N, R), degrees."""
     measured: np.ndarray
     """Reference at the frames, (N, R), degrees."""
+    left_out: tuple[int, ...] = ()
+    """For each rotation the measured frames that are not compared: its sensor failed. Empty: none."""
 
     @property
     def error(self) -> np.ndarray:
@@ -47,6 +49,15 @@ class Residuals:
         some = np.any([np.isfinite(item.measured).any(axis=0) for item in self.takes], axis=0)
         return tuple(name for name, is_measured in zip(self.rotations, some, strict=True) if is_measured)
 
+    @property
+    def left_out(self) -> dict[str, int]:
+        """Measured frames that are not compared, by rotation; only those that have some."""
+        counts = dict.fromkeys(self.rotations, 0)
+        for item in self.takes:
+            for name, count in zip(self.rotations, item.left_out, strict=False):
+                counts[name] += count
+        return {name: count for name, count in counts.items() if count}
+
     def column(self, rotation: str) -> int:
         return self.rotations.index(rotation)
 
@@ -62,14 +73,21 @@ def residuals(model: CalibrationModel, takes: Sequence[Take]) -> Residuals:
     found = []
     for take in takes:
         require_layout(take, model.layout)
+        given = take
         take = usable(model, take)
+        left_out = () if take is given else _left_out(given, take, names)
         index = [take.sensors.index(name) for name in model.layout.sensors]
         angles = predictor.predict_take(take.time_s, take.readings[:, index], take.context, take.wearing)
         take = realigned(model, take, angles.mean)
-        found.append(TakeResiduals(take, angles.mean, angles.sd, take.reference_at_frames(names)))
+        found.append(TakeResiduals(take, angles.mean, angles.sd, take.reference_at_frames(names), left_out))
     result = Residuals(names, tuple(found))
     if not found or not result.measured_rotations:
         raise BadInput(
             "none of the takes measured a rotation of this model; compare needs r.ROTATION columns"
         )
     return result
+
+
+def _left_out(given: Take, kept: Take, rotations: Sequence[str]) -> tuple[int, ...]:
+    counts = [np.isfinite(take.reference_at_frames(rotations)).sum(axis=0) for take in (given, kept)]
+    return tuple(int(count) for count in np.maximum(counts[0] - counts[1], 0))

@@ -74,7 +74,8 @@ def diagnose(
         naming = named(found)
     impossible += [NotJudgeable(item.name, SINGLE_POSES) for item in lasting]
     naming = delays_told(naming, beside, screened)
-    findings = tuple(signature_findings(takes, layout, ground.joints, naming, found)) if signatures else ()
+    asked = signature_findings(takes, layout, ground.joints, naming, found, has)
+    findings = tuple(asked) if signatures else ()
     naming = jump_beside_curve(naming, takes, findings)
     said("looking at what is left", 0.95)
     if ground.is_sparse or are_held_levels(takes):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import replace
 
 import numpy as np
@@ -49,8 +49,9 @@ def signature_findings(
     joints: Sequence[str],
     naming: Naming,
     assessments: Sequence[Assessment],
+    without: Set[str] = frozenset(),
 ) -> Iterator[Finding]:
-    """Largest first within each effect."""
+    """Largest first within each effect; ``without`` names effects that the model has already."""
     sensor_of = own_sensors(layout, joints)
     if not sensor_of:
         return
@@ -58,12 +59,12 @@ def signature_findings(
         faults = _found("sensor_fault", takes, sensor_of, None)
         yield from (_between_levels(item, takes, sensor_of) for item in faults if item.kind == "jump")
         return
-    for name in BEFORE_ALL:
+    for name in (name for name in BEFORE_ALL if name not in without):
         yield from _found(name, takes, sensor_of, None)
     if may_be_slip(naming):
         plausible = _with_plausible_context(takes, assessments)
-        for name in AFTER_ALL:
-            yield from _found(name, plausible, sensor_of, _static_errors(takes, sensor_of))
+        for name in (name for name in AFTER_ALL if name not in without):
+            yield from _found(name, plausible, sensor_of, static_errors(takes, sensor_of))
 
 
 def are_held_levels(takes: Sequence[Take]) -> bool:
@@ -123,7 +124,7 @@ def _with_plausible_context(takes: Sequence[Take], assessments: Sequence[Assessm
     ]
 
 
-def _static_errors(takes: Sequence[Take], sensor_of: dict[str, str]) -> list[np.ndarray]:
+def static_errors(takes: Sequence[Take], sensor_of: dict[str, str]) -> list[np.ndarray]:
     """For each take (N, joints): what a smooth curve of each joint's own sensor leaves, degrees."""
     result = [np.full((len(take.time_s), len(sensor_of)), np.nan) for take in takes]
     for column, (rotation, sensor) in enumerate(sensor_of.items()):

@@ -3,19 +3,19 @@
 Found by bands of 4 % of a sensor's range. In the end band readings pile up, and the reference there spreads
 more than one band's worth of angles. Where the reference rests too, it is a posture. A curve that becomes
 flat looks the same as a clipped one, and what was lost is the same: inside the band the angle is known on one
-side only.
+side only. The interval there has to cover what the reference was seen to do.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Literal
 
 import numpy as np
 
 from glovecal_models.effects.effect import Settings
-from glovecal_models.effects.signature_effect import Finding, SignatureEffect, check_signature_input
+from glovecal_models.effects.interval_effect import IntervalEffect, LeftOutErrors
+from glovecal_models.effects.saturated_band import SaturatedBand, SaturationInterval
+from glovecal_models.effects.signature_effect import Finding, check_signature_input
 from glovecal_models.takes.take import Take
 
 BAND = 0.04
@@ -27,46 +27,10 @@ MOVES_SHARE = 0.25
 """Of the reference's spread in the band, to be seen within visits to it: else the hand only rested there."""
 LEAST_EXTRA_DEG = 2.0
 """A smaller loss is not worth a word."""
+LEAST_NOISE_SHARE, MOST_NOISE_SHARE = 0.05, 2.0
 
 
-@dataclass(frozen=True)
-class SaturatedBand:
-    """Readings between which a sensor no longer says where the joint is."""
-
-    sensor: str
-    rotation: str
-    low: float
-    high: float
-    """Raw readings; the open end is the sensor's own."""
-    end: Literal["low", "high"]
-    towards: int
-    """+1 when the true angle may be larger than predicted, -1 when smaller."""
-    extra_sd_deg: float
-    """What the reference spreads in the band beyond what it does in the next one."""
-    piled_up: float
-    """Density of readings in the band over that of the next two."""
-    spread_ratio: float
-    frames: int
-
-    def extra_sd(self, readings: np.ndarray) -> np.ndarray:
-        """(N,) degrees to be added (in squares) to the standard deviation, on the side ``towards``."""
-        inside = readings >= self.low if self.end == "high" else readings <= self.high
-        return np.where(inside, self.extra_sd_deg, 0.0)
-
-    def censored_interval(
-        self, readings: np.ndarray, predicted_deg: np.ndarray, sd_deg: np.ndarray, times: float = 1.0
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper angle (N,), ``times`` standard deviations away; one-sidedly wider in the band."""
-        wide = np.hypot(sd_deg, self.extra_sd(readings))
-        below, above = (sd_deg, wide) if self.towards > 0 else (wide, sd_deg)
-        return predicted_deg - times * below, predicted_deg + times * above
-
-    def to_settings(self) -> Settings:
-        """Plain JSON-able data; ``SaturatedBand(**settings)`` reads it back."""
-        return asdict(self)
-
-
-class Saturation(SignatureEffect):
+class Saturation(IntervalEffect):
     name = "saturation"
     explanation = "The sensor stops responding near the end of its range: further bending is not seen."
     source = "clipped converter or fully stretched sensor; bands: study of missing effects"
@@ -80,6 +44,57 @@ class Saturation(SignatureEffect):
         check_signature_input(takes, sensor_of, errors)
         bands = sorted(saturated_bands(takes, sensor_of), key=lambda band: -band.extra_sd_deg)
         return tuple(_finding(band) for band in bands)
+
+    def learned(self, left_out: Sequence[LeftOutErrors], found: Settings) -> Settings:
+        bands = [SaturatedBand.of(item) for item in found["bands"]]
+        shares, learned = {}, []
+        for name in dict.fromkeys(band.rotation for band in bands):
+            own = [band for band in bands if band.rotation == name]
+            errors = [item for item in left_out if item.rotation == name]
+            shares[name] = _noise_share(own, errors)
+            learned += [band.learned(errors, shares[name]).to_settings() for band in own]
+        return {"bands": learned, "noise_share": shares}
+
+    def interval(
+        self, settings: Settings, rotations: Sequence[str], sensors: Sequence[str], noise: np.ndarray
+    ) -> SaturationInterval:
+        bands = [SaturatedBand.of(item) for item in settings["bands"]]
+        shares = np.array([settings.get("noise_share", {}).get(name, 1.0) for name in rotations])
+        return SaturationInterval(bands, shares, rotations, sensors, noise)
+
+    def sentence(self, settings: Settings, rotations: Sequence[str]) -> str:
+        bands = [SaturatedBand.of(item) for item in settings["bands"]]
+        largest = max((max(band.step_sd_deg, default=band.extra_sd_deg) for band in bands), default=0.0)
+        return (
+            "no calibration brings back what the sensor does not say; near the end of its range the claimed "
+            f"standard deviation is up to {largest:.1f} degrees"
+        )
+
+    def described_on(self, settings: Settings, rotation: str) -> dict[str, float]:
+        told: dict[str, float] = {}
+        for band in (SaturatedBand.of(item) for item in settings["bands"] if item["rotation"] == rotation):
+            told |= {
+                f"{band.end}_band_from_counts": band.low,
+                f"{band.end}_band_to_counts": band.high,
+                f"{band.end}_band_sd_deg": max(band.step_sd_deg, default=band.extra_sd_deg),
+            }
+        return told
+
+
+def _near(band: SaturatedBand, left_out: LeftOutErrors) -> np.ndarray:
+    return band.is_near(left_out.readings[:, left_out.sensors.index(band.sensor)])
+
+
+def _noise_share(bands: Sequence[SaturatedBand], left_out: Sequence[LeftOutErrors]) -> float:
+    """How much of the noise that training found is there far from the bands: it took the loss for noise."""
+    square, known, noise = 0.0, 0.0, 0.0
+    for item in left_out:
+        far = ~np.any([_near(band, item) for band in bands], axis=0)
+        square += float(np.sum(item.error[far] ** 2))
+        known += float(np.sum(item.variance[far] - item.noise))
+        noise += float(far.sum() * item.noise)
+    share = (square - known) / noise if noise > 0 else 1.0
+    return float(np.clip(share, LEAST_NOISE_SHARE, MOST_NOISE_SHARE))
 
 
 def saturated_bands(takes: Sequence[Take], sensor_of: Mapping[str, str]) -> tuple[SaturatedBand, ...]:

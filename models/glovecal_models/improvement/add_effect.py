@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from glovecal_models.calibration.effect_correction import SENSOR_FAULT
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.quick_check import is_only_checked
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
+from glovecal_models.diagnosis.signatures import own_sensors
 from glovecal_models.effects.catalogue import effect as known_effect
 from glovecal_models.effects.clock_scan import aligned
 from glovecal_models.effects.effect import Signals
+from glovecal_models.effects.interval_effect import IntervalEffect
 from glovecal_models.effects.signature_effect import SignatureEffect
 from glovecal_models.errors import BadInput
+from glovecal_models.improvement.add_interval import add_interval
+from glovecal_models.improvement.addition import Addition, total_rmse_deg
 from glovecal_models.improvement.child_model import child_model
+from glovecal_models.improvement.decoy_share import share_left_by_decoy
 from glovecal_models.improvement.effect_fit import fit_with_effects
 from glovecal_models.improvement.held_out_check import HeldOutErrors, held_out_errors
+from glovecal_models.improvement.live_faults import live_faults
 from glovecal_models.improvement.prepared_takes import PreparedTakes
 from glovecal_models.improvement.relearned import columnless_effects, kept_lanes
 from glovecal_models.improvement.wanted_effect import WantedEffect
@@ -27,36 +34,6 @@ from glovecal_models.takes.take import Take
 
 LEAST_GAIN = 0.05
 """Of the held-out RMSE of the touched rotations; with less an effect is undone."""
-
-
-@dataclass(frozen=True)
-class Addition:
-    """What became of an effect that was added."""
-
-    effect: str
-    rotations: tuple[str, ...]
-    added: bool
-    sentence: str
-    before: HeldOutErrors
-    after: HeldOutErrors
-    model: CalibrationModel
-    """The child; the parent itself when the effect was undone."""
-    wanted: tuple[WantedEffect, ...]
-    """All effects of ``model``."""
-    parameters: dict[str, dict[str, float]] = field(default_factory=dict)
-    """For each rotation, units in the names."""
-
-    def to_document(self) -> dict[str, Any]:
-        """Plain JSON-able data."""
-        return {
-            "effect": self.effect,
-            "where": list(self.rotations),
-            "added": self.added,
-            "sentence": self.sentence,
-            "before": _rmse(self.before, self.rotations),
-            "after": _rmse(self.after, self.rotations),
-            "parameters": self.parameters,
-        }
 
 
 def wanted_of(model: CalibrationModel) -> tuple[WantedEffect, ...]:
@@ -105,6 +82,7 @@ def add_effect(
     before: HeldOutErrors | None = None,
     judged: Sequence[str] | None = None,
     least_gain: float = LEAST_GAIN,
+    decoy_share: float | None = None,
     parent_id: str | None = None,
     take_hashes: Sequence[str] = (),
     cancelled: Callable[[], bool] | None = None,
@@ -113,8 +91,10 @@ def add_effect(
     """Learn ``model`` anew with effect ``name`` on ``rotations`` (default: all measured ones).
 
     ``takes`` are the training takes. ``constants``: settings of an effect without columns, such as the
-    clocks' offsets. ``before`` saves measuring the parent. Undone, with the reason, unless the held-out RMSE
-    of the ``judged`` rotations (default: all chosen) falls by ``least_gain``. Raises BadInput for an unknown
+    clocks' offsets. ``before`` saves measuring the parent, ``decoy_share`` (of the error, that is left with
+    the effect's decoy instead) screening it. Undone, with the reason, unless the held-out RMSE of the
+    ``judged`` rotations (default: all chosen) falls by ``least_gain``; an effect that widens the interval
+    is judged by its claim (``add_interval``). Raises BadInput for an unknown
     effect or rotation, or when the takes cannot carry it; Cancelled.
     """
     effect = known_effect(name)
@@ -126,8 +106,19 @@ def add_effect(
     if unknown:
         raise BadInput(f"no rotation {unknown[0]!r} is trained in this model; it has {', '.join(every)}")
     fresh = WantedEffect(name, chosen, dict(constants or {}))
+    faults = None
+    if name == SENSOR_FAULT:
+        others = repaired_takes(takes, [item for item in has if item.name != name])
+        faults = live_faults(model, others, own_sensors(model.layout, every), cancelled)
+        live = {} if faults.live is None else {"live": faults.live}
+        fresh = replace(fresh, settings=fresh.settings | live)
     wanted = (*(item for item in has if item.name != name), _joined(has, fresh))
     prepared = PreparedTakes.of(repaired_takes(takes, wanted), model.layout)
+    if isinstance(effect, IntervalEffect):
+        return add_interval(
+            model, effect, fresh, has, prepared, settings, parent_id=parent_id, take_hashes=take_hashes,
+            cancelled=cancelled,
+        )  # fmt: skip
     if fresh.has_columns:
         _require_judgeable(prepared, effect.missing(_all_signals(prepared)), name)
     before = before or held_out_errors(
@@ -143,28 +134,35 @@ def add_effect(
         report=_part(report, 0.4, 0.8, f"with {name}"),
     )
     judged = tuple(judged or chosen)
-    gain = 1.0 - _total(after, judged) / max(_total(before, judged), 1e-12)
+    gain = 1.0 - total_rmse_deg(after, judged) / max(total_rmse_deg(before, judged), 1e-12)
     sentence = _sentence(name, judged, before, after, gain, least_gain)
-    widens = not fresh.has_columns and not fresh.is_on_reference
-    if widens:
-        sentence = (
-            f"{name} on {', '.join(chosen)}: no calibration brings back what the sensor does not say;"
-            " the interval is widened there."
-        )
-    elif gain < least_gain:
+    if faults is not None:
+        sentence = f"{sentence} {faults.sentence}"
+    if gain < least_gain:
         return Addition(name, chosen, False, sentence, before, after, model, has)
     if report:
         report(f"learning {name} from all takes", 0.85)
     fit = fit_with_effects(prepared, chosen, wanted, settings, cancelled=cancelled)
-    evidence = {"rmse_before_deg": _total(before, chosen), "rmse_after_deg": _total(after, chosen)}
-    fitted = [replace(item, evidence=evidence) if item.name == name else item for item in fit.effects]
-    effects = [*kept_lanes(model.effects, chosen), *fitted, *columnless_effects(wanted)]
+    if decoy_share is None and fresh.has_columns:
+        decoy_share = share_left_by_decoy(model, repaired_takes(takes, has), effect, chosen, cancelled)
+    evidence = _evidence(before, after, chosen, decoy_share) | (faults.to_document() if faults else {})
+    effects = [*kept_lanes(model.effects, chosen), *fit.effects, *columnless_effects(wanted, model.effects)]
+    effects = [replace(item, evidence=evidence) if item.name == name else item for item in effects]
     whole = before.with_those_of(after)
     child = child_model(model, parent_id, prepared, fit, effects, whole, settings, take_hashes)
     described = {
-        key: value for item in fitted if item.name == name for key, value in item.described().items()
+        key: value for item in fit.effects if item.name == name for key, value in item.described().items()
     }
     return Addition(name, chosen, True, sentence, before, after, child, tuple(wanted), described)
+
+
+def _evidence(
+    before: HeldOutErrors, after: HeldOutErrors, rotations: Sequence[str], decoy_share: float | None
+) -> dict[str, float]:
+    """The held-out errors of ``rotations`` without the effect, with it, and with its decoy."""
+    rmse_before = total_rmse_deg(before, rotations)
+    found = {"rmse_before_deg": rmse_before, "rmse_after_deg": total_rmse_deg(after, rotations)}
+    return found if decoy_share is None else found | {"rmse_decoy_deg": decoy_share * rmse_before}
 
 
 def _joined(has: Sequence[WantedEffect], fresh: WantedEffect) -> WantedEffect:
@@ -190,15 +188,6 @@ def _all_signals(takes: PreparedTakes) -> list[Signals]:
     return takes.signals(own, np.zeros(own[0].shape[1]), frozenset())
 
 
-def _total(errors: HeldOutErrors, rotations: Sequence[str]) -> float:
-    square = sum(errors.square[name] for name in rotations)
-    return float(np.sqrt(square / max(sum(errors.count[name] for name in rotations), 1)))
-
-
-def _rmse(errors: HeldOutErrors, rotations: Sequence[str]) -> dict[str, float]:
-    return {name: errors.rmse_deg(name) for name in rotations}
-
-
 def _sentence(
     name: str,
     rotations: Sequence[str],
@@ -208,7 +197,7 @@ def _sentence(
     least: float,
 ) -> str:
     where = ", ".join(rotations) if len(rotations) <= 4 else f"{len(rotations)} rotations"
-    change = f"from {_total(before, rotations):.2f} to {_total(after, rotations):.2f} degrees"
+    change = f"from {total_rmse_deg(before, rotations):.2f} to {total_rmse_deg(after, rotations):.2f} degrees"
     if gain >= least:
         return f"{name} on {where}: the error on takes left out falls {change} ({100 * gain:.0f} %)."
     return (

@@ -39,6 +39,12 @@ class HeldOutErrors:
         """These, replaced by the other's where it has any."""
         return HeldOutErrors(self.square | other.square, self.count | other.count)
 
+    def of(self, rotations: Sequence[str]) -> HeldOutErrors:
+        """Those of some rotations."""
+        return HeldOutErrors(
+            {name: self.square[name] for name in rotations}, {name: self.count[name] for name in rotations}
+        )
+
     @property
     def over_all_deg(self) -> float:
         """RMSE over all rotations and frames."""

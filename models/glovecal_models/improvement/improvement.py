@@ -11,7 +11,7 @@ from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.hold_drift_document import hold_document
 from glovecal_models.diagnosis.next_take import NextTake
-from glovecal_models.improvement.add_effect import Addition
+from glovecal_models.improvement.addition import Addition
 
 CLOCK = "clock_offset"
 
@@ -88,23 +88,26 @@ class Improvement:
 
 
 def added_document(
-    addition: Addition, clock: dict[str, Any] | None, diagnosis: Diagnosis | None
+    addition: Addition, constants: dict[str, Any] | None, diagnosis: Diagnosis | None
 ) -> dict[str, Any]:
     rivals = [addition.effect] if diagnosis is None else list(diagnosis.naming.confidence_set)
     if addition.effect not in rivals:
         rivals = [addition.effect]
     parameters: dict[str, Any] = dict(addition.parameters)
-    if clock is not None and addition.effect != CLOCK:
-        parameters = clock
-    elif clock is not None:
-        parameters = {"offset_s": clock["offset_s"] if clock["per_take"] else clock["common_s"]}
+    if constants is not None and addition.effect == CLOCK:
+        offsets = constants["offset_s"] if constants["per_take"] else constants["common_s"]
+        parameters = {"offset_s": offsets}
+    elif constants is not None and addition.claim is None:
+        parameters = constants
     document: dict[str, Any] = {
         "effect": addition.effect,
-        "where": list((clock or {}).get("where", addition.rotations)),
+        "where": list((constants or {}).get("where", addition.rotations)),
         "verdict": "named" if len(rivals) < 2 else "ambiguous",
         "confidence_set": rivals,
         "parameters": parameters,
     }
+    if addition.claim is not None:
+        document["claim"] = addition.claim.to_document()
     if diagnosis is not None and diagnosis.next_take is not None and len(rivals) > 1:
         document["next_take"] = next_take_document(diagnosis.next_take)
     return document

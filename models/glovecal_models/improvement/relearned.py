@@ -22,12 +22,19 @@ def kept_lanes(effects: Sequence[AddedEffect], relearned: Sequence[str]) -> list
     return kept
 
 
-def columnless_effects(wanted: Sequence[WantedEffect]) -> list[AddedEffect]:
-    """The effects among ``wanted`` that have settings only: repairs of the measurement, wider intervals."""
+def columnless_effects(
+    wanted: Sequence[WantedEffect], before: Sequence[AddedEffect] = ()
+) -> list[AddedEffect]:
+    """The effects among ``wanted`` that have settings only: repairs of the measurement, wider intervals.
+
+    Those there were ``before`` keep their evidence.
+    """
+    evidence = {item.name: item.evidence for item in before}
     found = []
     for item in wanted:
         if not item.has_columns:
             nothing = np.zeros((len(item.rotations), 0))
             zero = np.zeros(len(item.rotations))
-            found.append(AddedEffect(item.name, item.rotations, item.settings, nothing, nothing, zero))
+            known = evidence.get(item.name, {})
+            found.append(AddedEffect(item.name, item.rotations, item.settings, nothing, nothing, zero, known))
     return found

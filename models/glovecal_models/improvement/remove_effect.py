@@ -56,5 +56,5 @@ def remove_effect(
     prepared = PreparedTakes.of(repaired_takes(takes, wanted), model.layout)
     fit = fit_with_effects(prepared, every, wanted, settings, cancelled=cancelled)
     errors = held_out_errors(prepared, every, wanted, settings, cancelled=cancelled)
-    effects = [*fit.effects, *columnless_effects(wanted)]
+    effects = [*fit.effects, *columnless_effects(wanted, model.effects)]
     return child_model(model, parent_id, prepared, fit, effects, errors, settings, take_hashes)

@@ -122,5 +122,8 @@ def _print_side_by_side(documents: dict[str, dict[str, Any]], results: dict[str,
 
 def _warn(name: str, result: dict[str, Any], takes: list[dict[str, Any]]) -> None:
     warn_trained_on(name, result["trained_on"], takes)
+    if result["left_out"]:
+        frames = ", ".join(f"{count} frames of {rotation}" for rotation, count in result["left_out"].items())
+        err.print(f"Not compared, because the sensor failed or frames were repeated: {frames}.")
     if result["not_predicted"]:
         err.print(f"Model {name[:12]} does not predict {', '.join(result['not_predicted'])}.", style="yellow")

@@ -17,7 +17,13 @@ COLUMNS = {
     "needs": "needs",
     "explanation": "in a sentence",
 }
-DOES = {"correction": "corrects", "repair": "repairs", "finding": "is found", "nothing": "-"}
+DOES = {
+    "correction": "corrects",
+    "repair": "repairs",
+    "interval": "widens",
+    "finding": "is found",
+    "nothing": "-",
+}
 LEGEND = (
     "corrects: adds to the prediction (glovecal add-effect); repairs: mends the reference; is found: says "
     "where a recording lost something; needs: context columns of the takes. * brought by a package of yours."

@@ -138,6 +138,7 @@ def _state(poses: PoseSubscriber, pose: Pose) -> str:
         PoseFlag.EXTRAPOLATING: "extrapolating",
         PoseFlag.TOO_UNCERTAIN: "too uncertain",
         PoseFlag.SETTLING: "settling",
+        PoseFlag.FAULTY_SENSOR: "faulty sensor",
         PoseFlag.SIMULATED: "simulated glove",
     }
     said = [word for flag, word in words.items() if pose.flags & flag]

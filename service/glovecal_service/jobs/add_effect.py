@@ -76,7 +76,7 @@ class AddEffectJob:
 
 def run(work: AdditionWork, cancelled: Callable[[], bool], report: Report) -> TaskResult:
     """In a worker. Raises BadInput, NotTrainable, Cancelled."""
-    from glovecal_service.jobs.effect_constants import effect_constants, saturated_rotations  # heavy
+    from glovecal_service.jobs.effect_constants import effect_constants, widened_rotations  # heavy
 
     on, model = work.on, work.on.model
     with known_by_name([*declared_in(model), *declared(work.declaration)]):
@@ -88,7 +88,7 @@ def run(work: AdditionWork, cancelled: Callable[[], bool], report: Report) -> Ta
             model,
             on.takes,
             work.effect,
-            rotations=saturated_rotations(constants) or work.rotations,
+            rotations=widened_rotations(model, on.takes, work.effect, constants, work.rotations),
             constants=constants,
             settings=on.settings,
             parent_id=on.id,

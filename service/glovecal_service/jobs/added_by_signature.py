@@ -2,5 +2,5 @@
 
 from __future__ import annotations
 
-CLOCK, SATURATION = "clock_offset", "saturation"
-ADDED_BY_SIGNATURE = (CLOCK, "repeated_samples", "sensor_fault", SATURATION)
+CLOCK, SATURATION, SLIP = "clock_offset", "saturation", "garment_slip"
+ADDED_BY_SIGNATURE = (CLOCK, "repeated_samples", "sensor_fault", SATURATION, SLIP)

@@ -7,8 +7,9 @@ from typing import Any
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.diagnosis.diagnose import diagnose
-from glovecal_models.diagnosis.signatures import own_sensors
+from glovecal_models.diagnosis.signatures import own_sensors, static_errors
 from glovecal_models.effects.catalogue import effect
+from glovecal_models.effects.garment_slip import GarmentSlip
 from glovecal_models.effects.saturation import saturated_bands
 from glovecal_models.effects.signature_effect import SignatureEffect
 from glovecal_models.errors import BadInput
@@ -16,7 +17,7 @@ from glovecal_models.improvement.add_effect import repaired_takes, trained_rotat
 from glovecal_models.improvement.clocks import clock_settings, coarse_clock_settings
 from glovecal_models.improvement.known_effects import known_effects
 from glovecal_models.takes.take import Take
-from glovecal_service.jobs.added_by_signature import ADDED_BY_SIGNATURE, CLOCK, SATURATION
+from glovecal_service.jobs.added_by_signature import ADDED_BY_SIGNATURE, CLOCK, SATURATION, SLIP
 
 LAG = "lag"
 """Judging a lag, the only other delay, judges the clocks too."""
@@ -28,6 +29,8 @@ def effect_constants(
     """None for an effect with columns. Raises BadInput when nothing is found, Cancelled."""
     if name not in ADDED_BY_SIGNATURE:
         return None
+    if name == SLIP:
+        return {}
     wanted = [item for item in wanted_of(model) if item.name != name]
     repaired = repaired_takes(takes, wanted)
     if name == CLOCK:
@@ -42,10 +45,27 @@ def effect_constants(
     return found
 
 
-def saturated_rotations(constants: dict[str, Any] | None) -> tuple[str, ...] | None:
-    """The rotations that saturation is on; None for other effects."""
-    bands = (constants or {}).get("bands")
-    return None if bands is None else tuple(dict.fromkeys(band["rotation"] for band in bands))
+def widened_rotations(
+    model: CalibrationModel,
+    takes: Sequence[Take],
+    name: str,
+    constants: dict[str, Any] | None,
+    asked: tuple[str, ...] | None,
+) -> tuple[str, ...] | None:
+    """The rotations that saturation or a slip is on; those ``asked`` for with other effects.
+
+    Raises BadInput when no slip is found and nobody said where to look for it.
+    """
+    if name == SATURATION:
+        return tuple(dict.fromkeys(band["rotation"] for band in (constants or {})["bands"]))
+    if name != SLIP or asked is not None:
+        return asked
+    repaired = repaired_takes(takes, wanted_of(model))
+    sensor_of = own_sensors(model.layout, trained_rotations(model))
+    found = GarmentSlip().find(repaired, sensor_of, static_errors(repaired, sensor_of))
+    if not found:
+        raise BadInput(f"effect {name!r}: nothing of it is found in these {len(takes)} takes")
+    return tuple(dict.fromkeys(name for item in found for name in item.where))
 
 
 def _repair(model: CalibrationModel, takes: Sequence[Take], name: str) -> dict[str, Any] | None:

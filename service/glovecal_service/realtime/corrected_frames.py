@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from glovecal_client.wire.frame import Frame
+from glovecal_models.calibration.doubt import Doubt
 from glovecal_models.calibration.predictor import GloveAngles
 from glovecal_service.realtime.glove_lane import GloveLane
 from glovecal_service.realtime.served_model import ServedModel
@@ -27,7 +28,7 @@ def corrected(
         return angles, flags
     correction = np.zeros_like(angles.mean)
     undefined = np.zeros(correction.shape, dtype=bool)
-    variance = np.zeros_like(correction)
+    doubt: Doubt | None = None
     finite: list[bool] = np.all(np.isfinite(angles.mean), axis=1).tolist()
     for row, (lane, frame, _) in enumerate(opened):
         # What is no number gets no pose, and must not get into a state either.
@@ -37,7 +38,7 @@ def corrected(
             correction[row], flags[row] = found.degrees, found.flags
             if found.undefined is not None:
                 undefined[row] = found.undefined
-            if found.variance is not None:
-                variance[row] = found.variance
-    angles = model.predictor.corrected(angles, correction, undefined)
-    return (model.predictor.less_certain(angles, variance) if variance.any() else angles), flags
+            if found.doubt is not None:
+                doubt = doubt or Doubt(np.zeros_like(angles.mean), np.zeros(correction.shape, dtype=bool))
+                doubt.variance[row], doubt.is_faulty[row] = found.doubt
+    return model.predictor.corrected(angles, correction, undefined, doubt), flags

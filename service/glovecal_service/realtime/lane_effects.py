@@ -9,12 +9,14 @@ a new run, a new wearing or another model starts all of them anew.
 from __future__ import annotations
 
 import logging
+from collections import Counter
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from glovecal_client.wire.frame import Frame
 from glovecal_client.wire.pose import PoseFlag
+from glovecal_models.calibration.doubt import Doubt
 from glovecal_models.calibration.effect_correction import usable_correction
 from glovecal_models.effects.history_effect import LONGEST_GAP_S
 from glovecal_service.realtime.served_model import ServedModel
@@ -22,6 +24,7 @@ from glovecal_service.realtime.worn_gloves import WornGlove
 
 _RESET = int(PoseFlag.STATE_RESET)
 _SETTLING = int(PoseFlag.SETTLING)
+_FAULTY_SENSOR = int(PoseFlag.FAULTY_SENSOR)
 
 _log = logging.getLogger("glovecal.realtime")
 
@@ -35,8 +38,8 @@ class Correction(NamedTuple):
     """PoseFlag bits."""
     undefined: np.ndarray | None = None
     """(R,) True where an effect had no value and was left out; None: nowhere."""
-    variance: np.ndarray | None = None
-    """(R,), degrees squared: what is not known of the correction; None: nothing."""
+    doubt: Doubt | None = None
+    """What the effects add to the claimed variance, and where a sensor fails; None: nothing."""
 
 
 class LaneEffects:
@@ -48,6 +51,8 @@ class LaneEffects:
         """How often an effect with a memory began anew."""
         self.unusable = 0
         """Frames in which some correction had no value, was no number or absurd: flagged, and left out."""
+        self.faulty: Counter[str] = Counter()
+        """Frames in which each sensor failed."""
         self._stream = model.predictor.stream()
         self._run_id: int | None = None
         self._wearing = ""
@@ -69,27 +74,35 @@ class LaneEffects:
                 self._stream.reset()
             readings = frame.readings.astype(np.float64)
             degrees = self._stream.of_frame(time_s, base, readings, context, wearing)
-            variance = self._stream.variance(base[None], wearing)
         except Exception as error:  # an effect may be somebody else's code; the poses must go on
             degrees = np.zeros_like(base)
             degrees[self._stream.rows] = np.nan
-            variance = None
             self._give_up(str(error) or type(error).__name__)
         else:
             if not usable_correction(degrees).all():
                 self._give_up("a correction is no number, or more than a full turn")
             elif self._stream.undefined is not None:
                 self._count("an effect has no value for some readings")
-        return Correction(degrees, flags, self._stream.undefined, None if variance is None else variance[0])
+        doubt = self._stream.doubt
+        if self._stream.faulty_sensors:
+            self.faulty.update(self._stream.faulty_sensors)
+        if doubt is not None and doubt.is_faulty.any():
+            flags |= _FAULTY_SENSOR
+        return Correction(degrees, flags, self._stream.undefined, doubt)
 
     def status(self) -> dict[str, Any]:
-        """For the status document: what is not corrected, and why."""
+        """For the status document: what is not corrected, and why; which sensors fail."""
         seen = self._seen
+        failing = [
+            f"sensor {name} fails: the rotations read from it keep their last good angle"
+            for name in self._stream.faulty_sensors
+        ]
         return {
             "settling": self._settling,
             "starts": self.starts,
             "unusable_corrections": self.unusable,
-            "sentences": [] if seen is None else list(self._stream.silent(*seen)),
+            "faulty_frames": dict(self.faulty),
+            "sentences": failing + ([] if seen is None else list(self._stream.silent(*seen))),
         }
 
     def _begins(self, run_id: int, wearing: str) -> bool:

@@ -77,10 +77,11 @@ def _with_decoy(before: Mapping[str, Any], step: Mapping[str, Any]) -> float | N
     Not above the error before: what made it worse would have been undone.
     """
     decoy, added = step.get("decoy_rmse_deg"), step["added"]
-    if decoy is None or not added:
+    if decoy is None or not added or not before["rmse_deg"]:
         return None
+    share = decoy / before["rmse_deg"]
     squares = [
-        decoy**2 if name in added["where"] else error**2
+        (share * error) ** 2 if name in added["where"] else error**2
         for name, error in before["per_rotation"].items()
         if error is not None
     ]

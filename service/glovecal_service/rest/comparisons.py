@@ -92,6 +92,9 @@ class ComparisonView(BaseModel):
     fingertips: FingertipsView | None = Field(
         description="Null where no finger's chain was predicted and measured."
     )
+    left_out: dict[str, int] = Field(
+        description="Measured frames, by rotation, that are not compared: faulty sensors, repeated frames."
+    )
     trained_on: list[str] = Field(description="Takes among those given that the model was trained on.")
 
 

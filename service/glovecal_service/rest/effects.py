@@ -11,6 +11,7 @@ from pydantic import BaseModel, Field
 from glovecal_models.effects.catalogue import GROUP, catalogue, effect
 from glovecal_models.effects.columnless_effect import ColumnlessEffect
 from glovecal_models.effects.effect import Effect
+from glovecal_models.effects.interval_effect import IntervalEffect
 from glovecal_models.errors import BadInput
 from glovecal_service.jobs.added_by_signature import ADDED_BY_SIGNATURE
 from glovecal_service.plain import plain
@@ -22,7 +23,7 @@ router = APIRouter(prefix="/effects", tags=["effects"])
 
 OURS = "glovecal-models"
 NO_EFFECT = "no_effect"
-Kind = Literal["correction", "repair", "finding", "nothing"]
+Kind = Literal["correction", "repair", "interval", "finding", "nothing"]
 EffectInPath = Annotated[str, Path(max_length=64, pattern=ONE_LINE, description="As in the catalogue.")]
 
 
@@ -38,8 +39,9 @@ class CatalogueEffect(BaseModel):
     name: str
     explanation: str
     kind: Kind = Field(
-        description="correction: adds to the prediction; repair: mends the reference; finding: says where a "
-        "recording lost something; nothing: the null hypothesis."
+        description="correction: adds to the prediction; repair: mends the reference; interval: widens "
+        "the claimed standard deviation; finding: says where a recording lost something; nothing: the null "
+        "hypothesis."
     )
     can_be_added: bool = Field(description="Whether `models/{id}/effects` takes it.")
     parameters: list[ParameterView] = Field(description="What is searched for beside weights.")
@@ -75,11 +77,13 @@ def kind_of(item: Effect) -> Kind:
         return "nothing"
     if item.side == "reference":
         return "repair"
+    if isinstance(item, IntervalEffect):
+        return "interval"
     return "finding" if isinstance(item, ColumnlessEffect) else "correction"
 
 
 def can_be_added(item: Effect) -> bool:
-    """Corrections, and what is found in a recording as far as it can be repaired or told."""
+    """Corrections, and what is found in a recording as far as it can be repaired or claimed."""
     return kind_of(item) == "correction" or item.name in ADDED_BY_SIGNATURE
 
 

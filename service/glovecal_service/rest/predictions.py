@@ -55,7 +55,9 @@ class Angles(BaseModel):
     rotations: list[str]
     mean_deg: list[list[float | None]]
     sd_deg: list[list[float | None]] = Field(description="Of the rotation with its measurement noise.")
-    flags: list[list[int]] = Field(description="Sum of 1 extrapolating, 2 too uncertain, 4 by rule.")
+    flags: list[list[int]] = Field(
+        description="Sum of 1 extrapolating, 2 too uncertain, 4 by rule, 8 faulty sensor (last good angle)."
+    )
     effects: list[str] = Field(description="The model's effects that are in these angles.")
     settling_s: float = Field(
         description="So long after the first frame, and after a gap, the effects remember too little."
@@ -81,7 +83,7 @@ def predict(id: ModelInPath, body: Readings, parts: PartsNeeded) -> dict[str, An
     effects = predictor.stream()
     if effects.needing_time and body.time_s is None:
         raise BadInput(
-            f"model {record.id[:12]} corrects {', '.join(effects.needing_time)}, for which it matters when "
+            f"model {record.id[:12]} has {', '.join(effects.needing_time)}, for which it matters when "
             f"the frames were read: send time_s, seconds for each of the {len(readings)} frames, increasing"
         )
     context = _context(body)

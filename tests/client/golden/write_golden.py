@@ -37,6 +37,7 @@ POSE = {
 }
 
 SETTLING_POSE = POSE | {"flags": 16 | 64, "skipped": 0}
+FAULTY_POSE = POSE | {"flags": 8 | 128, "rotation_flags": [8, 0, 8 | 4 | 2]}
 
 
 def sealed(body: bytes) -> bytes:
@@ -64,6 +65,7 @@ def main() -> None:
         ("frame_v1", FRAME, frame_bytes(FRAME)),
         ("pose_v1", POSE, pose_bytes(POSE)),
         ("pose_v1_settling", SETTLING_POSE, pose_bytes(SETTLING_POSE)),
+        ("pose_v1_faulty", FAULTY_POSE, pose_bytes(FAULTY_POSE)),
     ):
         (HERE / f"{name}.bin").write_bytes(message)
         (HERE / f"{name}.json").write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")

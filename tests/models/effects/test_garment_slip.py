@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from glovecal_models.effects.garment_slip import GarmentSlip, slip_of, slip_sd
+from glovecal_models.effects.garment_slip import GarmentSlip
+from glovecal_models.effects.interval_effect import LeftOutErrors
+from glovecal_models.effects.slip_growth import GROWS_S, SlipGrowth, SlipInterval, slip_growth
+from glovecal_models.effects.slip_walk import slip_walk
 
 SLIP = GarmentSlip()
 
@@ -60,7 +63,8 @@ def test_a_curve_that_the_model_lacks_is_not_a_slip(glove):
 def test_without_errors_or_with_short_takes_nothing_is_said(glove):
     takes = glove.takes(count=2, seconds=15, shape_counts=slipping(4.0))
     assert SLIP.find(takes, glove.sensor_of) == ()
-    assert slip_of(takes, [error[:, 1] for error in glove.errors(takes)], "M_PIP") is None
+    times, errors = [take.time_s for take in takes], [error[:, 1] for error in glove.errors(takes)]
+    assert slip_walk(times, errors, [take.reference[:, 1] for take in takes]) is None
 
 
 def between_takes(size_deg):
@@ -102,5 +106,26 @@ def test_what_all_sensors_do_together_is_no_slip(glove):
     assert SLIP.find(takes, glove.sensor_of, glove.errors(takes)) == ()
 
 
-def test_uncertainty_grows_from_the_last_known_pose():
-    np.testing.assert_allclose(slip_sd(2.0, np.array([-1.0, 0.0, 60.0, 240.0])), [0.0, 0.0, 2.0, 4.0])
+def test_the_claimed_variance_grows_in_proportion_to_the_time():
+    interval = SlipInterval([SlipGrowth(2.0), SlipGrowth(0.0)])
+    ages = np.array([-1.0, 0.0, 60.0, 240.0, 1e6, 1e9])
+    added = interval.added_variance(ages, np.zeros((6, 2)))
+    assert added[:4, 0] == pytest.approx([0.0, 0.0, 4.0, 16.0])
+    assert added[4, 0] == added[5, 0] == pytest.approx(GROWS_S / 60.0 * 4.0)
+    assert not added[:, 1].any()
+
+
+def test_the_rate_of_the_growth_is_that_of_the_walk(glove):
+    takes = glove.takes(count=6, seconds=60, shape_counts=slipping(4.0))
+    left_out = [
+        LeftOutErrors(
+            take.name, "M_PIP", take.time_s, error[:, 1], take.reference[:, 1], np.full(len(error), 2.0), 2.0,
+            take.sensors, take.readings,
+        )
+        for take, error in zip(takes, glove.errors(takes), strict=True)
+    ]  # fmt: skip
+    growth = slip_growth(left_out)
+    assert growth.rate_deg_per_sqrt_min == pytest.approx(4.0, rel=0.4)
+    settings = SLIP.learned(left_out, {})
+    assert "in the first minute" in SLIP.sentence(settings, ["M_PIP"])
+    assert SLIP.described_on(settings, "M_PIP")["rate_deg_per_sqrt_min"] == growth.rate_deg_per_sqrt_min

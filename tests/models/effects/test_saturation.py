@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from glovecal_models.effects.saturation import SaturatedBand, Saturation, saturated_bands
+from glovecal_models.effects.interval_effect import LeftOutErrors
+from glovecal_models.effects.saturated_band import SaturatedBand
+from glovecal_models.effects.saturation import Saturation, saturated_bands
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.take import Take
 
@@ -38,15 +41,41 @@ def test_a_sensor_that_is_cut_off_is_found(glove, end):
     assert finding.evidence["reference_spread_over_next_band_1"] > 2
 
 
-def test_inside_the_band_the_interval_is_wider_on_the_open_side(glove):
+def test_before_anything_is_learned_the_band_counts_as_unsure_as_the_reference_spreads(glove):
     [band] = saturated_bands(cut_off(glove.takes(), 0.2), glove.sensor_of)
-    readings = np.array([100.0, band.high])
-    np.testing.assert_array_equal(band.extra_sd(readings), [0.0, band.extra_sd_deg])
-    low, high = band.censored_interval(readings, np.array([30.0, 70.0]), np.array([1.0, 1.0]), times=2)
-    np.testing.assert_allclose(low, [28.0, 68.0])
-    assert high[0] == 32.0
-    assert high[1] > 70 + 2 * band.extra_sd_deg
-    assert SaturatedBand(**band.to_settings()) == band
+    np.testing.assert_array_equal(band.extra_sd(np.array([100.0, band.high])), [0.0, band.extra_sd_deg])
+    assert SaturatedBand.of(json.loads(json.dumps(band.to_settings()))) == band
+
+
+def left_out(takes: list[Take]) -> list[LeftOutErrors]:
+    """Errors of a straight line that claims 2 degrees everywhere, on the second rotation."""
+    found = []
+    for take in takes:
+        error = (take.readings[:, 1] - 40.0) / 2.0 - take.reference[:, 1]
+        four = np.full(len(error), 4.0)
+        found.append(
+            LeftOutErrors(
+                take.name, "M_PIP", take.time_s, error, take.reference[:, 1], four, 4.0, take.sensors,
+                take.readings,
+            )
+        )  # fmt: skip
+    return found
+
+
+@pytest.mark.parametrize("end", ["high", "low"])
+def test_what_is_learned_covers_the_rail_and_is_narrow_elsewhere(glove, end):
+    takes = cut_off(glove.takes(count=8), 0.2, end)
+    bands = saturated_bands(takes, glove.sensor_of)
+    settings = SATURATION.learned(left_out(takes[:4]), {"bands": [band.to_settings() for band in bands]})
+    interval = SATURATION.interval(settings, ["M_PIP"], takes[0].sensors, np.array([4.0]))
+    at_rail, elsewhere = [], []
+    for item in left_out(takes[4:]):
+        variance = item.variance + interval.added_variance(item.since_start_s, item.readings)[:, 0]
+        rail = item.readings[:, 1] == (bands[0].high if end == "high" else bands[0].low)
+        at_rail.append(np.abs(item.error[rail]) <= 1.96 * np.sqrt(variance[rail]))
+        elsewhere.append(np.sqrt(variance[~bands[0].is_near(item.readings[:, 1])]))
+    assert np.concatenate(at_rail).mean() > 0.9
+    assert np.concatenate(elsewhere).max() < 1.0, "what training took for noise is taken back"
 
 
 def test_a_falling_sensor_opens_to_the_other_side(glove):

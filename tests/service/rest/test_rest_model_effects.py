@@ -174,7 +174,6 @@ def test_a_hypothesis_is_tried_beside_the_catalogue(walk: Walk) -> None:
     ("effect", "status", "sentence"),
     [
         ("glue", 422, "no effect 'glue'; there are"),
-        ("garment_slip", 422, "cannot be added to a model: it is found, not fitted"),
         ("no_effect", 422, "it is the null hypothesis"),
         ("contact_pressure", 422, "needs the context column c.contact_n; these takes have c.humidity_pct"),
         (

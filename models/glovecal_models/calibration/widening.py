@@ -1,0 +1,48 @@
+"""What a model's effects without columns add to its claimed variance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from glovecal_models.calibration.added_effect import AddedEffect
+from glovecal_models.effects.interval_effect import Interval, IntervalEffect
+
+
+class Widening:
+    """All interval effects of one model together; without a state."""
+
+    def __init__(
+        self,
+        effects: Sequence[AddedEffect],
+        rotations: Sequence[str],
+        sensors: Sequence[str],
+        noise: np.ndarray,
+    ) -> None:
+        """``noise``: measurement noise of each of the R rotations, degrees squared, (R,)."""
+        self.effects: list[IntervalEffect] = []
+        self._parts: list[tuple[Interval, np.ndarray]] = []
+        self._count = len(rotations)
+        for item in effects:
+            effect = item.effect
+            lanes = [name for name in item.rotations if name in rotations]
+            if isinstance(effect, IntervalEffect) and lanes:
+                rows = np.array([list(rotations).index(name) for name in lanes])
+                self.effects.append(effect)
+                self._parts.append((effect.interval(item.settings, lanes, sensors, noise[rows]), rows))
+
+    @property
+    def is_empty(self) -> bool:
+        return not self._parts
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(effect.name for effect in self.effects)
+
+    def added_variance(self, since_start_s: np.ndarray, readings: np.ndarray) -> np.ndarray:
+        """(N, R) degrees squared, for frames ``since_start_s`` (N,) after a start; ``readings`` (N, S)."""
+        total = np.zeros((len(readings), self._count))
+        for interval, rows in self._parts:
+            total[:, rows] += interval.added_variance(since_start_s, readings)
+        return total

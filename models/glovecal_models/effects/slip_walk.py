@@ -1,0 +1,136 @@
+"""How the error of one rotation wanders inside takes: a random walk, its rate, and if it is beyond chance.
+
+The error is averaged over 10 s. Frame noise and everything that is stationary within 10 s (misfit that comes
+and goes with the posture) give such means a variance that can be worked out from the 10 s themselves; a slip
+gives far more, and its means follow one another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+MEAN_S = 10.0
+SHORT_S = 1.0
+LEAST_MEANS = 3
+"""Of a take, for it to count; over all takes twice as many."""
+EVERY_GLOVE_DEG = 0.6
+"""Slow wandering of a healthy glove stays below this."""
+OVER_NOISE = 1.0
+"""The slip must exceed the frame noise so many times."""
+OVER_STATIONARY = 3.0
+"""Variance of the 10 s means over what stationary errors would give."""
+FOLLOWS = 1.5
+"""Von Neumann's ratio: 2 for means in no order, below 1 for a random walk."""
+CERTAINTY = 0.01
+POSTURE_DEGREE = 3
+
+
+@dataclass(frozen=True)
+class SlipWalk:
+    """How the error of one rotation wanders."""
+
+    size_deg: float
+    """Standard deviation of the wandering inside a take."""
+    least_deg: float
+    """Its lower bound, one-sided 99 %."""
+    rate_deg_per_sqrt_min: float
+    frame_noise_deg: float
+    over_stationary: float
+    follows: float
+    means: int
+
+    @property
+    def is_slip(self) -> bool:
+        return (
+            self.least_deg > max(EVERY_GLOVE_DEG, OVER_NOISE * self.frame_noise_deg)
+            and self.over_stationary > OVER_STATIONARY
+            and self.follows < FOLLOWS
+        )
+
+
+def slip_walk(
+    times: Sequence[np.ndarray], errors: Sequence[np.ndarray], angles: Sequence[np.ndarray]
+) -> SlipWalk | None:
+    """How the errors (N,) of each take wander; None when the takes are too short to say.
+
+    ``times`` (N,) in seconds, ``angles`` (N,) measured, degrees.
+    """
+    errors = without_posture(errors, angles)
+    groups = [_short_means(time, error) for time, error in zip(times, errors, strict=True)]
+    groups = [group for group in groups if len(group) >= LEAST_MEANS]
+    if sum(map(len, groups)) < 2 * LEAST_MEANS:
+        return None
+    long = [group.mean(axis=1) for group in groups]
+    free = sum(len(means) - 1 for means in long)
+    squares = sum(float(np.sum((means - means.mean()) ** 2)) for means in long)
+    successive = sum(float(np.sum(np.diff(means) ** 2)) for means in long)
+    expected = _stationary_variance(np.concatenate(groups))
+    variance = squares / free
+    excess = max(variance - expected, 0.0)
+    # The means of a walk hold one another: about half of them count as independent.
+    independent = max(free / 2.0, 1.0)
+    least = max(variance * independent / float(chi2.ppf(1.0 - CERTAINTY, independent)) - expected, 0.0)
+    # A walk of rate q gives J means of length T a variance of q² T (J + 1) / 6.
+    walked = sum(MEAN_S * (len(means) + 1) / 6.0 * (len(means) - 1) for means in long) / free
+    return SlipWalk(
+        float(np.sqrt(excess)), float(np.sqrt(least)), float(np.sqrt(60.0 * excess / walked)),
+        frame_noise(errors, times), variance / max(expected, 1e-12), successive / max(squares, 1e-12),
+        sum(map(len, long)),
+    )  # fmt: skip
+
+
+def without_posture(errors: Sequence[np.ndarray], angles: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Errors less a smooth function of the joint's own angle: a curve that is missing is not a slip."""
+    every = np.concatenate(angles)
+    known = np.isfinite(every) & np.isfinite(np.concatenate(errors))
+    if known.sum() < 100 or every[known].std() < 1.0:
+        return list(errors)
+    centre, scale = every[known].mean(), 2.0 * every[known].std()
+
+    def powers(angle: np.ndarray) -> np.ndarray:
+        return np.vander((angle - centre) / scale, POSTURE_DEGREE + 1)
+
+    weights = np.linalg.lstsq(powers(every[known]), np.concatenate(errors)[known], rcond=None)[0]
+    return [error - powers(angle) @ weights for error, angle in zip(errors, angles, strict=True)]
+
+
+def _short_means(time_s: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """(J, 10) means over 1 s, a row for each complete 10 s; (0, 10) when there are none."""
+    per = round(MEAN_S / SHORT_S)
+    known = np.isfinite(error)
+    if not known.any():
+        return np.empty((0, per))
+    second = ((time_s - time_s[0]) / SHORT_S).astype(int)
+    count = np.bincount(second, known)
+    total = np.bincount(second, np.where(known, error, 0.0))
+    means = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    rows = means[: len(means) // per * per].reshape(-1, per)
+    return rows[np.isfinite(rows).all(axis=1)]
+
+
+def _stationary_variance(rows: np.ndarray) -> float:
+    """Variance of the mean of a row, were the rows (J, T) pieces of an autoregressive noise of order one."""
+    inside = rows - rows.mean(axis=1, keepdims=True)
+    length = rows.shape[1]
+    variance = float(np.sum(inside**2)) / (len(rows) * (length - 1))
+    correlation = float(np.sum(inside[:, 1:] * inside[:, :-1]) / max(float(np.sum(inside**2)), 1e-300))
+    # Taking the mean of so short a row away makes it look less correlated than it is.
+    correlation = float(np.clip(correlation + (1.0 + 3.0 * correlation) / length, 0.0, 0.8))
+    return variance / length * (1.0 + correlation) / (1.0 - correlation)
+
+
+def frame_noise(errors: Sequence[np.ndarray], times: Sequence[np.ndarray]) -> float:
+    """RMS, degrees, of what is quicker than a second."""
+    total, count = 0.0, 0
+    for time, error in zip(times, errors, strict=True):
+        known = np.isfinite(error)
+        second = ((time - time[0]) / SHORT_S).astype(int)[known]
+        if len(second):
+            frames = np.maximum(np.bincount(second), 1)
+            left = error[known] - (np.bincount(second, error[known]) / frames)[second]
+            total, count = total + float(np.sum(left**2)), count + len(left)
+    return float(np.sqrt(total / max(count, 1)))

@@ -1,0 +1,64 @@
+"""What an effect's decoy would leave of the error: the line that the effect's own error has to beat."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.diagnosis.assessment import Assessment
+from glovecal_models.diagnosis.candidates import assessed
+from glovecal_models.diagnosis.delays import SMOOTHING
+from glovecal_models.diagnosis.diagnosis import Diagnosis
+from glovecal_models.diagnosis.directions import forward
+from glovecal_models.diagnosis.evened import evened, smoothed
+from glovecal_models.diagnosis.ground import measured_joints
+from glovecal_models.effects.effect import Effect
+from glovecal_models.errors import Cancelled
+from glovecal_models.improvement.known_effects import known_effects
+from glovecal_models.takes.take import Take
+
+
+def share_left_by_decoy(
+    model: CalibrationModel,
+    takes: Sequence[Take],
+    effect: Effect,
+    rotations: Sequence[str],
+    cancelled: Callable[[], bool] | None = None,
+) -> float | None:
+    """Of the RMSE of ``rotations`` on takes left out, at most 1; None when the takes cannot judge it.
+
+    Raises Cancelled.
+    """
+
+    def said(text: str, share: float) -> None:
+        if cancelled and cancelled():
+            raise Cancelled("adding an effect was cancelled")
+
+    joints = [name for name in measured_joints(takes, model.layout) if name in rotations]
+    if not joints:
+        return None
+    even = [smoothed(evened(take, model.layout.sensors, joints), SMOOTHING) for take in takes]
+    known = [item for item in known_effects(model) if item.effect.name != effect.name]
+    linear = model.method in ("raw", "linear")
+    direction = forward(even, model.layout, joints, linear=linear, known=known)
+    found, _ = assessed(direction, [effect], np.random.default_rng(0), set(), said)
+    judged = next((item for item in found if item.effect == effect.name), None)
+    return None if judged is None else decoy_share(judged, rotations)
+
+
+def share_in(diagnosis: Diagnosis | None, name: str, rotations: Sequence[str]) -> float | None:
+    """The same from a diagnosis; None without one, or when it does not rank the effect."""
+    ranked = diagnosis.naming.ranked if diagnosis is not None else ()
+    judged = next((item for item in ranked if item.effect == name), None)
+    return None if judged is None else decoy_share(judged, rotations)
+
+
+def decoy_share(judged: Assessment, rotations: Sequence[str]) -> float | None:
+    """The same from an assessment; None when it has none of ``rotations``."""
+    pairs = zip(judged.joints, judged.errors, strict=True)
+    errors = [error for name, error in pairs if name in rotations]
+    base = sum(float(error.base.sum()) for error in errors)
+    decoy = sum(float(error.decoy.sum()) for error in errors)
+    return min(float(np.sqrt(max(decoy, 0.0) / base)), 1.0) if base > 0 else None
