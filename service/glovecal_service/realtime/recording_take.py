@@ -25,7 +25,7 @@ class RecordedTake:
     first frame that was asked for, after the lead-in; ``left_out``: frames not taken."""
 
 
-def read_take(path: Path, *, name: str, wearing: str, first_sequence: int) -> RecordedTake:
+def read_take(path: Path, *, name: str, wearing: str, first_sequence: int = 0) -> RecordedTake:
     """The frames of all runs in order; ``time_s`` is the capture computer's monotonic clock in seconds.
 
     What has a smaller sequence number than ``first_sequence`` in the first run is the lead-in.
