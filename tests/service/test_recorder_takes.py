@@ -94,7 +94,7 @@ def check_exact(store: Store, record: RecordingRecord) -> None:
     assert facts["sent"] == facts["recorded"] + facts["missing_frames"]
     assert facts["missing_frames"] == sum(last - first + 1 for first, last in facts["missing"])
     take = store.takes.load(facts["take"])
-    assert len(take.time_s) == facts["recorded"]
+    assert len(take.time_s) == facts["recorded"] + facts["lead_in"]["frames"]
     assert store.takes.get(facts["take"]).recording == record.id
 
 
@@ -157,6 +157,8 @@ def test_what_capture_can_no_longer_give_is_reported_missing(settings: Settings,
     assert record.facts["missing"] == [[20, 24], [30, 30]]
     assert (record.facts["sent"], record.facts["recorded"], record.facts["refused"]) == (22, 16, 1)
     assert record.facts["end_known"] is False
+    assert record.facts["lead_in"]["frames"] == 0
+    assert "capture's log did not give more: " in record.facts["lead_in"]["sentence"]
 
 
 def test_a_killed_recorder_goes_on_and_fetches_what_it_missed(settings: Settings, store: Store) -> None:

@@ -40,8 +40,9 @@ def add(store, take, **given):
     return store.takes.add(take, **{"subject": "anna", "layout": LAYOUT.name, "source": "import", **given})
 
 
-def test_a_take_comes_back_bit_for_bit(anna):
-    take = make_take(1)
+@pytest.mark.parametrize("begins_s", [None, 1.0 / 3.0])
+def test_a_take_comes_back_bit_for_bit(anna, begins_s):
+    take = dataclasses.replace(make_take(1), begins_s=begins_s)
     record = add(anna, take, accounting={"sent": 300, "recorded": 300, "missing": []})
     assert same(anna.takes.load(record.id), take)
     assert anna.takes.get(record.id) == record

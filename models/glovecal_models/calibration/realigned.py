@@ -18,6 +18,7 @@ RANGE_S, COARSE_S, FINE_S = 3.0, 0.04, 0.002
 NEAR_S = 0.3
 """When training's offsets all lie within this, so will this take's."""
 LEAST_OVERLAP = 0.6
+"""Of the frames that the reference can cover."""
 
 
 def realigned(model: CalibrationModel, take: Take, predicted: np.ndarray) -> Take:
@@ -50,10 +51,13 @@ def offset_of(take: Take, rotations: tuple[str, ...], predicted: np.ndarray, wid
     columns = [(take.rotations.index(name), i) for i, name in enumerate(rotations) if name in take.rotations]
     scale = np.maximum(np.nanstd(take.reference, axis=0), 1.0)
 
+    measured_s = float(take.reference_time_s[-1] - take.reference_time_s[0])
+    least = LEAST_OVERLAP * min(1.0, measured_s / max(take.duration_s, 1e-9))
+
     def misfit(offset_s: float) -> float:
         at = take.time_s + offset_s
         inside = (at >= take.reference_time_s[0]) & (at <= take.reference_time_s[-1])
-        if inside.mean() < LEAST_OVERLAP:
+        if inside.mean() < least:
             return np.inf
         total = []
         for column, row in columns:

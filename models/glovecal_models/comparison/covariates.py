@@ -38,7 +38,7 @@ def covariates(found: Residuals, rotation: str) -> Iterator[Covariate]:
     yield Covariate("angle", "deg", "the angle itself", angle)
     yield Covariate("speed", "deg/s", "how fast the joint moves", tuple(np.abs(v) for v in speeds))
     yield Covariate("direction", "deg/s", "which way the joint moves", speeds)
-    in_take = tuple(item.take.time_s - item.take.time_s[:1] for item in found.takes)
+    in_take = tuple(item.take.time_s - item.take.start_s for item in found.takes)
     yield Covariate("time in take", "s", "how long the take has lasted", in_take)
     for sensor in dict.fromkeys(name for item in found.takes for name in item.take.sensors):
         readings = tuple(_reading(item, sensor) for item in found.takes)

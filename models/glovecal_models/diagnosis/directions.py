@@ -15,7 +15,7 @@ from glovecal_models.diagnosis.base_features import BaseFeatures
 from glovecal_models.diagnosis.evened import EvenTake
 from glovecal_models.diagnosis.held_out import BaseProducts, Rows
 from glovecal_models.diagnosis.known_effect import KnownEffect
-from glovecal_models.diagnosis.left_out import are_short, pieces
+from glovecal_models.diagnosis.left_out import are_short, first_measured, pieces
 from glovecal_models.effects.effect import Signals
 from glovecal_models.layout import Correspondence, Layout
 
@@ -58,8 +58,11 @@ def forward(
 ) -> Direction:
     """Own sensor, scaled to degrees, from the measured angles; ``known`` effects belong to the base."""
     names = list(rotations)
-    filled = [_filled(take.reference) for take in takes]
     sensor = [_own_sensor(takes, layout, rotation, column) for column, rotation in enumerate(rotations)]
+    filled = [
+        _filled(take.reference, np.column_stack([item.values[number] for item in sensor]))
+        for number, take in enumerate(takes)
+    ]
     everything = np.concatenate(filled)
     spread, centre = everything.std(axis=0), everything.mean(axis=0)
     spare = {name: i for i, name in enumerate(layout.sensors) if name not in names}
@@ -77,7 +80,7 @@ def forward(
         )
         for take, angles, values in zip(takes, filled, standard, strict=True)
     )
-    short = len(takes) == 1 or are_short([take.time_s for take in takes])
+    short = len(takes) == 1 or are_short([take.time_s[first_measured(take.reference) :] for take in takes])
     cut = [pieces(take.time_s, take.reference) if short else [slice(0, len(take.time_s))] for take in takes]
     unit_take = tuple(number for number, parts in enumerate(cut) for _ in parts)
     read, used, products = [], [], []
@@ -156,11 +159,17 @@ def _own_sensor(takes: Sequence[EvenTake], layout: Layout, rotation: str, column
     return _OwnSensor(values, float(-x.mean(axis=0) @ slope))
 
 
-def _filled(reference: np.ndarray) -> np.ndarray:
-    """Straight lines across rows that were not measured; only the operators' states pass through them."""
+def _filled(reference: np.ndarray, read: np.ndarray) -> np.ndarray:
+    """Straight lines across rows that were not measured; only the operators' states pass through them.
+
+    Before the first measured row the hand moved as its sensors say: ``read`` (N, R), degrees of any zero.
+    """
     result = reference.copy()
     rows = np.arange(len(reference))
     for column in range(reference.shape[1]):
         known = np.isfinite(reference[:, column])
         result[:, column] = np.interp(rows, rows[known], reference[known, column]) if known.any() else 0.0
+        if known.any():
+            first = int(np.argmax(known))
+            result[:first, column] += read[:first, column] - read[first, column]
     return result

@@ -52,6 +52,8 @@ def evened(take: Take, sensors: Sequence[str], rotations: Sequence[str], shift_s
             if known.sum() > 1:
                 at = take.reference_time_s[known] - shift_s
                 reference[:, column] = _windowed(time, at, values[known, None])[:, 0]
+    if take.begins_s is not None:
+        reference[time < take.begins_s] = np.nan
     context = {name: _carried(time, take.time_s, values) for name, values in take.context.items()}
     read = np.isfinite(readings).all(axis=1)
     return EvenTake(

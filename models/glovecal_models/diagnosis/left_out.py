@@ -16,8 +16,17 @@ SHORTEST_LEVEL = 5
 
 
 def are_short(times: Sequence[np.ndarray]) -> bool:
-    """Whether takes of these frame times are left out in pieces instead of whole."""
+    """Whether takes measured at these times are left out in pieces instead of whole."""
     return float(np.median([part[-1] - part[0] if len(part) else 0.0 for part in times])) < SHORT_S
+
+
+def first_measured(reference: np.ndarray) -> int:
+    """The first row of ``reference`` (N, R) in which anything was measured, 0 when nothing was.
+
+    The frames before only tell effects with a memory where they stand: they are no time to leave out.
+    """
+    measured = np.isfinite(reference).any(axis=1)
+    return int(np.argmax(measured)) if len(reference) else 0
 
 
 def held_levels(reference: np.ndarray) -> list[slice] | None:
@@ -36,9 +45,10 @@ def held_levels(reference: np.ndarray) -> list[slice] | None:
 
 
 def pieces(time_s: np.ndarray, reference: np.ndarray) -> list[slice]:
-    """Levels held one by one, else quarters of time."""
-    found = held_levels(reference)
+    """Levels held one by one, else quarters of the time measured; what lies before belongs to the first."""
+    start = first_measured(reference)
+    found = held_levels(reference[start:])
+    edges = np.linspace(start, len(time_s), QUARTERS + 1).astype(int).tolist()
     if found is not None:
-        return found
-    edges = np.linspace(0, len(time_s), QUARTERS + 1).astype(int)
-    return [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
+        edges = [start, *(start + part.stop for part in found)]
+    return [slice(a, b) for a, b in itertools.pairwise([0, *edges[1:]])]

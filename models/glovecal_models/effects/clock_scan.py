@@ -21,6 +21,7 @@ RANGE_S = 3.0
 COARSE_S, FINE_S = 0.02, 0.005
 GRID_HZ = 50.0
 LEAST_OVERLAP = 0.6
+"""Of the frames that the reference can cover."""
 RIDGE = 1e-3
 """Of a sensor's variance: keeps the map bounded when sensors say the same."""
 POLISHING_ROUNDS = 3
@@ -63,6 +64,8 @@ class Grid:
     readings: np.ndarray
     columns: tuple[int, ...]
     """Reference columns that move."""
+    most_overlap: float
+    """Share of the times that the reference can cover: it may be shorter than the frames."""
 
     def reference(self, at: np.ndarray) -> np.ndarray:
         """(N, R) at reference times (N,), NaN outside the recording."""
@@ -100,7 +103,10 @@ def on_grid(take: Take) -> Grid | None:
     count = int(take.duration_s * GRID_HZ) + 1
     time = take.time_s[0] + np.arange(count) / GRID_HZ
     readings = np.column_stack([np.interp(time, take.time_s, column) for column in take.readings.T])
-    return Grid(take, time, readings, tuple(np.flatnonzero(moves).tolist()))
+    measured_s = float(take.reference_time_s[-1] - take.reference_time_s[0])
+    return Grid(
+        take, time, readings, tuple(np.flatnonzero(moves).tolist()), min(1.0, measured_s / take.duration_s)
+    )
 
 
 def _offsets(width_s: float, step_s: float, centre_s: float = 0.0) -> np.ndarray:
@@ -116,7 +122,7 @@ def unexplained(grid: Grid, readings: np.ndarray, at: np.ndarray) -> float:
     leaves; NaN: no overlap."""
     reference = grid.reference(at)
     known = np.isfinite(reference[:, 0])
-    if known.mean() < LEAST_OVERLAP:
+    if known.mean() < LEAST_OVERLAP * grid.most_overlap:
         return np.nan
     x, y = readings[known], reference[known]
     x, y = x - x.mean(axis=0), y - y.mean(axis=0)

@@ -10,7 +10,7 @@ import numpy as np
 from glovecal_models.calibration.effect_correction import EffectCorrection
 from glovecal_models.calibration.folds import folds_over_takes
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.diagnosis.left_out import are_short, pieces
+from glovecal_models.diagnosis.left_out import are_short, first_measured, pieces
 from glovecal_models.errors import NotTrainable
 from glovecal_models.improvement.effect_fit import (
     EffectFit,
@@ -65,7 +65,12 @@ def held_out_errors(
     A single take, and short takes of one motion each, are left out in pieces (``left_out``).
     """
     square, count = dict.fromkeys(rotations, 0.0), dict.fromkeys(rotations, 0)
-    short = len(takes.takes) == 1 or are_short([take.time_s for take in takes.takes])
+    short = len(takes.takes) == 1 or are_short(
+        [
+            take.time_s[first_measured(known) :]
+            for take, known in zip(takes.takes, takes.reference, strict=True)
+        ]
+    )
     number = np.arange(len(takes.takes))
     parts, folds = takes, [fold.held_out for fold in folds_over_takes(number, max(settings.folds, 2))]
     if short:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glovecal_models.takes.reference_check import reference_warnings
+from glovecal_models.takes.reference_check import frames_with_reference, reference_warnings
 from glovecal_models.takes.take import Take
 
 GAP_INTERVALS = 2.5
@@ -47,7 +47,10 @@ class Examination:
     repeated_frames: float
     """Share of frames that are the same as the one before in every sensor."""
     frames_with_reference: float
-    """Share of frames that have at least one reference angle."""
+    """Share of the frames after the lead-in that have at least one reference angle."""
+    lead_in_frames: int
+    lead_in_s: float
+    """Frames, and seconds, recorded before the take was asked for."""
     sensors: tuple[SensorRange, ...]
     rotations: tuple[RotationRange, ...]
     sentences: tuple[str, ...]
@@ -61,13 +64,14 @@ def examine(take: Take) -> Examination:
     changed = take.readings[1:] != take.readings[:-1]
     repeated = float((~changed.any(axis=1)).mean()) if len(changed) else 0.0
     sensors = tuple(_sensor(take, index, changed[:, index]) for index in range(len(take.sensors)))
-    paired = np.isfinite(take.reference_at_frames(take.rotations)).any(axis=1) if take.rotations else None
     return Examination(
         rate_hz=None if typical is None else 1.0 / typical,
         gaps=gaps,
         longest_interval_s=float(intervals.max()) if len(intervals) else None,
         repeated_frames=repeated,
-        frames_with_reference=0.0 if paired is None else float(paired.mean()),
+        frames_with_reference=float(frames_with_reference(take).mean()),
+        lead_in_frames=take.lead_in_frames,
+        lead_in_s=take.start_s - float(take.time_s[0]),
         sensors=sensors,
         rotations=tuple(
             item for index in range(len(take.rotations)) if (item := _rotation(take, index)) is not None

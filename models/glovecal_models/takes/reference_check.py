@@ -22,16 +22,22 @@ def reference_warnings(take: Take) -> list[str]:
             f"{who}: the reference never moves (no rotation changes by more than {max(spans):.2g} degrees), "
             "so it can teach one pose at most. Was the tracker frozen?"
         )
-    paired = np.isfinite(take.reference_at_frames(take.rotations)).any(axis=1)
+    paired = frames_with_reference(take)
     if not paired.any():
         warnings.append(
-            f"{who}: no frame has a reference (frames from {take.time_s[0]:g} to {take.time_s[-1]:g} s, "
+            f"{who}: no frame has a reference (frames from {take.start_s:g} to {take.time_s[-1]:g} s, "
             f"reference from {take.reference_time_s[0]:g} to {take.reference_time_s[-1]:g} s). "
             "Are the two clocks different?"
         )
     elif paired.mean() < 0.5:
         warnings.append(f"{who}: only {100 * paired.mean():.0f} % of the frames have a reference.")
     return warnings
+
+
+def frames_with_reference(take: Take) -> np.ndarray:
+    """(N,) whether anything was measured at each frame that was asked for; the lead-in is not counted."""
+    angles = take.reference_at_frames(take.rotations)[take.lead_in_frames :]
+    return np.any(np.isfinite(angles), axis=1)
 
 
 def _span(values: np.ndarray) -> float:

@@ -38,6 +38,10 @@ class Take:
     poses: tuple[str, ...] | None = None
     """A pose name for each frame ("" for none), or None when the take has no pose column."""
     simulated: bool = False
+    begins_s: float | None = None
+    """Frames before this time are a lead-in: recorded before the take was asked for, they tell effects with a
+    memory where they stand. No reference is read there, as other takes may hold the same frames. None: all
+    frames are asked for."""
 
     def __post_init__(self) -> None:
         frames, rows = len(self.time_s), len(self.reference_time_s)
@@ -59,6 +63,16 @@ class Take:
         return float(self.time_s[-1] - self.time_s[0]) if len(self.time_s) > 1 else 0.0
 
     @property
+    def start_s(self) -> float:
+        """The time of the first frame that was asked for; a take has at least one frame."""
+        first = float(self.time_s[0])
+        return first if self.begins_s is None else max(first, self.begins_s)
+
+    @property
+    def lead_in_frames(self) -> int:
+        return 0 if self.begins_s is None else int(np.searchsorted(self.time_s, self.begins_s))
+
+    @property
     def has_own_reference_clock(self) -> bool:
         return not np.array_equal(self.time_s, self.reference_time_s)
 
@@ -66,7 +80,7 @@ class Take:
         """Reference angles at the frame times, shape (N, len(rotations)), NaN where none was measured.
 
         With a time column of its own the reference is interpolated linearly, never extrapolated and
-        never across a gap longer than ``LONGEST_INTERPOLATED_GAP_S``.
+        never across a gap longer than ``LONGEST_INTERPOLATED_GAP_S``, and never in the lead-in.
         """
         result = np.full((len(self.time_s), len(rotations)), np.nan)
         for column, rotation in enumerate(rotations):
@@ -76,6 +90,7 @@ class Take:
             if self.has_own_reference_clock:
                 values = _interpolate(self.time_s, self.reference_time_s, values)
             result[:, column] = values
+        result[: self.lead_in_frames] = np.nan
         return result
 
 

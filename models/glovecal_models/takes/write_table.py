@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -84,22 +85,38 @@ def _frames_columns(takes: Sequence[Take], *, with_reference: bool) -> dict[str,
 
 
 def _reference_columns(takes: Sequence[Take]) -> dict[str, TableColumn]:
+    takes = [_without_reference_of_lead_in(take) for take in takes]
     columns: dict[str, TableColumn] = {"time_s": np.concatenate([take.reference_time_s for take in takes])}
     columns["take"] = [take.name for take in takes for _ in take.reference_time_s]
     return columns | _rotation_columns(takes, lambda take: len(take.reference_time_s))
+
+
+def _without_reference_of_lead_in(take: Take) -> Take:
+    """A table does not say where a take begins: a reference that is not to be read is not written."""
+    if take.begins_s is None:
+        return take
+    kept = take.reference_time_s >= take.begins_s
+    return replace(take, reference_time_s=take.reference_time_s[kept], reference=take.reference[kept])
 
 
 def _rotation_columns(takes: Sequence[Take], rows: Callable[[Take], int]) -> dict[str, TableColumn]:
     columns: dict[str, TableColumn] = {}
     for name in _union(take.rotations for take in takes):
         parts = [
-            take.reference[:, take.rotations.index(name)]
+            _measured(take, name)
             if name in take.rotations and len(take.reference_time_s)
             else np.full(rows(take), np.nan)
             for take in takes
         ]
         columns[f"r.{name}"] = np.concatenate(parts)
     return columns
+
+
+def _measured(take: Take, rotation: str) -> np.ndarray:
+    values = take.reference[:, take.rotations.index(rotation)]
+    return (
+        values if take.begins_s is None else np.where(take.reference_time_s < take.begins_s, np.nan, values)
+    )
 
 
 def _union(lists) -> list[str]:  # an iterable of tuples of names

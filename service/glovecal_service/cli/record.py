@@ -30,12 +30,20 @@ def record(
         typer.Option("--subject", "-s", help="Default: who wears it.", callback=identifier("subject")),
     ] = None,
     wearing: Annotated[str | None, typer.Option(help="Default: the glove's wearing.")] = None,
+    lead_in: Annotated[
+        float,
+        typer.Option(
+            min=0, max=600, help="Seconds before it to fetch from the capture log, for effects with a memory."
+        ),
+    ] = 60.0,
     as_json: AsJson = False,
 ) -> None:
     """Record a take from a glove that is streaming to the service. Ctrl-C ends it sooner."""
-    wanted = {"glove": glove, "name": name, "subject": subject, "wearing": wearing}
+    wanted = {"glove": glove, "name": name, "subject": subject, "wearing": wearing, "lead_s": lead_in}
     with connect() as service:
-        started = service.post("/recordings", {key: value for key, value in wanted.items() if value})
+        started = service.post(
+            "/recordings", {key: value for key, value in wanted.items() if value is not None}
+        )
         try:
             _wait_for_the_recorder(service, started["id"], glove)
             err.print(f"Recording {name} for {seconds:g} s; Ctrl-C ends it sooner.")
@@ -54,6 +62,8 @@ def record(
         f"Take {facts['take'][:12]}: {facts['recorded']} of {facts['sent']} frames sent, "
         f"{facts['repaired']} of them fetched again from the capture log, {len(facts['missing'])} gaps left."
     )
+    if lead_in:
+        out.print(f"Lead-in: {facts['lead_in']['sentence']}.")
 
 
 def _wait_for_the_recorder(service: RestClient, recording: str, glove: str) -> None:

@@ -81,7 +81,14 @@ def _record(
         options["duration"] = str(FREE_MOTION_S)  # it has no end of its own
     if motion == "evaluation":
         options["reference_noise_deg"] = "0"  # the simulated hand's truth itself
-    wanted = {"glove": GLOVE, "name": f"{wearing}-{motion}", "subject": SUBJECT, "wearing": wearing}
+    # each motion is a run of its own, and nothing in this glove remembers: no lead-in
+    wanted = {
+        "glove": GLOVE,
+        "name": f"{wearing}-{motion}",
+        "subject": SUBJECT,
+        "wearing": wearing,
+        "lead_s": 0,
+    }
     recording = service.post("/recordings", wanted) if _is_seen(service) else None
     with running_capture(place, glove=GLOVE, subject=SUBJECT, wearing=wearing, options=options) as capture:
         if recording is None:

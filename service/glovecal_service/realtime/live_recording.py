@@ -14,24 +14,36 @@ from glovecal_client.queries import ask_json
 from glovecal_client.wire.frame import encode_frame
 from glovecal_service.realtime.arrivals import Arrivals
 from glovecal_service.realtime.frame_gate import TAKEOVER_AFTER_NS
+from glovecal_service.realtime.lead_in import LeadIn
+from glovecal_service.realtime.lead_in_wish import LeadInWish
 from glovecal_service.realtime.recording_file import RecordingFile, RunBooks, decoded
+from glovecal_service.store.recordings import LEAD_IN
 
 WAITING_LIMIT = 65536
 REPAIR_AFTER_S = 0.5
 """A gap this old is asked for; a shorter one may still be on its way."""
 ANSWER_WITHIN_S = 2.0
+LEAD_IN_PATIENCE_S = 5.0
+"""At the end of a recording; ten minutes at 120 Hz come in about as long."""
 END_OF_RUN = (1 << 63) - 1
 
 
 class LiveRecording:
-    """Reads its glove's frames by a subscription of its own, which cannot hold up anybody else."""
+    """Reads its glove's frames by a subscription of its own, which cannot hold up anybody else.
 
-    def __init__(self, session: zenoh.Session, keys: GloveKeys, file: RecordingFile) -> None:
+    The lead-in is fetched once a frame is there to lead to.
+    """
+
+    def __init__(
+        self, session: zenoh.Session, keys: GloveKeys, file: RecordingFile, wish: LeadInWish
+    ) -> None:
         self.file = file
         self.keys = keys
         self.refused = 0
         """Messages of a second publisher, and damaged ones."""
         self._session = session
+        self._wish = wish
+        self._lead_in: LeadIn | None = None
         self._run_id: int | None = None
         self._heard_ns = 0
         self._repair_at = 0.0
@@ -41,6 +53,28 @@ class LiveRecording:
         """Write what arrived since the last call."""
         for arrival in self._arrivals.drain():
             self._record(arrival.payload, arrival.received_ns)
+
+    def take_lead_in(self) -> None:
+        """Write what was fetched of the lead-in since the last call; never waits."""
+        if self._lead_in is None:
+            self._lead_in = self._begin_lead_in()
+        else:
+            self._write_some(self._lead_in)
+
+    def _begin_lead_in(self) -> LeadIn | None:
+        first, oldest = self.file.first_frame, self.file.oldest_frame
+        if first is None or oldest is None or not self._wish.most_s:
+            return None
+        from_ns = first.monotonic_ns - round(self._wish.most_s * 1e9)
+        return LeadIn(self._session, self.keys, oldest, from_ns)
+
+    def _write_some(self, lead_in: LeadIn) -> None:
+        frames = lead_in.take()
+        if frames and not self.file.has_room_to_spare:
+            lead_in.stop("the disk is nearly full")
+            return
+        for frame in frames:
+            self.file.add(frame, encode_frame(frame))
 
     def _record(self, message: bytes, received_ns: int) -> None:
         frame = decoded(message)
@@ -95,13 +129,26 @@ class LiveRecording:
         deadline = time.monotonic() + (patience_s if known else 0.0)
         while self._gaps() and (self.repair() or time.monotonic() < deadline):
             time.sleep(0.05)
+        self._finish_lead_in()
         self.file.close()
         return known
+
+    def _finish_lead_in(self) -> None:
+        self.take_lead_in()
+        deadline = time.monotonic() + LEAD_IN_PATIENCE_S
+        while self._lead_in is not None and self._lead_in.goes_on and time.monotonic() < deadline:
+            self._write_some(self._lead_in)
+            time.sleep(0.01)
+        if self._lead_in is not None:
+            self._lead_in.stop()
 
     def abandon(self) -> None:
         """Close the file as it is; a later process resumes it."""
         self._arrivals.close()
         self.take_in()
+        if self._lead_in is not None:
+            self._lead_in.stop()
+            self._lead_in.wait()
         self.file.close()
 
     def _learn_the_end(self) -> bool:
@@ -116,8 +163,18 @@ class LiveRecording:
         books.last = max(books.last, sequence)
         return True
 
+    def _why_shorter(self) -> str:
+        if self._lead_in is not None:
+            return self._lead_in.why_shorter
+        if self.file.first_frame is None:
+            return "no frame has come yet"
+        return "the recording was interrupted" if self.file.lead_in_s < self._wish.most_s - 1.0 else ""
+
     def account(self) -> dict[str, Any]:
-        """Facts for the recording's row; over all runs ``sent`` = ``recorded`` + missing frames."""
+        """Facts for the recording's row; over all runs ``sent`` = ``recorded`` + missing frames.
+
+        The lead-in is counted apart, and nothing of it is ever missing.
+        """
         runs = [books.document() for books in self.file.runs.values()]
         return {
             "first_sequence": runs[0]["first_sequence"] if runs else None,
@@ -128,6 +185,7 @@ class LiveRecording:
             "missing": [gap for run in runs for gap in run["missing"]],
             "missing_frames": sum(last - first + 1 for run in runs for first, last in run["missing"]),
             "refused": self.refused,
+            LEAD_IN: self._wish.account(len(self.file.lead_in), self.file.lead_in_s, self._why_shorter()),
             "runs": runs,
             "file": self.file.path.name,
         }

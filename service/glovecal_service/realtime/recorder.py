@@ -16,11 +16,14 @@ from glovecal_client.errors import ClientError, NoAnswer
 from glovecal_client.keys import GloveKeys
 from glovecal_client.queries import ask_json
 from glovecal_models.errors import GlovecalError
+from glovecal_service.realtime.lead_in_wish import LeadInWish, lead_in_wish
 from glovecal_service.realtime.live_recording import LiveRecording
 from glovecal_service.realtime.recording_file import SUFFIX, RecordingFile
 from glovecal_service.realtime.recording_result import keep_as_take
 from glovecal_service.settings import Settings
+from glovecal_service.store.clock import now
 from glovecal_service.store.errors import NotFound, StorageFull, StoreError, StoreUnavailable
+from glovecal_service.store.recordings import LEAD_IN
 from glovecal_service.store.records import RecordingRecord
 from glovecal_service.store.store import Store
 
@@ -61,6 +64,7 @@ class Recorder:
         for id, live in list(self._live.items()):
             try:
                 live.take_in()
+                live.take_lead_in()
                 live.repair_now_and_then()
             except (ClientError, OSError, ValueError) as error:
                 self._note(id, sentence=f"recording goes on with trouble: {error}")
@@ -112,7 +116,8 @@ class Recorder:
         path = self._settings.recordings_folder / f"{record.id}{SUFFIX}"
         interrupted = path.exists()
         file = RecordingFile.resume(path) if interrupted else self._create(store, record, keys, path)
-        self._live[record.id] = LiveRecording(self._session, keys, file)
+        wish = LeadInWish.of_document(file.meta.get(LEAD_IN))
+        self._live[record.id] = LiveRecording(self._session, keys, file, wish)
         facts = {}
         if interrupted:
             facts["interruptions"] = [*record.facts.get("interruptions", []), _interruption(file)]
@@ -130,7 +135,14 @@ class Recorder:
             capture = ask_json(self._session, keys.meta, timeout_s=5.0)
         except NoAnswer:
             capture = _stored_meta(store, record.glove)
-        meta = {"recording": record.id, "name": record.name, "glove": record.glove, "capture": capture}
+        meta: dict[str, Any] = {
+            "recording": record.id,
+            "name": record.name,
+            "glove": record.glove,
+            "capture": capture,
+        }
+        others = store.recordings.list(record.glove)
+        meta[LEAD_IN] = lead_in_wish(record, store.gloves.get(record.glove), others, now()).document()
         try:
             return RecordingFile.create(path, meta)
         except OSError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from shutil import disk_usage
 from typing import Any
 
 from glovecal_client.errors import WireError
@@ -14,6 +15,8 @@ from glovecal_client.wire.frame import Frame, decode_frame
 from glovecal_service.realtime.sequence_ranges import SequenceRanges
 
 SUFFIX = ".glog"
+LEFT_FREE_BYTES = 256 << 20
+"""Of the disk, for frames that were asked for: hours of one glove."""
 
 
 @dataclass
@@ -57,6 +60,12 @@ class RecordingFile:
         self.runs: dict[int, RunBooks] = {}
         """In the order they were first met."""
         self.last_wall_ns = 0
+        self.first_frame: Frame | None = None
+        """The first frame that was asked for."""
+        self.lead_in = SequenceRanges()
+        """Frames of the first run that come before it."""
+        self.oldest_frame: Frame | None = None
+        """The first frame of the lead-in, or ``first_frame``."""
 
     @classmethod
     def create(cls, path: Path, meta: Mapping[str, Any]) -> RecordingFile:
@@ -94,6 +103,17 @@ class RecordingFile:
         self._log.append(message)
         return True
 
+    @property
+    def lead_in_s(self) -> float:
+        if self.first_frame is None or self.oldest_frame is None:
+            return 0.0
+        return (self.first_frame.monotonic_ns - self.oldest_frame.monotonic_ns) / 1e9
+
+    @property
+    def has_room_to_spare(self) -> bool:
+        """Whether the disk takes more than the frames that were asked for."""
+        return self.problem is None and disk_usage(self.path.parent).free > LEFT_FREE_BYTES
+
     def open_run(self, run_id: int) -> RunBooks:
         """The books of a run; one that was not met before belongs to the recording from its start."""
         return self.runs.setdefault(run_id, RunBooks(run_id, 0))
@@ -103,11 +123,22 @@ class RecordingFile:
         if books is None:
             first = 0 if self.runs else frame.sequence
             books = self.runs[frame.run_id] = RunBooks(frame.run_id, first)
-        if frame.sequence < books.first or not books.recorded.add(frame.sequence):
+        if self.first_frame is None:
+            self.first_frame = self.oldest_frame = frame
+        if frame.sequence < books.first:
+            return frame.repaired and self._enter_lead_in(frame)
+        if not books.recorded.add(frame.sequence):
             return False
         books.last = max(books.last, frame.sequence)
         books.repaired += frame.repaired
         self.last_wall_ns = max(self.last_wall_ns, frame.wall_ns)
+        return True
+
+    def _enter_lead_in(self, frame: Frame) -> bool:
+        if not self.lead_in.add(frame.sequence):
+            return False
+        if self.oldest_frame is None or frame.sequence < self.oldest_frame.sequence:
+            self.oldest_frame = frame
         return True
 
     def sync(self) -> None:
@@ -120,6 +151,7 @@ class RecordingFile:
             self._count_again()
 
     def _count_again(self) -> None:
+        self.lead_in, self.oldest_frame = SequenceRanges(), self.first_frame
         for books in self.runs.values():
             books.recorded, books.repaired = SequenceRanges(), 0
         for frame in Recording.open(self.path).frames():

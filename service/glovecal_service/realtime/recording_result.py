@@ -37,7 +37,12 @@ def keep_as_take(
         )
     take = _stored_before(store, subject, record.id)
     if take is None:
-        recorded = read_take(folder / f"{record.id}{SUFFIX}", name=record.name, wearing=record.wearing or "")
+        recorded = read_take(
+            folder / f"{record.id}{SUFFIX}",
+            name=record.name,
+            wearing=record.wearing or "",
+            first_sequence=account["first_sequence"],
+        )
         _require_subject(store, subject)
         take = store.takes.add(
             recorded.take,

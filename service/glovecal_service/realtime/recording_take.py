@@ -21,12 +21,14 @@ class RecordedTake:
 
     take: Take
     clock: dict[str, Any]
-    """``wall_minus_time_s``: add it to ``time_s`` for seconds since 1970; ``left_out``: frames not taken."""
+    """``wall_minus_time_s``: add it to ``time_s`` for seconds since 1970; ``begins_s``: ``time_s`` of the
+    first frame that was asked for, after the lead-in; ``left_out``: frames not taken."""
 
 
-def read_take(path: Path, *, name: str, wearing: str) -> RecordedTake:
+def read_take(path: Path, *, name: str, wearing: str, first_sequence: int = 0) -> RecordedTake:
     """The frames of all runs in order; ``time_s`` is the capture computer's monotonic clock in seconds.
 
+    What has a smaller sequence number than ``first_sequence`` in the first run is the lead-in.
     Frames whose time does not increase, or with another number of sensors, are left out and counted.
     Raises BadInput if nothing usable remains, DamagedLog, OSError.
     """
@@ -42,6 +44,10 @@ def read_take(path: Path, *, name: str, wearing: str) -> RecordedTake:
     time_s = _time_s(usable)
     kept = _increasing(time_s)
     taken = [frame for frame, keep in zip(usable, kept, strict=True) if keep]
+    lead = sum(frame.run_id == taken[0].run_id and frame.sequence < first_sequence for frame in taken)
+    if lead == len(taken):
+        raise BadInput(f"recording {path.name}: none of the frames asked for has {len(sensors)} sensors")
+    begins_s = float(time_s[kept][lead])
     take = Take(
         name=name,
         wearing=wearing,
@@ -50,9 +56,11 @@ def read_take(path: Path, *, name: str, wearing: str) -> RecordedTake:
         readings=np.array([frame.readings for frame in taken], dtype=np.float64),
         context=_context(taken, [str(item) for item in meta.get("context") or ()]),
         simulated=any(frame.simulated for frame in taken),
+        begins_s=begins_s if lead else None,
     )
-    offset = taken[0].wall_ns / 1e9 - float(take.time_s[0])
-    return RecordedTake(take, {"wall_minus_time_s": offset, "left_out": len(frames) - len(taken)})
+    offset = taken[lead].wall_ns / 1e9 - begins_s
+    clock = {"wall_minus_time_s": offset, "begins_s": begins_s, "left_out": len(frames) - len(taken)}
+    return RecordedTake(take, clock)
 
 
 def _in_order(frames: Sequence[Frame]) -> list[Frame]:

@@ -88,7 +88,7 @@ def over_time(found: Residuals, rotation: str) -> tuple[str, str]:
     """Prediction with its claimed band and measurement, errors below, around the worst time; and where."""
     column = found.column(rotation)
     item, rows = _worst_window(found, column)
-    time = item.take.time_s[rows] - item.take.time_s[0]
+    time = item.take.time_s[rows] - item.take.start_s
     predicted, sd = item.predicted[rows, column], item.sd[rows, column]
     measured, error = item.measured[rows, column], item.error[rows, column]
 

@@ -12,6 +12,7 @@ from glovecal_service.rest.answers import change_problems, problems
 from glovecal_service.rest.dependencies import StoreNeeded
 from glovecal_service.rest.names import IDENTIFIER, Identifier, IdInPath, WearingName
 from glovecal_service.rest.strict_body import StrictBody
+from glovecal_service.store.recordings import LEAD_IN_S, LONGEST_LEAD_IN_S
 from glovecal_service.store.records import RecordingRecord, RecordingState
 
 router = APIRouter(prefix="/recordings", tags=["recordings"])
@@ -22,6 +23,13 @@ class NewRecording(StrictBody):
     name: WearingName = Field(description="What the take will be called.")
     subject: Identifier | None = Field(None, description="None: who wears the glove now.")
     wearing: WearingName | None = None
+    lead_s: float = Field(
+        LEAD_IN_S,
+        ge=0,
+        le=LONGEST_LEAD_IN_S,
+        description="Seconds before the request that are fetched from the capture log, as far as they lie in "
+        "the same run and wearing: they tell effects with a memory where they stand.",
+    )
 
 
 class Recording(BaseModel):
@@ -31,7 +39,9 @@ class Recording(BaseModel):
     subject: str | None
     wearing: str | None
     state: RecordingState
-    facts: dict[str, Any] = Field(description="`sent`, `recorded`, `repaired`, `missing`, `take` ...")
+    facts: dict[str, Any] = Field(
+        description="`sent`, `recorded`, `repaired`, `missing`, `lead_in`, `take` ..."
+    )
     requested_at: datetime
     updated_at: datetime
 
@@ -45,7 +55,7 @@ class Recording(BaseModel):
 )
 def start_recording(body: NewRecording, store: StoreNeeded, response: Response) -> RecordingRecord:
     """404 when the glove was never seen, 409 while it is being recorded."""
-    record = store.recordings.request(body.glove, name=body.name, subject=body.subject, wearing=body.wearing)
+    record = store.recordings.request(**body.model_dump())
     response.headers["Location"] = f"/v1/recordings/{record.id}"
     return record
 

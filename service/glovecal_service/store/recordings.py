@@ -16,6 +16,11 @@ from glovecal_service.store.records import OPEN_RECORDING_STATES, RecordingRecor
 from glovecal_service.store.subjects import require_subject
 from glovecal_service.store.texts import check_text
 
+LEAD_IN = "lead_in"
+"""Fact of a recording: how much of the time before it was asked for, and came."""
+LEAD_IN_S = 60.0
+LONGEST_LEAD_IN_S = 600.0
+
 _ORDER: dict[str, int] = {"requested": 0, "recording": 1, "stopping": 2, "done": 3, "failed": 3}
 
 
@@ -24,17 +29,28 @@ class Recordings:
         self._database = database
 
     def request(
-        self, glove: str, *, name: str, subject: str | None = None, wearing: str | None = None
+        self,
+        glove: str,
+        *,
+        name: str,
+        subject: str | None = None,
+        wearing: str | None = None,
+        lead_s: float = LEAD_IN_S,
     ) -> RecordingRecord:
         """Ask for a recording; subject and wearing default to the glove's at this moment.
 
-        Raises BadInput (names), NotFound (glove never seen, unknown subject), Conflict if the glove is
-        being recorded already.
+        ``lead_s`` seconds before it are to be in it too, as far as they were captured. Raises BadInput
+        (names, a lead-in that is negative or longer than ``LONGEST_LEAD_IN_S``), NotFound (glove never seen,
+        unknown subject), Conflict if the glove is being recorded already.
         """
         check_identifier(glove, "glove")
         check_text(name, "name of the recording")
         if wearing is not None:
             check_text(wearing, f"wearing of recording {name!r}")
+        if not 0.0 <= lead_s <= LONGEST_LEAD_IN_S:
+            raise BadInput(
+                f"lead-in of recording {name!r}: {lead_s:g} s; 0 to {LONGEST_LEAD_IN_S:g} s are possible"
+            )
         at, id = now(), new_id()
         with self._database.write() as connection:
             revision.grow(connection)
@@ -54,7 +70,7 @@ class Recordings:
                 "subject": subject if subject is not None else worn.subject,
                 "wearing": wearing if wearing is not None else worn.wearing,
                 "state": "requested",
-                "facts": {},
+                "facts": {LEAD_IN: {"asked_s": lead_s}},
                 "requested_at": at,
                 "updated_at": at,
             }

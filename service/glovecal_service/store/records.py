@@ -134,7 +134,8 @@ class RecordingRecord:
     wearing: str | None
     state: RecordingState
     facts: dict[str, Any]
-    """``first_sequence``, ``last_sequence``, ``sent``, ``recorded``, ``repaired``, ``missing``, ``take``"""
+    """``first_sequence``, ``last_sequence``, ``sent``, ``recorded``, ``repaired``, ``missing``, ``lead_in``,
+    ``take``"""
     requested_at: datetime
     updated_at: datetime
 

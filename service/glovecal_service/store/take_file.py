@@ -35,6 +35,7 @@ def dump_take(take: Take) -> bytes:
         "context": list(take.context),
         "simulated": take.simulated,
         "poses": None,
+        **({} if take.begins_s is None else {"begins_s": take.begins_s}),
     }
     if take.poses is not None:
         numbers = {pose: number for number, pose in enumerate(dict.fromkeys(take.poses))}
@@ -67,6 +68,7 @@ def load_take(content: bytes) -> Take:
             context={name: arrays[f"context.{name}"] for name in description["context"]},
             poses=poses,
             simulated=bool(description["simulated"]),
+            begins_s=description.get("begins_s"),
         )
     except (SafetensorError, KeyError, IndexError, TypeError, ValueError) as error:
         raise DamagedArtifact(f"these bytes are no take file: {error}") from error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import time
@@ -115,11 +116,21 @@ def test_a_recorded_take_becomes_a_model_that_predicts_live(live, recorded):
         assert f"model {model['id'][:12]}" in drawn.out
         assert "I_MCP" in drawn.out
         _watch_until_interrupted(live)
+        _record_with_lead_in(live)
         assert "worn by nobody" in run("glove", "wear", GLOVE, "--nobody").out
         eventually(lambda: "no model is active" in run("watch", GLOVE, "--seconds", 0.2).out, "nobody's pose")
     silent = run("watch", "left-hand", "--seconds", 0.3, "--json")
     assert (silent.code, silent.out) == (1, "")
     assert "no pose of glove left-hand came" in silent.said
+
+
+def _record_with_lead_in(live: dict[str, str]) -> None:
+    """The glove streams for seconds already: the take begins before it was asked for."""
+    run = partial(glovecal, live)
+    said = run("record", GLOVE, "second", "--seconds", 0.3, "--lead-in", 0.5).out
+    assert re.search(r"Lead-in: 0\.[45] of the 0\.5 s before it \(\d+ frames\)\.", said)
+    assert re.search(r"lead-in +\d+ of them in 0\.[45]", run("take", "examine", "second").out)
+    assert "lead-in" in run("record", GLOVE, "x", "--lead-in", 601).said.lower()
 
 
 def _watch_until_interrupted(live: dict[str, str]) -> None:

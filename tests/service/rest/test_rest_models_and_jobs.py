@@ -226,9 +226,13 @@ def test_recordings(client: RestClient, settings: Settings) -> None:
         "anna",
         "morning",
     )
+    assert recording["facts"]["lead_in"] == {"asked_s": 60.0}
     with pytest.raises(Refused) as refused:
         client.post("/recordings", {"glove": "left", "name": "again"})
     assert refused.value.status == 409
+    with pytest.raises(Refused, match="lead_s") as refused:
+        client.post("/recordings", {"glove": "left", "name": "again", "lead_s": 601})
+    assert refused.value.status == 422
     assert client.post(f"/recordings/{recording['id']}/stop")["state"] == "stopping"
     assert client.get("/recordings", {"only_open": True})[0]["id"] == recording["id"]
     assert client.get(f"/recordings/{recording['id']}")["name"] == "wave"

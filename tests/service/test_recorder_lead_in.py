@@ -1,0 +1,413 @@
+"""The frames before a recording, with the real capture daemon: what comes, what does not, what is said."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+from realtime_support import LAYOUT, SteadyDevice, eventually, free_endpoint, part_of_service
+
+from glovecal_client import DamagedLog, Frame, FrameLog, Recording, encode_frame
+from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings
+from glovecal_client.keys import GloveKeys
+from glovecal_client.session import open_client, open_router
+from glovecal_models.errors import BadInput
+from glovecal_service.realtime import lead_in, recording_file
+from glovecal_service.realtime.lead_in_wish import lead_in_wish
+from glovecal_service.realtime.recorder import Recorder
+from glovecal_service.serve import recorder
+from glovecal_service.settings import Settings
+from glovecal_service.store import Store
+from glovecal_service.store.records import GloveRecord, RecordingRecord
+
+GLOVE = "g1"
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Settings:
+    return Settings(data=tmp_path, database=None, artifacts=None, zenoh=free_endpoint(), site="lab")
+
+
+@pytest.fixture
+def store(settings: Settings) -> Iterator[Store]:
+    with Store.open(settings) as store:
+        store.gloves.seen(GLOVE, {"layout": LAYOUT.name, "subject": "anna", "wearing": "morning"})
+        yield store
+
+
+@pytest.fixture(autouse=True)
+def room_on_any_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recording_file, "LEFT_FREE_BYTES", 0)
+
+
+class PausingDevice(SteadyDevice):
+    """Silent for a while after so many frames."""
+
+    def __init__(self, after: int, silent_s: float) -> None:
+        super().__init__(200.0)
+        self._after, self._silent_s, self.frames = after, silent_s, 0
+
+    def read(self, timeout_s: float):
+        if self.frames == self._after:
+            time.sleep(self._silent_s)
+            self._due = time.monotonic()
+        self.frames += 1
+        return super().read(timeout_s)
+
+
+@contextmanager
+def capturing(settings: Settings, device: SteadyDevice | None = None) -> Iterator[CaptureDaemon]:
+    """The capture daemon with a glove at 200 Hz, in a thread."""
+    stop = threading.Event()
+    capture = CaptureSettings(
+        GloveKeys(settings.site, GLOVE), "anna", "morning", (settings.zenoh,), settings.data / "captured"
+    )
+    daemon = CaptureDaemon(device or SteadyDevice(200.0), capture, lambda sentence: None)
+    thread = threading.Thread(target=daemon.run, args=(stop,))
+    thread.start()
+    try:
+        yield daemon
+    finally:
+        stop.set()
+        thread.join(10)
+
+
+@contextmanager
+def recording_thread(settings: Settings) -> Iterator[None]:
+    """The recorder as its process runs it, in a thread."""
+    stop = threading.Event()
+    with open_client([settings.zenoh], wait_s=20) as session:
+        it = Recorder(session, settings, lambda: Store.open(settings))
+        thread = threading.Thread(target=it.run, args=(stop,))
+        thread.start()
+        try:
+            yield
+        finally:
+            stop.set()
+            thread.join(15)
+
+
+def logged(settings: Settings) -> list[Path]:
+    """Oldest first."""
+    logs = (settings.data / "captured" / "capture" / "lab" / GLOVE).glob("*.glvlog")
+    return sorted(logs, key=lambda log: log.stat().st_mtime_ns)
+
+
+def captured(settings: Settings, frames: int, *, runs: int = 1) -> None:
+    """Wait until the log of the newest of so many runs holds so many frames."""
+
+    def are_there() -> bool:
+        logs = logged(settings)
+        with suppress(DamagedLog):  # its header is being written
+            return len(logs) == runs and len(list(Recording.open(logs[-1]).payloads())) >= frames
+        return False
+
+    eventually(are_there, f"{frames} frames in the log")
+
+
+def recorded(store: Store, id: str, frames: int) -> None:
+    eventually(lambda: store.recordings.get(id).facts.get("recorded", 0) >= frames, f"{frames} frames")
+
+
+def lead_in_sentence(store: Store, id: str) -> str:
+    return store.recordings.get(id).facts["lead_in"].get("sentence", "")
+
+
+def finished(store: Store, id: str) -> RecordingRecord:
+    store.recordings.stop(id)
+    eventually(lambda: not store.recordings.get(id).is_open, "the end of the recording")
+    record = store.recordings.get(id)
+    check(store, record)
+    return record
+
+
+def check(store: Store, record: RecordingRecord) -> None:
+    """The lead-in is counted apart and precedes what was asked for, without a hole and in one run."""
+    facts, lead = record.facts, record.facts["lead_in"]
+    assert record.state == "done", facts
+    assert facts["sent"] == facts["recorded"] + facts["missing_frames"]
+    take = store.takes.load(facts["take"])
+    assert len(take.time_s) == facts["recorded"] + lead["frames"]
+    assert take.lead_in_frames == lead["frames"]
+    kept = store.takes.get(facts["take"]).accounting
+    assert kept is not None
+    assert kept["begins_s"] == take.start_s
+    assert take.start_s - take.time_s[0] == pytest.approx(lead["seconds"], abs=1e-6)
+    assert kept["lead_in"] == lead
+    assert (np.diff(take.time_s[: lead["frames"] + 1]) < 1.0).all()
+
+
+def test_a_recording_begins_with_the_seconds_before_it(settings: Settings, store: Store) -> None:
+    with open_router([settings.zenoh]), capturing(settings), recording_thread(settings):
+        captured(settings, 500)
+        asked = store.recordings.request(GLOVE, name="walk", lead_s=1.5)
+        recorded(store, asked.id, 100)
+        record = finished(store, asked.id)
+    lead = record.facts["lead_in"]
+    assert lead["asked_s"] == 1.5
+    assert lead["seconds"] == pytest.approx(1.5, abs=0.1)
+    assert lead["sentence"] == f"1.5 of the 1.5 s before it ({lead['frames']} frames)"
+    assert record.facts["missing"] == []
+    assert record.facts["repaired"] == 0
+    frames = list(Recording.open(settings.recordings_folder / record.facts["file"]).frames())
+    own = record.facts["first_sequence"]
+    assert frames[0].sequence == own, "what was asked for is on disk before the lead-in"
+    numbers = sorted(frame.sequence for frame in frames)
+    assert numbers == list(range(own - lead["frames"], own + record.facts["recorded"]))
+
+
+def test_none_is_fetched_when_none_is_asked_for(settings: Settings, store: Store) -> None:
+    with open_router([settings.zenoh]), capturing(settings), recording_thread(settings):
+        captured(settings, 100)
+        asked = store.recordings.request(GLOVE, name="walk", lead_s=0)
+        recorded(store, asked.id, 50)
+        record = finished(store, asked.id)
+    assert record.facts["lead_in"] == {
+        "asked_s": 0, "frames": 0, "seconds": 0.0, "sentence": "none was asked for"
+    }  # fmt: skip
+
+
+def test_a_run_that_is_shorter_gives_what_it_has_and_nothing_of_the_run_before(
+    settings: Settings, store: Store
+) -> None:
+    with open_router([settings.zenoh]), recording_thread(settings):
+        with capturing(settings):
+            captured(settings, 200)
+        with capturing(settings):
+            captured(settings, 150, runs=2)
+            asked = store.recordings.request(GLOVE, name="short")
+            recorded(store, asked.id, 50)
+            record = finished(store, asked.id)
+    assert len(logged(settings)) == 2
+    lead = record.facts["lead_in"]
+    assert lead["frames"] == record.facts["first_sequence"] >= 150
+    assert lead["sentence"].endswith("frames): the run began then")
+    assert len(record.facts["runs"]) == 1
+    assert record.facts["missing"] == []
+
+
+def test_it_ends_at_a_pause_after_which_nothing_remembers(settings: Settings, store: Store) -> None:
+    device = PausingDevice(after=100, silent_s=1.3)
+    with open_router([settings.zenoh]), capturing(settings, device), recording_thread(settings):
+        captured(settings, 200)
+        asked = store.recordings.request(GLOVE, name="paused")
+        recorded(store, asked.id, 50)
+        record = finished(store, asked.id)
+    assert record.facts["lead_in"]["frames"] == record.facts["first_sequence"] - 100
+    assert "before that the glove was silent for 1." in record.facts["lead_in"]["sentence"]
+
+
+def test_it_ends_where_somebody_said_who_wears_the_glove(settings: Settings, store: Store) -> None:
+    with open_router([settings.zenoh]), capturing(settings), recording_thread(settings):
+        captured(settings, 300)
+        store.subjects.create("ben")
+        store.gloves.assign(GLOVE, "ben", "after lunch")
+        said_at = time.monotonic()
+        time.sleep(0.5)
+        asked = store.recordings.request(GLOVE, name="another wearing")
+        recorded(store, asked.id, 50)
+        record = finished(store, asked.id)
+    take = store.takes.load(record.facts["take"])
+    assert take.time_s[0] > said_at - 0.05
+    assert record.facts["lead_in"]["seconds"] > 0.3
+    assert "who wears the glove was said only then" in record.facts["lead_in"]["sentence"]
+
+
+def replay_source(folder: Path) -> Path:
+    log = FrameLog.create(folder / "source.glvlog", {"layout": LAYOUT.name, "sensors": list(LAYOUT.sensors)})
+    for i in range(400):
+        log.append(encode_frame(Frame(i, 1, i * 5_000_000, 0, np.array([i % 250, 1, 2], np.float32))))
+    log.close()
+    return log.path
+
+
+@contextmanager
+def capture_process(settings: Settings) -> Iterator[subprocess.Popen[bytes]]:
+    source = settings.data / "source.glvlog"
+    source = source if source.exists() else replay_source(settings.data)
+    command = [sys.executable, "-m", "glovecal_client.capture.command", "--device", f"replay:{source}"]
+    command += ["--option", "loop=yes", "--glove", GLOVE, "--subject", "anna", "--wearing", "morning"]
+    command += ["--connect", settings.zenoh, "--data", str(settings.data / "captured")]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+def written(settings: Settings, id: str) -> list[int]:
+    file = settings.recordings_folder / f"{id}.glog"
+    return [frame.sequence for frame in Recording.open(file).frames()] if file.exists() else []
+
+
+def test_capture_killed_while_it_is_fetched_leaves_the_recording_as_it_is(
+    settings: Settings, store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """kill -9 after the first blocks; the take has what came, and its own frames."""
+    monkeypatch.setattr(lead_in, "BLOCK_FRAMES", 16)
+    monkeypatch.setattr(lead_in, "PAUSE_S", 0.15)
+    monkeypatch.setattr(lead_in, "TRY_AGAIN_AFTER_S", 0.1)
+    with open_router([settings.zenoh]), recording_thread(settings):
+        with capture_process(settings) as process:
+            captured(settings, 300)
+            asked = store.recordings.request(GLOVE, name="killed")
+            eventually(
+                lambda: (numbers := written(settings, asked.id)) and min(numbers) < numbers[0],
+                "the first of the lead-in",
+            )
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+        eventually(
+            lambda: "did not give more" in lead_in_sentence(store, asked.id),
+            "it is said",
+        )
+        record = finished(store, asked.id)
+    lead = record.facts["lead_in"]
+    assert 0 < lead["frames"] < record.facts["first_sequence"]
+    assert record.facts["missing"] == []
+    assert record.facts["end_known"] is False
+
+
+def test_capture_that_comes_back_still_has_the_log_of_the_run_before(
+    settings: Settings, store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lead_in, "BLOCK_FRAMES", 16)
+    monkeypatch.setattr(lead_in, "PAUSE_S", 0.1)
+    monkeypatch.setattr(lead_in, "TRY_AGAIN_AFTER_S", 0.1)
+    with open_router([settings.zenoh]), recording_thread(settings):
+        with capture_process(settings) as process:
+            captured(settings, 200)
+            asked = store.recordings.request(GLOVE, name="twice")
+            eventually(lambda: len(written(settings, asked.id)) > 30, "the first of the lead-in")
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+        monkeypatch.setattr(lead_in, "PAUSE_S", 0.0)
+        with capture_process(settings):
+            eventually(
+                lambda: lead_in_sentence(store, asked.id).endswith("began then"),
+                "all of it",
+            )
+            recorded(store, asked.id, 100)
+            record = finished(store, asked.id)
+    assert len(record.facts["runs"]) == 2
+    assert record.facts["lead_in"]["frames"] == record.facts["first_sequence"]
+    assert record.facts["missing"] == []
+
+
+def test_capture_that_does_not_answer_is_said_and_the_recording_goes_on(
+    settings: Settings, store: Store
+) -> None:
+    """The log is gone: capture answers that it has no such run in its log."""
+    with open_router([settings.zenoh]), capturing(settings) as daemon, recording_thread(settings):
+        captured(settings, 100)
+        os.truncate(logged(settings)[-1], 0)
+        asked = store.recordings.request(GLOVE, name="no log")
+        recorded(store, asked.id, 100)
+        record = finished(store, asked.id)
+    assert daemon is not None
+    assert record.facts["lead_in"]["frames"] == 0
+    assert "capture's log did not give more" in record.facts["lead_in"]["sentence"]
+    assert record.facts["recorded"] >= 100
+
+
+def test_a_killed_recorder_goes_on_with_it(
+    settings: Settings, store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with open_router([settings.zenoh]), capturing(settings):
+        captured(settings, 600)
+        with part_of_service(recorder, settings) as process:
+            asked = store.recordings.request(GLOVE, name="killed recorder")
+            recorded(store, asked.id, 20)
+            process.kill()
+            process.join()
+        with recording_thread(settings):
+            recorded(store, asked.id, store.recordings.get(asked.id).facts["recorded"] + 100)
+            record = finished(store, asked.id)
+    lead = record.facts["lead_in"]
+    assert lead["frames"] == record.facts["first_sequence"] >= 600
+    assert lead["sentence"].endswith("the run began then")
+    assert record.facts["missing"] == []
+
+
+def test_a_nearly_full_disk_gets_no_lead_in(
+    settings: Settings, store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recording_file, "LEFT_FREE_BYTES", shutil.disk_usage(settings.data).free + (1 << 40))
+    with open_router([settings.zenoh]), capturing(settings), recording_thread(settings):
+        captured(settings, 100)
+        asked = store.recordings.request(GLOVE, name="full")
+        recorded(store, asked.id, 50)
+        record = finished(store, asked.id)
+    assert record.facts["lead_in"]["frames"] == 0
+    assert record.facts["lead_in"]["sentence"].endswith("the disk is nearly full")
+
+
+def test_a_reference_counts_from_the_request_on(settings: Settings, store: Store) -> None:
+    """A tracker that ran all the time has angles of the lead-in too; another take may hold those frames."""
+    with open_router([settings.zenoh]), capturing(settings), recording_thread(settings):
+        captured(settings, 250)
+        asked = store.recordings.request(GLOVE, name="all day")
+        recorded(store, asked.id, 100)
+        record = finished(store, asked.id)
+    bare = store.takes.load(record.facts["take"])
+    store.takes.attach_reference(
+        record.facts["take"], bare.time_s, ["I_MCP"], 0.3 * bare.readings[:, :1], [""] * len(bare.time_s)
+    )
+    take = store.takes.load(record.facts["take"])
+    known = np.isfinite(take.reference_at_frames(["I_MCP"])[:, 0])
+    assert known.tolist() == [t >= take.start_s for t in take.time_s]
+    assert known.sum() == record.facts["recorded"]
+
+
+@pytest.mark.parametrize("lead_s", [-1.0, 601.0, float("nan")])
+def test_a_lead_in_that_cannot_be_is_refused(store: Store, lead_s: float) -> None:
+    with pytest.raises(BadInput, match="0 to 600 s"):
+        store.recordings.request(GLOVE, name="x", lead_s=lead_s)
+
+
+NOON = datetime(2026, 5, 1, 12, tzinfo=UTC)
+
+
+def said(id: str, seconds: float, subject: str | None = "anna", wearing: str | None = "w") -> RecordingRecord:
+    """A recording requested, and last changed, so many seconds after noon; it asks for a minute."""
+    at = NOON + timedelta(seconds=seconds)
+    facts = {"lead_in": {"asked_s": 60.0}}
+    return RecordingRecord(id, GLOVE, id, subject, wearing, "done", facts, at, at)
+
+
+def worn(assigned_s: float | None = None) -> GloveRecord:
+    at = None if assigned_s is None else NOON + timedelta(seconds=assigned_s)
+    return GloveRecord(GLOVE, LAYOUT.name, "anna", "w", "right", False, {}, NOON, NOON, at)
+
+
+@pytest.mark.parametrize(
+    ("record", "glove", "others", "most_s"),
+    [
+        (said("now", 100), worn(), [], 60.0),
+        (said("now", 100), worn(assigned_s=10), [], 60.0),
+        (said("now", 100), worn(assigned_s=70), [], 30.0),
+        (said("now", 100), worn(), [said("other", 80, wearing="v")], 20.0),
+        (said("now", 100), worn(assigned_s=90), [said("other", 80, wearing="v")], 10.0),
+        (said("now", 100), worn(), [said("same", 80), said("other", 70, wearing="v")], 30.0),
+        (said("now", 100, wearing="new"), worn(), [], 0.0),
+        (said("now", 100, wearing="new"), worn(), [said("same", 75, wearing="new")], 25.0),
+        (said("now", 100, wearing="new"), worn(), [said("same", 75, wearing="new"), said("o", 70)], 25.0),
+        (said("now", 100, subject=None), worn(), [], 0.0),
+    ],
+)
+def test_it_never_reaches_into_another_wearing(record, glove, others, most_s) -> None:
+    wish = lead_in_wish(record, glove, [record, *others], NOON + timedelta(seconds=100))
+    assert wish.most_s == most_s
+    assert bool(wish.why_less) == (most_s < 60.0)
