@@ -34,7 +34,8 @@ def added(
 
 
 HYSTERESIS = added("hysteresis", (5.0,), (0.4, 0.3, 0.2))
-CREEP = added("creep", (0.5, 2.5), (0.1, 0.15, 0.05, 0.1), ("I_MCP", "M_MCP"), settings=UNITS)
+CREEP_WEIGHTS = (0.05, 0.05, 0.15, 0.03, 0.02, 0.1)
+CREEP = added("creep", (0.5, 1.1, 2.5), CREEP_WEIGHTS, ("I_MCP", "M_MCP"), settings=UNITS)
 LAG = added("lag", (0.05,), (0.2, 0.3, 0.1), ("I_PIP",))
 
 

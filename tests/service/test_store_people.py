@@ -176,7 +176,7 @@ def test_a_recording_moves_forward_only(store):
     assert store.recordings.update(recording.id, state="recording").state == "stopping"
     facts = {"last_sequence": 99, "sent": 93, "recorded": 90, "missing": [[50, 52]]}
     done = store.recordings.update(recording.id, state="done", **facts)
-    assert done.facts == {"first_sequence": 7, **facts}
+    assert done.facts == {"lead_in": {"asked_s": 60.0}, "first_sequence": 7, **facts}
     assert store.recordings.stop(recording.id).state == "done"
     assert store.recordings.update(recording.id, state="failed").state == "done"
     second = store.recordings.request("left", name="run")
