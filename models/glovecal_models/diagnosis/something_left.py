@@ -175,5 +175,5 @@ def _unsure(judged: Sequence[LastingError]) -> str | None:
 
 def _told(columns: Sequence[GoesWith]) -> str:
     if not columns:
-        return "it goes with no recorded column: a cause that was not recorded"
+        return "it goes with none of the recorded columns"
     return f"it goes with {', '.join(item.told() for item in columns[:MOST_SAID])}"

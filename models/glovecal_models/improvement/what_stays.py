@@ -16,7 +16,7 @@ def what_stays(per_rotation: Mapping[str, float], floors: Mapping[str, NoiseFloo
         f"{per_rotation[name]:.2f} on {name}{_floor(floors.get(name))}" for name in worst[:MOST_NAMED]
     )
     more = f" and less on {len(worst) - MOST_NAMED} more" if len(worst) > MOST_NAMED else ""
-    return f"What stays, in degrees on takes left out: {told}{more}."
+    return f"What stays, in degrees on takes not trained on: {told}{more}."
 
 
 def repeats_sentence(floors: Mapping[str, NoiseFloor]) -> str | None:

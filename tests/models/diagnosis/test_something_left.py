@@ -120,7 +120,7 @@ def test_without_its_column_the_cause_was_not_recorded(healthy):
     found = left_of(with_error(healthy, None, 5, 3.0))
     assert found.is_left
     assert found.goes_with == ()
-    assert found.sentence.endswith("it goes with no recorded column: a cause that was not recorded.")
+    assert found.sentence.endswith("it goes with none of the recorded columns.")
 
 
 def test_a_column_that_wanders_by_itself_is_not_accused(healthy):
