@@ -10,65 +10,32 @@ import numpy as np
 
 from glovecal_models.calibration.effect_correction import SENSOR_FAULT
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.quick_check import is_only_checked
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
 from glovecal_models.diagnosis.signatures import own_sensors
 from glovecal_models.effects.catalogue import effect as known_effect
-from glovecal_models.effects.clock_scan import aligned
-from glovecal_models.effects.effect import Signals
+from glovecal_models.effects.effect import Effect, Signals
 from glovecal_models.effects.interval_effect import IntervalEffect
-from glovecal_models.effects.signature_effect import SignatureEffect
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_interval import add_interval
 from glovecal_models.improvement.addition import Addition, total_rmse_deg
 from glovecal_models.improvement.child_model import child_model
 from glovecal_models.improvement.decoy_share import share_left_by_decoy
 from glovecal_models.improvement.effect_fit import fit_with_effects
+from glovecal_models.improvement.had_already import (
+    repaired_takes,
+    settings_of,
+    trained_rotations,
+    wanted_of,
+)
 from glovecal_models.improvement.held_out_check import HeldOutErrors, held_out_errors
-from glovecal_models.improvement.live_faults import live_faults
+from glovecal_models.improvement.live_faults import LiveFaults, live_faults
 from glovecal_models.improvement.prepared_takes import PreparedTakes
 from glovecal_models.improvement.relearned import columnless_effects, kept_lanes
 from glovecal_models.improvement.wanted_effect import WantedEffect
-from glovecal_models.regression.rule_regressor import RuleRegressor
 from glovecal_models.takes.take import Take
 
 LEAST_GAIN = 0.05
 """Of the held-out RMSE of the touched rotations; with less an effect is undone."""
-
-
-def wanted_of(model: CalibrationModel) -> tuple[WantedEffect, ...]:
-    """The effects a model has, as they would be asked for again."""
-    merged: dict[str, WantedEffect] = {}
-    for item in model.effects:
-        if is_only_checked(item):
-            continue  # training takes tell nothing of a wearing that only a quick check saw
-        before = merged.get(item.name)
-        rotations = item.active if before is None else (*before.rotations, *item.active)
-        settings = item.settings if not item.weights.shape[1] else {}
-        merged[item.name] = WantedEffect(item.name, tuple(dict.fromkeys(rotations)), settings)
-    return tuple(merged.values())
-
-
-def trained_rotations(model: CalibrationModel) -> tuple[str, ...]:
-    """Rotations with a regressor of their own, no rule."""
-    return tuple(item.rotation for item in model.rotations if not isinstance(item.regressor, RuleRegressor))
-
-
-def repaired_takes(takes: Sequence[Take], wanted: Sequence[WantedEffect]) -> list[Take]:
-    """The takes with what their measurement needs: clocks on the frames' time, faulty pieces left out."""
-    result = list(takes)
-    for item in wanted:
-        if item.name == "clock_offset":
-            offsets, common = item.settings["offset_s"], float(item.settings["common_s"])
-            result = [aligned(take, float(offsets.get(take.name, common))) for take in result]
-        elif item.is_on_reference and isinstance(item.effect, SignatureEffect):
-            result = list(item.effect.repaired(result))
-    return result
-
-
-def settings_of(model: CalibrationModel, settings: TrainingSettings | None) -> TrainingSettings:
-    """How the model was trained, as far as it tells."""
-    return settings or TrainingSettings(method=model.method)  # pyright: ignore[reportArgumentType]
 
 
 def add_effect(
@@ -100,18 +67,10 @@ def add_effect(
     effect = known_effect(name)
     settings = settings_of(model, settings)
     has = wanted_of(model)
-    every = trained_rotations(model)
-    chosen = tuple(every if rotations is None or effect.side == "reference" else rotations)
-    unknown = [item for item in chosen if item not in every]
-    if unknown:
-        raise BadInput(f"no rotation {unknown[0]!r} is trained in this model; it has {', '.join(every)}")
-    fresh = WantedEffect(name, chosen, dict(constants or {}))
-    faults = None
+    chosen = _chosen(model, effect, rotations)
+    fresh, faults = WantedEffect(name, chosen, dict(constants or {})), None
     if name == SENSOR_FAULT:
-        others = repaired_takes(takes, [item for item in has if item.name != name])
-        faults = live_faults(model, others, own_sensors(model.layout, every), cancelled)
-        live = {} if faults.live is None else {"live": faults.live}
-        fresh = replace(fresh, settings=fresh.settings | live)
+        fresh, faults = _watched_live(model, takes, has, fresh, cancelled)
     wanted = (*(item for item in has if item.name != name), _joined(has, fresh))
     prepared = PreparedTakes.of(repaired_takes(takes, wanted), model.layout)
     if isinstance(effect, IntervalEffect):
@@ -125,14 +84,8 @@ def add_effect(
         PreparedTakes.of(repaired_takes(takes, has), model.layout), chosen, has, settings,
         cancelled=cancelled, report=_part(report, 0.0, 0.4, "measuring what there is"),
     )  # fmt: skip
-    after = held_out_errors(
-        prepared,
-        chosen,
-        wanted,
-        settings,
-        cancelled=cancelled,
-        report=_part(report, 0.4, 0.8, f"with {name}"),
-    )
+    with_it = _part(report, 0.4, 0.8, f"with {name}")
+    after = held_out_errors(prepared, chosen, wanted, settings, cancelled=cancelled, report=with_it)
     judged = tuple(judged or chosen)
     gain = 1.0 - total_rmse_deg(after, judged) / max(total_rmse_deg(before, judged), 1e-12)
     sentence = _sentence(name, judged, before, after, gain, least_gain)
@@ -150,10 +103,34 @@ def add_effect(
     effects = [replace(item, evidence=evidence) if item.name == name else item for item in effects]
     whole = before.with_those_of(after)
     child = child_model(model, parent_id, prepared, fit, effects, whole, settings, take_hashes)
-    described = {
-        key: value for item in fit.effects if item.name == name for key, value in item.described().items()
-    }
+    mine = [item.described() for item in fit.effects if item.name == name]
+    described = {key: value for each in mine for key, value in each.items()}
     return Addition(name, chosen, True, sentence, before, after, child, tuple(wanted), described)
+
+
+def _chosen(model: CalibrationModel, effect: Effect, rotations: Sequence[str] | None) -> tuple[str, ...]:
+    """What is wrong with a reference is wrong for all rotations. Raises BadInput."""
+    every = trained_rotations(model)
+    chosen = tuple(every if rotations is None or effect.side == "reference" else rotations)
+    unknown = [item for item in chosen if item not in every]
+    if unknown:
+        raise BadInput(f"no rotation {unknown[0]!r} is trained in this model; it has {', '.join(every)}")
+    return chosen
+
+
+def _watched_live(
+    model: CalibrationModel,
+    takes: Sequence[Take],
+    has: Sequence[WantedEffect],
+    fresh: WantedEffect,
+    cancelled: Callable[[], bool] | None,
+) -> tuple[WantedEffect, LiveFaults]:
+    """A sensor fault with the limits by which it is seen live, where it can be."""
+    others = repaired_takes(takes, [item for item in has if item.name != fresh.name])
+    sensors = own_sensors(model.layout, trained_rotations(model))
+    faults = live_faults(model, others, sensors, cancelled)
+    live = {} if faults.live is None else {"live": faults.live}
+    return replace(fresh, settings=fresh.settings | live), faults
 
 
 def _evidence(

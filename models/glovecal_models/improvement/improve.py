@@ -16,11 +16,12 @@ from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.diagnosis_document import named_sentence
 from glovecal_models.diagnosis.pose_labels import are_pose_labels
-from glovecal_models.improvement.add_effect import add_effect, repaired_takes, trained_rotations, wanted_of
+from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.improvement.addition import Addition
 from glovecal_models.improvement.baselines import baselines
 from glovecal_models.improvement.clocks import clock_settings, coarse_clock_settings
 from glovecal_models.improvement.decoy_share import share_in
+from glovecal_models.improvement.had_already import repaired_takes, trained_rotations, wanted_of
 from glovecal_models.improvement.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.improvement.improvement import CLOCK, Improvement, Step, added_document
 from glovecal_models.improvement.known_effects import known_effects

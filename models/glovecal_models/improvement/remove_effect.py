@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput
-from glovecal_models.improvement.add_effect import repaired_takes, settings_of, trained_rotations, wanted_of
 from glovecal_models.improvement.child_model import child_model
 from glovecal_models.improvement.effect_fit import fit_with_effects
+from glovecal_models.improvement.had_already import repaired_takes, settings_of, trained_rotations, wanted_of
 from glovecal_models.improvement.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.improvement.prepared_takes import PreparedTakes
 from glovecal_models.improvement.relearned import columnless_effects

@@ -13,7 +13,7 @@ from glovecal_models.diagnosis.signatures import are_held_levels, own_sensors
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.effects.saturation import saturated_bands
 from glovecal_models.effects.signature_effect import SignatureEffect
-from glovecal_models.improvement.add_effect import trained_rotations
+from glovecal_models.improvement.had_already import trained_rotations
 from glovecal_models.takes.take import Take
 
 REPAIRS = ("repeated_samples", "sensor_fault")

@@ -10,7 +10,7 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.comparison.rotation_noise import rotation_noise
 from glovecal_models.effects.expression_effect import ExpressionEffect
-from glovecal_models.improvement.add_effect import repaired_takes, wanted_of
+from glovecal_models.improvement.had_already import repaired_takes, wanted_of
 from glovecal_models.improvement.known_effects import known_effects
 from glovecal_models.takes.take import Take
 from glovecal_service.jobs.declared_effects import declared_in, known_by_name

@@ -13,8 +13,8 @@ from glovecal_models.effects.garment_slip import GarmentSlip
 from glovecal_models.effects.saturation import saturated_bands
 from glovecal_models.effects.signature_effect import SignatureEffect
 from glovecal_models.errors import BadInput
-from glovecal_models.improvement.add_effect import repaired_takes, trained_rotations, wanted_of
 from glovecal_models.improvement.clocks import clock_settings, coarse_clock_settings
+from glovecal_models.improvement.had_already import repaired_takes, trained_rotations, wanted_of
 from glovecal_models.improvement.known_effects import known_effects
 from glovecal_models.takes.take import Take
 from glovecal_service.jobs.added_by_signature import ADDED_BY_SIGNATURE, CLOCK, SATURATION, SLIP

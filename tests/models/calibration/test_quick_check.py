@@ -18,7 +18,8 @@ from glovecal_models.calibration.sensor_sensitivity import sensor_sensitivity
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput
-from glovecal_models.improvement.add_effect import add_effect, wanted_of
+from glovecal_models.improvement.add_effect import add_effect
+from glovecal_models.improvement.had_already import wanted_of
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.cause import Cause
 from glovecal_models.simulation.session import record_session
