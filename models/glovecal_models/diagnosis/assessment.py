@@ -17,9 +17,14 @@ LEAST_SESSION_CONTRAST = 0.12
 JOINT_PROBABILITY = 0.002
 POOLED_PROBABILITY = 0.001
 FEWEST_BLOCKS = 9
-SESSION_PROBABILITY = 0.01
+CLEAR_CONTRAST = 0.3
+"""Causes that change from take to take save so much from 1.3 noise floors on; healthy gloves 0.21 at most."""
+SESSION_PROBABILITY = 0.025
 WEARING_PROBABILITY = 0.04
 """Wearings have one way to be dealt, where context columns have many names: less is asked of them."""
+FAINT_SESSION_PROBABILITY = 0.005
+FAINT_WEARING_PROBABILITY = 0.01
+"""What saves less than ``CLEAR_CONTRAST`` has to be surer."""
 
 
 @dataclass(frozen=True)
@@ -78,11 +83,8 @@ class Assessment:
     @cached_property
     def touched(self) -> tuple[int, ...]:
         """Joints on which the effect saves error beyond chance."""
-        most = WEARING_PROBABILITY if self.effect == "donning_shift" else SESSION_PROBABILITY
-        if self.probability is not None and self.probability > most:
-            return ()
         if self.probability is not None:
-            return tuple(i for i, item in enumerate(self.errors) if item.contrast >= LEAST_SESSION_CONTRAST)
+            return self._touched_by_session(self.probability)
         some = {
             i
             for i, item in enumerate(self.errors)
@@ -95,6 +97,15 @@ class Assessment:
             if pooled.contrast >= LEAST_CONTRAST and signed_rank(pooled.beyond_decoy) <= POOLED_PROBABILITY:
                 some.update(together)
         return tuple(sorted(some))
+
+    def _touched_by_session(self, probability: float) -> tuple[int, ...]:
+        faint, clear = FAINT_SESSION_PROBABILITY, SESSION_PROBABILITY
+        if self.effect == "donning_shift":
+            faint, clear = FAINT_WEARING_PROBABILITY, WEARING_PROBABILITY
+        largest = max((item.contrast for item in self.errors), default=0.0)
+        if probability > (clear if largest >= CLEAR_CONTRAST else faint):
+            return ()
+        return tuple(i for i, item in enumerate(self.errors) if item.contrast >= LEAST_SESSION_CONTRAST)
 
     @property
     def saved_square(self) -> float:
