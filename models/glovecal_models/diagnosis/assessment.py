@@ -17,8 +17,9 @@ LEAST_SESSION_CONTRAST = 0.12
 JOINT_PROBABILITY = 0.002
 POOLED_PROBABILITY = 0.001
 FEWEST_BLOCKS = 9
-CLEAR_CONTRAST = 0.3
-"""Causes that change from take to take save so much from 1.3 noise floors on; healthy gloves 0.21 at most."""
+CLEAR_CONTRAST = 0.25
+"""Causes that change from take to take save 0.46 and more at 1.3 noise floors, donnings of real ankles 0.26;
+healthy gloves 0.21 at most."""
 SESSION_PROBABILITY = 0.025
 WEARING_PROBABILITY = 0.04
 """Wearings have one way to be dealt, where context columns have many names: less is asked of them."""
