@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable
 from queue import SimpleQueue
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_client.wire.pose import Pose, decode_pose
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_service.realtime.arrivals import Arrival
+from glovecal_service.realtime.arrivals import Arrival, Arrivals
 from glovecal_service.realtime.pose_loop import PoseLoop
 from glovecal_service.realtime.served_model import ServedModel, ServedModels
 from glovecal_service.realtime.worn_gloves import WornGlove, WornGloves
@@ -43,8 +43,10 @@ class LoopByHand:
         self.arrivals, self.models, self.worn = ByHand(), ServedModels(), WornGloves()
         self.poses: dict[str, list[Pose]] = {}
         # so much time that a slow machine skips no frame either
-        patience: dict[str, Any] = {"oldest_ns": 600 * 10**9, "round_budget_s": 600.0}
-        self.loop = PoseLoop(self.arrivals, self.models, self._publish, self.worn, **patience)  # type: ignore[arg-type]
+        self.loop = PoseLoop(
+            cast(Arrivals, self.arrivals), self.models, self._publish, self.worn,
+            oldest_ns=600 * 10**9, round_budget_s=600.0,
+        )  # fmt: skip
 
     @classmethod
     def serving(cls, model: CalibrationModel) -> LoopByHand:

@@ -7,42 +7,34 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 import pytest
-from realtime_support import LAYOUT, SteadyDevice, eventually, free_endpoint, part_of_service
+from realtime_support import LAYOUT, SteadyDevice, eventually, part_of_service
+from recorder_support import GLOVE, capturing, recorder_settings, recording_thread, store_with_glove
 
 from glovecal_client import DamagedLog, Frame, FrameLog, Recording, encode_frame
-from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings
-from glovecal_client.keys import GloveKeys
-from glovecal_client.session import open_client, open_router
+from glovecal_client.session import open_router
 from glovecal_models.errors import BadInput
 from glovecal_service.realtime import lead_in, recording_file
-from glovecal_service.realtime.lead_in_wish import lead_in_wish
-from glovecal_service.realtime.recorder import Recorder
 from glovecal_service.serve import recorder
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
-from glovecal_service.store.records import GloveRecord, RecordingRecord
-
-GLOVE = "g1"
+from glovecal_service.store.records import RecordingRecord
 
 
 @pytest.fixture
 def settings(tmp_path: Path) -> Settings:
-    return Settings(data=tmp_path, database=None, artifacts=None, zenoh=free_endpoint(), site="lab")
+    return recorder_settings(tmp_path)
 
 
 @pytest.fixture
 def store(settings: Settings) -> Iterator[Store]:
-    with Store.open(settings) as store:
-        store.gloves.seen(GLOVE, {"layout": LAYOUT.name, "subject": "anna", "wearing": "morning"})
+    with store_with_glove(settings) as store:
         yield store
 
 
@@ -64,38 +56,6 @@ class PausingDevice(SteadyDevice):
             self._due = time.monotonic()
         self.frames += 1
         return super().read(timeout_s)
-
-
-@contextmanager
-def capturing(settings: Settings, device: SteadyDevice | None = None) -> Iterator[CaptureDaemon]:
-    """The capture daemon with a glove at 200 Hz, in a thread."""
-    stop = threading.Event()
-    capture = CaptureSettings(
-        GloveKeys(settings.site, GLOVE), "anna", "morning", (settings.zenoh,), settings.data / "captured"
-    )
-    daemon = CaptureDaemon(device or SteadyDevice(200.0), capture, lambda sentence: None)
-    thread = threading.Thread(target=daemon.run, args=(stop,))
-    thread.start()
-    try:
-        yield daemon
-    finally:
-        stop.set()
-        thread.join(10)
-
-
-@contextmanager
-def recording_thread(settings: Settings) -> Iterator[None]:
-    """The recorder as its process runs it, in a thread."""
-    stop = threading.Event()
-    with open_client([settings.zenoh], wait_s=20) as session:
-        it = Recorder(session, settings, lambda: Store.open(settings))
-        thread = threading.Thread(target=it.run, args=(stop,))
-        thread.start()
-        try:
-            yield
-        finally:
-            stop.set()
-            thread.join(15)
 
 
 def logged(settings: Settings) -> list[Path]:
@@ -199,7 +159,7 @@ def test_a_run_that_is_shorter_gives_what_it_has_and_nothing_of_the_run_before(
 
 def test_it_ends_at_a_pause_after_which_nothing_remembers(settings: Settings, store: Store) -> None:
     device = PausingDevice(after=100, silent_s=1.3)
-    with open_router([settings.zenoh]), capturing(settings, device), recording_thread(settings):
+    with open_router([settings.zenoh]), capturing(settings, device=device), recording_thread(settings):
         captured(settings, 200)
         asked = store.recordings.request(GLOVE, name="paused")
         recorded(store, asked.id, 50)
@@ -306,17 +266,13 @@ def test_capture_that_comes_back_still_has_the_log_of_the_run_before(
     assert record.facts["missing"] == []
 
 
-def test_capture_that_does_not_answer_is_said_and_the_recording_goes_on(
-    settings: Settings, store: Store
-) -> None:
-    """The log is gone: capture answers that it has no such run in its log."""
-    with open_router([settings.zenoh]), capturing(settings) as daemon, recording_thread(settings):
+def test_a_log_that_is_gone_is_said_and_the_recording_goes_on(settings: Settings, store: Store) -> None:
+    with open_router([settings.zenoh]), capturing(settings), recording_thread(settings):
         captured(settings, 100)
         os.truncate(logged(settings)[-1], 0)
         asked = store.recordings.request(GLOVE, name="no log")
         recorded(store, asked.id, 100)
         record = finished(store, asked.id)
-    assert daemon is not None
     assert record.facts["lead_in"]["frames"] == 0
     assert "capture's log did not give more" in record.facts["lead_in"]["sentence"]
     assert record.facts["recorded"] >= 100
@@ -375,39 +331,3 @@ def test_a_reference_counts_from_the_request_on(settings: Settings, store: Store
 def test_a_lead_in_that_cannot_be_is_refused(store: Store, lead_s: float) -> None:
     with pytest.raises(BadInput, match="0 to 600 s"):
         store.recordings.request(GLOVE, name="x", lead_s=lead_s)
-
-
-NOON = datetime(2026, 5, 1, 12, tzinfo=UTC)
-
-
-def said(id: str, seconds: float, subject: str | None = "anna", wearing: str | None = "w") -> RecordingRecord:
-    """A recording requested, and last changed, so many seconds after noon; it asks for a minute."""
-    at = NOON + timedelta(seconds=seconds)
-    facts = {"lead_in": {"asked_s": 60.0}}
-    return RecordingRecord(id, GLOVE, id, subject, wearing, "done", facts, at, at)
-
-
-def worn(assigned_s: float | None = None) -> GloveRecord:
-    at = None if assigned_s is None else NOON + timedelta(seconds=assigned_s)
-    return GloveRecord(GLOVE, LAYOUT.name, "anna", "w", "right", False, {}, NOON, NOON, at)
-
-
-@pytest.mark.parametrize(
-    ("record", "glove", "others", "most_s"),
-    [
-        (said("now", 100), worn(), [], 60.0),
-        (said("now", 100), worn(assigned_s=10), [], 60.0),
-        (said("now", 100), worn(assigned_s=70), [], 30.0),
-        (said("now", 100), worn(), [said("other", 80, wearing="v")], 20.0),
-        (said("now", 100), worn(assigned_s=90), [said("other", 80, wearing="v")], 10.0),
-        (said("now", 100), worn(), [said("same", 80), said("other", 70, wearing="v")], 30.0),
-        (said("now", 100, wearing="new"), worn(), [], 0.0),
-        (said("now", 100, wearing="new"), worn(), [said("same", 75, wearing="new")], 25.0),
-        (said("now", 100, wearing="new"), worn(), [said("same", 75, wearing="new"), said("o", 70)], 25.0),
-        (said("now", 100, subject=None), worn(), [], 0.0),
-    ],
-)
-def test_it_never_reaches_into_another_wearing(record, glove, others, most_s) -> None:
-    wish = lead_in_wish(record, glove, [record, *others], NOON + timedelta(seconds=100))
-    assert wish.most_s == most_s
-    assert bool(wish.why_less) == (most_s < 60.0)

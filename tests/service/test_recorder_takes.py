@@ -4,70 +4,32 @@ from __future__ import annotations
 
 import re
 import subprocess
-import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 import pytest
-from realtime_support import LAYOUT, SteadyDevice, WireGlove, eventually, free_endpoint, part_of_service
+from realtime_support import LAYOUT, WireGlove, eventually, part_of_service
+from recorder_support import GLOVE, capturing, recorder_settings, recording_thread, store_with_glove
 
-from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings
-from glovecal_client.keys import GloveKeys
 from glovecal_client.session import open_client, open_router
-from glovecal_service.realtime.recorder import Recorder
 from glovecal_service.serve import recorder
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 from glovecal_service.store.records import RecordingRecord
 
-GLOVE = "g1"
-
 
 @pytest.fixture
 def settings(tmp_path: Path) -> Settings:
-    return Settings(data=tmp_path, database=None, artifacts=None, zenoh=free_endpoint(), site="lab")
+    return recorder_settings(tmp_path)
 
 
 @pytest.fixture
 def store(settings: Settings) -> Iterator[Store]:
-    with Store.open(settings) as store:
-        store.gloves.seen(GLOVE, {"layout": LAYOUT.name, "subject": "anna", "wearing": "morning"})
+    with store_with_glove(settings) as store:
         yield store
-
-
-@contextmanager
-def capturing(settings: Settings, data: Path) -> Iterator[None]:
-    """The capture daemon with a glove at 200 Hz, in a thread."""
-    stop = threading.Event()
-    capture = CaptureSettings(
-        GloveKeys(settings.site, GLOVE), "anna", "morning", (settings.zenoh,), data / "captured"
-    )
-    daemon = CaptureDaemon(SteadyDevice(200.0), capture, lambda sentence: None)
-    thread = threading.Thread(target=daemon.run, args=(stop,))
-    thread.start()
-    try:
-        yield
-    finally:
-        stop.set()
-        thread.join(120)
-
-
-@contextmanager
-def recording_thread(settings: Settings) -> Iterator[Recorder]:
-    """The recorder as its process runs it, in a thread."""
-    stop = threading.Event()
-    with open_client([settings.zenoh], wait_s=20) as session:
-        it = Recorder(session, settings, lambda: Store.open(settings))
-        thread = threading.Thread(target=it.run, args=(stop,))
-        thread.start()
-        try:
-            yield it
-        finally:
-            stop.set()
-            thread.join(120)
 
 
 def frames(store: Store, id: str, at_least: int) -> Callable[[], RecordingRecord | None]:
