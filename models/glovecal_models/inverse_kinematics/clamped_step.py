@@ -18,7 +18,8 @@ LONGEST_PULL_MM = 20.0
 DAMPING_PER_MM2 = 1e-4
 """The damping factor over the squared distance, as a share of the Jacobian's size: 1 at 100 mm."""
 SINGULAR = 1e-9
-"""Directions with less than this share of the largest squared slope are no directions."""
+"""Share of the largest squared slope that stands in for directions in which nothing moves."""
+LEAST_SQUARE = 1e-6
 MOST_EXCHANGES = 8
 """Of joints held at a limit for others, within one step."""
 
@@ -39,25 +40,28 @@ def clamped_step(
     -J^T force in every joint that is not at its limit.
     """
     low, high = room
-    held, step = np.zeros(len(back), dtype=bool), np.zeros_like(back)
-    force = np.zeros_like(pull)
+    held, at_limit = np.zeros(len(back), dtype=bool), np.zeros_like(back)
+    step, force = at_limit, np.zeros_like(pull)
     for _ in range(MOST_EXCHANGES):
-        left = pull - slopes @ np.where(held, step, 0.0)
+        left = pull - slopes @ np.where(held, at_limit, 0.0)
         force = _force(np.where(held, 0.0, slopes), left, distance_mm, back)
         wanted = back + force @ slopes
-        step = np.clip(wanted, low, high)
-        beyond = step != wanted
+        step = np.clip(np.where(held, at_limit, wanted), low, high)
+        beyond = (wanted < low) | (wanted > high)
         if (beyond == held).all():
             break
-        held = beyond
+        held, at_limit = beyond, np.clip(wanted, low, high)
     return step, force
 
 
 def _force(free: np.ndarray, left: np.ndarray, distance_mm: float, back: np.ndarray) -> np.ndarray:
-    """(J J^T + lambda^2 I)^-1 e - (J J^T)^-1 J z, in the directions that the free joints can move."""
+    """(J J^T + lambda^2 I)^-1 e - (J J^T)^-1 J z.
+
+    Where the free joints cannot move the tips it is very large: that is what lets go of a held joint that can.
+    """
     squares, directions = np.linalg.eigh(free @ free.T)
-    usable = squares > SINGULAR * squares[-1]
-    squares = np.where(usable, squares, np.inf)
-    damping = (DAMPING_PER_MM2 * distance_mm**2) ** 2 * squares[-1]
+    largest = max(squares[-1], LEAST_SQUARE)
+    squares = np.maximum(squares, 0.0) + SINGULAR * largest
+    damping = (DAMPING_PER_MM2 * distance_mm**2) ** 2 * largest
     along, shape = left @ directions, (free @ back) @ directions
     return directions @ (along / (squares + damping) - shape / squares)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,11 @@ TIP_TOLERANCE_MM = 0.01
 """Tips this close are where they should be."""
 STILL_DEG = 0.01
 """No joint moves further in the last step."""
+STUCK_DEG = 1e-4
+"""Nor does it here, where a finger is bent so that its tip cannot start on the way."""
 LONGEST_STEP_DEG = 10.0
+SCATTERED_STARTS = 8
+"""Hands anywhere within the limits, tried where the way is barred from the last frame and from the shape."""
 MOST_STEPS = 100
 AT_LIMIT_DEG = 1e-6
 
@@ -41,7 +46,7 @@ def follow(
     """The likeliest hands of ``shape`` that keep ``contact``: clamped damped least squares, frame by frame.
 
     Each frame starts from the solution of the one before, the first from ``start_deg`` (K,), else from its
-    shape. Solves equations (2) to (6) of Wang & Neff 2013 at once: the shape's standard deviations are the
+    shape; where that does not lead there, from elsewhere. Solves equations (2) to (6) of Wang & Neff 2013 at once: the shape's standard deviations are the
     stiffness, and the tips meet where both chains are likeliest to. Raises BadInput where chains, contact and
     shape are of different fingers or rotations.
     """
@@ -53,11 +58,10 @@ def follow(
     angles, missing = np.empty_like(shape.centre_deg), np.empty(len(shape))
     steps, forces = np.empty(len(shape), dtype=int), []
     at = shape.centre_deg[0] if start_deg is None else np.asarray(start_deg, dtype=float)
+    scattered = np.random.default_rng(0).uniform(*chains.limits_deg.T, (SCATTERED_STARTS, len(at)))
     for frame, centre in enumerate(shape.centre_deg):
         problem = _Frame(chains, contact, frame, centre, shape.sd_deg[frame])
-        found = problem.solved(at)
-        if found.distance_mm > TIP_TOLERANCE_MM:
-            found = min(found, problem.solved(centre), key=lambda each: each.distance_mm)
+        found = problem.solved_from([at, centre, *scattered])
         at = angles[frame] = found.angles_deg
         missing[frame], steps[frame] = found.distance_mm, found.steps
         forces.append(found.force)
@@ -80,6 +84,15 @@ class _Frame:
     centre_deg: np.ndarray
     sd_deg: np.ndarray
 
+    def solved_from(self, starts_deg: Sequence[np.ndarray]) -> _Solution:
+        """The first that reaches, else the nearest."""
+        best = self.solved(starts_deg[0])
+        for start in starts_deg[1:]:
+            if best.distance_mm <= TIP_TOLERANCE_MM:
+                break
+            best = min(best, self.solved(start), key=lambda each: each.distance_mm)
+        return best
+
     def solved(self, start_deg: np.ndarray) -> _Solution:
         """Steps until the joints are still. ``eagerness`` to get back to the shape falls where they sway."""
         low, high = self.chains.limits_deg.T
@@ -88,7 +101,8 @@ class _Frame:
             steps += 1
             step, distance, _ = self._step(at, eagerness)
             furthest = float(np.abs(step).max())
-            if furthest < STILL_DEG * eagerness and distance < TIP_TOLERANCE_MM:
+            reached = distance < TIP_TOLERANCE_MM
+            if furthest < (STILL_DEG * eagerness if reached else STUCK_DEG):
                 break
             at = np.clip(at + step * min(1.0, LONGEST_STEP_DEG / max(furthest, STILL_DEG)), low, high)
             eagerness = eagerness / 2 if step @ before < 0 else min(1.0, 1.5 * eagerness)

@@ -58,14 +58,14 @@ def ik_samples(take: Take, model: CalibrationModel, skeleton: Skeleton, contact:
     """
     chains = TipChains(skeleton, contact.fingers)
     require_possible(chains, contact, skeleton)
-    hand = predicted_hand(take, model).since(take.lead_in_frames)
+    hand = predicted_hand(take, model).frames(slice(take.lead_in_frames, None))
     hand = replace(hand, mean_deg=steadied(take.time_s[take.lead_in_frames :], hand.mean_deg))
     shape = hand.shape(chains)
     if not len(shape):
         raise BadInput(f"take {take.name!r} has no frames to find a touch in")
     found = follow(chains, contact, shape)
     verdict = judged(chains, contact, shape, found)
-    require_happened(verdict, chains, contact, found, hand, skeleton)
+    require_happened(verdict, contact, hand, skeleton)
     kept = verdict.believable & ~hand.is_faulty[:, chains.columns].any(axis=1)
     told = _told(chains, contact, shape, found.angles_deg)
     frames = np.flatnonzero(kept) + take.lead_in_frames

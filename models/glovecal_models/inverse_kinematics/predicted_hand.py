@@ -31,9 +31,9 @@ class PredictedHand:
     is_faulty: np.ndarray
     """(N, R): its sensor fails."""
 
-    def since(self, frame: int) -> PredictedHand:
-        """Without the frames before ``frame``."""
-        return PredictedHand(self.mean_deg[frame:], self.sd_deg[frame:], self.is_faulty[frame:])
+    def frames(self, chosen: slice) -> PredictedHand:
+        """These frames alone."""
+        return PredictedHand(self.mean_deg[chosen], self.sd_deg[chosen], self.is_faulty[chosen])
 
     def shape(self, chains: TipChains) -> HandShape:
         """Of the rotations that move these fingertips."""

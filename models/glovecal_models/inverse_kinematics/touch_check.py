@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.forward_kinematics import forward_kinematics
-from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS, WRIST
+from glovecal_models.hand.rotations import FINGERS
 from glovecal_models.hand.skeleton import Skeleton
+from glovecal_models.inverse_kinematics.closest_approach import closest_approach
 from glovecal_models.inverse_kinematics.contact import Rod, Touch
 from glovecal_models.inverse_kinematics.follow import FollowedHands, follow
 from glovecal_models.inverse_kinematics.hand_shape import HandShape
@@ -19,11 +19,16 @@ from glovecal_models.inverse_kinematics.tip_chains import TipChains
 TOUCHING_MM = 0.1
 """What may be left between tips that touch."""
 MOST_MISFIT = 5.0
-"""Standard deviations of the calibration by which a hand may have to bend for its tips to touch. A calibration
-that knows its own error needs 1.5 for a true touch (chi with 3 degrees of freedom), and 5 in one frame of 60000.
-"""
+"""Standard deviations of the calibration by which a hand may have to bend for its tips to touch. Where the
+calibration knows its own error, a true touch needs 1.5 (chi with 3 degrees of freedom), and more than 5 in one
+frame of 65000."""
 LEAST_SHARE = 0.5
 """Of the frames in which the tips must have touched for the take to be a touching motion."""
+SUSPICIOUS_MISFIT = 2.5
+"""Of the middle frame: one true touch in ten is as far off, if the calibration knows its error."""
+CLEARLY_BETTER = 0.7
+"""Share of the misfit that another finger leaves when it was that one."""
+COMPARED_FRAMES = 20
 AT_LIMIT_DEG = 0.01
 
 
@@ -43,14 +48,14 @@ class TouchVerdict:
 
 def require_possible(chains: TipChains, contact: Touch | Rod, skeleton: Skeleton) -> None:
     """Raise BadInput, with what is left and the joints at their limits, where no hand of this size can."""
-    found = follow(chains, contact, HandShape.at_rest(chains.rotations))
-    if found.missing_mm[0] <= TOUCHING_MM:
+    angles, distance = closest_approach(chains, contact)
+    if distance <= TOUCHING_MM:
         return
     sizes = skeleton.dimensions
     whose = "which nobody measured" if sizes.is_assumed else f"measured: {', '.join(sizes.measured)}"
     raise BadInput(
-        f"{_what(contact)} is impossible for this hand: at best {found.missing_mm[0]:.1f} mm are missing, "
-        f"with {_at_limits(chains, found.angles_deg[0])}. Check the hand's dimensions (hand length "
+        f"{_what(contact)} is impossible for this hand: at best {distance:.1f} mm are missing, "
+        f"with {_at_limits(chains, angles)}. Check the hand's dimensions (hand length "
         f"{sizes.hand_length_mm:.0f} mm; {whose})"
     )
 
@@ -63,54 +68,43 @@ def judged(chains: TipChains, contact: Touch | Rod, shape: HandShape, found: Fol
 
 
 def require_happened(
-    verdict: TouchVerdict,
-    chains: TipChains,
-    contact: Touch | Rod,
-    found: FollowedHands,
-    hand: PredictedHand,
-    skeleton: Skeleton,
+    verdict: TouchVerdict, contact: Touch | Rod, hand: PredictedHand, skeleton: Skeleton
 ) -> None:
-    """Raise BadInput where the tips cannot have touched in most frames, as the calibration reads them."""
-    share = float(verdict.believable.mean())
-    if share >= LEAST_SHARE:
+    """Raise BadInput where the tips cannot have touched in most frames, or another finger's did."""
+    share, misfit = float(verdict.believable.mean()), float(np.median(verdict.misfit))
+    other = _better_finger(contact, misfit, hand, skeleton) if misfit > SUSPICIOUS_MISFIT else None
+    if share >= LEAST_SHARE and other is None:
         return
     said = (
-        f"{_what(contact)} cannot be seen in this take: only {100 * share:.0f} % of its "
-        f"{len(verdict.reached)} frames fit it (at least {100 * LEAST_SHARE:.0f} % must). The tips are read "
-        f"{np.median(verdict.apart_mm):.0f} mm off (median), {np.median(verdict.misfit):.1f} times what the "
-        f"calibration may be wrong by (at most {MOST_MISFIT:g})"
+        f"{_what(contact)} cannot be seen in this take: {100 * share:.0f} % of its {len(verdict.reached)} "
+        f"frames fit it (at least {100 * LEAST_SHARE:.0f} % must). The tips are read "
+        f"{np.median(verdict.apart_mm):.0f} mm off (median), {misfit:.1f} times what the calibration may be "
+        f"wrong by (at most {MOST_MISFIT:g})"
     )
-    unreached = np.flatnonzero(~verdict.reached)
-    if len(unreached):
-        worst = unreached[np.argmax(found.missing_mm[unreached])]
-        said += (
-            f"; in frame {worst} {found.missing_mm[worst]:.1f} mm stay missing with "
-            f"{_at_limits(chains, found.angles_deg[worst])}"
+    if other is None:
+        raise BadInput(
+            f"{said}. Repeat the motion with the tips together, check the hand's dimensions, or calibrate "
+            "better before"
         )
-    raise BadInput(f"{said}. {_advice(contact, verdict, hand, skeleton)}")
+    finger, needed = other
+    raise BadInput(f"{said}. For the {FINGERS[finger]} it is {needed:.1f} times: was that the finger?")
 
 
-def _advice(contact: Touch | Rod, verdict: TouchVerdict, hand: PredictedHand, skeleton: Skeleton) -> str:
-    """What else may have happened."""
-    first, second = contact.fingers
-    nearest = _nearest(first, hand, skeleton)
-    if isinstance(contact, Touch) and nearest[0] != second and nearest[1] < np.median(verdict.apart_mm) / 2:
-        return (
-            f"The tip nearest to the {FINGERS[first]} is the {FINGERS[nearest[0]]}'s ({nearest[1]:.0f} mm): "
-            "was that the finger?"
-        )
-    return "Repeat the motion with the tips together, or calibrate with key poses first"
-
-
-def _nearest(finger: str, hand: PredictedHand, skeleton: Skeleton) -> tuple[str, float]:
-    """The fingertip that is predicted nearest to that of ``finger``, and the median distance in mm."""
-    straight = hand.mean_deg.copy()
-    straight[:, [HAND_ROTATIONS.index(name) for name in WRIST]] = 0.0
-    tips = forward_kinematics(skeleton, straight).tips_mm
-    own = list(FINGERS).index(finger)
-    distances = np.median(np.linalg.norm(tips - tips[:, own, None], axis=2), axis=0)
-    distances[own] = np.inf
-    return list(FINGERS)[int(distances.argmin())], float(distances.min())
+def _better_finger(
+    contact: Touch | Rod, misfit: float, hand: PredictedHand, skeleton: Skeleton
+) -> tuple[str, float] | None:
+    """Another finger whose touch with the thumb the readings fit clearly better, and how well."""
+    if isinstance(contact, Rod) or contact.fingers[0] != "T":
+        return None
+    some = hand.frames(slice(None, None, max(len(hand.mean_deg) // COMPARED_FRAMES, 1)))
+    found = []
+    for finger in set(FINGERS) - set(contact.fingers):
+        chains = TipChains(skeleton, ("T", finger))
+        shape = some.shape(chains)
+        angles = follow(chains, Touch(("T", finger)), shape).angles_deg
+        found.append((float(np.median(shape.misfit(angles))), finger))
+    best, finger = min(found)
+    return (finger, best) if best < min(MOST_MISFIT, CLEARLY_BETTER * misfit) else None
 
 
 def _what(contact: Touch | Rod) -> str:
