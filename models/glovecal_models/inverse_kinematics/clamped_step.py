@@ -12,6 +12,7 @@ limit (w = 0) as long as it would go beyond, and the others take over its share.
 from __future__ import annotations
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 LONGEST_PULL_MM = 20.0
 """e_max of equation (3)."""
@@ -40,24 +41,29 @@ def clamped_step(
     -J^T force in every joint that is not at its limit.
     """
     low, high = room
-    held, at_limit = np.zeros(len(back), dtype=bool), np.zeros_like(back)
-    step, force = at_limit, np.zeros_like(pull)
+    held, at_limit, force = np.zeros(len(back), dtype=bool), np.zeros_like(back), np.zeros_like(pull)
     for _ in range(MOST_EXCHANGES):
-        left = pull - slopes @ np.where(held, at_limit, 0.0)
+        left = pull - slopes @ at_limit
         force = _force(np.where(held, 0.0, slopes), left, distance_mm, back)
         wanted = back + force @ slopes
-        step = np.clip(np.where(held, at_limit, wanted), low, high)
         beyond = (wanted < low) | (wanted > high)
         if (beyond == held).all():
-            break
-        held, at_limit = beyond, np.clip(wanted, low, high)
-    return step, force
+            return np.clip(wanted, low, high), force
+        held, at_limit = beyond, np.where(beyond, np.clip(wanted, low, high), 0.0)
+    return _nearest_step(slopes, pull, back, room), force
+
+
+def _nearest_step(slopes: np.ndarray, pull: np.ndarray, back: np.ndarray, room: np.ndarray) -> np.ndarray:
+    """The step that brings the tips nearest, where the limits do not let them go the whole way."""
+    little = np.sqrt(SINGULAR * (slopes * slopes).sum())
+    rows = np.vstack([slopes, little * np.eye(len(back))])
+    return lsq_linear(rows, np.concatenate([pull, little * back]), bounds=tuple(room)).x
 
 
 def _force(free: np.ndarray, left: np.ndarray, distance_mm: float, back: np.ndarray) -> np.ndarray:
     """(J J^T + lambda^2 I)^-1 e - (J J^T)^-1 J z.
 
-    Where the free joints cannot move the tips it is very large: that is what lets go of a held joint that can.
+    Very large where the free joints cannot move the tips: that lets go of a held joint that can.
     """
     squares, directions = np.linalg.eigh(free @ free.T)
     largest = max(squares[-1], LEAST_SQUARE)

@@ -46,9 +46,9 @@ def follow(
     """The likeliest hands of ``shape`` that keep ``contact``: clamped damped least squares, frame by frame.
 
     Each frame starts from the solution of the one before, the first from ``start_deg`` (K,), else from its
-    shape; where that does not lead there, from elsewhere. Solves equations (2) to (6) of Wang & Neff 2013 at once: the shape's standard deviations are the
-    stiffness, and the tips meet where both chains are likeliest to. Raises BadInput where chains, contact and
-    shape are of different fingers or rotations.
+    shape; where that does not lead there, from elsewhere. Solves equations (2) to (6) of Wang & Neff 2013 at
+    once: the shape's standard deviations are the stiffness, and the tips meet where both chains are likeliest
+    to. Raises BadInput where chains, contact and shape are of different fingers or rotations.
     """
     if contact.fingers != chains.fingers or shape.rotations != chains.rotations:
         raise BadInput(
@@ -58,7 +58,8 @@ def follow(
     angles, missing = np.empty_like(shape.centre_deg), np.empty(len(shape))
     steps, forces = np.empty(len(shape), dtype=int), []
     at = shape.centre_deg[0] if start_deg is None else np.asarray(start_deg, dtype=float)
-    scattered = np.random.default_rng(0).uniform(*chains.limits_deg.T, (SCATTERED_STARTS, len(at)))
+    low, high = chains.limits_deg.T
+    scattered = np.random.default_rng(0).uniform(low, high, (SCATTERED_STARTS, len(low)))
     for frame, centre in enumerate(shape.centre_deg):
         problem = _Frame(chains, contact, frame, centre, shape.sd_deg[frame])
         found = problem.solved_from([at, centre, *scattered])

@@ -20,8 +20,8 @@ TOUCHING_MM = 0.1
 """What may be left between tips that touch."""
 MOST_MISFIT = 5.0
 """Standard deviations of the calibration by which a hand may have to bend for its tips to touch. Where the
-calibration knows its own error, a true touch needs 1.5 (chi with 3 degrees of freedom), and more than 5 in one
-frame of 65000."""
+calibration knows its own error, a true touch needs 1.5 (chi with 3 degrees of freedom), and over 5 in one of
+65000 frames."""
 LEAST_SHARE = 0.5
 """Of the frames in which the tips must have touched for the take to be a touching motion."""
 SUSPICIOUS_MISFIT = 2.5
