@@ -98,18 +98,15 @@ class _Frame:
         """Steps until the joints are still. ``eagerness`` to get back to the shape falls where they sway."""
         low, high = self.chains.limits_deg.T
         at, before, eagerness, steps = np.clip(start_deg, low, high), np.zeros(len(low)), 1.0, 0
-        while steps < MOST_STEPS:
-            steps += 1
-            step, distance, _ = self._step(at, eagerness)
+        while True:
+            step, distance, force = self._step(at, eagerness)
             furthest = float(np.abs(step).max())
-            reached = distance < TIP_TOLERANCE_MM
-            if furthest < (STILL_DEG * eagerness if reached else STUCK_DEG):
-                break
+            still = STILL_DEG * eagerness if distance < TIP_TOLERANCE_MM else STUCK_DEG
+            if furthest < still or steps == MOST_STEPS:
+                return _Solution(at, distance, force / eagerness, steps)
             at = np.clip(at + step * min(1.0, LONGEST_STEP_DEG / max(furthest, STILL_DEG)), low, high)
             eagerness = eagerness / 2 if step @ before < 0 else min(1.0, 1.5 * eagerness)
-            before = step
-        _, distance, force = self._step(at, 1.0)
-        return _Solution(at, distance, force, steps)
+            before, steps = step, steps + 1
 
     def _step(self, at: np.ndarray, eagerness: float) -> tuple[np.ndarray, float, np.ndarray]:
         """The step (K,) in degrees, the distance in mm, the force."""
