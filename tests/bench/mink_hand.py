@@ -1,5 +1,5 @@
 # pyright: reportAttributeAccessIssue=false
-"""The same touch with mink, an inverse kinematics library on MuJoCo: two chains built from the skeleton's JSON.
+"""The same touch with mink, an inverse kinematics library on MuJoCo, on two chains from the exported JSON.
 
 The touch is a task of great cost and the hand's shape one of little, each joint's cost one over its standard
 deviation: with the tips together mink minimises what ours does.
