@@ -29,7 +29,8 @@ SEED = st.integers(0, 10**6)
 def wild_shape(chains: TipChains, seed: int, frames: int = 1) -> HandShape:
     """Anywhere within the limits, some joints far less sure than others."""
     random = np.random.default_rng(seed)
-    centre = random.uniform(*chains.limits_deg.T, (frames, len(chains.rotations)))
+    low, high = chains.limits_deg.T
+    centre = random.uniform(low, high, (frames, len(low)))
     return HandShape(chains.rotations, centre, random.uniform(1.0, 10.0, centre.shape))
 
 
