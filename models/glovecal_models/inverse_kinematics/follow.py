@@ -22,7 +22,9 @@ STUCK_DEG = 1e-4
 LONGEST_STEP_DEG = 10.0
 SCATTERED_STARTS = 8
 """Hands anywhere within the limits, tried where the way is barred from the last frame and from the shape."""
-MOST_STEPS = 100
+MOST_STEPS = 200
+SWAYED, LEAST_EAGER = 0.8, 0.2
+"""Once swayed, joints come back to their shape in smaller steps."""
 AT_LIMIT_DEG = 1e-6
 
 
@@ -95,9 +97,10 @@ class _Frame:
         return best
 
     def solved(self, start_deg: np.ndarray) -> _Solution:
-        """Steps until the joints are still. ``eagerness`` to get back to the shape falls where they sway."""
+        """Steps until the joints are still. Where they sway, the eagerness to get back to the shape falls."""
         low, high = self.chains.limits_deg.T
-        at, before, eagerness, steps = np.clip(start_deg, low, high), np.zeros(len(low)), 1.0, 0
+        at, before, steps = np.clip(start_deg, low, high), np.zeros(len(low)), 0
+        eagerness = most_eager = 1.0
         while True:
             step, distance, force = self._step(at, eagerness)
             furthest = float(np.abs(step).max())
@@ -105,7 +108,10 @@ class _Frame:
             if furthest < still or steps == MOST_STEPS:
                 return _Solution(at, distance, force / eagerness, steps)
             at = np.clip(at + step * min(1.0, LONGEST_STEP_DEG / max(furthest, STILL_DEG)), low, high)
-            eagerness = eagerness / 2 if step @ before < 0 else min(1.0, 1.5 * eagerness)
+            if step @ before < 0:
+                eagerness, most_eager = eagerness / 2, max(SWAYED * eagerness, LEAST_EAGER)
+            else:
+                eagerness = min(most_eager, 1.5 * eagerness)
             before, steps = step, steps + 1
 
     def _step(self, at: np.ndarray, eagerness: float) -> tuple[np.ndarray, float, np.ndarray]:

@@ -52,6 +52,7 @@ class TipChains:
                 self._turns[:, place, finger, :3, :3] = skeleton.turns[joint]
                 self._turns[0, place, finger, :3, 3] = skeleton.offsets_mm[joint]
             self._tips[finger, :3, 0] = skeleton.tips[tip].offset_mm
+        self._turning = self._weights.reshape(-1, len(self.rotations)).T
 
     def tips_and_slopes(self, angles_deg: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Fingertips (N, F, 3) in mm and their derivatives (N, F, 3, K) in mm per degree, at (N, K)."""
@@ -67,7 +68,8 @@ class TipChains:
 
     def _frames(self, angles_deg: np.ndarray) -> np.ndarray:
         """Each joint's frame in the palm's, (N, depth, F, 4, 4)."""
-        turns = np.tensordot(angles_deg, self._weights, axes=(1, 2))[..., None, None]
+        depth, count = self._axes.shape[:2]
+        turns = (angles_deg @ self._turning).reshape(-1, depth, count, 1, 1)
         still, sine_part, cosine_part = self._turns
         frames = still + np.sin(turns) * sine_part + (1 - np.cos(turns)) * cosine_part
         for place in range(1, frames.shape[1]):
