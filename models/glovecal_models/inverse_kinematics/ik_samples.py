@@ -113,7 +113,7 @@ def _sentence(frames: int, apart_mm: np.ndarray, told: np.ndarray, rotations: tu
         f"({100 * share.max():.0f} % of what was not known of it)"
     )
     return (
-        f"{said}; {left_out} of {frames} frames do not fit a touch and are left out."
+        f"{said}; {left_out} of {frames} frames do not fit a touch, or a sensor fails, and are left out."
         if left_out
         else f"{said}."
     )

@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.samples import gather_samples
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.effects.fault_watch import FaultLimits
 from glovecal_models.errors import BadInput, LayoutMismatch
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS
@@ -125,6 +127,39 @@ def test_a_lead_in_gives_no_samples(model, taken) -> None:
     assert samples.frames.min() >= 60
     assert np.isnan(samples.take.reference[:60]).all()
     assert samples.take.begins_s == take.begins_s
+
+
+def test_a_failing_sensor_of_the_chain_gives_no_samples(model, taken) -> None:
+    """The model knows what each sensor can do; here one of index and one of ring finger drop out."""
+    sensors, rotations = GLOVE.layout.sensors, model.rotation_names
+    limits = FaultLimits(
+        sensors=sensors,
+        lag_s=(0.02, 0.1, 0.5),
+        surprise_counts=((25.0, 35.0, 80.0),) * len(sensors),
+        still_s=(1e3,) * len(sensors),
+        rotations=rotations,
+        move_lag_s=(0.02, 0.1, 1.0),
+        move_deg=((0.5, 5.0, 30.0),) * len(rotations),
+        reads=tuple(GLOVE.layout.correspondence(name).sensors[:1] for name in rotations),
+    )
+    settings = {"where": ["I_PIP"], "live": limits.to_settings()}
+    nothing = np.zeros((len(rotations), 0))
+    fault = AddedEffect("sensor_fault", rotations, settings, nothing, nothing, np.zeros(len(rotations)))
+    watching = replace(
+        model,
+        effects=(fault,),
+        sensor_centre=np.full(len(sensors), 120.0),
+        sensor_scale=np.full(len(sensors), 50.0),
+    )
+    take = taken["I"].take
+    readings = take.readings.copy()
+    readings[50:56, sensors.index("I_PIP")] = 1.0
+    readings[100:106, sensors.index("R_PIP")] = 1.0
+    samples = ik_samples(replace(take, readings=readings), watching, HAND, Touch(("T", "I")))
+    assert not set(range(50, 56)) & set(samples.frames.tolist())
+    assert set(range(100, 106)) <= set(samples.frames.tolist())
+    assert len(samples.frames) > 0.9 * FRAMES
+    assert "of 176 frames do not fit a touch, or a sensor fails, and are left out" in samples.sentence
 
 
 @pytest.mark.parametrize("length", [20.0, 45.0])
