@@ -1,7 +1,7 @@
 """``python3 do.py bench``: Glovecal beside its peers, in one run, as ratios.
 
-Two parts: Gaussian-process training and prediction against scikit-learn, GPy, GPyTorch and GPBoost, and
-capture to pose through real zenoh. Figures and the picture go to a folder.
+Three parts: Gaussian-process training and prediction against scikit-learn, GPy, GPyTorch and GPBoost, capture
+to pose through real zenoh, and inverse kinematics against mink. Figures and the picture go to a folder.
 """
 
 from __future__ import annotations
@@ -13,13 +13,17 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-PARTS = {"gaussian-process": "gaussian_process_bench.py", "streaming": "streaming_bench.py"}
+PARTS = {
+    "gaussian-process": "gaussian_process_bench.py",
+    "streaming": "streaming_bench.py",
+    "inverse-kinematics": "inverse_kinematics_bench.py",
+}
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"{' or '.join(PARTS)}; default: both")
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"{' or '.join(PARTS)}; default: all")
     parser.add_argument("--quick", action="store_true", help="fewer frames, shorter runs")
     parser.add_argument("--folder", type=Path, default=Path(".bench"), help="for figures and picture")
     options = parser.parse_args()

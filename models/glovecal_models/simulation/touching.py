@@ -1,0 +1,120 @@
+"""A simulated hand that keeps thumb and fingertip together while it moves (Wang & Neff 2013, Figure 6).
+
+Its tips touch by the person's own rules for joints that no sensor reads, not by the calibration's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from glovecal_models.errors import BadInput
+from glovecal_models.hand.forward_kinematics import forward_kinematics
+from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS
+from glovecal_models.hand.skeleton import Skeleton
+from glovecal_models.simulation.hand_motion import Unrest, posture_vector, within_range
+from glovecal_models.simulation.postures import POSTURES
+from glovecal_models.simulation.protocol import GAPS, Segment
+from glovecal_models.simulation.simulated_hand import DRIVEN, ROTATIONS, SimulatedHand
+
+TABLE_HZ = 120.0
+WAVES_DEG = {"MCP": 12.0, "PIP": 14.0, "ABD": 4.0, "TMC": 4.0, "IP": 8.0}
+"""How far the joints of both fingers are meant to swing, by the end of their names."""
+WAVES_HZ = (0.15, 0.45)
+TOUCHING_MM = 1e-3
+MOST_STEPS = 200
+SLOPE_STEP_DEG = 1e-4
+LONGEST_STEP_DEG = 8.0
+_THUMB = ("T_TMC", "TI_ABD", "T_MCP", "T_IP")
+_NEAR_TOUCH = {
+    "I": {**dict(zip(_THUMB, (36.0, 22.0, 13.0, 14.0), strict=True)), "I_MCP": 46.0, "I_PIP": 56.0},
+    "M": {**dict(zip(_THUMB, (48.0, 17.0, 16.0, 15.0), strict=True)), "M_MCP": 47.0, "M_PIP": 60.0},
+    "R": {**dict(zip(_THUMB, (52.0, 12.0, 20.0, 15.0), strict=True)), "R_MCP": 44.0, "R_PIP": 59.0},
+    "P": {**dict(zip(_THUMB, (48.0, 8.0, 24.0, 20.0), strict=True)), "P_MCP": 40.0, "P_PIP": 55.0},
+}
+
+
+@dataclass(frozen=True)
+class TouchingMotion:
+    """Driven rotations at ``TABLE_HZ``, (N, len(DRIVEN)) degrees; between them a straight line."""
+
+    table: np.ndarray
+    name: str
+
+    @property
+    def duration_s(self) -> float:
+        return (len(self.table) - 1) / TABLE_HZ
+
+    def driven(self, time_s: np.ndarray) -> np.ndarray:
+        at = np.clip(time_s * TABLE_HZ, 0, len(self.table) - 1)
+        before = np.minimum(at.astype(int), len(self.table) - 2)
+        share = (at - before)[:, None]
+        return (1 - share) * self.table[before] + share * self.table[before + 1]
+
+    def poses(self, time_s: np.ndarray) -> tuple[str, ...]:
+        return (self.name,) * len(time_s)
+
+
+def touching_segment(
+    hand: SimulatedHand, skeleton: Skeleton, finger: str, seed: int, duration_s: float = 3.0
+) -> Segment:
+    """Thumb and ``finger`` ("I", "M", "R" or "P") touching from beginning to end.
+
+    Raises BadInput for another finger, and for a hand of ``skeleton`` whose tips cannot stay together.
+    """
+    if finger not in _NEAR_TOUCH:
+        raise BadInput(f"the thumb touches {', '.join(_NEAR_TOUCH)}, not {finger!r}")
+    random = np.random.default_rng([seed, 15, list(FINGERS).index(finger)])
+    name = f"touch_{FINGERS[finger]}"
+    near = posture_vector(POSTURES["ok"] | _NEAR_TOUCH[finger] | dict.fromkeys(GAPS, 4.0))
+    touching = _brought_together(near[None], hand, skeleton, finger)
+    meant = _waving(touching, finger, random, int(np.ceil(duration_s * TABLE_HZ)) + 1)
+    table = _brought_together(meant, hand, skeleton, finger)
+    return Segment(name, TouchingMotion(table, name), Unrest(random, held=DRIVEN))
+
+
+def _waving(posture: np.ndarray, finger: str, random: np.random.Generator, frames: int) -> np.ndarray:
+    """Slow waves of the two fingers about ``posture`` (1, len(DRIVEN))."""
+    table = np.tile(posture, (frames, 1))
+    time = np.arange(frames) / TABLE_HZ
+    for column, name in enumerate(DRIVEN):
+        size = WAVES_DEG.get(name.partition("_")[2], 0.0) if name[0] in ("T", finger) else 0.0
+        speed, phase = random.uniform(*WAVES_HZ), random.uniform(0, 2 * np.pi)
+        table[:, column] += size * np.sin(2 * np.pi * speed * time + phase)
+    return within_range(table)
+
+
+def _brought_together(table: np.ndarray, hand: SimulatedHand, skeleton: Skeleton, finger: str) -> np.ndarray:
+    """Each frame changed as little as it takes for the tips to touch; joints stay within their ranges."""
+    moving = [
+        column
+        for column, name in enumerate(DRIVEN)
+        if name in (*skeleton.chain("T"), *skeleton.chain(finger))
+    ]
+    gap = _gap_mm(table, hand, skeleton, finger)
+    for _ in range(MOST_STEPS):
+        slopes = np.empty((len(table), 3, len(moving)))
+        for place, column in enumerate(moving):
+            ahead = table.copy()
+            ahead[:, column] += SLOPE_STEP_DEG
+            slopes[:, :, place] = (_gap_mm(ahead, hand, skeleton, finger) - gap) / SLOPE_STEP_DEG
+        step = -(np.linalg.pinv(slopes) @ gap[:, :, None])[:, :, 0]
+        table = table.copy()
+        table[:, moving] += np.clip(step, -LONGEST_STEP_DEG, LONGEST_STEP_DEG)
+        table = within_range(table)
+        gap = _gap_mm(table, hand, skeleton, finger)
+        if np.abs(gap).max() < TOUCHING_MM:
+            return table
+    furthest = np.linalg.norm(gap, axis=1).max()
+    raise BadInput(
+        f"thumb and {FINGERS[finger]} of this hand cannot stay together: {furthest:.1f} mm are between them"
+    )
+
+
+def _gap_mm(driven: np.ndarray, hand: SimulatedHand, skeleton: Skeleton, finger: str) -> np.ndarray:
+    """From fingertip to the tip of the thumb, (N, 3)."""
+    angles = hand.complete(dict(zip(DRIVEN, driven.T, strict=True)))
+    columns = [ROTATIONS.index(name) for name in HAND_ROTATIONS]
+    tips = forward_kinematics(skeleton, angles[:, columns]).tips_mm
+    return tips[:, 0] - tips[:, list(FINGERS).index(finger)]

@@ -1,0 +1,104 @@
+"""Touching hands per second beside mink, on one core, in alternating runs.
+
+    python tests/bench/inverse_kinematics_bench.py [--quick] [--json FILE]
+
+Motions of 176 frames, the length of the paper's, in which the tips of thumb and index, middle or ring finger
+stay together; the shape is off by a few degrees. Both stop at the same distance and the same stillness.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import time
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mink_hand import MinkHand
+
+from glovecal_models.hand.rotations import FINGERS
+from glovecal_models.hand.skeleton import hand_skeleton
+from glovecal_models.inverse_kinematics.contact import Touch
+from glovecal_models.inverse_kinematics.follow import STILL_DEG, TIP_TOLERANCE_MM, follow
+from glovecal_models.inverse_kinematics.hand_shape import HandShape
+from glovecal_models.inverse_kinematics.tip_chains import TipChains
+from glovecal_models.simulation.simulated_hand import DRIVEN, ROTATIONS, SimulatedHand
+from glovecal_models.simulation.touching import touching_segment
+from glovecal_models.threads import pin_blas_to_one_thread
+
+FRAMES, RATE_HZ = 176, 60.0
+OFF_DEG = 5.0
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description="Inverse kinematics beside mink")
+    parser.add_argument("--quick", action="store_true", help="3 runs each instead of 15")
+    parser.add_argument("--json", type=Path, help="write the figures to this file")
+    options = parser.parse_args()
+    pin_blas_to_one_thread()
+    print(f"{FRAMES} frames, hands per second (median); mink {version('mink')}, daqp {version('daqp')}")
+    rows = [compared(finger, 3 if options.quick else 15) for finger in "IMR"]
+    for row in rows:
+        print(
+            f"  thumb and {FINGERS[row['finger']]}: "
+            f"Glovecal {row['glovecal_hz']:.0f} (tips within {row['glovecal_mm']:.4f} mm), "
+            f"mink {row['mink_hz']:.0f} ({row['mink_mm']:.4f} mm), ratio {row['ratio']:.2f}; "
+            f"angles differ by at most {row['apart_deg']:.3f} degrees"
+        )
+    if options.json:
+        options.json.write_text(json.dumps(rows, indent=1))
+    return 0
+
+
+def compared(finger: str, runs: int) -> dict[str, Any]:
+    """One motion; ``ratio`` above 1: ours is quicker."""
+    skeleton = hand_skeleton()
+    chains, shape = TipChains(skeleton, ("T", finger)), moving_shape(finger)
+    mink_hand = MinkHand(skeleton, ("T", finger))
+    answers: dict[str, np.ndarray] = {}
+
+    def ours() -> None:
+        answers["ours"] = follow(chains, Touch(("T", finger)), shape).angles_deg
+
+    def mink() -> None:
+        answers["mink"] = mink_hand.follow(shape, TIP_TOLERANCE_MM, STILL_DEG)
+
+    times = np.array([[_seconds(ours), _seconds(mink)] for _ in range(runs)])
+    hz = FRAMES / np.array([statistics.median(column) for column in times.T])
+    apart = {name: np.diff(chains.tips_mm(angles), axis=1)[:, 0] for name, angles in answers.items()}
+    return {
+        "finger": finger,
+        "glovecal_hz": float(hz[0]),
+        "mink_hz": float(hz[1]),
+        "ratio": float(hz[0] / hz[1]),
+        "glovecal_mm": float(np.linalg.norm(apart["ours"], axis=1).max()),
+        "mink_mm": float(np.linalg.norm(apart["mink"], axis=1).max()),
+        "apart_deg": float(np.abs(answers["ours"] - answers["mink"]).max()),
+    }
+
+
+def moving_shape(finger: str) -> HandShape:
+    """A hand that touches, seen through errors that change slowly."""
+    skeleton, hand = hand_skeleton(), SimulatedHand(0)
+    chains = TipChains(skeleton, ("T", finger))
+    time_s = np.arange(FRAMES) / RATE_HZ
+    driven = touching_segment(hand, skeleton, finger, seed=1).driven(time_s)
+    whole = hand.complete(dict(zip(DRIVEN, driven.T, strict=True)))
+    true = whole[:, [ROTATIONS.index(name) for name in chains.rotations]]
+    off = OFF_DEG * np.sin(np.arange(true.shape[1]) + 2 * time_s[:, None])
+    sd = np.random.default_rng(0).uniform(1.5, 8.0, true.shape[1])
+    return HandShape(chains.rotations, true + off, np.tile(sd, (FRAMES, 1)))
+
+
+def _seconds(work: Callable[[], None]) -> float:
+    begun = time.process_time()
+    work()
+    return time.process_time() - begun
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
