@@ -1,10 +1,10 @@
 """Each affecting sensor's own share in what a still sensor did, also where neighbours moved together.
 
 Sensors are taken in one after another while the error on pieces of time left out falls, then products of
-two; what is no longer missed is dropped again. The share of a sensor is what its own curve does on an even sweep over the range it was
-moved through: standard and largest deviation, as in Wang & Neff 2013, Table 1. Intervals come from drawing
-pieces of time anew. A sensor that could stand in for another, because both always moved together, is told
-as its rival: no interval shows that.
+two; what is no longer missed is dropped again. The share of a sensor is what its own curve does on an even
+sweep over the range it was moved through: standard and largest deviation, as in Wang & Neff 2013, Table 1.
+Intervals come from drawing pieces of time anew. A sensor that could stand in for another, because both always
+moved together, is told as its rival: no interval shows that.
 """
 
 from __future__ import annotations
@@ -182,9 +182,7 @@ def _share(
     )  # fmt: skip
 
 
-def _rivals(
-    columns: PullColumns, fitted: list, name: str, every: list, pulled: Set[str]
-) -> tuple[str, ...]:
+def _rivals(columns: PullColumns, fitted: list, name: str, every: list, pulled: Set[str]) -> tuple[str, ...]:
     """Sensors that would do as well in the place of ``name``; not those that only move with it."""
     others = [item for item in fitted if item != name]
     as_good = columns.held_out_rms(fitted) ** 2 + LEAST_TOLD_PCT**2

@@ -1,4 +1,4 @@
-"""A whole glove examined: every rotation that was kept still in some take, and what is odd about the glove."""
+"""A whole glove examined: each rotation that was kept still in a take, and what is odd about the glove."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 from glovecal_models.independence.active_range import ActiveRange, active_ranges
 from glovecal_models.independence.affecting_shares import AffectingShare
-from glovecal_models.independence.examination import KnownPulls, RotationExamination, examine_rotation
+from glovecal_models.independence.examination import RotationExamination, examine_rotation
 from glovecal_models.independence.smooth_readings import SmoothTake, smooth_take
+from glovecal_models.independence.still_frames import KnownPulls
 from glovecal_models.independence.still_rotation import own_sensor, still_rotations
 from glovecal_models.independence.worn_side import WornSide, worn_side
 from glovecal_models.layout import Layout
@@ -65,7 +66,7 @@ def examine_independence(
     ranges = {
         name: active_ranges(
             layout,
-            for_range or [item for item in smooth if name not in _held(layout, still[item.take.name])],
+            [*for_range, *(item for item in smooth if name not in _held(layout, still[item.take.name]))],
         )[name]
         for name in layout.sensors
     }
@@ -78,9 +79,7 @@ def examine_independence(
             sensor = own_sensor(layout, rotation)
             if held and sensor is not None:
                 is_dead = sensor in dead
-                examined.append(
-                    examine_rotation(rotation, sensor, held, ranges, dead=is_dead, known=known)
-                )
+                examined.append(examine_rotation(rotation, sensor, held, ranges, dead=is_dead, known=known))
     side = worn_side(layout, [*smooth, *for_range])
     return Independence(
         layout,

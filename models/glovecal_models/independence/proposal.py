@@ -49,14 +49,15 @@ def proposed_layout(
     for rotation in only or ():
         if rotation not in by_rotation or by_rotation[rotation].is_sure is None:
             raise BadInput(f"there is no proposal for {rotation}: it was not examined")
-    document = layout.to_document() | {"name": name}
-    rotations, palm = dict(document["rotations"]), list(document["palm"])
+    document = layout.to_document()
+    rotations: dict[str, list[str]] = dict(document["rotations"])
+    palm: list[str] = list(document["palm"])
     for item in wanted:
         if item.is_change and (item.rotation in only if only is not None else item.is_sure):
             rotations[item.rotation] = list(item.sensors)
             palm = [one for one in palm if one != item.rotation]
             palm += [item.rotation] if item.kind == "MSMR" else []
-    return Layout.from_document(document | {"rotations": rotations, "palm": palm})
+    return Layout.from_document(document | {"name": name, "rotations": rotations, "palm": palm})
 
 
 def _proposal(now: Correspondence, found: RotationExamination | None) -> Proposal:
@@ -100,12 +101,15 @@ def _sentence(
     size = f"{found.std_pct:.1f} % of its range (at most {found.max_pct:.1f} %)"
     read = f"read it from {_listed(sensors)} ({kind})"
     if not affecting and found.is_coupled:
-        return f"{found.sensor} moves by {size} while {found.rotation} is still, and no sensor explains it: {read}."
+        return f"{found.sensor} moves by {size} while {found.rotation} is still, and no sensor explains "
+            f"it: {read}."
     if not affecting:
         rule = f"below {LEAST_STD_PCT:g} % and {LEAST_MAX_PCT:g} %"
         beside = " Thumb rotations are more accurate with all thumb sensors." if thumb else ""
         return f"{found.sensor} stays within {size} while others move, {rule}: {read}.{beside}"
-    by = _listed([f"{share.sensor} ({share.std_pct:.1f} %, at most {share.max_pct:.1f} %)" for share in affecting])
+    by = _listed(
+        [f"{share.sensor} ({share.std_pct:.1f} %, at most {share.max_pct:.1f} %)" for share in affecting]
+    )
     doubt = [share.sensor for share in affecting if share.affects is None]
     unsure = f" {_listed(doubt)} may be below the rule or stand for another." if doubt else ""
     return f"{found.sensor} is stretched by {by}, in all {size}: {read}.{unsure}"

@@ -2,8 +2,8 @@
 
 Each neighbour has a curve of its own, a polynomial of u, how far it is from where the take began (in shares
 of its range), and two neighbours may have products ``u1 u2``, ``u1**2 u2`` and ``u1 u2**2``. All of them are
-zero where the take began: a neighbour's curve is what it does when it moves alone. Sums of products are kept for each block of
-time, so that leaving out a block or drawing blocks anew costs one small solution.
+zero where the take began: a neighbour's curve is what it does when it moves alone. Sums of products are kept
+for each block of time, so that leaving out a block or drawing blocks anew costs one small solution.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class PullColumns:
         block: np.ndarray,
         pairs: Iterable[tuple[str, str]] = (),
     ) -> None:
-        """``target`` (N,), each of ``moved`` (N,), ``constants`` (N, C) in every fit, ``block`` (N,) numbers."""
+        """``target`` (N,), each of ``moved`` (N,), ``constants`` (N, C) in every fit, ``block`` (N,)."""
         columns = [constants]
         self.groups: dict[str | tuple[str, str], list[int]] = {}
         place = constants.shape[1]

@@ -43,7 +43,8 @@ def worn_side(layout: Layout, takes: Sequence[SmoothTake]) -> WornSide:
     turned = tuple(name for name, sign in signs.items() if sign < 0)
     if len(bends) < LEAST_SENSORS or len(sideways) < LEAST_SENSORS:
         return _unknown(
-            f"it takes measured angles of {LEAST_SENSORS} bending and {LEAST_SENSORS} sideways joints that moved"
+            f"it takes measured angles of {LEAST_SENSORS} bending and {LEAST_SENSORS} sideways joints that "
+            "moved"
         )
     wrong_bends, wrong_sideways = (sum(sign < 0 for sign in part.values()) for part in (bends, sideways))
     chance = 0.5 ** len(signs)

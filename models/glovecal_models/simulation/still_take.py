@@ -1,7 +1,8 @@
 """Takes for the independence examination: one rotation kept still, or one alone through its range.
 
-Joints move evenly (to and fro at constant speed), several at speeds without a common period: Wang & Neff 2013, section 3.1, "freely moving other speculative affecting sensors to
-the largest possible extent". The palm's arch can be kept still too, as by a splint.
+Joints move evenly (to and fro at constant speed), several at speeds without a common period: Wang & Neff
+2013, section 3.1, "freely moving other speculative affecting sensors to the largest possible extent". The
+palm's arch can be kept still too, as by a splint.
 """
 
 from __future__ import annotations
