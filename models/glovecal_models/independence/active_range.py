@@ -40,17 +40,15 @@ def active_ranges(layout: Layout, takes: Sequence[SmoothTake]) -> dict[str, Acti
     return {sensor: _active_range(sensor, layout, takes) for sensor in layout.sensors}
 
 
-def measured_slope(item: SmoothTake, sensor: str) -> tuple[float, float] | None:
-    """Readings per degree of the sensor's own rotation, other measured rotations accounted for, and its
-    standard error; None where the take cannot tell.
+def measured_slope(item: SmoothTake, sensor: str, layout: Layout) -> tuple[float, float] | None:
+    """Readings per degree of the sensor's own rotation, and its standard error; None where the take cannot
+    tell. Rotations of the sensors that the layout reads beside it are accounted for.
 
-    Ordinary least squares; the error counts one independent frame a window of smoothing."""
+    Ordinary least squares; the error is doubled, as neighbouring frames err alike."""
     own = item.angle(sensor)
-    if own is None:
+    if own is None or sensor not in layout.rotations:
         return None
-    others = [
-        item.angle(name) for name in item.take.rotations if name != sensor and not name.endswith("_DIP")
-    ]
+    others = [item.angle(name) for name in layout.correspondence(sensor).sensors if name != sensor]
     columns = np.column_stack([own, *(one for one in others if one is not None and span(one) > 1.0)])
     known = np.isfinite(columns).all(axis=1)
     if known.sum() < 4 * columns.shape[1] or span(own[known]) < 1.0:
@@ -71,7 +69,7 @@ def _active_range(sensor: str, layout: Layout, takes: Sequence[SmoothTake]) -> A
     angle = max((span(a) for item in holding if (a := item.angle(sensor)) is not None), default=None)
     readings, source = max((span(item.reading(sensor)) for item in own), default=0.0), "its own range take"
     if not own:
-        readings, source = _by_slope(sensor, holding), "measured angles"
+        readings, source = _by_slope(sensor, holding, layout), "measured angles"
     if not readings and holding:
         readings, source = _all_read(sensor, holding), "all that was read"
     moved = any(item.has_moved(sensor) for item in holding)
@@ -81,11 +79,11 @@ def _active_range(sensor: str, layout: Layout, takes: Sequence[SmoothTake]) -> A
     return ActiveRange(sensor, readings, source, angle, _doubt(sensor, source, moved, angle))
 
 
-def _by_slope(sensor: str, takes: Sequence[SmoothTake]) -> float:
+def _by_slope(sensor: str, takes: Sequence[SmoothTake], layout: Layout) -> float:
     """Slope times the angles seen, of the take that saw most of them."""
     best = 0.0
     for item in takes:
-        found, own = measured_slope(item, sensor), item.angle(sensor)
+        found, own = measured_slope(item, sensor, layout), item.angle(sensor)
         if found is not None and own is not None and abs(found[0]) > 3 * found[1]:
             best = max(best, abs(found[0]) * span(own))
     return best

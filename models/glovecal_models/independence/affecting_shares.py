@@ -3,8 +3,8 @@
 Sensors are taken in one after another while the error on pieces of time left out falls, then products of
 two; what is no longer missed is dropped again. The share of a sensor is what its own curve does on an even
 sweep over the range it was moved through: standard and largest deviation, as in Wang & Neff 2013, Table 1.
-Intervals come from drawing pieces of time anew. A sensor that could stand in for another, because both always
-moved together, is told as its rival: no interval shows that.
+Intervals come from weighting pieces of time anew. A sensor that could stand in for another, because both
+always moved together, is told as its rival: no interval shows that.
 """
 
 from __future__ import annotations
@@ -21,6 +21,9 @@ LEAST_STD_PCT, LEAST_MAX_PCT = 5.0, 12.0
 LEAST_TOLD_PCT = 0.7
 """Smaller pulls (standard deviation, per cent of the range) are not looked for: a hand held still moves as
 much."""
+FEW = 3
+"""Up to so many sensors all products stay in the fit: where joints move together a product that is left out
+would be counted as one sensor's own, and no interval would show it."""
 DRAWS = 300
 _SWEEP = np.linspace(0.0, 1.0, 101)
 
@@ -73,14 +76,17 @@ def take_apart(
     constants: np.ndarray,
     block: np.ndarray,
     pulled: Set[str] = frozenset(),
+    *,
+    at_once: bool = True,
 ) -> TakenApart:
     """``target`` (N,) is the still sensor in per cent of its range, each of ``moved`` (N,) a joint in shares
     of its range from where it began, ``constants`` (N, C) what is in every fit. Sensors in ``pulled`` are
-    cross-coupled themselves: one that is no cause still moves with the causes, so they come last."""
+    cross-coupled themselves: one that is no cause still moves with the causes, so they come last. Products
+    need joints that moved ``at_once``."""
 
     def columns(fitted: list) -> PullColumns:
         chosen = [name for name in fitted if isinstance(name, str)]
-        pairs = [(a, b) for place, a in enumerate(chosen) for b in chosen[place + 1 :]]
+        pairs = [(a, b) for place, a in enumerate(chosen) for b in chosen[place + 1 :]] if at_once else []
         return PullColumns(target, moved, constants, block, pairs)
 
     chosen: list = []
@@ -89,6 +95,10 @@ def take_apart(
         chosen += _selected(columns(already), [name for name in stage if name not in chosen], already)
     whole = columns(chosen)
     fitted = _without_the_needless(whole, [*chosen, *_products(whole, chosen)])
+    sensors = [name for name in fitted if isinstance(name, str)]
+    if len(sensors) <= FEW:
+        whole = columns(sensors)
+        fitted = sensors + [name for name in whole.groups if not isinstance(name, str)]
     return _told(whole, fitted, moved, pulled)
 
 
@@ -151,10 +161,14 @@ def _without_the_needless(columns: PullColumns, fitted: list) -> list:
 
 
 def _draws(columns: PullColumns, fitted: list) -> np.ndarray:
-    """Coefficients with pieces of time drawn anew, shape (DRAWS + 1, P); the first counts each once."""
+    """Coefficients with pieces of time weighted anew, shape (DRAWS + 1, P); the first counts each once.
+
+    Weights are exponential (Rubin's Bayesian bootstrap, 1981): no piece is ever left out, as few of them hold
+    the ends of a range.
+    """
     random = np.random.default_rng(0)
     blocks = len(columns.rows)
-    weights = random.multinomial(blocks, np.full(blocks, 1 / blocks), size=DRAWS).astype(float)
+    weights = random.exponential(size=(DRAWS, blocks))
     return np.stack([columns.solve(fitted, weight) for weight in (np.ones(blocks), *weights)])
 
 

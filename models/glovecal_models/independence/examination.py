@@ -33,6 +33,8 @@ from glovecal_models.independence.still_frames import (
 from glovecal_models.independence.still_rotation import Stillness, stillness
 
 LEAST_BLOCKS = 10
+SURELY_MOVED = 0.3
+"""Of its range: so far known pulls never are off."""
 UNEXPLAINED_PCT = 5.0
 """Of the range: so much that no other sensor explains is a joint that was not still."""
 
@@ -86,12 +88,14 @@ def examine_rotation(
         )
     causes = alone(frames) or frames
     moved = {name: np.concatenate([item.moved[name] for item in causes]) for name in frames[0].moved}
-    apart = _apart(causes, scale, moved, known)
+    at_once = causes is frames
+    apart = _apart(causes, scale, moved, known, at_once)
     std, largest = deviations(frames, 100 / scale, apart.constants[len(causes) :])
     unmeasured = {name for name in known.pulled if any(item.angle(name) is None for item in takes)}
-    rough = unmeasured if causes is frames and len(apart.shares) > 1 else set()
+    rough = unmeasured if at_once and len(apart.shares) > 1 else set()
     apart = replace(apart, shares=tuple(_in_doubt(share, rough) for share in apart.shares))
     still = _least_still(takes, rotation)
+    unknown = {name for name in unmeasured - set(apart.curves) if not _surely_moves(name, moved, known)}
     return RotationExamination(
         rotation=rotation,
         sensor=sensor,
@@ -103,9 +107,7 @@ def examine_rotation(
         taken_apart=apart,
         stillness=still,
         active_range=ranges[sensor],
-        not_moved=tuple(
-            name for name in moved if not _moves(moved[name]) or name in unmeasured - set(apart.curves)
-        ),
+        not_moved=tuple(name for name in moved if not _moves(moved[name]) or name in unknown),
         is_dead=dead,
         doubts=(
             *_doubts(rotation, sensor, still, apart, ranges[sensor], dead),
@@ -115,16 +117,25 @@ def examine_rotation(
 
 
 def _apart(
-    causes: Sequence[StillFrames], scale: float, moved: Mapping[str, np.ndarray], known: KnownPulls
+    causes: Sequence[StillFrames],
+    scale: float,
+    moved: Mapping[str, np.ndarray],
+    known: KnownPulls,
+    at_once: bool,
 ) -> TakenApart:
     target = np.concatenate([item.target for item in causes]) * 100 / scale
     block = np.concatenate([item.block + 1e6 * number for number, item in enumerate(causes)])
     moving = {name: share for name, share in moved.items() if _moves(share)}
-    return take_apart(target, moving, constants(causes), block, known.pulled)
+    return take_apart(target, moving, constants(causes), block, known.pulled, at_once=at_once)
 
 
 def _moves(share: np.ndarray) -> bool:
     return bool(np.ptp(share) >= LEAST_MOVED)
+
+
+def _surely_moves(name: str, moved: Mapping[str, np.ndarray], known: KnownPulls) -> bool:
+    """Whether a sensor that others pull on moved by more than what is left when their pulls are taken off."""
+    return name in known.pulls and name in moved and bool(np.ptp(moved[name]) >= SURELY_MOVED)
 
 
 def _in_doubt(share: AffectingShare, rough: Set[str]) -> AffectingShare:

@@ -12,7 +12,7 @@ from glovecal_models.independence.proposal import Proposal, proposals, proposed_
 
 
 def independence_document(found: Independence, layout_name: str) -> dict[str, Any]:
-    """``layout_name`` is for the layout that is proposed. Per cents are of the still sensor's active range."""
+    """The proposed layout gets ``layout_name``. Per cents are of the still sensor's active range."""
     offered = proposals(found)
     return {
         "layout": found.layout.name,

@@ -70,6 +70,9 @@ def _proposal(now: Correspondence, found: RotationExamination | None) -> Proposa
         sentence = f"{rotation} stays as it is, read from {', '.join(now.sensors)} ({now.kind}): {why}."
         return Proposal(rotation, now.kind, now.sensors, now.kind, now.sensors, None, sentence)
     affecting = [share for share in found.taken_apart.shares if share.affects is not False]
+    weak = found.is_coupled and not affecting
+    if weak:  # each below the rule, all of them above it
+        affecting = list(found.taken_apart.shares)
     sensors = (found.sensor, *(share.sensor for share in affecting))
     thumb = tuple(name for name in now.sensors if name in THUMB and name not in sensors)
     if rotation in THUMB and thumb:
@@ -82,9 +85,8 @@ def _proposal(now: Correspondence, found: RotationExamination | None) -> Proposa
         else "1S1R"
     )
     unsure = any(share.affects is None for share in affecting) or _moved_when_still(found)
-    missing = found.is_coupled and not affecting
     sentence = _sentence(found, affecting, sensors, kind, thumb if rotation in THUMB else ())
-    return Proposal(rotation, kind, sensors, now.kind, now.sensors, not (unsure or missing), sentence)
+    return Proposal(rotation, kind, sensors, now.kind, now.sensors, not (unsure or weak), sentence)
 
 
 def _moved_when_still(found: RotationExamination) -> bool:
@@ -101,8 +103,8 @@ def _sentence(
     size = f"{found.std_pct:.1f} % of its range (at most {found.max_pct:.1f} %)"
     read = f"read it from {_listed(sensors)} ({kind})"
     if not affecting and found.is_coupled:
-        return f"{found.sensor} moves by {size} while {found.rotation} is still, and no sensor explains "
-            f"it: {read}."
+        none = f"while {found.rotation} is still, and no sensor explains it"
+        return f"{found.sensor} moves by {size} {none}: {read}."
     if not affecting:
         rule = f"below {LEAST_STD_PCT:g} % and {LEAST_MAX_PCT:g} %"
         beside = " Thumb rotations are more accurate with all thumb sensors." if thumb else ""

@@ -23,4 +23,10 @@ def _words(name: str) -> str:
 
 
 def _found(words: str, rotations: Sequence[str]) -> list[str]:
-    return [rotation for rotation in rotations if f"_{rotation.lower()}_" in words]
+    """Longer names first, so that MCP is not found in I_MCP."""
+    found = []
+    for rotation in sorted(rotations, key=len, reverse=True):
+        if f"_{rotation.lower()}_" in words:
+            found.append(rotation)
+            words = words.replace(f"_{rotation.lower()}_", "_/_")
+    return found

@@ -37,7 +37,7 @@ def worn_side(layout: Layout, takes: Sequence[SmoothTake]) -> WornSide:
     """Needs takes with measured angles of a CyberGlove."""
     if layout.counts is None or not set(layout.sensors) <= set(TYPICAL_COUNTS):
         return _unknown("only of a CyberGlove it is known which way each sensor reads")
-    signs = {name: sign for name in layout.sensors if (sign := _sign(name, takes)) is not None}
+    signs = {name: sign for name in layout.sensors if (sign := _sign(name, takes, layout)) is not None}
     bends = {name: sign for name, sign in signs.items() if name not in SIDEWAYS}
     sideways = {name: sign for name, sign in signs.items() if name in SIDEWAYS}
     turned = tuple(name for name, sign in signs.items() if sign < 0)
@@ -66,11 +66,11 @@ def worn_side(layout: Layout, takes: Sequence[SmoothTake]) -> WornSide:
     )
 
 
-def _sign(sensor: str, takes: Sequence[SmoothTake]) -> int | None:
+def _sign(sensor: str, takes: Sequence[SmoothTake], layout: Layout) -> int | None:
     """+1 when the sensor reads the way a CyberGlove's does, -1 when the other way, None when unclear."""
     best = 0.0
     for item in takes:
-        found = measured_slope(item, sensor) if sensor in item.take.sensors else None
+        found = measured_slope(item, sensor, layout) if sensor in item.take.sensors else None
         if found is not None and found[1] > 0 and abs(found[0] / found[1]) > abs(best):
             best = found[0] / found[1]
     if abs(best) < CLEAR:

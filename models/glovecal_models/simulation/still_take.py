@@ -24,6 +24,7 @@ from glovecal_models.takes.take import Take
 
 SPEEDS_HZ = (0.31, 0.83)
 ALONE_HZ = 0.25
+REST_S = 0.5
 PALM = "PALM_ARCH"
 REFERENCE_NOISE_DEG = 0.7
 
@@ -85,6 +86,7 @@ def still_take(
 
 
 def _to_and_fro(name: str, speed_hz: float, time_s: np.ndarray) -> np.ndarray:
-    """Degrees, shape (N,): from the low end of a rotation's range to the high one and back."""
+    """Degrees, shape (N,): from the low end of a rotation's range to the high one and back, after a rest."""
     low, high = ACTIVE_RANGE_DEG[name]
-    return low + (high - low) * (1 - np.abs(1 - 2 * ((speed_hz * time_s) % 1.0)))
+    turn = speed_hz * np.maximum(time_s - REST_S, 0.0) % 1.0
+    return low + (high - low) * (1 - np.abs(1 - 2 * turn))

@@ -15,7 +15,6 @@ from glovecal_service.cli.printing import err, moment, out, print_facts, print_j
 from glovecal_service.cli.take_rows import print_takes
 from glovecal_service.cli.takes_named import find_take, find_takes
 from glovecal_service.cli.writing import Overwrite, require_place, write_whole
-from glovecal_service.report.sentences import counted
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
@@ -162,7 +161,9 @@ def use_layout(
         wanted = find_takes(rows, take) if take else rows
         for row in wanted:
             service.put(f"/takes/{row['id']}/layout", {"layout": layout})
-    out.print(f"{counted(len(wanted), 'take')} read by layout {layout}.")
+    out.print(
+        f"Read by layout {layout} from now on: {', '.join(row['name'] for row in wanted) or 'no take'}."
+    )
 
 
 @app.command("remove")

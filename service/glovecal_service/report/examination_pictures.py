@@ -60,7 +60,7 @@ def deviations(found: Mapping[str, Any]) -> tuple[str, str]:
     alone = [item["rotation"] for item in found["rotations"] if not item["is_coupled"]]
     sentence = (
         f"Cross-coupled: {', '.join(coupled) or 'none'}. Independent: {', '.join(alone) or 'none'}. "
-        "The limits are those of Wang & Neff 2013: from either on a sensor is cross-coupled."
+        "From either limit on a sensor is cross-coupled (Wang & Neff 2013)."
     )
     return svg(draw, 9, 1.4 + 0.3 * len(rows)), sentence
 
@@ -99,8 +99,8 @@ def _fill(axes: Axes, row: int, column: int, colour: str, hatch: str | None) -> 
 
 def _matrix_sentence(rows: Sequence[Mapping[str, Any]]) -> str:
     legend = (
-        "Standard | largest deviation of each affecting sensor's own, % of the still sensor's active range. A "
-        "dot: affects by the 5 % and 12 % rule; ?: undecided; grey: did not move by itself, so nothing is "
+        "Standard | largest deviation of each affecting sensor's own, % of the still sensor's active range. "
+        "A dot: affects by the 5 % and 12 % rule; ?: undecided; grey: did not move by itself, so nothing is "
         "known; white: adds nothing; hatched: the rotation's own sensor."
     )
     shares = [

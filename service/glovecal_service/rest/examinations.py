@@ -46,7 +46,7 @@ class Examined(StrictBody):
 class ShareView(BaseModel):
     sensor: str
     std_pct: float | None
-    std_low: float | None = Field(description="95 % interval, pieces of time drawn anew.")
+    std_low: float | None = Field(description="95 % interval, pieces of time weighted anew.")
     std_high: float | None
     max_pct: float | None
     max_low: float | None
