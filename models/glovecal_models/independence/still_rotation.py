@@ -63,7 +63,7 @@ def still_rotations(item: SmoothTake, layout: Layout, named: str | None = None) 
     if not found:
         raise BadInput(
             f"take {item.take.name!r} does not tell which rotation was kept still, and no measured rotation "
-            f"was; name it like still-{layout.rotations[0]}, or say so"
+            f"was; call it like still-{layout.rotations[0]}, or say which it was"
         )
     return found
 

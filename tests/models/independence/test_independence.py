@@ -185,7 +185,7 @@ def test_which_rotation_was_still_comes_from_names_angles_or_the_user():
     take = recorded("walk", {"B": b, "C": b, "D": b}, A=0.2 * b, measured=True)
     assert examine_independence(LAYOUT, [take], RANGES).still == {"walk": ("A",)}
     bare = recorded("walk", {"B": b})
-    with pytest.raises(BadInput, match="name it like still-A"):
+    with pytest.raises(BadInput, match="call it like still-A"):
         examine_independence(LAYOUT, [bare], RANGES)
     assert examine_independence(LAYOUT, [bare], RANGES, {"walk": "D"}).still == {"walk": ("D",)}
     rotations = ("I_MCP", "IM_ABD", "MCP")

@@ -60,22 +60,18 @@ def test_from_still_takes_to_a_model_that_reads_the_neighbours(eve: Run, tmp_pat
     assert "plain" in html
     kept = eve("take", "examine", "-s", "eve", "--keep", "eves")
     assert "it reads IM_ABD otherwise" in kept.out
-    (cross, free) = (row["id"] for row in eve("take", "list", "--json").json if row["name"] in ("cross", "free"))
+    ids = {row["name"]: row["id"] for row in eve("take", "list", "--json").json}
+    cross, free = ids["cross"], ids["free"]
     used = eve("take", "use-layout", "eves", cross, free)
     assert used.out == "Read by layout eves from now on: cross, free.\n"
     errors = {}
     for layout, takes in (("eves", (cross, free)), ("plain", (cross, free))):
         eve("take", "use-layout", layout, *takes)
-        options = ("--method", "linear", "--take", cross, "--folds", "0", "--json")
+        options = ("--samples", "150", "--take", cross, "--folds", "0", "--json")
         model = eve("train", "-s", "eve", "-l", layout, *options).json["model"]["id"]
         compared = eve("compare", model, "--take", free, "--json").json
-        errors[layout] = error_of(compared, "IM_ABD")
+        errors[layout] = compared[model]["rotations"]["IM_ABD"]["rmse_deg"]
     assert errors["eves"] < 0.7 * errors["plain"]
-
-
-def error_of(compared: dict | list, rotation: str) -> float:
-    found = compared[0] if isinstance(compared, list) else compared
-    return next(item["rmse_deg"] for item in found["rotations"] if item["rotation"] == rotation)
 
 
 def test_json_and_a_choice_of_proposals(eve: Run) -> None:
@@ -100,8 +96,8 @@ def test_what_cannot_be_examined_is_refused(eve: Run, run: Run) -> None:
         assert answer.code in (1, 2)
         return answer
 
-    assert "does not tell which rotation was kept still" in refused("cross", "free").said or True
-    assert "rotation X has no sensor" in refused("free", "--still", "free=X").said or True
+    assert "does not tell which rotation was kept still" in refused("cross").said
+    assert "layout 'plain' has no rotation 'X'" in refused("free", "--still", "free=X").said
     assert "no proposal for I_MCP" in refused("still-IM_ABD", "--keep", "n", "--rotation", "I_MCP").said
     assert "give both" in refused("still-IM_ABD", "--rotation", "I_MCP").said
     assert "write TAKE=ROTATION" in refused("--still", "free").said
