@@ -48,8 +48,8 @@ class SmoothTake:
 
 
 def smooth_take(take: Take) -> SmoothTake:
-    """A take with at least one frame after its lead-in."""
-    first = take.lead_in_frames
+    """Of a take with at least one frame."""
+    first = min(take.lead_in_frames, len(take.time_s) - 1)
     time, readings = take.time_s[first:], take.readings[first:]
     angles = take.reference_at_frames(take.rotations)[first:]
     interval = float(np.median(np.diff(time))) if len(time) > 1 else WINDOW_S

@@ -54,7 +54,7 @@ def deviations(found: Mapping[str, Any]) -> tuple[str, str]:
         )
         axes.set_yticks(places, [item["rotation"] for item in rows])
         axes.set_xlabel("% of the active range, while the rotation is kept still")
-        axes.legend(frameon=False, loc="lower right", fontsize=8)
+        axes.legend(frameon=False, ncols=4, loc="lower left", bbox_to_anchor=(0, 1), fontsize=8)
 
     coupled = [item["rotation"] for item in found["rotations"] if item["is_coupled"]]
     alone = [item["rotation"] for item in found["rotations"] if not item["is_coupled"]]

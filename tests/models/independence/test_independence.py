@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
+import json
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,6 +12,7 @@ from hypothesis import strategies as st
 
 from glovecal_models.errors import BadInput
 from glovecal_models.independence.independence import Independence, examine_independence
+from glovecal_models.independence.independence_document import independence_document
 from glovecal_models.independence.proposal import proposals, proposed_layout
 from glovecal_models.independence.take_names import moved_in_name, rotation_in_name
 from glovecal_models.layout import Layout
@@ -214,3 +218,35 @@ def test_per_cents_do_not_depend_on_a_sensors_units(gain: list[float], zero: lis
     assert [share.sensor for share in two.taken_apart.shares] == ["C", "B"]
     for first, second in zip(one.taken_apart.shares, two.taken_apart.shares, strict=True):
         assert second.std_pct == pytest.approx(first.std_pct, rel=1e-3)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    frames=st.integers(1, 60),
+    values=st.sampled_from(["still", "steps", "noise", "huge"]),
+    measured=st.sampled_from(["none", "all", "gaps"]),
+    lead_in=st.booleans(),
+    seed=st.integers(0, 99),
+)
+def test_any_take_is_examined_or_refused_in_a_sentence(
+    frames: int, values: str, measured: str, lead_in: bool, seed: int
+):
+    """Single frames, dead sensors, wild readings, angles with gaps: figures are finite or there are none."""
+    random = np.random.default_rng(seed)
+    time = np.arange(frames) * random.uniform(0.005, 2.0)
+    made = {
+        "still": np.full((frames, 4), 7.0),
+        "steps": np.repeat(random.integers(0, 256, (frames, 1)), 4, axis=1).astype(float),
+        "noise": random.standard_normal((frames, 4)),
+        "huge": 1e12 * random.standard_normal((frames, 4)),
+    }[values]
+    take = Take("still-A", "w", SENSORS, time, made, begins_s=float(time[-1]) + 1 if lead_in else None)
+    if measured != "none":
+        angles = random.uniform(-90, 90, (frames, 4))
+        angles[:: 2 if measured == "gaps" else frames + 1] = np.nan
+        take = dataclasses.replace(take, rotations=SENSORS, reference_time_s=time, reference=angles)
+    for ranges in (RANGES, [take]):
+        found = examine_independence(LAYOUT, [take], ranges)
+        document = independence_document(found, "mine")
+        assert len(found.rotations) + len(found.not_told) == 1
+        json.dumps(document, allow_nan=False)
