@@ -61,16 +61,20 @@ def still_rotations(item: SmoothTake, layout: Layout, named: str | None = None) 
         and how.is_still
     )
     if not found:
+        having = [rotation for rotation in layout.rotations if own_sensor(layout, rotation) is not None]
+        if not having:
+            raise BadInput(f"no rotation of layout {layout.name!r} has a sensor of its own to examine")
         raise BadInput(
             f"take {item.take.name!r} does not tell which rotation was kept still, and no measured rotation "
-            f"was; call it like still-{layout.rotations[0]}, or say which it was"
+            f"was; call it like still-{having[0]}, or say which it was"
         )
     return found
 
 
 def own_sensor(layout: Layout, rotation: str) -> str | None:
-    """The sensor that is there to measure a rotation: of its name, else the first it is read from."""
+    """The sensor that is there to measure a rotation: of its name, else the only one it is read from; None
+    for a rotation without a sensor, or one that several sensors of other names share."""
     item = layout.correspondence(rotation)
-    if item.simulated is not None:
-        return None
-    return rotation if rotation in item.sensors else item.sensors[0]
+    if item.simulated is None and rotation in item.sensors:
+        return rotation
+    return item.sensors[0] if item.kind == "1S1R" else None

@@ -200,6 +200,18 @@ def test_which_rotation_was_still_comes_from_names_angles_or_the_user():
     assert moved_in_name("still-IM_ABD", rotations) == ()
 
 
+def test_a_rotation_that_sensors_share_has_none_of_its_own():
+    sleeve = Layout.from_columns("sleeve", SENSORS, ["FLEXION", "INVERSION"])
+    with pytest.raises(BadInput, match="no rotation of layout 'sleeve' has a sensor of its own"):
+        examine_independence(sleeve, [recorded("walk", {"B": sweep(0.31)})])
+    with pytest.raises(BadInput, match="FLEXION has no sensor of its own"):
+        examine_independence(sleeve, [recorded("still-FLEXION", {"B": sweep(0.31)})])
+    renamed = Layout.from_document(LAYOUT.to_document() | {"rotations": {"KNEE": ["A"]}, "order": ["KNEE"]})
+    takes = [recorded("still-knee", {"B": sweep(0.31)}, A=0.3 * sweep(0.31))]
+    (item,) = examine_independence(renamed, takes, RANGES).rotations
+    assert (item.rotation, item.sensor) == ("KNEE", "A")
+
+
 @settings(max_examples=8, deadline=None)
 @given(
     gain=st.lists(st.floats(0.2, 50).flatmap(lambda g: st.sampled_from([g, -g])), min_size=4, max_size=4),
