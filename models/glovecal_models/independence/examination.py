@@ -179,7 +179,7 @@ def _doubts(
             f"sensor: was {rotation} really kept still? Nothing else here measures it."
         )
     for share in apart.shares:
-        if share.rivals:
+        if share.rivals and share.affects is not False:
             doubts.append(
                 f"{share.sensor} and {' and '.join(share.rivals)} always moved together, so which of them "
                 f"pulls on {sensor} cannot be told: move each for some seconds by itself."

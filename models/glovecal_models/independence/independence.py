@@ -72,7 +72,7 @@ def examine_independence(
     }
     examined: list[RotationExamination | str] = []
     for _ in range(PASSES):
-        known = _known([item for item in examined if isinstance(item, RotationExamination)])
+        known = _known(layout, [item for item in examined if isinstance(item, RotationExamination)])
         examined = []
         for rotation in layout.rotations:
             held = [item for item in smooth if rotation in still[item.take.name]]
@@ -92,8 +92,14 @@ def examine_independence(
     )
 
 
-def _known(examined: Sequence[RotationExamination]) -> KnownPulls:
-    pulled = frozenset(item.sensor for item in examined if item.is_coupled)
+def _known(layout: Layout, examined: Sequence[RotationExamination]) -> KnownPulls:
+    """Besides what was examined the layout tells: a sensor of a movement of several rotations (the palm's)
+    follows others."""
+    several = [item.rotation for item in layout.correspondences if item.kind == "MSMR"]
+    pulled = frozenset(
+        [item.sensor for item in examined if item.is_coupled]
+        + [name for rotation in several if (name := own_sensor(layout, rotation)) is not None]
+    )
     return KnownPulls(
         pulled,
         {
