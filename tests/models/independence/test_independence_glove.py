@@ -10,8 +10,7 @@ import pytest
 from glovecal_models.independence.independence import Independence, examine_independence
 from glovecal_models.independence.proposal import proposals
 from glovecal_models.independence.worn_side import SIDEWAYS
-from glovecal_models.simulation.performance import Performance
-from glovecal_models.simulation.protocol import free_segment, segments
+from glovecal_models.simulation.protocol import segments
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.simulation.simulated_take import simulate_take
 from glovecal_models.simulation.still_take import still_take
@@ -89,23 +88,3 @@ def test_the_glove_of_the_other_hand_is_seen_and_how_sure_it_is(glove: Simulated
     assert swapped.verdict == "as it should be"
     assert swapped.reversed_sensors == ("I_PIP",)
     assert examine_independence(glove.layout, still, []).worn_side.verdict == "not judgeable"
-
-
-def test_fingers_that_move_as_hands_do_are_taken_apart_by_readings_alone():
-    """Free motion (few synergies), spread held at 0 but for a slow wander of a degree; no angles."""
-    glove = SimulatedGlove(1)
-    time = np.arange(40 * 40) / 40
-    still = []
-    for part, rotation in ((1, "MR_ABD"), (2, "RP_ABD")):
-        truth, _ = Performance(glove.hand, [free_segment(1, 40.0, part)], glove.rotations).at(time)
-        wander = 0.6 * np.sin(2 * np.pi * 0.2 * time) + 0.5 * np.sin(2 * np.pi * 0.37 * time + 1)
-        truth[:, glove.rotations.index(rotation)] = wander
-        readings = glove.readings(truth, np.random.default_rng(part))
-        still.append(Take(f"still-{rotation}", "w", glove.sensors, time, readings))
-    ranges = [still_take(glove, None, (name,), name=f"range-{name}", seconds=6) for name in glove.sensors]
-    found = examine_independence(glove.layout, still, ranges)
-    for rotation, causes in (("MR_ABD", {"M_MCP", "R_MCP"}), ("RP_ABD", {"R_MCP", "P_MCP"})):
-        item = found.of(rotation)
-        assert item is not None
-        affecting = {share.sensor for share in item.taken_apart.shares if share.affects is not False}
-        assert affecting == causes
