@@ -23,9 +23,9 @@ from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.cause import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
-from glovecal_models.takes.examination import examine
 from glovecal_models.takes.table import read_takes, write_takes
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.take_check import check_take
 
 SENSORS = ("I_MCP", "I_PIP")
 LAYOUT = Layout.from_columns("two", SENSORS, SENSORS)
@@ -101,12 +101,12 @@ def test_the_time_in_a_take_counts_from_the_request_on(clean):
 
 
 def test_an_examination_does_not_ask_for_a_reference_there(clean):
-    found = examine(with_lead_in(clean[0]))
+    found = check_take(with_lead_in(clean[0]))
     assert found.frames_with_reference == 1.0
     assert found.lead_in_s == pytest.approx(LEAD_S)
     assert found.lead_in_frames == pytest.approx(60 * LEAD_S, abs=2)
     assert found.sentences == ()
-    assert examine(clean[0]).lead_in_frames == 0
+    assert check_take(clean[0]).lead_in_frames == 0
 
 
 @pytest.mark.parametrize("clock", ["same", "own"])

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glovecal_models.takes.examination import GAP_INTERVALS
+from glovecal_models.takes.take_check import GAP_INTERVALS
 
 SHORTEST_SIDE_S = 4.0
 SEARCHED_FRAMES = 12

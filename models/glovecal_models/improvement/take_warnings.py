@@ -5,19 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from glovecal_models.takes.examination import examine
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.take_check import check_take
 
 NUMBER = re.compile(r"[0-9]+(\.[0-9]+)?(e-?[0-9]+)?")
 
 
 def take_warnings(takes: Sequence[Take]) -> list[str]:
-    """The sentences of ``examine``; of those that differ in numbers alone the first, and how many more."""
+    """The sentences of ``check_take``; of those that differ in numbers alone the first, and how many more."""
     alike: dict[str, list[str]] = {}
     for take in takes:
         if not len(take.time_s):
             continue
-        for sentence in examine(take).sentences:
+        for sentence in check_take(take).sentences:
             key = NUMBER.sub("#", sentence.removeprefix(f"Take {take.name!r}"))
             alike.setdefault(key.replace("gaps", "gap"), []).append(sentence)
     return [_told(sentences) for sentences in alike.values()]

@@ -12,7 +12,7 @@ def next_command(model: str, found: Mapping[str, Any]) -> str:
     """For a diagnosis document of that model."""
     short = model[:SHORT]
     if found.get("reference_problems"):
-        return f"glovecal take examine {_take_of(found)}"
+        return f"glovecal take check {_take_of(found)}"
     named, following = found.get("named"), found.get("next_take")
     if named and named.get("verdict") == "named":
         where = "".join(f" --rotation {name}" for name in named.get("where") or ())

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from glovecal_client.errors import ServiceError
-from glovecal_service.cli import take_clocks, take_holds, take_import
+from glovecal_service.cli import take_clocks, take_examine, take_holds, take_import
 from glovecal_service.cli.connection import connect
-from glovecal_service.cli.options import AsJson, OnlyLayout, OnlySubject, Take
+from glovecal_service.cli.options import AsJson, OnlyLayout, OnlySubject, Take, identifier
 from glovecal_service.cli.printing import err, moment, out, print_facts, print_json, print_table
 from glovecal_service.cli.take_rows import print_takes
-from glovecal_service.cli.takes_named import find_take
+from glovecal_service.cli.takes_named import find_take, find_takes
 from glovecal_service.cli.writing import Overwrite, require_place, write_whole
 
 if TYPE_CHECKING:
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 app = typer.Typer(help="Takes: recordings with or without reference angles.", no_args_is_help=True)
 app.command("import")(take_import.import_takes)
 app.command("clocks")(take_clocks.clocks)
+app.command("examine")(take_examine.examine)
 app.command("holds")(take_holds.holds)
 
 CONFLICT = 409
@@ -41,11 +42,11 @@ def list_takes(subject: OnlySubject = None, layout: OnlyLayout = None, as_json: 
     print_takes(rows, empty="No takes yet. Import some: glovecal take import FILE --subject NAME")
 
 
-@app.command("examine")
-def examine(take: Take, as_json: AsJson = False) -> None:
+@app.command("check")
+def check(take: Take, as_json: AsJson = False) -> None:
     """Show one take: how long, how regular, what was measured, what looks wrong."""
     with connect() as service:
-        found = service.get(f"/takes/{_id(service, take)}/examination")
+        found = service.get(f"/takes/{_id(service, take)}/check")
     if as_json:
         print_json(found)
         return
@@ -104,7 +105,7 @@ def reference(
     """Attach reference angles that were measured elsewhere to a recorded take."""
     with connect() as service:
         document = service.attach_reference(_id(service, take), file, clock=clock)
-        found = service.get(f"/takes/{document['id']}/examination")
+        found = service.get(f"/takes/{document['id']}/check")
     out.print(
         f"Take {document['name']} now has {document['reference_rows']} reference rows; "
         f"{100 * found['frames_with_reference']:.0f} % of its frames have a reference."
@@ -142,6 +143,27 @@ def _tables(service: RestClient, take: str, file: Path, overwrite: bool) -> dict
         }
     require_place(file, overwrite=overwrite)
     return {file: whole}
+
+
+@app.command("use-layout")
+def use_layout(
+    layout: Annotated[str, typer.Argument(help="The layout's name.", callback=identifier("layout"))],
+    take: Annotated[
+        list[str] | None, typer.Argument(help="Takes: names or ids. Default: all of the subject.")
+    ] = None,
+    subject: OnlySubject = None,
+) -> None:
+    """Read takes by another layout of the same sensors, such as one that take examine --keep made."""
+    if not take and subject is None:
+        raise typer.BadParameter("say which: TAKE ..., or all takes of a subject with --subject")
+    with connect() as service:
+        rows = service.get("/takes", {"subject": subject} if subject else {})
+        wanted = find_takes(rows, take) if take else rows
+        for row in wanted:
+            service.put(f"/takes/{row['id']}/layout", {"layout": layout})
+    out.print(
+        f"Read by layout {layout} from now on: {', '.join(row['name'] for row in wanted) or 'no take'}."
+    )
 
 
 @app.command("remove")

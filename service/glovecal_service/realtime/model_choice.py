@@ -41,6 +41,14 @@ def choose(
 
 def _activations(store: Store, subject: str, layout: str) -> list[str]:
     """Model ids: the active one, then what rolling back would lead to."""
+    newest = {
+        name: max((item.id for item in store.models.activations(subject, name)), default=0)
+        for name in _of_the_same_sensors(store, layout)
+        if store.models.active(subject, name) is not None
+    }
+    if not newest:
+        return []
+    layout = max(newest, key=lambda name: newest[name])
     active = store.models.active(subject, layout)
     if active is None:
         return []
@@ -51,6 +59,12 @@ def _activations(store: Store, subject: str, layout: str) -> list[str]:
         if current.model not in chain:
             chain.append(current.model)
     return chain
+
+
+def _of_the_same_sensors(store: Store, layout: str) -> list[str]:
+    """The layout, and others that read the same sensors otherwise: an examination proposes such."""
+    sensors = {record.name: set(record.document["sensors"]) for record in store.layouts.list()}
+    return [layout, *(name for name in sensors if name != layout and sensors[name] == sensors.get(layout))]
 
 
 def _first_that_loads(

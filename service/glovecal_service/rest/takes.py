@@ -15,15 +15,24 @@ from fastapi.responses import FileResponse
 from pydantic import BaseModel, Field
 from starlette.background import BackgroundTask
 
-from glovecal_models.takes.examination import examine
 from glovecal_models.takes.table import read_reference, read_takes, write_takes
 from glovecal_models.takes.take import Take as TakeArrays
+from glovecal_models.takes.take_check import check_take
 from glovecal_service.plain import plain
 from glovecal_service.rest.answers import change_problems, problems
 from glovecal_service.rest.dependencies import Parts, PartsNeeded, StoreNeeded
-from glovecal_service.rest.names import IDENTIFIER, SHA256, IdInPath, LayoutFilter, SubjectFilter, WearingName
+from glovecal_service.rest.names import (
+    IDENTIFIER,
+    SHA256,
+    Identifier,
+    IdInPath,
+    LayoutFilter,
+    SubjectFilter,
+    WearingName,
+)
 from glovecal_service.rest.problem import Problem
 from glovecal_service.rest.reference_clock import ReferenceClock, on_take_clock
+from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.rest.table_upload import (
     MEDIA_TYPES,
     TABLE_BODY,
@@ -74,7 +83,7 @@ class RotationRangeView(BaseModel):
     high_deg: float
 
 
-class ExaminationView(BaseModel):
+class CheckView(BaseModel):
     take: Take
     rate_hz: float | None = Field(description="By the median interval between frames.")
     gaps: int = Field(description="Intervals in which frames are missing.")
@@ -171,13 +180,29 @@ def get_take(id: IdInPath, store: StoreNeeded) -> TakeRecord:
 
 
 @router.get(
-    "/{id}/examination",
-    response_model=ExaminationView,
+    "/{id}/check",
+    response_model=CheckView,
     summary="How regular a take is, what was measured, what looks wrong",
     responses=problems(),
 )
-def examine_take(id: IdInPath, store: StoreNeeded) -> dict[str, Any]:
-    return {"take": store.takes.get(id), **plain(asdict(examine(store.takes.load(id))))}
+def check_one_take(id: IdInPath, store: StoreNeeded) -> dict[str, Any]:
+    return {"take": store.takes.get(id), **plain(asdict(check_take(store.takes.load(id))))}
+
+
+class TakeLayout(StrictBody):
+    layout: Identifier
+
+
+@router.put(
+    "/{id}/layout",
+    response_model=Take,
+    summary="Read a take's rotations by another layout",
+    responses=change_problems(),
+)
+def put_layout(id: IdInPath, body: TakeLayout, store: StoreNeeded) -> TakeRecord:
+    """Frames and reference stay as they are; models that were trained on the take stay what they are. 422
+    when the take lacks a sensor of the layout."""
+    return store.takes.use_layout(id, store.layouts.get(body.layout))
 
 
 @router.delete(

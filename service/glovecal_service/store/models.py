@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from sqlalchemy import Connection, Row, insert, select
+from sqlalchemy import Connection, Row, func, insert, select
 
 from glovecal_models.calibration.artifact import read_manifest
 from glovecal_models.errors import BadInput, DamagedArtifact
@@ -113,7 +113,9 @@ class Models:
             revision.grow(connection)
             earlier = _current(connection, model.subject, model.layout)
             if earlier is not None and earlier.model == model.id:
-                return earlier
+                if earlier.id == _newest(connection, model.subject):
+                    return earlier
+                return _append(connection, model, "activate", earlier.previous)
             previous = None if earlier is None else earlier.id
             return _append(connection, model, "activate", previous)
 
@@ -186,6 +188,12 @@ def _current(connection: Connection, subject: str, layout: str) -> Activation | 
     mine = (table.c.subject == subject) & (table.c.layout == layout)
     row = connection.execute(select(table).where(mine).order_by(table.c.id.desc()).limit(1)).first()
     return None if row is None else _checked_activation(row)
+
+
+def _newest(connection: Connection, subject: str) -> int | None:
+    """Of all layouts: layouts of the same sensors compete for a glove."""
+    table = tables.activations
+    return connection.scalar(select(func.max(table.c.id)).where(table.c.subject == subject))
 
 
 def _activation(connection: Connection, id: int) -> Activation:

@@ -12,6 +12,7 @@ from sqlalchemy.exc import IntegrityError
 
 from glovecal_models.effects.clock_scan import aligned
 from glovecal_models.errors import BadInput
+from glovecal_models.layout import Layout
 from glovecal_models.names import check_identifier
 from glovecal_models.takes.pose_names import poses_at_frames
 from glovecal_models.takes.take import Take
@@ -155,6 +156,19 @@ class Takes:
         take = aligned(take, -seconds)
         total = earlier.facts.get(CLOCK_OFFSET, 0.0) - seconds
         return self._replace(earlier, take, {CLOCK_OFFSET: round(total, 9)})
+
+    def use_layout(self, id: str, layout: Layout) -> TakeRecord:
+        """Read a take's rotations as ``layout`` says from now on; its frames stay as they are.
+
+        Raises NotFound, BadInput when the take lacks a sensor of the layout.
+        """
+        missing = [name for name in layout.sensors if name not in self.get(id).sensors]
+        if missing:
+            raise BadInput(f"take {id} has no sensor {missing[0]}, which layout {layout.name!r} reads")
+        with self._database.write() as connection:
+            same = tables.takes.c.id == id
+            connection.execute(update(tables.takes).where(same).values(layout=layout.name))
+            return _require(connection, id)
 
     def _replace(self, earlier: TakeRecord, take: Take, facts: dict[str, Any]) -> TakeRecord:
         """Store ``take`` in the place of ``earlier``, whose artifact stays on file."""

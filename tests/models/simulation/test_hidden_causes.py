@@ -15,7 +15,7 @@ from glovecal_models.simulation.session import RecordedSession, record_session
 from glovecal_models.simulation.session_glove import SessionGlove
 from glovecal_models.simulation.session_plan import SessionPlan
 from glovecal_models.simulation.session_schedule import schedule
-from glovecal_models.takes.examination import examine
+from glovecal_models.takes.take_check import check_take
 
 PLAN = SessionPlan(seed=5, takes_per_wearing=2, take_s=20.0, bits=12)
 STRENGTH_DEG = 1.5
@@ -82,7 +82,7 @@ def test_a_hidden_cause_is_as_strong_as_asked_and_changes_nothing_else(name, for
         assert take.readings.min() >= 1
         assert take.readings.max() <= 2**PLAN.bits - 1
         assert take.simulated
-        assert examine(take).gaps == 0
+        assert check_take(take).gaps == 0
         assert (hidden.column in take.context) == (hidden.column is not None)
 
 

@@ -129,7 +129,7 @@ def _record_with_lead_in(live: dict[str, str]) -> None:
     run = partial(glovecal, live)
     said = run("record", GLOVE, "second", "--seconds", 0.3, "--lead-in", 0.5).out
     assert re.search(r"Lead-in: 0\.[45] of the 0\.5 s before it \(\d+ frames\)\.", said)
-    assert re.search(r"lead-in +\d+ of them in 0\.[45]", run("take", "examine", "second").out)
+    assert re.search(r"lead-in +\d+ of them in 0\.[45]", run("take", "check", "second").out)
     assert "lead-in" in run("record", GLOVE, "x", "--lead-in", 601).said.lower()
 
 

@@ -66,7 +66,7 @@ def test_what_is_not_there(run):
         (("subject", "show", "ben"), "there is no subject 'ben'"),
         (("subject", "remove", "ben"), "there is no subject 'ben'"),
         (("glove", "show", "mitten"), "there is no layout 'mitten'"),
-        (("take", "examine", "walk"), "there is no take 'walk'; there are none"),
+        (("take", "check", "walk"), "there is no take 'walk'; there are none"),
         (("train", "-s", "ben"), "there is no subject 'ben'"),
         (("model", "show", "abcdef"), "abcdef"),
         (("model", "rollback", "-s", "ben"), "there is no subject 'ben'"),

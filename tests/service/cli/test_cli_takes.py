@@ -120,15 +120,15 @@ def test_a_reference_given_by_name(run, tables, tmp_path):
     assert "one frames file" in two.said
 
 
-def test_examine_tells_what_a_take_is_worth(anna):
-    found = anna("take", "examine", "second", "--json").json
+def test_check_tells_what_a_take_is_worth(anna):
+    found = anna("take", "check", "second", "--json").json
     assert found["take"]["name"] == "second"
     assert found["rate_hz"] == pytest.approx(20)
     assert (found["gaps"], found["sentences"]) == (0, [])
     assert found["frames_with_reference"] > 0.99
     assert len(found["sensors"]) == 18
     assert len(found["rotations"]) == 22
-    read = anna("take", "examine", found["take"]["id"][:4])
+    read = anna("take", "check", found["take"]["id"][:4])
     assert "20.00" in read.out
     assert "PALM_ARCH" in read.out
 
@@ -139,7 +139,7 @@ def test_a_reference_on_the_wrong_clock_is_told(run, tables, tmp_path):
     frames.write_bytes((tables / "test.frames.csv").read_bytes())
     (row,) = run("take", "import", frames, "-s", "ben", "-l", "cyberglove18", "--json").json
     assert row["reference_rows"] == 0
-    assert "nothing to train on" in run("take", "examine", row["id"]).out
+    assert "nothing to train on" in run("take", "check", row["id"]).out
     lines = (tables / "test.reference.csv").read_text().splitlines()
     later = [lines[0], *(f"{float(line.split(',')[0]) + 5e5},{line.partition(',')[2]}" for line in lines[1:])]
     wrong = tmp_path / "wrong.csv"
@@ -158,9 +158,9 @@ def test_a_reference_on_the_wrong_clock_is_told(run, tables, tmp_path):
 def test_a_take_is_found_by_what_names_it(anna):
     (first, *_) = anna("take", "list", "--json").json
     for name in (first["id"], first["id"][:5], first["name"]):
-        assert anna("take", "examine", name, "--json").json["take"]["id"] == first["id"]
+        assert anna("take", "check", name, "--json").json["take"]["id"] == first["id"]
     for name in ("", "pose", "zz", "%2e%2e", "../x", "\N{SNOWMAN}"):
-        refused = anna("take", "examine", name)
+        refused = anna("take", "check", name)
         assert (refused.code, refused.out) == (1, "")
         assert f"there is no take {name!r}; there are poses ({first['id']} of anna), cross" in refused.said
 
@@ -173,7 +173,7 @@ def test_a_name_that_two_takes_have_is_asked_about(run, tables, tmp_path):
     changed.write_text("\n".join(lines[:-1]))
     assert run("take", "import", tables / "train.csv", "-s", "anna").code == 0
     assert run("take", "import", changed, "-s", "ben").code == 0
-    asked = run("take", "examine", "cross")
+    asked = run("take", "check", "cross")
     assert asked.code == 1
     assert "2 takes are called 'cross'" in asked.said
     assert "of anna" in asked.said

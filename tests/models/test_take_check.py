@@ -1,4 +1,4 @@
-"""What a take's examination says, against takes made with known faults."""
+"""What a take's check says, against takes made with known faults."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from glovecal_models.takes.examination import examine
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.take_check import check_take
 
 
 def take(frames: int = 200, rate_hz: float = 50.0, **changes) -> Take:
@@ -23,7 +23,7 @@ def take(frames: int = 200, rate_hz: float = 50.0, **changes) -> Take:
 
 
 def test_a_sound_take_has_no_sentence():
-    found = examine(take())
+    found = check_take(take())
     assert found.rate_hz == pytest.approx(50.0)
     assert (found.gaps, found.frames_with_reference) == (0, 1.0)
     assert found.repeated_frames < 0.01
@@ -43,7 +43,7 @@ def test_left_out_frames_are_counted(left_out: set[int]):
         reference_time_s=np.empty(0), reference=np.empty((0, 0)),
     )  # fmt: skip
     gaps = int((np.diff(kept) > 2).sum())
-    found = examine(part)
+    found = check_take(part)
     assert found.gaps == gaps
     assert any("gap" in sentence for sentence in found.sentences) == bool(gaps)
 
@@ -51,7 +51,7 @@ def test_left_out_frames_are_counted(left_out: set[int]):
 def test_a_dead_sensor_and_a_slow_glove_are_named():
     readings = np.repeat(np.random.default_rng(1).integers(0, 256, (50, 3)), 4, axis=0).astype(float)
     readings[:, 1] = 87
-    found = examine(take(readings=readings))
+    found = check_take(take(readings=readings))
     assert found.repeated_frames == pytest.approx(0.75, abs=0.02)
     assert found.sensors[1].changed == 0
     dead, slow = found.sentences
@@ -60,12 +60,12 @@ def test_a_dead_sensor_and_a_slow_glove_are_named():
 
 
 def test_a_reference_on_another_clock_is_named():
-    found = examine(take(reference_time_s=take().time_s + 1e9))
+    found = check_take(take(reference_time_s=take().time_s + 1e9))
     assert found.frames_with_reference == 0
     assert "clocks" in found.sentences[-1]
 
 
 def test_one_frame_is_enough():
-    found = examine(Take("one", "w", ("A",), np.zeros(1), np.ones((1, 1))))
+    found = check_take(Take("one", "w", ("A",), np.zeros(1), np.ones((1, 1))))
     assert (found.rate_hz, found.longest_interval_s, found.gaps) == (None, None, 0)
     assert found.sentences == ()

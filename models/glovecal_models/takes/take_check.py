@@ -37,7 +37,7 @@ class RotationRange:
 
 
 @dataclass(frozen=True)
-class Examination:
+class TakeCheck:
     """Facts about a take, and ``sentences`` on what looks wrong (none when nothing does)."""
 
     rate_hz: float | None
@@ -56,7 +56,7 @@ class Examination:
     sentences: tuple[str, ...]
 
 
-def examine(take: Take) -> Examination:
+def check_take(take: Take) -> TakeCheck:
     """Look at a take with at least one frame."""
     intervals = np.diff(take.time_s)
     typical = float(np.median(intervals)) if len(intervals) else None
@@ -64,7 +64,7 @@ def examine(take: Take) -> Examination:
     changed = take.readings[1:] != take.readings[:-1]
     repeated = float((~changed.any(axis=1)).mean()) if len(changed) else 0.0
     sensors = tuple(_sensor(take, index, changed[:, index]) for index in range(len(take.sensors)))
-    return Examination(
+    return TakeCheck(
         rate_hz=None if typical is None else 1.0 / typical,
         gaps=gaps,
         longest_interval_s=float(intervals.max()) if len(intervals) else None,
