@@ -68,8 +68,9 @@ class Sampling:
 
     def __init__(self, state: SamplingState, *, touch_check: TouchCheck | None = None) -> None:
         self.state = state
-        self.recording = ""
-        """Name of the recording that the frames are written to; marked in each attempt."""
+        self.recording: str | None = ""
+        """Name of the recording that the frames are written to; marked in each attempt. None: nobody writes
+        them now, and no step is recorded until somebody does."""
         self._touch_check = touch_check
         self._ranges = ActiveRanges.from_document(state.ranges)
         self._recent = RecentReadings()
@@ -79,13 +80,18 @@ class Sampling:
 
     def interrupted(self, now_s: float) -> None:
         """Taken up by another process: the frames of a running step are gone, so it begins again."""
-        judged = self.state.phase == "judged"
-        if judged and self.state.attempts[-1].counts:
-            self._next(now_s)
-        elif judged or self.state.phase in RUNNING:
+        self._accept_verdict(now_s)
+        if self.state.phase == "judged" or self.state.phase in RUNNING[1:]:
             self._ask(now_s, speech.INTERRUPTED)
-        elif self.state.phase == "waiting":
+        elif self.state.phase in ("waiting", "countdown"):
             self.state.since_s = now_s
+
+    def follow(self, state: SamplingState) -> None:
+        """Go on with ``state``, which somebody else has changed; the frames stay."""
+        if state.phase != self.state.phase or state.since_s != self.state.since_s:
+            self._recent.end()
+        self.state = state
+        self._ranges = ActiveRanges.from_document(state.ranges)
 
     @property
     def steadiness_percent(self) -> float | None:
@@ -149,7 +155,9 @@ class Sampling:
 
     def _pause(self, now_s: float) -> None:
         self._leave(now_s)
-        self._enter("paused", now_s, speech.PAUSED)
+        self._accept_verdict(now_s)
+        if self.state.phase not in OVER:
+            self._enter("paused", now_s, speech.PAUSED)
 
     def _resume(self, now_s: float) -> None:
         if self.state.phase not in ("paused", "lost"):
@@ -191,13 +199,15 @@ class Sampling:
             return
         if self._is_lost(now_s):
             self._leave(now_s)
-            self._enter("lost", now_s, speech.LOST)
+            self._accept_verdict(now_s)
+            if state.phase not in OVER:
+                self._enter("lost", now_s, speech.LOST)
             self._recent.forget()
             return
         waited = now_s - state.since_s
         if state.phase == "waiting":
             self._maybe_begin(now_s, waited)
-        elif state.phase == "countdown" and waited >= COUNTDOWN_S:
+        elif state.phase == "countdown" and waited >= COUNTDOWN_S and self.recording is not None:
             self._after_countdown(now_s)
         elif state.phase == "settling":
             self._maybe_settled(now_s, waited)
@@ -223,7 +233,8 @@ class Sampling:
         step, trigger = self.state.now(), self.state.trigger
         if trigger == "timer" and waited >= TIMER_S:
             self._enter("countdown", now_s, speech.COUNTDOWN)
-        if trigger == "still" and step.motion == "hold" and not step.needs and self._recent.moved:
+        by_hand = trigger == "still" and step.motion == "hold" and not step.needs
+        if by_hand and self._recent.moved and self.recording is not None:
             still = self._recent.percent(GESTURE_STILL_S, self._ranges)
             if still is not None and still <= STILL_PERCENT:
                 self._record(now_s)
@@ -259,6 +270,11 @@ class Sampling:
         elif self.state.trigger != "key" and waited >= TIMER_S:
             self._ask(now_s)
 
+    def _accept_verdict(self, now_s: float) -> None:
+        """A good verdict stands, whatever comes before it was shown long enough."""
+        if self.state.phase == "judged" and self.state.attempts[-1].counts:
+            self._next(now_s)
+
     def _maybe_recorded(self, now_s: float) -> None:
         over = now_s - self.state.since_s >= self.state.now().seconds
         # A glove that fell silent may be lost: that verdict comes first.
@@ -270,7 +286,7 @@ class Sampling:
 
     def _judge(self, readings: list[GloveReading]) -> Attempt:
         step, sensors = self.state.now(), self.state.sensors
-        attempt = Attempt(step.name, "good", recording=self.recording, frames=len(readings))
+        attempt = Attempt(step.name, "good", recording=self.recording or "", frames=len(readings))
         if readings:
             attempt.begins_s, attempt.ends_s = readings[0].time_s, readings[-1].time_s
             attempt.missing = missing_frames(readings)

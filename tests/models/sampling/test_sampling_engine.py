@@ -101,6 +101,21 @@ def test_pause_and_resume_begin_the_step_again(ready: Bench) -> None:
     assert ready.state.attempts[-1].step == "loosen"
 
 
+@pytest.mark.parametrize("how", ["pause", "kill", "lose"])
+def test_a_good_verdict_stands_whatever_comes_next(ready: Bench, how: str) -> None:
+    ready.event("go")
+    assert ready.pass_time(3.7) == "judged"
+    if how == "pause":
+        ready.event("pause")
+        ready.event("resume")
+    elif how == "kill":
+        ready.sampling.interrupted(ready.now_s)
+    else:
+        # Nothing more is heard: the verdict's moment passes first, then the next step waits for the glove.
+        assert ready.pass_time(2.0, None) == "lost"
+    assert ready.state.step == "fist"
+
+
 def test_a_lost_glove_is_waited_for(ready: Bench) -> None:
     ready.event("go")
     ready.pass_time(2.7)
