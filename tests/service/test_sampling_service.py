@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
+import pty
+import select
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
@@ -56,11 +61,19 @@ def start(service: RestClient, **more: Any) -> str:
 
 
 def in_phase(service: RestClient, id: str, phase: str) -> dict[str, Any]:
-    return eventually(lambda: (v := service.get(f"/sampling/{id}"))["phase"] == phase and v, phase)
+    def there() -> dict[str, Any] | None:
+        view = service.get(f"/sampling/{id}")
+        return view if view["phase"] == phase else None
+
+    return eventually(there, phase)
 
 
 def over(service: RestClient, id: str) -> dict[str, Any]:
-    return eventually(lambda: (v := service.get(f"/sampling/{id}"))["open"] is False and v, "the end")
+    def stored() -> dict[str, Any] | None:
+        view = service.get(f"/sampling/{id}")
+        return None if view["open"] else view
+
+    return eventually(stored, "the end")
 
 
 def walk(service: RestClient, id: str, names: tuple[str, ...]) -> Iterator[str]:
@@ -194,3 +207,77 @@ def test_a_glove_of_the_other_hand_is_refused(service: RestClient) -> None:
     service.post("/subjects", {"name": "lefty", "hand": "left"})
     with pytest.raises(Refused, match="is for the right hand; lefty's hand is the left one"):
         service.post("/sampling", {"glove": GLOVE, "subject": "lefty"})
+
+
+class Terminal:
+    """``glovecal`` in a terminal of its own: what it shows, and keys to press."""
+
+    def __init__(self, place: DemoPlace, *arguments: str) -> None:
+        self._ours, theirs = pty.openpty()
+        command = [sys.executable, "-m", "glovecal_service.cli.command", *arguments]
+        surroundings = place.environment | {"GLOVECAL_URL": place.url, "TERM": "xterm", "COLUMNS": "100"}
+        self.process = subprocess.Popen(
+            command, stdin=theirs, stdout=theirs, stderr=theirs, env=surroundings, start_new_session=True
+        )
+        os.close(theirs)
+        self.shown = ""
+
+    def press(self, key: str) -> None:
+        os.write(self._ours, key.encode())
+
+    def wait_for(self, words: str) -> None:
+        """Until ``words`` come, after what was waited for before."""
+
+        def came() -> bool:
+            if select.select([self._ours], [], [], 0.05)[0]:
+                with suppress(OSError):  # the other end is closed
+                    self.shown += os.read(self._ours, 65536).decode(errors="replace")
+            return words in self.shown
+
+        eventually(came, f"{words!r} in {self.shown[-2000:]!r}")
+        self.shown = self.shown.partition(words)[2]
+
+    def close(self) -> int:
+        code = self.process.wait(60)
+        os.close(self._ours)
+        return code
+
+
+def test_the_command_walks_a_person_through_it_by_keys(service: RestClient, place: DemoPlace) -> None:
+    terminal = Terminal(place, "sample", "--glove", GLOVE, "-s", "anna", "--protocol", "second_wearing")
+    terminal.wait_for("Step 1 of 5. Open and close the hand")
+    terminal.wait_for("% of a sensor's range (5 is still)")
+    terminal.press("u")
+    terminal.wait_for("there is nothing to undo")
+    terminal.press("s")
+    terminal.wait_for("Left out. Step 2 of 5.")
+    terminal.press(" ")
+    terminal.wait_for("Ready.")
+    terminal.press("q")
+    terminal.wait_for("Go on with: glovecal sample resume ")
+    assert terminal.close() == 0
+    (paused,) = service.get("/sampling", {"glove": GLOVE, "only_open": True})
+    assert paused["phase"] == "paused"
+    again = Terminal(place, "sample", "resume", paused["id"])
+    again.wait_for("Step 2 of 5.")
+    for _ in range(4):
+        again.press("s")
+        again.wait_for("Left out." if _ < 3 else "Done. Thank you.")
+    again.wait_for("0 takes of 0 steps")
+    assert again.close() == 0
+
+
+def test_without_a_terminal_nobody_can_press_a_key(service: RestClient, place: DemoPlace) -> None:
+    command = [sys.executable, "-m", "glovecal_service.cli.command", "sample"]
+    surroundings = place.environment | {"GLOVECAL_URL": place.url}
+
+    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [*command, *arguments], env=surroundings, capture_output=True, text=True, stdin=subprocess.DEVNULL
+        )
+
+    refused = run("--glove", GLOVE, "-s", "anna")
+    assert (refused.returncode, "use --trigger timer" in refused.stderr) == (1, True)
+    assert run("--glove", GLOVE, "-s", "anna", "--widget", "IM_ABD:3").returncode == 2
+    assert GLOVE in run("list").stdout
+    assert "its takes are stored" in run("resume", service.get("/sampling")[0]["id"]).stderr
