@@ -45,7 +45,7 @@ def second_schema(tmp_path, monkeypatch):
         own = f"{config.get_main_option('script_location')}/versions"
         config.set_main_option("version_locations", f"{own}:{folder}")
         monkeypatch.setattr(migrate, "_config", lambda: config)
-        monkeypatch.setattr(schema, "newest_revision", lambda: "0003")
+        monkeypatch.setattr(schema, "newest_revision", lambda: "0004")
 
     return write
 
