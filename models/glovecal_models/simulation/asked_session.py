@@ -19,7 +19,7 @@ from glovecal_models.simulation.simulated_hand import DRIVEN, ROTATIONS
 from glovecal_models.takes.take import Take
 
 RECORDING = "whole"
-LONGEST_S = 1800.0
+LONGEST_S = 900.0
 AT_ONCE_S = 0.05
 Disturb = Callable[[SamplingState, GloveReading], GloveReading | None]
 """What a fault makes of a frame; None: it never arrives."""

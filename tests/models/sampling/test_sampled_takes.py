@@ -15,7 +15,9 @@ from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.catalogue import PROTOCOLS, Equipment, make_protocol
 from glovecal_models.sampling.protocol import Protocol
+from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.sampled_takes import for_other_subject, sampled_takes
+from glovecal_models.sampling.state import SamplingState
 from glovecal_models.sampling.step import Step
 from glovecal_models.simulation.asked_session import RECORDING, AskedSession, asked_session
 from glovecal_models.simulation.protocol import evaluation_segment
@@ -158,6 +160,57 @@ def test_a_wrong_widget_is_found_in_a_whole_session() -> None:
         wrong = asked_session(Protocol("t", tuple(thumb)), glove, seed=seed, does=does)
         said = [reason for attempt in wrong.state.attempts for reason in attempt.reasons]
         assert any(reason.startswith("TI_ABD at ") for reason in said)
+
+
+def poses_only() -> Protocol:
+    steps = make_protocol("fk_only", LAYOUT).steps
+    return Protocol("poses", tuple(step for step in steps if step.kind != "fk_cross_couple"))
+
+
+def test_a_glove_that_jumps_or_loses_frames_costs_one_try() -> None:
+    tries = {"fist-1": 0, "flat-2": 0, "spread-2": 0}
+
+    def disturb(state: SamplingState, reading: GloveReading) -> GloveReading | None:
+        if state.phase != "recording" or any(a.step == state.step for a in state.attempts):
+            return reading
+        tries[state.step] = tries.get(state.step, 0) + 1
+        since_s = reading.time_s - state.since_s
+        if state.step == "fist-1" and since_s > 0.5:
+            return replace(reading, values=reading.values + 30 * (np.arange(len(reading.values)) == 4))
+        dropped = state.step == "flat-2" and reading.sequence % 3 == 0
+        gone = state.step == "spread-2" and 20 < tries["spread-2"] <= 90
+        return None if dropped or gone else reading
+
+    session = asked_session(poses_only(), SimulatedGlove(3), seed=3, disturb=disturb)
+    bad = {a.step: a.reasons[0] for a in session.state.attempts if a.outcome == "bad"}
+    assert set(bad) == {"fist-1", "flat-2"}
+    assert bad["fist-1"].startswith("sensor I_MCP jumped by ")
+    assert bad["flat-2"].endswith(" frames did not arrive.")
+    assert all(a.outcome == "good" for a in session.state.finished().values())
+    assert session.state.phase == "done"
+
+
+def test_a_step_that_is_not_in_its_recording_is_left_out_of_the_takes() -> None:
+    session = asked_session(poses_only(), SimulatedGlove(3), seed=3)
+    attempt = session.state.finished()["fist-1"]
+    assert attempt.begins_s is not None
+    kept = session.take.time_s < attempt.begins_s - 0.1
+    cut_short = replace(session.take, time_s=session.take.time_s[kept], readings=session.take.readings[kept])
+    takes = sampled_takes(session.state, {RECORDING: cut_short}, name="s")
+    names = [step.name for take in takes for step in take.steps]
+    assert "flat-1" in names
+    assert not {"fist-1", "fist-2"} & set(names)
+    assert sampled_takes(session.state, {}, name="s") == []
+
+
+def test_a_glove_that_slips_is_found_by_the_last_poses() -> None:
+    def slip(state: SamplingState, reading: GloveReading) -> GloveReading:
+        moved = 15.0 * (np.arange(len(reading.values)) == 4) * state.step.endswith("-end")
+        return replace(reading, values=reading.values + moved)
+
+    session = asked_session(poses_only(), SimulatedGlove(3), seed=3, disturb=slip)
+    (sentence,) = session.state.sentences
+    assert sentence.startswith("I_MCP reads otherwise at the end, in every pose")
 
 
 def test_the_second_wearing_is_a_quick_check(session: AskedSession) -> None:
