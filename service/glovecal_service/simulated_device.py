@@ -1,7 +1,8 @@
 """Capture device ``simulated``: a simulated hand in a simulated CyberGlove, for trials and demonstrations.
 
 Nothing it sends was measured; every frame is marked as simulated. With ``reference=FILE`` it also writes
-what a perfect but noisy reference system would have measured at each frame, as a reference table.
+what a perfect but noisy reference system would have measured at each frame, as a reference table. With
+``motion=asked`` it does what the open sampling of the service at ``service=URL`` asks.
 """
 
 from __future__ import annotations
@@ -22,8 +23,10 @@ from glovecal_models.simulation.performance import Performance, duration_s
 from glovecal_models.simulation.protocol import MOTIONS, Segment, free_segment, segments
 from glovecal_models.simulation.simulated_glove import LAYOUTS, SimulatedGlove
 from glovecal_models.simulation.simulated_take import REFERENCE_NOISE_DEG, measured_rotations
+from glovecal_service.asked_person import DEFAULT_SERVICE, AskedPerson
 
 FASTEST_HZ = 1000.0
+ASKED = "asked"
 _FRAMES_AT_ONCE = 32
 _FREE_PART_S = 20.0
 LATE_S = 1.0
@@ -39,6 +42,8 @@ class SimulationOptions:
     seed: int = 0
     layout: str = "cyberglove18"
     motion: str = "free"
+    service: str = DEFAULT_SERVICE
+    """Where it is asked, with ``motion="asked"``."""
     wearing: int = 0
     rate_hz: float = 120.0
     reference: Path | None = None
@@ -48,12 +53,13 @@ class SimulationOptions:
 
     @classmethod
     def parse(cls, options: Mapping[str, str]) -> SimulationOptions:
-        """From ``seed=N``, ``layout=``, ``motion=``, ``wearing=N``, ``rate_hz=``, ``reference=FILE``,
-        ``reference_noise_deg=``, ``duration=SECONDS``. Raises BadOption."""
+        """From ``seed=N``, ``layout=``, ``motion=``, ``service=URL``, ``wearing=N``, ``rate_hz=``,
+        ``reference=FILE``, ``reference_noise_deg=``, ``duration=SECONDS``. Raises BadOption."""
         known = (
             "seed",
             "layout",
             "motion",
+            "service",
             "wearing",
             "rate_hz",
             "reference",
@@ -68,7 +74,8 @@ class SimulationOptions:
         return cls(
             seed=_number(options, "seed", 0, int, 0, 2**32),
             layout=_choice(options, "layout", "cyberglove18", LAYOUTS),
-            motion=_choice(options, "motion", "free", MOTIONS),
+            motion=_choice(options, "motion", "free", (*MOTIONS, ASKED)),
+            service=options.get("service", DEFAULT_SERVICE),
             wearing=_number(options, "wearing", 0, int, 0, 2**32),
             rate_hz=_number(options, "rate_hz", 120.0, float, 1.0, FASTEST_HZ),
             reference=None if reference is None else Path(reference),
@@ -82,7 +89,7 @@ class SimulationOptions:
 class SimulatedDevice:
     """Gives the frames of a simulated glove, frame ``i`` at ``i / rate_hz`` after ``open``.
 
-    Free motion goes on for ever, any other ends when it was done once; with a duration both last that
+    Free and asked motion go on for ever, any other ends when it was done once; with a duration both last that
     long. Opened again it goes through the same motion from the start.
     """
 
@@ -164,8 +171,14 @@ class SimulatedDevice:
     def _simulate(self) -> Iterator[_SimulatedFrame]:
         """All frames, worked out a few at a time."""
         glove, options = self._glove, self._options
-        planned = _planned_segments(options)
-        performance = Performance(glove.hand, planned, glove.rotations)
+        if options.motion == ASKED:
+            planned, performance = (
+                iter(()),
+                AskedPerson(glove.hand, glove.rotations, options.seed, options.wearing, options.service),
+            )
+        else:
+            planned = _planned_segments(options)
+            performance = Performance(glove.hand, planned, glove.rotations)
         last_s = options.duration_s
         if last_s is None and isinstance(planned, list):
             last_s = duration_s(planned)

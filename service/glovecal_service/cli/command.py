@@ -28,6 +28,7 @@ from glovecal_service.cli import (
     model,
     quick_check,
     record,
+    sample,
     serve,
     subject,
     take,
@@ -53,6 +54,7 @@ app.command("capture")(capture.capture)
 app.command("find-port")(find_port.find_port)
 app.command("watch")(watch.watch)
 app.command("record")(record.record)
+app.add_typer(sample.app, name="sample")
 app.add_typer(subject.app, name="subject")
 app.add_typer(glove.app, name="glove")
 app.add_typer(take.app, name="take")

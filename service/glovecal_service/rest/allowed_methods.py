@@ -11,7 +11,7 @@ from starlette.routing import Route, compile_path
 class AllowedMethods:
     """Called with a path, gives the methods of all routes under ``prefix`` that match it, sorted.
 
-    A route without parameters is the only one its path means: ``models/train`` is no model's id.
+    The routes with the fewest parameters are the ones its path means: ``models/train`` is no model's id.
     """
 
     def __init__(self, prefix: str, routers: Iterable[APIRouter]) -> None:
@@ -24,5 +24,5 @@ class AllowedMethods:
 
     def __call__(self, path: str) -> list[str]:
         found = [(pattern, methods) for pattern, methods in self._routes if pattern.match(path)]
-        literal = [item for item in found if not item[0].groups]
-        return sorted(frozenset().union(*(methods for _, methods in literal or found)))
+        fewest = min((pattern.groups for pattern, _ in found), default=0)
+        return sorted(frozenset().union(*(each for pattern, each in found if pattern.groups == fewest)))

@@ -29,6 +29,7 @@ from glovecal_service.rest import (
     predictions,
     quick_checks,
     recordings,
+    sampling,
     subjects,
     takes,
     training,
@@ -51,7 +52,7 @@ JSON_LIMIT_BYTES = 8_000_000
 """Enough for 20,000 frames of 18 sensors to predict."""
 BODY_PATIENCE_S = 30.0
 ROUTERS = (
-    *(subjects, gloves, clocks, holds, examinations, takes, uploads, recordings),
+    *(subjects, gloves, clocks, holds, examinations, takes, uploads, recordings, sampling),
     *(training, models, predictions, comparisons, diagnosis, model_effects, effects, improvements),
     quick_checks,
     *(jobs, job_reports, health, metrics_page),

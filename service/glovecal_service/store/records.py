@@ -145,6 +145,30 @@ class RecordingRecord:
 
 
 @dataclass(frozen=True)
+class SamplingRecord:
+    """A guided sampling; the recorder process lets it go on."""
+
+    id: str
+    glove: str
+    subject: str
+    wearing: str
+    layout: str
+    open: bool
+    """Until its takes are stored."""
+    version: int
+    """Grows with each change of ``document``; who changes it says which version he saw."""
+    document: dict[str, Any]
+    """``glovecal_models.sampling.state.SamplingState``."""
+    recordings: list[str]
+    takes: list[str]
+    live: dict[str, Any]
+    """``steadiness_percent``, ``frames_come``: as of now, never needed again."""
+    problem: str
+    created_at: datetime
+    updated_at: datetime
+
+
+@dataclass(frozen=True)
 class JobRecord:
     """Long work: a database row is its only memory."""
 

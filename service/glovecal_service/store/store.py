@@ -16,6 +16,7 @@ from glovecal_service.store.layouts import Layouts
 from glovecal_service.store.models import Models
 from glovecal_service.store.recordings import Recordings
 from glovecal_service.store.revision import Revision
+from glovecal_service.store.samplings import Samplings
 from glovecal_service.store.schema import upgrade
 from glovecal_service.store.subjects import Subjects
 from glovecal_service.store.takes import Takes
@@ -33,6 +34,7 @@ class Store:
         self.takes = Takes(database, artifacts)
         self.models = Models(database, artifacts)
         self.recordings = Recordings(database)
+        self.samplings = Samplings(database)
         self.jobs = Jobs(database, clock)
         self.revision = Revision(database)
 

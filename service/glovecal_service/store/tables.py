@@ -162,6 +162,25 @@ recordings = Table(
     Column("updated_at", UtcTime, nullable=False),
 )
 
+samplings = Table(
+    "samplings",
+    metadata,
+    Column("id", NAME, primary_key=True),
+    Column("glove", NAME, nullable=False),
+    Column("subject", NAME, ForeignKey("subjects.name"), nullable=False),
+    Column("wearing", Text, nullable=False),
+    Column("layout", NAME, nullable=False),
+    Column("open", Boolean, nullable=False, index=True),
+    Column("version", Integer, nullable=False),
+    Column("document", JSON, nullable=False),
+    Column("recordings", JSON, nullable=False),
+    Column("takes", JSON, nullable=False),
+    Column("live", JSON, nullable=False),
+    Column("problem", Text, nullable=False),
+    Column("created_at", UtcTime, nullable=False),
+    Column("updated_at", UtcTime, nullable=False),
+)
+
 jobs = Table(
     "jobs",
     metadata,

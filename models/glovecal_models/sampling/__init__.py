@@ -1,0 +1,1 @@
+"""Guided sampling: a person is led through poses and motions whose angles are known (Wang & Neff 2013, 5)."""

@@ -1,0 +1,106 @@
+"""The protocols there are: a new subject (both accuracies or one of them), and a second wearing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Literal, get_args
+
+from glovecal_models.errors import BadInput
+from glovecal_models.layout import Layout
+from glovecal_models.sampling.key_poses import (
+    KEY_POSES,
+    PoseAngles,
+    check_steps,
+    key_pose_steps,
+    verification_steps,
+)
+from glovecal_models.sampling.protocol import Protocol
+from glovecal_models.sampling.step import Step
+from glovecal_models.sampling.touches import rod_step, touch_steps
+from glovecal_models.sampling.widgets import WIDEST_DEG, WidgetAngles, widget_steps
+
+ProtocolName = Literal["new_subject", "fk_only", "ik_only", "second_wearing"]
+PROTOCOLS: tuple[ProtocolName, ...] = get_args(ProtocolName)
+POSE_ROUNDS = 2
+ROD_MM = 60.0
+SHORTEST_MM, LONGEST_MM = 5.0, 200.0
+
+
+@dataclass(frozen=True)
+class Equipment:
+    """What a user has, and has measured, that differs from the usual."""
+
+    widget_deg: WidgetAngles = field(default_factory=dict)
+    """Widgets by the rotation they hold; an empty list leaves the rotation out."""
+    pose_deg: PoseAngles = field(default_factory=dict)
+    """Measured angles by pose."""
+    rod_mm: tuple[float, ...] = (ROD_MM,)
+
+
+def make_protocol(name: str, layout: Layout, equipment: Equipment | None = None) -> Protocol:
+    """One of ``PROTOCOLS``, without what the layout has no sensor or rotation for.
+
+    ``fk_only`` and ``ik_only`` are the paper's accuracy adaptation (section 8.2). Raises BadInput.
+    """
+    own = equipment or Equipment()
+    _check(own)
+    independent = [*key_pose_steps(POSE_ROUNDS, own.pose_deg), *widget_steps(layout, own.widget_deg)]
+    touching = [*touch_steps(), *(rod_step(length) for length in own.rod_mm)]
+    steps: dict[str, list[Step]] = {
+        "new_subject": [*independent, *touching],
+        "fk_only": independent,
+        "ik_only": touching,
+    }
+    if name == "second_wearing":
+        return Protocol(name, tuple(_for_layout([_loosen(3.0), *check_steps(KEY_POSES)], layout)))
+    if name not in steps:
+        raise BadInput(f"no protocol {name!r}; there are {', '.join(PROTOCOLS)}")
+    asked = _for_layout(steps[name], layout)
+    around = (
+        _for_layout([_loosen(6.0), *verification_steps("start")], layout),
+        _for_layout(verification_steps("end"), layout),
+    )
+    return Protocol(name, (*around[0], *asked, *around[1]) if asked else ())
+
+
+def _loosen(seconds: float) -> Step:
+    ask = "Open and close the hand, spread the fingers, turn thumb and wrist as far as they go."
+    return Step("loosen", "range", "move", ask, seconds, "loosen")
+
+
+def _for_layout(steps: list[Step], layout: Layout) -> list[Step]:
+    fitting = [
+        replace(
+            step,
+            angles={name: angle for name, angle in step.angles.items() if name in layout.rotations},
+            moves=tuple(sensor for sensor in step.moves if sensor in layout.sensors),
+        )
+        for step in steps
+    ]
+    return [step for step, asked in zip(fitting, steps, strict=True) if _can_teach(step, asked, layout)]
+
+
+def _can_teach(step: Step, asked: Step, layout: Layout) -> bool:
+    if step.touches:
+        return all(any(name.startswith(f"{digit}_") for name in layout.sensors) for digit in step.touches)
+    return bool(step.angles) or not asked.angles
+
+
+def _check(own: Equipment) -> None:
+    for rotation, angles in own.widget_deg.items():
+        if any(not abs(angle) <= WIDEST_DEG for angle in angles) or len(set(angles)) < len(angles):
+            told = ", ".join(f"{angle:g}" for angle in angles)
+            raise BadInput(
+                f"widgets of {rotation}: {told}; give different angles up to {WIDEST_DEG:g} degrees"
+            )
+    for pose, angles in own.pose_deg.items():
+        for rotation, angle in angles.items():
+            if not abs(angle) <= WIDEST_DEG:
+                raise BadInput(
+                    f"pose {pose}: {rotation} is {angle:g} degrees; up to {WIDEST_DEG:g} are possible"
+                )
+    for length in own.rod_mm:
+        if not SHORTEST_MM <= length <= LONGEST_MM:
+            raise BadInput(
+                f"rod of {length:g} mm: between {SHORTEST_MM:g} and {LONGEST_MM:g} mm can be held so"
+            )

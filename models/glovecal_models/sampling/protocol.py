@@ -1,0 +1,55 @@
+"""A sampling protocol: steps in their order, and the time that they take."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from glovecal_models.errors import BadInput
+from glovecal_models.sampling.step import Step
+
+COUNTDOWN_S = 2.0
+SETTLE_S = 0.5
+"""The hand has to be still for so long before a pose is recorded."""
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """Raises BadInput for no steps, or two of one name."""
+
+    name: str
+    steps: tuple[Step, ...]
+
+    def __post_init__(self) -> None:
+        names = [step.name for step in self.steps]
+        if not names:
+            raise BadInput(f"protocol {self.name!r} has no step that this glove's layout could learn from")
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise BadInput(f"protocol {self.name!r}: two steps are named {twice!r}")
+
+    @property
+    def capture_s(self) -> float:
+        """Countdowns, settling and recording of a person who does every step at once, in seconds."""
+        return sum(
+            COUNTDOWN_S + (SETTLE_S if step.motion == "hold" else 0.0) + step.seconds for step in self.steps
+        )
+
+    def step(self, name: str) -> Step:
+        """Raises BadInput."""
+        for step in self.steps:
+            if step.name == name:
+                return step
+        raise BadInput(f"no step {name!r} in protocol {self.name}; there are {', '.join(self._names)}")
+
+    @property
+    def _names(self) -> list[str]:
+        return [step.name for step in self.steps]
+
+    def to_document(self) -> dict[str, Any]:
+        return {"name": self.name, "steps": [step.to_document() for step in self.steps]}
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> Protocol:
+        return cls(document["name"], tuple(Step.from_document(step) for step in document["steps"]))

@@ -1,0 +1,95 @@
+"""Where a sampling stands: everything that has to outlive a process, as one JSON document."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, get_args
+
+from glovecal_models.errors import BadInput
+from glovecal_models.sampling.attempt import Attempt
+from glovecal_models.sampling.protocol import Protocol
+from glovecal_models.sampling.step import Step
+
+VERSION = 1
+Phase = Literal[
+    "waiting", "countdown", "settling", "recording", "judged", "lost", "paused", "done", "stopped"
+]
+RUNNING: tuple[Phase, ...] = ("countdown", "settling", "recording")
+OVER: tuple[Phase, ...] = ("done", "stopped")
+Trigger = Literal["key", "timer", "still"]
+TRIGGERS: tuple[Trigger, ...] = get_args(Trigger)
+
+
+@dataclass
+class SamplingState:
+    """``since_s`` is the clock that the protocol is driven by, attempts have the glove's."""
+
+    protocol: Protocol
+    sensors: tuple[str, ...]
+    trigger: Trigger = "key"
+    """What begins a step: ``key`` waits for the user (or the glove's button), ``timer`` gives him three
+    seconds, ``still`` begins when the hand is still again after it moved. Steps that need something in the
+    hand wait for the user anyway, except with ``timer``."""
+    phase: Phase = "waiting"
+    since_s: float = 0.0
+    step: str = ""
+    """The one at hand, "" when all are finished."""
+    attempts: list[Attempt] = field(default_factory=list)
+    ranges: dict[str, Any] = field(default_factory=dict)
+    """Of the sensors, ``ActiveRanges.to_document()``."""
+    capture_s: float = 0.0
+    """Time spent in countdown, settling and recording so far."""
+    said: str = ""
+    said_number: int = 0
+    """Grows with each sentence, so that each is read out once."""
+    sentences: list[str] = field(default_factory=list)
+    """What the end found."""
+
+    def now(self) -> Step:
+        return self.protocol.step(self.step)
+
+    def finished(self) -> dict[str, Attempt]:
+        """The attempt that counts, by step: the last good or skipped one that was not undone."""
+        return {attempt.step: attempt for attempt in self.attempts if attempt.counts}
+
+    def first_unfinished(self) -> str:
+        finished = self.finished()
+        return next((step.name for step in self.protocol.steps if step.name not in finished), "")
+
+    def say(self, sentence: str) -> None:
+        self.said, self.said_number = sentence, self.said_number + 1
+
+    def to_document(self) -> dict[str, Any]:
+        return {
+            "version": VERSION,
+            "protocol": self.protocol.to_document(),
+            "sensors": list(self.sensors),
+            "trigger": self.trigger,
+            "phase": self.phase,
+            "since_s": self.since_s,
+            "step": self.step,
+            "attempts": [attempt.to_document() for attempt in self.attempts],
+            "ranges": self.ranges,
+            "capture_s": self.capture_s,
+            "said": self.said,
+            "said_number": self.said_number,
+            "sentences": list(self.sentences),
+        }
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> SamplingState:
+        """Raises BadInput for another version."""
+        if document.get("version") != VERSION:
+            raise BadInput(
+                f"sampling document of version {document.get('version')}; this software reads {VERSION}"
+            )
+        values = {name: value for name, value in document.items() if name != "version"}
+        return cls(
+            **{
+                **values,
+                "protocol": Protocol.from_document(document["protocol"]),
+                "sensors": tuple(document["sensors"]),
+                "attempts": [Attempt.from_document(item) for item in document["attempts"]],
+            }
+        )

@@ -1,0 +1,87 @@
+"""How still a hand is, in percent of each sensor's active range, and what that range is.
+
+Means of 0.1 s are compared, so that noise is not taken for motion. The range is what the sensor has shown so
+far in this wearing: nobody knows a new subject's before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from glovecal_models.sampling.reading import GloveReading
+
+BLOCK_S = 0.1
+STILL_PERCENT = 5.0
+"""Of the active range: what moves less is still. As for poses that are found held in takes."""
+LEAST_SHARE_OF_COUNTS = 0.1
+"""A sensor that has shown less than this share of what the hardware can send is judged by it."""
+
+
+@dataclass
+class ActiveRanges:
+    """Lowest and highest block mean of each sensor, shape (S,) each."""
+
+    low: np.ndarray
+    high: np.ndarray
+    least: float = 0.0
+    """In readings."""
+
+    @classmethod
+    def unknown(cls, sensors: int, counts: tuple[float, float] | None) -> ActiveRanges:
+        least = LEAST_SHARE_OF_COUNTS * (counts[1] - counts[0]) if counts else 0.0
+        return cls(np.full(sensors, np.inf), np.full(sensors, -np.inf), least)
+
+    @property
+    def span(self) -> np.ndarray:
+        """Active range in readings; not smaller than what the hardware makes sensible, never 0."""
+        seen = np.where(self.high > self.low, self.high - self.low, 0.0)
+        return np.maximum(seen, max(self.least, 1e-9))
+
+    @property
+    def middle(self) -> np.ndarray:
+        return (self.low + self.high) / 2
+
+    def widen(self, means: np.ndarray) -> None:
+        """``means`` (B, S): what the sensors showed now."""
+        if len(means):
+            self.low = np.minimum(self.low, means.min(axis=0))
+            self.high = np.maximum(self.high, means.max(axis=0))
+
+    def to_document(self) -> dict[str, Any]:
+        seen = np.isfinite(self.low)
+        return {
+            "low": np.where(seen, self.low, 0.0).tolist() if seen.all() else None,
+            "high": np.where(seen, self.high, 0.0).tolist() if seen.all() else None,
+            "least": self.least,
+            "sensors": len(self.low),
+        }
+
+    @classmethod
+    def from_document(cls, document: dict[str, Any]) -> ActiveRanges:
+        ranges = cls.unknown(document["sensors"], None)
+        ranges.least = document["least"]
+        if document["low"] is not None:
+            ranges.low, ranges.high = np.array(document["low"]), np.array(document["high"])
+        return ranges
+
+
+def block_means(readings: Sequence[GloveReading]) -> np.ndarray:
+    """Means of 0.1 s, shape (B, S)."""
+    if not readings:
+        return np.empty((0, 0))
+    time_s = np.array([reading.time_s for reading in readings])
+    values = np.array([reading.values for reading in readings], float)
+    number = np.floor((time_s - time_s[0]) / BLOCK_S).astype(int)
+    starts = np.flatnonzero(np.diff(number, prepend=-1))
+    counts = np.diff(starts, append=len(number))
+    return np.add.reduceat(values, starts, axis=0) / counts[:, None]
+
+
+def moved_percent(readings: Sequence[GloveReading], ranges: ActiveRanges) -> np.ndarray:
+    """How far each sensor went, shape (S,), percent of its active range."""
+    means = block_means(readings)
+    return 100 * np.ptp(means, axis=0) / ranges.span if len(means) else np.empty(0)

@@ -1,0 +1,106 @@
+"""Lets the open samplings of the store go on, and stores the takes of those that are over."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from threading import Event
+
+import zenoh
+from sqlalchemy.exc import SQLAlchemyError
+
+from glovecal_client.errors import ClientError
+from glovecal_client.keys import GloveKeys
+from glovecal_models.errors import GlovecalError
+from glovecal_service.realtime.live_sampling import LiveSampling
+from glovecal_service.realtime.sampling_takes import keep_sampled_takes
+from glovecal_service.settings import Settings
+from glovecal_service.store.errors import StorageFull, StoreUnavailable
+from glovecal_service.store.records import SamplingRecord
+from glovecal_service.store.store import Store
+
+LOOK_EVERY_S = 0.04
+FOLLOW_EVERY_S = 0.1
+AFTER_TROUBLE_S = 1.0
+
+_log = logging.getLogger("glovecal.sampling")
+
+
+class SamplingRunner:
+    """One thread for all samplings, beside the recorder's: it may stand still, the frames are written."""
+
+    def __init__(self, session: zenoh.Session, settings: Settings, open_store: Callable[[], Store]) -> None:
+        self._session = session
+        self._site = settings.site
+        self._open_store = open_store
+        self._store: Store | None = None
+        self._revision: int | None = None
+        self._follow_at = 0.0
+        self._live: dict[str, LiveSampling] = {}
+
+    def run(self, stopped: Event) -> None:
+        """Until ``stopped``; what goes on is left for the next process."""
+        while not stopped.wait(LOOK_EVERY_S):
+            self.look()
+        for live in self._live.values():
+            live.close()
+        if self._store is not None:
+            self._store.close()
+
+    def look(self) -> None:
+        """One round. Nothing here raises."""
+        try:
+            store = self._store = self._store or self._open_store()
+            if time.monotonic() >= self._follow_at:
+                self._follow_at = time.monotonic() + FOLLOW_EVERY_S
+                self._follow(store)
+            for live in list(self._live.values()):
+                self._go_on(store, live)
+        except (StoreUnavailable, StorageFull, SQLAlchemyError, OSError) as error:
+            _log.warning("the store does not answer, samplings wait: %s", error)
+            self._revision, self._follow_at = None, time.monotonic() + AFTER_TROUBLE_S
+
+    def _follow(self, store: Store) -> None:
+        revision = store.revision()
+        if revision == self._revision:
+            return
+        records = {record.id: record for record in store.samplings.list(only_open=True)}
+        for id in [id for id in self._live if id not in records]:
+            self._live.pop(id).close()
+        for id, record in records.items():
+            try:
+                if id in self._live:
+                    self._live[id].follow(record)
+                else:
+                    keys = GloveKeys(self._site, record.glove)
+                    self._live[id] = LiveSampling(self._session, keys, record)
+            except (GlovecalError, ClientError, KeyError, TypeError) as error:
+                self._give_up(store, record, f"the sampling cannot go on: {error}")
+        self._revision = revision
+
+    def _go_on(self, store: Store, live: LiveSampling) -> None:
+        try:
+            live.look(store)
+            if live.is_over and self._recordings_are_done(store, live.record):
+                self._finish(store, live)
+        except (StoreUnavailable, StorageFull, SQLAlchemyError, OSError):
+            raise
+        except (GlovecalError, ClientError) as error:
+            self._give_up(store, live.record, str(error))
+
+    def _recordings_are_done(self, store: Store, record: SamplingRecord) -> bool:
+        return not any(store.recordings.get(id).is_open for id in record.recordings)
+
+    def _finish(self, store: Store, live: LiveSampling) -> None:
+        takes, missing = keep_sampled_takes(store, live.record)
+        store.samplings.note(live.record.id, takes=takes, problem=missing, open=False, live={})
+        self._live.pop(live.record.id).close()
+        _log.info("sampling %s is over: %d takes", live.record.id, len(takes))
+
+    def _give_up(self, store: Store, record: SamplingRecord, problem: str) -> None:
+        _log.warning("sampling %s: %s", record.id, problem)
+        store.samplings.note(record.id, problem=problem, open=False)
+        live = self._live.pop(record.id, None)
+        if live is not None:
+            live.close()

@@ -1,0 +1,126 @@
+"""A sampling as a page or a terminal shows it."""
+
+from __future__ import annotations
+
+import time
+from datetime import datetime
+from typing import Any
+
+from pydantic import BaseModel, Field
+
+from glovecal_models.sampling.protocol import COUNTDOWN_S, SETTLE_S
+from glovecal_models.sampling.state import Phase, SamplingState, Trigger
+from glovecal_models.sampling.steadiness import STILL_PERCENT
+from glovecal_models.sampling.step import Kind, Motion
+from glovecal_service.store.records import SamplingRecord
+
+
+class StepNow(BaseModel):
+    name: str
+    kind: Kind
+    motion: Motion
+    ask: str = Field(description="What the person is asked to do.")
+    needs: str = Field(description="What to take in the hand first.")
+    place: int = Field(description="1 for the first.")
+    seconds: float = Field(description="How long it is recorded.")
+    pose: str
+    angles: dict[str, float] = Field(description="Degrees by rotation that are known.")
+    moves: list[str] = Field(description="Sensors that have to move.")
+    touches: list[str]
+    rod_mm: float | None
+
+
+class StepDone(BaseModel):
+    name: str
+    kind: Kind
+    outcome: str = Field(description="`good`, `bad`, `skipped`, or `` when it was not done yet.")
+    reasons: list[str] = Field(description="Why it is bad, or was left out.")
+
+
+class SamplingView(BaseModel):
+    id: str
+    glove: str
+    subject: str
+    wearing: str
+    layout: str
+    protocol: str
+    trigger: Trigger
+    phase: Phase
+    phase_s: float = Field(description="Seconds in this phase until now.")
+    phase_of_s: float | None = Field(description="Seconds that it takes; None: until something happens.")
+    step: StepNow | None
+    steps: list[StepDone]
+    say: str = Field(description="To be read out, once for each `say_number`.")
+    say_number: int
+    steadiness_percent: float | None = Field(
+        description="How far the hand moved in the last half second, percent of a sensor's active range."
+    )
+    still_percent: float = Field(STILL_PERCENT, description="What is still.")
+    capture_s: float = Field(description="Spent in countdowns, settling and recording so far.")
+    capture_of_s: float = Field(description="What the whole takes of somebody who does every step at once.")
+    sentences: list[str] = Field(description="What the end found.")
+    problem: str
+    open: bool = Field(description="Until its takes are stored.")
+    recordings: list[str]
+    takes: list[str]
+    created_at: datetime
+    updated_at: datetime
+
+
+def sampling_view(record: SamplingRecord) -> SamplingView:
+    state = SamplingState.from_document(record.document)
+    return SamplingView(
+        id=record.id,
+        glove=record.glove,
+        subject=record.subject,
+        wearing=record.wearing,
+        layout=record.layout,
+        protocol=state.protocol.name,
+        trigger=state.trigger,
+        phase=state.phase,
+        phase_s=round(max(0.0, time.time() - state.since_s), 2),
+        phase_of_s=_length(state),
+        step=_now(state),
+        steps=_steps(state),
+        say=state.said,
+        say_number=state.said_number,
+        steadiness_percent=record.live.get("steadiness_percent"),
+        still_percent=STILL_PERCENT,
+        capture_s=round(state.capture_s, 2),
+        capture_of_s=round(state.protocol.capture_s, 2),
+        sentences=state.sentences,
+        problem=record.problem,
+        open=record.open,
+        recordings=record.recordings,
+        takes=record.takes,
+        created_at=record.created_at,
+        updated_at=record.updated_at,
+    )
+
+
+def _length(state: SamplingState) -> float | None:
+    if not state.step:
+        return None
+    lengths = {"countdown": COUNTDOWN_S, "settling": SETTLE_S, "recording": state.now().seconds}
+    return lengths.get(state.phase)
+
+
+def _now(state: SamplingState) -> StepNow | None:
+    if not state.step:
+        return None
+    document: dict[str, Any] = state.now().to_document()
+    names = [step.name for step in state.protocol.steps]
+    return StepNow(**document, place=names.index(state.step) + 1)
+
+
+def _steps(state: SamplingState) -> list[StepDone]:
+    told = {attempt.step: attempt for attempt in state.attempts if not attempt.withdrawn} | state.finished()
+    return [
+        StepDone(
+            name=step.name,
+            kind=step.kind,
+            outcome=told[step.name].outcome if step.name in told else "",
+            reasons=list(told[step.name].reasons) if step.name in told else [],
+        )
+        for step in state.protocol.steps
+    ]
