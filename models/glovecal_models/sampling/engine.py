@@ -8,24 +8,21 @@ It has no clock, no thread and no file: whoever drives it gives the time, and ke
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal, get_args
-
-import numpy as np
 
 from glovecal_models.errors import BadInput
 from glovecal_models.sampling import speech
 from glovecal_models.sampling.attempt import Attempt
 from glovecal_models.sampling.protocol import COUNTDOWN_S, SETTLE_S, Protocol
-from glovecal_models.sampling.quality import faults, missing_frames
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.recent import RecentReadings
 from glovecal_models.sampling.state import OVER, RUNNING, Phase, SamplingState, Trigger
-from glovecal_models.sampling.steadiness import STILL_PERCENT, ActiveRanges, block_means
+from glovecal_models.sampling.steadiness import STILL_PERCENT, ActiveRanges
 from glovecal_models.sampling.step import Step
+from glovecal_models.sampling.verdict import TouchCheck, verdict
 from glovecal_models.sampling.verification import moved_since_start
-from glovecal_models.sampling.widget_check import inconsistent_widgets, response
 from glovecal_models.sampling.widgets import WIDEST_DEG
 
 Event = Literal["go", "redo", "undo", "skip", "pause", "resume", "stop"]
@@ -38,9 +35,6 @@ GESTURE_STILL_S = 1.0
 SHOWN_S = 0.6
 """A good verdict is shown for so long."""
 MOVING_PERCENT = 3 * STILL_PERCENT
-
-TouchCheck = Callable[[Step, Sequence[GloveReading]], str | None]
-"""Why the fingertips of a step did not touch, in a sentence, or None: inverse kinematics can tell."""
 
 
 class NotNow(BadInput):
@@ -280,62 +274,9 @@ class Sampling:
         # A glove that fell silent may be lost: that verdict comes first.
         if over and self._heard_s is not None and now_s - self._heard_s <= BACK_AFTER_S:
             readings = self._leave(now_s)
-            self._judged(now_s, self._judge(readings))
-
-    # Verdicts ----------------------------------------------------------------------------------------------
-
-    def _judge(self, readings: list[GloveReading]) -> Attempt:
-        step, sensors = self.state.now(), self.state.sensors
-        attempt = Attempt(step.name, "good", recording=self.recording or "", frames=len(readings))
-        if readings:
-            attempt.begins_s, attempt.ends_s = readings[0].time_s, readings[-1].time_s
-            attempt.missing = missing_frames(readings)
-            means = np.mean([reading.values for reading in readings], axis=0)
-            attempt.means = dict(zip(sensors, means.tolist(), strict=True))
-        if step.kind == "range":
-            self._learn_ranges(readings)
-        attempt.reasons = faults(step, readings, sensors, self._ranges, self._flat())
-        if readings:
-            percent = 100 * np.ptp([reading.values for reading in readings], axis=0) / self._ranges.span
-            attempt.moved_percent = float(percent.max())
-        if not attempt.reasons:
-            self._learn_ranges(readings)
-            attempt.reasons = self._contradictions(step, readings, attempt)
-        attempt.outcome = "bad" if attempt.reasons else "good"
-        return attempt
-
-    def _learn_ranges(self, readings: list[GloveReading]) -> None:
-        self._ranges.widen(block_means(readings)[:-1])  # the last block may be as noisy as a frame
-        self.state.ranges = self._ranges.to_document()
-
-    def _contradictions(self, step: Step, readings: list[GloveReading], attempt: Attempt) -> tuple[str, ...]:
-        """What only the other steps, or inverse kinematics, can tell."""
-        if step.kind == "fk_cross_couple":
-            attempt.response = response(step, readings, self.state.sensors, self._ranges)
-            (rotation,) = step.angles
-            sentence = inconsistent_widgets(rotation, self._responses(rotation, step, attempt))
-            return (sentence,) if sentence else ()
-        if step.touches and self._touch_check is not None:
-            sentence = self._touch_check(step, readings)
-            return (sentence,) if sentence else ()
-        return ()
-
-    def _responses(self, rotation: str, step: Step, attempt: Attempt) -> dict[float, float]:
-        tried = {**self.state.finished(), step.name: attempt}
-        responses: dict[float, float] = {}
-        for other in self.state.protocol.steps:
-            found = tried.get(other.name)
-            same = other.kind == "fk_cross_couple" and rotation in other.angles
-            if same and found is not None and found.response is not None:
-                responses[other.angles[rotation]] = found.response
-        return responses
-
-    def _flat(self) -> dict[str, float] | None:
-        finished = self.state.finished()
-        for step in self.state.protocol.steps:
-            if step.pose == "flat" and step.name in finished and finished[step.name].means:
-                return finished[step.name].means
-        return None
+            attempt = verdict(self.state, readings, self._ranges, self.recording or "", self._touch_check)
+            self.state.ranges = self._ranges.to_document()
+            self._judged(now_s, attempt)
 
     def _judged(self, now_s: float, attempt: Attempt) -> None:
         self.state.attempts.append(attempt)

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.sampling.engine import Sampling, TouchCheck, begin_sampling
+from glovecal_models.sampling.engine import Sampling, begin_sampling
 from glovecal_models.sampling.protocol import Protocol
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.state import OVER, SamplingState
 from glovecal_models.sampling.step import Step
+from glovecal_models.sampling.verdict import TouchCheck
 from glovecal_models.simulation.asked_hand import AskedHand
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.simulation.simulated_hand import DRIVEN, ROTATIONS
