@@ -110,7 +110,7 @@ class LiveSampling:
         failed = last is not None and last.state == "failed"
         try:
             asked = store.recordings.request(
-                mine.glove, name=name, subject=mine.subject, wearing=mine.wearing
+                mine.glove, name=name, subject=mine.subject, wearing=mine.wearing or None
             )
         except Conflict as error:
             store.samplings.note(mine.id, problem=str(error))
@@ -119,7 +119,7 @@ class LiveSampling:
         problem = last.facts.get("sentence", "") if last is not None and failed else ""
         recordings = [*mine.recordings[: -1 if failed else None], asked.id]
         store.samplings.note(mine.id, recordings=recordings, problem=problem)
-        self.record = store.samplings.get(mine.id)
+        self.follow(store.samplings.get(mine.id))
 
     def _tell(self, store: Store) -> None:
         now = time.monotonic()

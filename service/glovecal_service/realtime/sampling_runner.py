@@ -75,7 +75,7 @@ class SamplingRunner:
                 else:
                     keys = GloveKeys(self._site, record.glove)
                     self._live[id] = LiveSampling(self._session, keys, record)
-            except (GlovecalError, ClientError, KeyError, TypeError) as error:
+            except (GlovecalError, ClientError, KeyError, TypeError, ValueError) as error:
                 self._give_up(store, record, f"the sampling cannot go on: {error}")
         self._revision = revision
 
@@ -86,8 +86,9 @@ class SamplingRunner:
                 self._finish(store, live)
         except (StoreUnavailable, StorageFull, SQLAlchemyError, OSError):
             raise
-        except (GlovecalError, ClientError) as error:
-            self._give_up(store, live.record, str(error))
+        except Exception as error:  # one sampling that fails must end neither the others nor this thread
+            _log.exception("sampling %s fails", live.record.id)
+            self._give_up(store, live.record, str(error) or type(error).__name__)
 
     def _recordings_are_done(self, store: Store, record: SamplingRecord) -> bool:
         return not any(store.recordings.get(id).is_open for id in record.recordings)
