@@ -1,13 +1,14 @@
 """Beliefs of all rotations from takes with known angles; where there are none, from rules and ranges.
 
-Shapes: a rotation that widgets moved has the trained process's own; one that poses hold at a few angles is
-nearly a line, bent by at most a few per cent of its range, as bend sensors are. A joint without a sensor
-follows its rule, roughly. Of a joint that nobody showed, the readings' range is the joint's (section 5.2.2).
+Shapes are what is known of bend sensors, not what a few angles make likeliest: one sensor by itself is nearly
+a line, bent by a few per cent of its range; pulls of neighbours bend a plane more; both do so smoothly. A
+joint without a sensor follows its rule, roughly. Of a joint that nobody showed, the readings' range is the
+joint's (section 5.2.2).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -19,11 +20,14 @@ from glovecal_models.inverse_kinematics.hand_shape import FINGER_SD_DEG, THUMB_S
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.typical_glove import TYPICAL_COUNTS
 
+Ranges = Mapping[str, tuple[float, float]]
+"""Lowest and highest reading by sensor."""
 BOW_SHARE = 0.03
 """Of a joint's range that a bend sensor's curve is off its line."""
 COUPLED_SHARE = 0.15
 """Of it that pulls of neighbours are off a plane."""
 WIDGET_SD_DEG = 0.9
+"""What is left of the sensors' noise in a frame of a widget, where several of them add up."""
 BOW_LENGTH = 0.5
 """Of the range over which the curve changes."""
 WIDE_DEG = 300.0
@@ -39,25 +43,22 @@ LEAST_MOVED = 40
 def first_beliefs(
     layout: Layout,
     samples: TaughtSamples,
-    ranges: Mapping[str, tuple[float, float]],
-    cancelled: Callable[[], bool] | None = None,
+    ranges: Ranges,
+    only: Iterable[str] | None = None,
 ) -> dict[str, RotationBelief]:
-    """Of every rotation that the hand has or the layout reads; ``ranges``: lowest and highest reading by
-    sensor. Raises Cancelled."""
+    """Of every rotation that the hand has or the layout reads, or ``only`` of these."""
     held_sd = hold_sd_deg(samples)
-    names = dict.fromkeys(
-        [*HAND_ROTATIONS, *(name for name in layout.rotations if name in samples.rotations)]
-    )
-    return {name: _belief(name, layout, samples, ranges, held_sd, cancelled) for name in names}
+    taught = (name for name in layout.rotations if name in samples.rotations)
+    names = dict.fromkeys([*HAND_ROTATIONS, *taught] if only is None else only)
+    return {name: _belief(name, layout, samples, ranges, held_sd) for name in names}
 
 
 def _belief(
     rotation: str,
     layout: Layout,
     samples: TaughtSamples,
-    ranges: Mapping[str, tuple[float, float]],
+    ranges: Ranges,
     held_sd: float,
-    cancelled: Callable[[], bool] | None,
 ) -> RotationBelief:
     sensors = layout.correspondence(rotation).sensors if rotation in layout.rotations else ()
     low, high = np.array([ranges[name] for name in sensors]).reshape(-1, 2).T
