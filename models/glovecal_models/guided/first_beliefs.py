@@ -1,8 +1,9 @@
 """Beliefs of all rotations from takes with known angles; where there are none, from rules and ranges.
 
-Shapes: a rotation that widgets moved has the trained process's own; one that poses hold at a few angles is
-nearly a line, bent by at most a few per cent of its range, as bend sensors are. A joint without a sensor
-follows its rule, roughly. Of a joint that nobody showed, the readings' range is the joint's (section 5.2.2).
+Shapes are what is known of bend sensors, not what a few angles make likeliest: one sensor by itself is nearly
+a line, bent by a few per cent of its range; pulls of neighbours bend a plane more; both do so smoothly. A
+joint without a sensor follows its rule, roughly. Of a joint that nobody showed, the readings' range is the
+joint's (section 5.2.2).
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ BOW_SHARE = 0.03
 COUPLED_SHARE = 0.15
 """Of it that pulls of neighbours are off a plane."""
 WIDGET_SD_DEG = 0.9
+"""What is left of the sensors' noise in a frame of a widget, where several of them add up."""
 BOW_LENGTH = 0.5
 """Of the range over which the curve changes."""
 WIDE_DEG = 300.0

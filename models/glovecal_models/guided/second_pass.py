@@ -1,8 +1,9 @@
-"""Training takes of the second pass: what was known beforehand, and what the touches tell, on the same readings.
+"""Training takes of the second pass: what was known beforehand and what touches tell, on the same readings.
 
-Frames of a hold and of a touch get the angle that the likeliest calibration of the whole session reads there;
-frames of a widget keep the widget's. Readings are without the sensors' noise, which would flatten every map
-a little; how far a single live frame is off is measured afterwards, on the readings as they came.
+Every frame gets the angle that the likeliest calibration of the whole session reads there. A widget's own
+four angles would teach a process a staircase: readings scatter about each step while the angle does not, and
+the likeliest process is flat there. Readings are without the sensors' noise, which would flatten every map a
+little; how far a single live frame is off is measured afterwards, on the readings as they came.
 """
 
 from __future__ import annotations
@@ -109,7 +110,7 @@ def taught_layout(layout: Layout, told: Iterable[str]) -> Layout:
 def with_live_noise(
     model: CalibrationModel, lessons: Sequence[Lesson], posterior: TouchPosterior
 ) -> CalibrationModel:
-    """The model claiming what a single frame as the glove sends it is off by, and what the session left open."""
+    """The model claiming what a single frame is off by as it came, and what the session left open."""
     return replace(model, rotations=tuple(_claiming(item, lessons, posterior) for item in model.rotations))
 
 

@@ -1,4 +1,4 @@
-"""Which touches of a sampling can be believed, and in which frames; the others are refused with the reason."""
+"""Which touches of a sampling can be believed, and in which frames; others are refused with the reason."""
 
 from __future__ import annotations
 

@@ -34,8 +34,8 @@ def guided_sentences(
 
 def hold_sentence(holds: int, sd_deg: float) -> str:
     return (
-        f"{holds} poses were held, {sd_deg:.1f} degrees (standard deviation) from the angles they are said to "
-        "have: each counts as one sample of that accuracy, however many frames it has."
+        f"{holds} poses were held, {sd_deg:.1f} degrees (standard deviation) from the angles they are said "
+        "to have: each counts as one sample of that accuracy, however many frames it has."
     )
 
 

@@ -93,7 +93,9 @@ def hold_sd_deg(samples: TaughtSamples) -> float:
     """
     squared, freedom = SEEN_BEFORE * REPEAT_SD_DEG**2, SEEN_BEFORE
     for rotation in samples.rotations:
-        readings, angles = samples.of_holds(rotation, (rotation,)) if _read(samples, rotation) else ([], [])
+        if not _read(samples, rotation):
+            continue
+        readings, angles = samples.of_holds(rotation, (rotation,))
         if len(angles) > LEAST_HOLDS and np.ptp(readings) > 0:
             line = np.polyfit(readings[:, 0], angles, 1)
             squared += float(np.sum((np.polyval(line, readings[:, 0]) - angles) ** 2))

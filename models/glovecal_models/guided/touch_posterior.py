@@ -3,9 +3,9 @@
 Inverse kinematics of single frames (``ik_samples.py``) cannot know whether a finger or the thumb was read
 wrong, so it divides the gap between them, and repeating it with a better calibration converges slowly. But a
 calibration errs in the same way in every frame: beliefs say how its errors go together, the touches of all
-frames and fingers are conditions on them, and one Gauss-Newton search (iterated Kalman update over all frames at once)
-finds the likeliest calibration under which every touch of the session closes. It is equation (6) of Wang &
-Neff 2013 over a session instead of a frame.
+frames and fingers are conditions on them, and one Gauss-Newton search (an iterated Kalman update) finds the
+likeliest calibration under which every touch of the session closes. It is equation (6) of Wang & Neff 2013
+over a session instead of a frame.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class TouchPosterior:
         return angle + sum(weight * self.angles(name, readings) for name, weight in follows.items())
 
     def variance(self, rotation: str, readings: np.ndarray) -> np.ndarray:
-        """(N,), degrees squared, of the calibration's error there; what a rule follows counts as independent."""
+        """(N,), degrees squared, of the calibration's error; what a rule follows counts as independent."""
         belief = self.beliefs[rotation]
         own = readings[:, self._columns(rotation)]
         variance = belief.variance(own)

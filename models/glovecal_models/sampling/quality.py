@@ -11,9 +11,9 @@ from glovecal_models.sampling.steadiness import STILL_PERCENT, ActiveRanges, mov
 from glovecal_models.sampling.step import Step
 
 MOVED_PERCENT = 25.0
-TOUCHING_PERCENT = 12.0
-"""Of a finger whose tip stays on the thumb's: ring and little finger of a usual hand get no further than 20 %."""
 """A sensor that had to move went at least so far."""
+TOUCHING_PERCENT = 12.0
+"""That of a finger whose tip stays on the thumb's: ring and little finger get no further than 20 %."""
 JUMP_PERCENT = 12.0
 FASTEST_PERCENT_S = 1500.0
 """A finger's hundred degrees in a fifteenth of a second: faster is no hand."""

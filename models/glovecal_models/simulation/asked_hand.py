@@ -1,8 +1,8 @@
 """A simulated person who does what a sampling protocol asks, as soon as it is asked.
 
 Poses are taken as far from the usual angles as people take them (2.5 degrees), widgets hold exactly, and
-nothing is ever quite still. With ``RealTouches`` the tips of a touch are on each other. Without, they are near
-each other: this hand has no skin, so its touches serve the protocol and not the inverse kinematics.
+nothing is ever quite still. With ``RealTouches`` the tips of a touch are on each other. Without, they are
+near each other: this hand has no skin, so its touches serve the protocol and not the inverse kinematics.
 """
 
 from __future__ import annotations

@@ -6,13 +6,14 @@ Its tips touch by the person's own rules for joints that no sensor reads, not by
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.forward_kinematics import forward_kinematics
-from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS
+from glovecal_models.hand.rotations import FINGERS
 from glovecal_models.hand.skeleton import Skeleton
+from glovecal_models.inverse_kinematics.tip_chains import TipChains
 from glovecal_models.simulation.hand_motion import Unrest, posture_vector, within_range
 from glovecal_models.simulation.postures import POSTURES
 from glovecal_models.simulation.protocol import GAPS, Segment
@@ -109,6 +110,14 @@ class _Tips:
     finger: str
     rod_mm: float
 
+    @cached_property
+    def chains(self) -> TipChains:
+        return TipChains(self.skeleton, ("T", self.finger))
+
+    @cached_property
+    def _columns(self) -> list[int]:
+        return [ROTATIONS.index(name) for name in self.chains.rotations]
+
     @property
     def moving(self) -> list[int]:
         """Columns of ``DRIVEN``."""
@@ -118,9 +127,8 @@ class _Tips:
     def gap_mm(self, driven: np.ndarray) -> np.ndarray:
         """What is to go from where the finger should be to the tip of the thumb, (N, 3)."""
         angles = self.hand.complete(dict(zip(DRIVEN, driven.T, strict=True)))
-        columns = [ROTATIONS.index(name) for name in HAND_ROTATIONS]
-        tips = forward_kinematics(self.skeleton, angles[:, columns]).tips_mm
-        apart = tips[:, 0] - tips[:, list(FINGERS).index(self.finger)]
+        thumb, finger = self.chains.tips_mm(angles[:, self._columns]).transpose(1, 0, 2)
+        apart = thumb - finger
         if not self.rod_mm:
             return apart
         return apart * (1 - self.rod_mm / np.linalg.norm(apart, axis=1, keepdims=True))
@@ -128,21 +136,22 @@ class _Tips:
 
 def _brought_together(table: np.ndarray, tips: _Tips) -> np.ndarray:
     """Each frame changed as little as it takes for the tips to touch; joints stay within their ranges."""
-    moving = tips.moving
+    moving, table = tips.moving, table.copy()
     gap = tips.gap_mm(table)
     for _ in range(MOST_STEPS):
-        slopes = np.empty((len(table), 3, len(moving)))
-        for place, column in enumerate(moving):
-            ahead = table.copy()
-            ahead[:, column] += SLOPE_STEP_DEG
-            slopes[:, :, place] = (tips.gap_mm(ahead) - gap) / SLOPE_STEP_DEG
-        step = -(np.linalg.pinv(slopes, rcond=SINGULAR) @ gap[:, :, None])[:, :, 0]
-        table = table.copy()
-        table[:, moving] += np.clip(step, -LONGEST_STEP_DEG, LONGEST_STEP_DEG)
-        table = within_range(table)
-        gap = tips.gap_mm(table)
-        if np.abs(gap).max() < TOUCHING_MM:
+        apart = np.flatnonzero(np.abs(gap).max(axis=1) >= TOUCHING_MM)
+        if not len(apart):
             return table
+        now = table[apart]
+        slopes = np.empty((len(apart), 3, len(moving)))
+        for place, column in enumerate(moving):
+            ahead = now.copy()
+            ahead[:, column] += SLOPE_STEP_DEG
+            slopes[:, :, place] = (tips.gap_mm(ahead) - gap[apart]) / SLOPE_STEP_DEG
+        step = -(np.linalg.pinv(slopes, rcond=SINGULAR) @ gap[apart][:, :, None])[:, :, 0]
+        now[:, moving] += np.clip(step, -LONGEST_STEP_DEG, LONGEST_STEP_DEG)
+        table[apart] = within_range(now)
+        gap[apart] = tips.gap_mm(table[apart])
     furthest = np.linalg.norm(gap, axis=1).max()
     raise BadInput(
         f"thumb and {FINGERS[tips.finger]} of this hand cannot stay together: {furthest:.1f} mm are between "
