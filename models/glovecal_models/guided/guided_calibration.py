@@ -11,6 +11,7 @@ from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
 from glovecal_models.errors import NotTrainable
 from glovecal_models.guided.guided_lessons import GuidedLessons, guided_lessons, known_of
+from glovecal_models.guided.left_out import LeftOut
 from glovecal_models.guided.second_pass import SampleCount, counted, with_live_noise
 from glovecal_models.guided.seen_touches import RefusedTouch
 from glovecal_models.guided.taught_samples import taught_samples
@@ -74,20 +75,24 @@ def guided_calibration(
 
 
 def finished(lessons: GuidedLessons, model: CalibrationModel, layout: Layout) -> GuidedCalibration:
-    """``model``, trained on the lessons' takes, claiming what a live frame is off by. Its error estimate is
-    that of ``left_out.py``: what the takes' angles were inferred from says nothing of errors."""
+    """``model``, trained on the lessons' takes, claiming what a live frame is off by.
+
+    Without an error estimate of its own it gets that of ``left_out.py``.
+    """
     model = with_live_noise(replace(model, layout=layout), lessons.lessons, lessons.posterior)
-    errors, rmse_deg = lessons.without.widget_rmse_deg, lessons.without.rmse_deg
-    estimate: dict[str, Any] = {"how": HELD_OUT, "folds": 0, "touch_mm": lessons.without.touch_mm}
-    model = replace(
-        model,
-        rotations=tuple(
-            replace(item, held_out_rmse_deg=errors.get(item.rotation)) for item in model.rotations
-        ),
-        error_estimate=estimate if rmse_deg is None else estimate | {"rmse_deg": rmse_deg},
-    )
+    if "rmse_deg" not in model.error_estimate:
+        model = _with_estimate(model, lessons.without)
     samples = counted(lessons.lessons, lessons.told)
     return GuidedCalibration(model, samples, lessons.refused, lessons.sentences)
+
+
+def _with_estimate(model: CalibrationModel, without: LeftOut) -> CalibrationModel:
+    estimate: dict[str, Any] = {"how": HELD_OUT, "folds": 0, "touch_mm": without.touch_mm}
+    if without.rmse_deg is not None:
+        estimate["rmse_deg"] = without.rmse_deg
+    errors = without.widget_rmse_deg
+    rotations = (replace(item, held_out_rmse_deg=errors.get(item.rotation)) for item in model.rotations)
+    return replace(model, rotations=tuple(rotations), error_estimate=estimate)
 
 
 def _plain(

@@ -9,7 +9,7 @@ angles the first calibration is the sensors' range put on the joints' (section 5
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -65,7 +65,7 @@ def guided_lessons(
     say = report or (lambda sentence, fraction: None)
     for taught in takes:
         require_layout(taught.take, layout)
-    used = [_in_order(taught, layout) for taught in takes]
+    used = [taught.in_order(layout) for taught in takes]
     known, touching = known_of(used), [taught for taught in used if taught.contacts]
     say("what the poses and widgets tell", 0.0)
     samples, ranges, first = _first_pass(used, layout)
@@ -104,14 +104,6 @@ def _first_pass(used: Sequence[TaughtTake], layout: Layout) -> tuple[TaughtSampl
     ranges = reading_ranges(layout.sensors, readings)
     beliefs = first_beliefs(layout, samples, ranges)
     return samples, ranges, TouchPosterior(beliefs, layout.sensors, None, ())
-
-
-def _in_order(taught: TaughtTake, layout: Layout) -> TaughtTake:
-    """The layout's sensors alone, in its order."""
-    take = taught.take
-    columns = [take.sensors.index(name) for name in layout.sensors]
-    ordered = replace(take, sensors=layout.sensors, readings=take.readings[:, columns])
-    return replace(taught, take=ordered)
 
 
 def _stop_if(cancelled: Callable[[], bool] | None) -> None:

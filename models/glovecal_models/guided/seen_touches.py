@@ -17,7 +17,12 @@ from glovecal_models.inverse_kinematics.follow import follow
 from glovecal_models.inverse_kinematics.predicted_hand import PredictedHand
 from glovecal_models.inverse_kinematics.steadied import steadied
 from glovecal_models.inverse_kinematics.tip_chains import TipChains
-from glovecal_models.inverse_kinematics.touch_check import judged, require_happened, require_possible
+from glovecal_models.inverse_kinematics.touch_check import (
+    TouchNotSeen,
+    judged,
+    require_happened,
+    require_possible,
+)
 from glovecal_models.takes.take import Take
 
 LOOKED_AT = 60
@@ -50,6 +55,8 @@ class RefusedTouch:
     take: str
     pose: str
     reason: str
+    brief: str
+    """The same in few words."""
 
 
 def seen_touches(
@@ -63,7 +70,8 @@ def seen_touches(
             try:
                 seen.append(_seen(taught, pose, contact, first, skeleton))
             except BadInput as error:
-                refused.append(RefusedTouch(taught.take.name, pose, str(error)))
+                brief = error.brief if isinstance(error, TouchNotSeen) else f"{error}."
+                refused.append(RefusedTouch(taught.take.name, pose, str(error), brief))
     return seen, refused
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from glovecal_models.inverse_kinematics.contact import Rod, Touch
+from glovecal_models.layout import Layout
 from glovecal_models.sampling.sampled_takes import SampledTake
 from glovecal_models.sampling.step import Kind
 from glovecal_models.takes.take import Take
@@ -30,14 +31,19 @@ class TaughtTake:
     @classmethod
     def from_document(cls, take: Take, document: Mapping[str, Any]) -> TaughtTake:
         """``document``: as ``SampledTake.to_document`` makes it. Raises BadInput for an impossible rod."""
-        contacts: dict[str, Touch | Rod] = {}
-        for step in document["steps"]:
-            if step["touches"]:
-                first, second = step["touches"]
-                length = step["rod_mm"]
-                tips = (first, second)
-                contacts[step["pose"]] = Touch(tips) if length is None else Rod(tips, float(length))
+        contacts = {
+            step["pose"]: contact_of(step["touches"], step["rod_mm"])
+            for step in document["steps"]
+            if step["touches"]
+        }
         return cls(take, document["kind"], contacts)
+
+    def in_order(self, layout: Layout) -> TaughtTake:
+        """With the layout's sensors alone, in its order; the take has them all."""
+        take = self.take
+        columns = [take.sensors.index(name) for name in layout.sensors]
+        ordered = replace(take, sensors=layout.sensors, readings=take.readings[:, columns])
+        return replace(self, take=ordered)
 
     def frames(self, pose: str) -> np.ndarray:
         """Rows of the take that are named ``pose``, lead-in left out."""
@@ -53,3 +59,10 @@ class TaughtTake:
             return []
         changes = (np.diff(rows) > 1) | (np.nan_to_num(np.diff(known[rows], axis=0)) != 0).any(axis=1)
         return np.split(rows, np.flatnonzero(changes) + 1)
+
+
+def contact_of(touches: Sequence[str], rod_mm: float | None) -> Touch | Rod:
+    """What the tips of a step do. Raises BadInput for a rod that nobody can hold."""
+    first, second = touches
+    tips = (first, second)
+    return Touch(tips) if rod_mm is None else Rod(tips, float(rod_mm))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 
@@ -14,9 +15,17 @@ from glovecal_models.sampling.steadiness import ActiveRanges, block_means
 from glovecal_models.sampling.step import Step
 from glovecal_models.sampling.widget_check import inconsistent_widgets, response
 
-TouchCheck = Callable[[SamplingState, Step, Sequence[GloveReading]], str | None]
-"""Why the fingertips of a step did not touch, in a sentence, or None: inverse kinematics can tell. It is
-given the state before the verdict, with what is known from the steps before."""
+
+class TouchCheck(Protocol):
+    """Inverse kinematics can tell whether fingertips touched; ``state`` is that before the verdict."""
+
+    def learn(self, state: SamplingState, step: Step, readings: Sequence[GloveReading]) -> None:
+        """Take in the frames of a good step."""
+        ...
+
+    def why_not(self, state: SamplingState, step: Step, readings: Sequence[GloveReading]) -> str | None:
+        """Why the fingertips of a step did not touch, in a sentence."""
+        ...
 
 
 def verdict(
@@ -44,6 +53,8 @@ def verdict(
         _widen(ranges, readings)
         attempt.reasons = _contradictions(state, readings, ranges, attempt, touch_check)
     attempt.outcome = "bad" if attempt.reasons else "good"
+    if touch_check is not None and attempt.outcome == "good":
+        touch_check.learn(state, step, readings)
     return attempt
 
 
@@ -65,7 +76,7 @@ def _contradictions(
         (rotation,) = step.angles
         sentence = inconsistent_widgets(rotation, _responses(state, rotation, attempt))
     elif step.touches and touch_check is not None:
-        sentence = touch_check(state, step, readings)
+        sentence = touch_check.why_not(state, step, readings)
     return (sentence,) if sentence else ()
 
 

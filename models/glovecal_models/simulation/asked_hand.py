@@ -1,7 +1,7 @@
 """A simulated person who does what a sampling protocol asks, as soon as it is asked.
 
 Poses are taken as far from the usual angles as people take them (2.5 degrees), widgets hold exactly, and
-nothing is ever quite still. With ``RealTouches`` the tips of a touch are on each other. Without, they are
+nothing is ever quite still. With ``Touches`` the tips of a touch are on each other. Without, they are
 near each other: this hand has no skin, so its touches serve the protocol and not the inverse kinematics.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from glovecal_models.sampling.step import Step
-from glovecal_models.simulation.asked_touch import RealTouches
+from glovecal_models.simulation.asked_touch import Touches
 from glovecal_models.simulation.hand_motion import (
     HandMotion,
     PostureSequence,
@@ -44,7 +44,7 @@ _SPEEDS_HZ = (0.5, 1.2)
 class AskedHand:
     """The hand's driven rotations as a function of time that only goes on."""
 
-    def __init__(self, seed: int, touches: RealTouches | None = None) -> None:
+    def __init__(self, seed: int, touches: Touches | None = None) -> None:
         self._touches = touches
         self._random = np.random.default_rng([seed, 41])
         self._unrest = Unrest(np.random.default_rng([seed, 42]))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -15,6 +16,12 @@ from glovecal_models.simulation.touching import touching_segment
 TOUCHING_S = 8.0
 EAGERNESS = 2.0
 """A person who is asked to move does so more than one who is left to it."""
+
+
+class Touches(Protocol):
+    def motion(self, step: Step, seed: int) -> HandMotion:
+        """Of a step that names the tips that touch."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -36,6 +43,23 @@ class RealTouches:
             eagerness=EAGERNESS,
         )
         return _ToAndFro(touching.motion)
+
+
+@dataclass(frozen=True)
+class PreparedTouches:
+    """Touches worked out beforehand: who simulates a live glove has no second to spare between two frames."""
+
+    touches: RealTouches
+    seed: int
+    _motions: dict[str, HandMotion] = field(default_factory=dict)
+
+    def prepare(self, step: Step) -> None:
+        """From any thread. Raises BadInput where this hand cannot."""
+        if step.touches and step.name not in self._motions:
+            self._motions[step.name] = self.touches.motion(step, self.seed)
+
+    def motion(self, step: Step, seed: int) -> HandMotion:
+        return self._motions[step.name]
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from glovecal_client.wire.frame import Frame
 from glovecal_models.sampling.engine import Sampling
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.state import OVER, SamplingState
+from glovecal_models.sampling.verdict import TouchCheck
 from glovecal_service.realtime.arrivals import Arrivals
 from glovecal_service.realtime.recording_file import decoded
 from glovecal_service.store.errors import Conflict
@@ -36,11 +37,12 @@ class LiveSampling:
         session: zenoh.Session,
         keys: GloveKeys,
         record: SamplingRecord,
+        touch_check: TouchCheck | None = None,
         clock: Callable[[], float] = time.time,
     ) -> None:
         self.record = record
         self._clock = clock
-        self._sampling = Sampling(SamplingState.from_document(record.document))
+        self._sampling = Sampling(SamplingState.from_document(record.document), touch_check=touch_check)
         self._sampling.recording = None
         self._saved = self._mark()
         self._sampling.interrupted(clock())

@@ -13,6 +13,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from glovecal_client.errors import ClientError
 from glovecal_client.keys import GloveKeys
 from glovecal_models.errors import GlovecalError
+from glovecal_models.guided.touch_watch import TouchWatch
 from glovecal_service.realtime.live_sampling import LiveSampling
 from glovecal_service.realtime.sampling_takes import keep_sampled_takes
 from glovecal_service.settings import Settings
@@ -74,7 +75,7 @@ class SamplingRunner:
                     self._live[id].follow(record)
                 else:
                     keys = GloveKeys(self._site, record.glove)
-                    self._live[id] = LiveSampling(self._session, keys, record)
+                    self._live[id] = LiveSampling(self._session, keys, record, _touch_watch(store, record))
             except (GlovecalError, ClientError, KeyError, TypeError, ValueError) as error:
                 self._give_up(store, record, f"the sampling cannot go on: {error}")
         self._revision = revision
@@ -105,3 +106,9 @@ class SamplingRunner:
         live = self._live.pop(record.id, None)
         if live is not None:
             live.close()
+
+
+def _touch_watch(store: Store, record: SamplingRecord) -> TouchWatch | None:
+    """None where nobody measured the subject's hand: then no touch can be judged."""
+    subject = store.subjects.get(record.subject)
+    return TouchWatch(store.layouts.get(record.layout), subject.skeleton()) if subject.dimensions else None

@@ -94,6 +94,16 @@ class TakeRecord:
     def has_reference(self) -> bool:
         return self.reference_rows > 0 and bool(self.rotations)
 
+    @property
+    def sampling(self) -> dict[str, Any] | None:
+        """What a guided sampling asked for in this take; None when it is of none."""
+        return (self.accounting or {}).get("sampling")
+
+    @property
+    def teaches(self) -> bool:
+        """Whether a calibration can learn from it: from angles, or from fingertips that touched."""
+        return self.has_reference or (self.sampling or {}).get("kind") == "ik"
+
 
 @dataclass(frozen=True)
 class ModelRecord:
