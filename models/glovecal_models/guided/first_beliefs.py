@@ -36,8 +36,6 @@ RULE_OFFSET_DEG, RULE_SLOPE_DEG, RULE_BOW_DEG = 1.0, 5.0, 2.0
 RANGE_SLOPE_DEG = 15.0
 """How far a joint's range on this hand is from the usual."""
 MOST_SAMPLES = 300
-LEAST_MOVED = 40
-"""Frames of widgets that carry a process."""
 
 
 def first_beliefs(
@@ -47,7 +45,7 @@ def first_beliefs(
     only: Iterable[str] | None = None,
 ) -> dict[str, RotationBelief]:
     """Of every rotation that the hand has or the layout reads, or ``only`` of these."""
-    held_sd = hold_sd_deg(samples)
+    held_sd = hold_sd_deg(samples, layout)
     taught = (name for name in layout.rotations if name in samples.rotations)
     names = dict.fromkeys([*HAND_ROTATIONS, *taught] if only is None else only)
     return {name: _belief(name, layout, samples, ranges, held_sd) for name in names}

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.guided.guided_calibration import BASELINES, finished
-from glovecal_models.guided.guided_lessons import GuidedLessons, guided_lessons
+from glovecal_models.guided.guided_calibration import BASELINES, GuidedSamples, guided_samples
 from glovecal_models.guided.taught_take import TaughtTake
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
@@ -23,8 +22,7 @@ class TrainingTakes:
     """How rotations are read in training."""
     settings: TrainingSettings
     sentences: tuple[str, ...] = ()
-    _lessons: GuidedLessons | None = None
-    _layout: Layout | None = None
+    _guided: GuidedSamples | None = None
 
     @classmethod
     def of(
@@ -51,18 +49,16 @@ class TrainingTakes:
             TaughtTake.from_document(store.takes.load(record.id), record.sampling or {}) for record in sampled
         ]
         measured = subject.skeleton() if subject.dimensions else None
-        lessons = guided_lessons(taught, layout, measured)
-        said = [*lessons.sentences]
+        guided = guided_samples(taught, layout, measured)
+        said = [*guided.sentences]
         if measured is None and any(each.contacts for each in taught):
             said.append(
                 f"Touches are not used: nobody measured {subject.name}'s hand. Its length is enough: "
                 f"glovecal subject measure {subject.name} --hand-length-mm 190"
             )
         settings = settings if plain else replace(settings, folds=0)
-        return cls((*lessons.takes, *plain), lessons.layout, settings, tuple(said), lessons, layout)
+        return cls((*guided.takes, *plain), guided.layout, settings, tuple(said), guided)
 
     def finished(self, model: CalibrationModel) -> CalibrationModel:
         """``model`` as it is kept."""
-        if self._lessons is None or self._layout is None:
-            return model
-        return finished(self._lessons, model, self._layout).model
+        return model if self._guided is None else self._guided.finished(model)

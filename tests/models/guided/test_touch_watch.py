@@ -52,5 +52,5 @@ def test_a_touch_that_no_such_hand_can_do_is_refused_at_the_start() -> None:
     protocol = make_protocol("ik_only", SimulatedGlove(4).layout)
     require_possible_touches(protocol, hand_skeleton())
     sizes = {"hand_length": 182, "hand_breadth": 140, "T_metacarpal": 24, "T_proximal": 19, "T_distal": 15}
-    with pytest.raises(BadInput, match="step touch-.: a touch of thumb and .* is impossible for this hand"):
+    with pytest.raises(BadInput, match=r"step touch-.: a touch of thumb and .* is impossible for this hand"):
         require_possible_touches(protocol, hand_skeleton(HandDimensions.from_measured(sizes)))
