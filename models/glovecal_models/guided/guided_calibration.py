@@ -65,6 +65,11 @@ class GuidedSamples:
     """The likeliest calibration before any training."""
     without: LeftOut
 
+    def training(self, settings: TrainingSettings) -> TrainingSettings:
+        """How to train on ``takes``: without folds, since inferred angles tell nothing of errors, and with
+        every frame counting in full, since there is no noise in them that neighbours could share."""
+        return replace(settings, folds=0, weigh_frames=False)
+
     def finished(self, model: CalibrationModel) -> CalibrationModel:
         """A ``model`` trained on ``takes`` by ``layout``, as it is to be kept.
 
@@ -176,7 +181,7 @@ def guided_calibration(
 
     found = guided_samples(takes, layout, skeleton, cancelled=cancelled, report=first)
     model = found.finished(
-        train(found.takes, found.layout, subject, replace(settings, folds=0), report=then, **how)
+        train(found.takes, found.layout, subject, found.training(settings), report=then, **how)
     )
     say("trained", 1.0)
     return GuidedCalibration(model, found.samples, found.refused, found.sentences)
