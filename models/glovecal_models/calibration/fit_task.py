@@ -86,9 +86,7 @@ def _fit(task: FitTask, cancelled: Callable[[], bool] | None, report: Report | N
     if settings.method == "linear":
         return fit_linear(task.inputs, task.target, sensor_names=task.sensors, cancelled=cancelled)
     samples = Recorded(task.inputs, task.target, task.take, task.position)
-    start = fit_weighted(
-        samples, seed=settings.seed, tries=settings.weigh_frames, cancelled=cancelled, report=report
-    )
+    start = fit_weighted(samples, seed=settings.seed, cancelled=cancelled, report=report)
     if settings.method == "lmc_gpr":
         return start.regressor
     sparse = fit_spgp(

@@ -60,11 +60,10 @@ def fit_weighted(
     samples: Recorded,
     *,
     seed: int = 0,
-    tries: bool = True,
     cancelled: Callable[[], bool] | None = None,
     report: Callable[[str, float], None] | None = None,
 ) -> Weighted:
-    """The LMC-GPR of ``samples``, each counting what serves takes left out best; 1 unless it ``tries``.
+    """The LMC-GPR of ``samples``, each counting what serves takes left out best.
 
     The regressor's evidence tells ``independent_share``, ``degrees_of_freedom`` and, where weights were
     tried, ``held_out_rmse_deg`` of each. Raises NotTrainable, Cancelled.
@@ -74,7 +73,7 @@ def fit_weighted(
     share = independent_share(samples.target - fitted.mean, samples.take, samples.position)
     freedom = float(np.minimum(fitted.variance / max(whole.noise_variance, 1e-12), 1.0).sum())
     evidence: dict[str, Any] = {"independent_share": share, "degrees_of_freedom": freedom}
-    if not tries or freedom <= CROWDED * share * len(samples.target):
+    if freedom <= CROWDED * share * len(samples.target):
         return Weighted(_with(whole, evidence), 1.0, evidence)
     if report:
         report("neighbouring frames err alike: trying on takes left out how much each shall count", 0.5)

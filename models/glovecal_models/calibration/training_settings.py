@@ -28,8 +28,6 @@ class TrainingSettings:
     pseudo_inputs: int = 100
     iterations: int = 200
     seed: int = 0
-    weigh_frames: bool = True
-    """Whether it is tried on takes left out how much neighbouring frames count (``sample_weight.py``)."""
 
     def __post_init__(self) -> None:
         if self.folds < 0 or self.folds == 1:

@@ -28,7 +28,7 @@ from glovecal_models.guided.second_pass import (
     known_lessons,
     taught_layout,
     touch_lessons,
-    with_live_noise,
+    with_open_variance,
 )
 from glovecal_models.guided.seen_touches import RefusedTouch, SeenTouch, seen_touches
 from glovecal_models.guided.sentences import guided_sentences, hold_sentence, nothing_left
@@ -65,17 +65,12 @@ class GuidedSamples:
     """The likeliest calibration before any training."""
     without: LeftOut
 
-    def training(self, settings: TrainingSettings) -> TrainingSettings:
-        """How to train on ``takes``: without folds, since inferred angles tell nothing of errors, and with
-        every frame counting in full, since there is no noise in them that neighbours could share."""
-        return replace(settings, folds=0, weigh_frames=False)
-
     def finished(self, model: CalibrationModel) -> CalibrationModel:
         """A ``model`` trained on ``takes`` by ``layout``, as it is to be kept.
 
         Where it has no error estimate it gets that of ``left_out.py``.
         """
-        model = with_live_noise(replace(model, layout=self.glove_layout), self.lessons, self.posterior)
+        model = with_open_variance(replace(model, layout=self.glove_layout), self.lessons, self.posterior)
         return model if "rmse_deg" in model.error_estimate else self._with_estimate(model)
 
     def _with_estimate(self, model: CalibrationModel) -> CalibrationModel:
@@ -113,7 +108,7 @@ def guided_samples(
     if not known and not touching:
         raise NotTrainable(nothing_left(skeleton is not None, 0, ()))
     say("what poses and widgets tell", 0.0)
-    samples = taught_samples(known)
+    samples = taught_samples(used)
     readings = np.concatenate([taught.take.readings[taught.take.lead_in_frames :] for taught in used])
     ranges = reading_ranges(layout.sensors, readings)
     beliefs = first_beliefs(layout, samples, ranges)
@@ -181,7 +176,7 @@ def guided_calibration(
 
     found = guided_samples(takes, layout, skeleton, cancelled=cancelled, report=first)
     model = found.finished(
-        train(found.takes, found.layout, subject, found.training(settings), report=then, **how)
+        train(found.takes, found.layout, subject, replace(settings, folds=0), report=then, **how)
     )
     say("trained", 1.0)
     return GuidedCalibration(model, found.samples, found.refused, found.sentences)

@@ -103,9 +103,9 @@ def _choose(
     service.get(f"/subjects/{subject}")
     rows = service.get("/takes", {"subject": subject})
     without = {row["id"] for row in find_takes(rows, left_out)}
-    chosen = find_takes(rows, wanted) or [row for row in rows if _teaches(row)]
+    chosen = find_takes(rows, wanted) or [row for row in rows if row["teaches"]]
     for row in chosen:
-        if not _teaches(row):
+        if not row["teaches"]:
             raise Refusal(
                 f"take {row['name']} ({row['id']}) has no reference angles; attach some with "
                 f"glovecal take reference {row['id']} FILE"
@@ -122,9 +122,3 @@ def _choose(
             "glovecal take import"
         )
     return [row["id"] for row in chosen], layouts[0]
-
-
-def _teaches(row: dict[str, Any]) -> bool:
-    """Whether angles were measured in the take, or fingertips kept together in a guided sampling."""
-    sampled = (row["accounting"] or {}).get("sampling") or {}
-    return bool(row["rotations"]) or sampled.get("kind") == "ik"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training_settings import TrainingSettings
@@ -56,7 +56,7 @@ class TrainingTakes:
                 f"Touches are not used: nobody measured {subject.name}'s hand. Its length is enough: "
                 f"glovecal subject measure {subject.name} --hand-length-mm 190"
             )
-        settings = settings if plain else guided.training(settings)
+        settings = settings if plain else replace(settings, folds=0)
         return cls((*guided.takes, *plain), guided.layout, settings, tuple(said), guided)
 
     def finished(self, model: CalibrationModel) -> CalibrationModel:
