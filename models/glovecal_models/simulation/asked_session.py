@@ -9,6 +9,7 @@ import numpy as np
 
 from glovecal_models.errors import BadInput
 from glovecal_models.sampling.engine import Sampling, TouchCheck, begin_sampling
+from glovecal_models.sampling.growing import Choose
 from glovecal_models.sampling.protocol import Protocol
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.state import OVER, SamplingState
@@ -42,13 +43,14 @@ def asked_session(
     rate_hz: float = 60.0,
     disturb: Disturb | None = None,
     touch_check: TouchCheck | None = None,
+    choose: Choose | None = None,
     does: Callable[[Step], Step] = lambda step: step,
     patience: int = 3,
 ) -> AskedSession:
     """Run the protocol on its timer. A step that is bad ``patience`` times is left out. Raises BadInput when
     it does not come to an end. ``does``: what the person does who is asked for a step."""
     state = begin_sampling(protocol, glove.sensors, trigger="timer", counts=glove.layout.counts)
-    sampling = Sampling(state, touch_check=touch_check)
+    sampling = Sampling(state, touch_check=touch_check, choose=choose)
     sampling.recording = RECORDING
     hand, random = AskedHand(seed), np.random.default_rng([seed, 43, glove.wearing])
     order = [ROTATIONS.index(rotation) for rotation in glove.rotations]
