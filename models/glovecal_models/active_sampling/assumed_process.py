@@ -23,12 +23,19 @@ USUAL_RANGE_DEG = 90.0
 LEVEL_SD_DEG = 60.0
 OWN_SLOPE, OTHER_SLOPE = 2.0, 1.5
 """Standard deviation of the slopes, in rotation ranges per sensor range."""
-BEND_ALONE, BEND_COUPLED = 0.04, 0.15
+BEND_ALONE, BEND_COUPLED = 0.06, 0.15
 """How far from straight, as a share of the rotation's range: read from one sensor, or from several."""
 LEAST_BEND_DEG = 6.0
 """Of a coupled rotation; an abduction's own range is small beside what its neighbours do to it."""
 OWN_LENGTH, OTHER_LENGTH = 0.35, 0.7
 """Lengthscales of that bend, in ranges of the sensor."""
+TYPICAL: dict[str, tuple[float, float, float]] = {
+    **dict.fromkeys(("IM_ABD", "MR_ABD", "RP_ABD"), (40.0, 0.8, 0.9)),
+    "TI_ABD": (10.0, 0.6, 0.7),
+    "W_FLEX": (20.0, 0.3, 0.25),
+    "W_ABD": (8.0, 0.3, 0.25),
+}
+"""Bend in degrees and its lengthscales along the own sensor and the others, of CyberGloves' coupled sensors."""
 NOISE_SD_DEG = 1.3
 """Of a frame: a CyberGlove's reading noise (Kessler et al. 1995: 1.1) and steps of 8 bits."""
 LEAST_NOISE_DEG = 0.5
@@ -100,10 +107,12 @@ def assumed_process(
 
 def _usual_bend(correspondence: Correspondence, range_deg: float) -> tuple[float, np.ndarray]:
     """Logarithms of the bend's variance and of each input's relevance."""
-    lengths = np.full(len(correspondence.inputs), OTHER_LENGTH)
-    lengths[_own(correspondence)] = OWN_LENGTH
-    alone = len(lengths) == 1
-    bend = BEND_ALONE * range_deg if alone else max(BEND_COUPLED * range_deg, LEAST_BEND_DEG)
+    bend = max(BEND_COUPLED * range_deg, LEAST_BEND_DEG)
+    if len(correspondence.inputs) == 1:
+        bend = BEND_ALONE * range_deg
+    bend, own, other = TYPICAL.get(correspondence.rotation, (bend, OWN_LENGTH, OTHER_LENGTH))
+    lengths = np.full(len(correspondence.inputs), other)
+    lengths[_own(correspondence)] = own
     return 2 * float(np.log(bend)), -2 * np.log(lengths)
 
 

@@ -18,7 +18,7 @@ POSE_SD_DEG = REPEAT_SD_DEG
 WIDGET_SD_DEG = 1.0
 """How well a widget holds its angle, the same in all frames of a step."""
 ALIKE_FRAMES = 10
-"""So many neighbouring frames of a continuous reference tell as much as one sample."""
+"""So many neighbouring frames tell as much as one sample: they read nearly the same, and err alike."""
 FREE_ROWS, DENSE_ROWS, MOTION_ROWS = 64, 200, 12
 """Most readings taken from all free motion, from one take with a continuous reference, from one step."""
 LEAST_FREE = 8
@@ -71,7 +71,7 @@ def known_from_state(state: SamplingState) -> KnownReadings:
             free.append(kept)
         elif step.angles:
             angles = {rotation: np.full(len(kept), deg) for rotation, deg in step.angles.items()}
-            blocks.append(KnownBlock(kept, angles, float(attempt.frames), shared_sd_deg(step)))
+            blocks.append(KnownBlock(kept, angles, attempt.frames / ALIKE_FRAMES, shared_sd_deg(step)))
     seen = np.concatenate(free)
     low, high = (seen.min(axis=0), seen.max(axis=0)) if len(seen) else (np.empty(0), np.empty(0))
     return KnownReadings(state.sensors, low, high, seen, tuple(blocks))
@@ -121,21 +121,17 @@ def _blocks(take: Take, sensors: tuple[str, ...]) -> list[KnownBlock]:
 
 def _dense(readings: np.ndarray, reference: np.ndarray, rows: np.ndarray, names: Sequence[str]) -> KnownBlock:
     chosen = rows[np.linspace(0, len(rows) - 1, min(len(rows), DENSE_ROWS)).round().astype(int)]
-    return KnownBlock(
-        readings[chosen], _angles(reference[chosen], names), max(1.0, len(rows) / ALIKE_FRAMES), 0.0
-    )
+    return KnownBlock(readings[chosen], _angles(reference[chosen], names), len(rows) / ALIKE_FRAMES, 0.0)
 
 
 def _step(readings: np.ndarray, reference: np.ndarray, run: np.ndarray, names: Sequence[str]) -> KnownBlock:
     """A widget holds one rotation, a pose several: then the hand is still and its mean reading counts."""
-    known = int(np.isfinite(reference[run[0]]).sum())
+    known, samples = int(np.isfinite(reference[run[0]]).sum()), len(run) / ALIKE_FRAMES
     if known > 1:
         mean = readings[run].mean(axis=0)[None]
-        return KnownBlock(mean, _angles(reference[run[:1]], names), float(len(run)), POSE_SD_DEG)
+        return KnownBlock(mean, _angles(reference[run[:1]], names), samples, POSE_SD_DEG)
     chosen = run[np.linspace(0, len(run) - 1, min(len(run), MOTION_ROWS)).round().astype(int)]
-    return KnownBlock(
-        readings[chosen], _angles(reference[chosen], names), float(len(run)), WIDGET_SD_DEG
-    )
+    return KnownBlock(readings[chosen], _angles(reference[chosen], names), samples, WIDGET_SD_DEG)
 
 
 def _angles(reference: np.ndarray, names: Sequence[str]) -> dict[str, np.ndarray]:

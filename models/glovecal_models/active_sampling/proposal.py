@@ -10,7 +10,12 @@ import numpy as np
 
 from glovecal_models.active_sampling.assumed_process import AssumedProcess, assumed_process
 from glovecal_models.active_sampling.expected_readings import ExpectedReadings
-from glovecal_models.active_sampling.known_readings import KnownBlock, KnownReadings, shared_sd_deg
+from glovecal_models.active_sampling.known_readings import (
+    ALIKE_FRAMES,
+    KnownBlock,
+    KnownReadings,
+    shared_sd_deg,
+)
 from glovecal_models.active_sampling.posterior_variance import PosteriorVariance, SampledPoints, step_errors
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Correspondence, Layout
@@ -160,7 +165,8 @@ def _fall(
 ) -> float:
     """Of the rotation's mean variance, degrees squared."""
     points = process.unit(expected.of(step, item))
-    errors = step_errors(len(points), step.seconds * rate_hz, process.noise_sd_deg, shared_sd_deg(step))
+    samples = step.seconds * rate_hz / ALIKE_FRAMES
+    errors = step_errors(len(points), samples, process.noise_sd_deg, shared_sd_deg(step))
     return float(state.fall(SampledPoints(points, errors)).mean())
 
 
