@@ -20,9 +20,8 @@ from glovecal_models.layout import Correspondence
 from glovecal_models.regression.process_regressor import ProcessRegressor
 
 USUAL_RANGE_DEG = 90.0
-LEVEL_SD_DEG = 60.0
-OWN_SLOPE, OTHER_SLOPE = 2.0, 1.5
-"""Standard deviation of the slopes, in rotation ranges per sensor range."""
+LEVEL, SLOPE = 1.0, 2.0
+"""Standard deviations of the level in rotation ranges, of slopes in these per range of a sensor."""
 BEND_ALONE, BEND_COUPLED = 0.06, 0.15
 """How far from straight, as a share of the rotation's range: read from one sensor, or from several."""
 LEAST_BEND_DEG = 6.0
@@ -30,12 +29,12 @@ LEAST_BEND_DEG = 6.0
 OWN_LENGTH, OTHER_LENGTH = 0.35, 0.7
 """Lengthscales of that bend, in ranges of the sensor."""
 TYPICAL: dict[str, tuple[float, float, float]] = {
-    **dict.fromkeys(("IM_ABD", "MR_ABD", "RP_ABD"), (40.0, 0.8, 0.9)),
+    **dict.fromkeys(("IM_ABD", "MR_ABD", "RP_ABD"), (80.0, 0.8, 0.9)),
     "TI_ABD": (10.0, 0.6, 0.7),
     "W_FLEX": (20.0, 0.3, 0.25),
     "W_ABD": (8.0, 0.3, 0.25),
 }
-"""Bend in degrees and its lengthscales along the own sensor and the others, of CyberGloves' coupled sensors."""
+"""Bend in degrees, its lengthscales along the own sensor and the others: coupled sensors of CyberGloves."""
 NOISE_SD_DEG = 1.3
 """Of a frame: a CyberGlove's reading noise (Kessler et al. 1995: 1.1) and steps of 8 bits."""
 LEAST_NOISE_DEG = 0.5
@@ -98,9 +97,7 @@ def assumed_process(
     else:
         bend, relevance = _usual_bend(correspondence, range_deg)
         noise_deg = NOISE_SD_DEG
-    slopes = np.full(len(span), OTHER_SLOPE * range_deg)
-    slopes[_own(correspondence)] = OWN_SLOPE * range_deg
-    line = 2 * np.log([*slopes, LEVEL_SD_DEG])
+    line = 2 * np.log(range_deg * np.array([*[SLOPE] * len(span), LEVEL]))
     theta = np.concatenate([line, [bend], relevance, [_NONE]])
     return AssumedProcess(correspondence, ends.mean(axis=0), span, theta, noise_deg, bool(learned))
 

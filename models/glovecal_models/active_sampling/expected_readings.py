@@ -53,7 +53,9 @@ class ExpectedReadings:
         if rotation not in self._learned:
             return
         weights = self._learned[rotation]
-        features = _features(_share(rotation, np.array([angles[rotation]])), unit[:, self._neighbours(rotation)])
+        features = _features(
+            _share(rotation, np.array([angles[rotation]])), unit[:, self._neighbours(rotation)]
+        )
         unit[:, self._known.sensors.index(rotation)] = np.clip(features @ weights, -FURTHEST, FURTHEST)
 
     def _neighbours(self, rotation: str) -> list[int]:

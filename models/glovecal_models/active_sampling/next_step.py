@@ -5,15 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from glovecal_models.active_sampling.candidates import candidate_steps
 from glovecal_models.active_sampling.known_readings import known_from_state
 from glovecal_models.active_sampling.proposal import Proposal, ProposedStep, gain_sentence, propose
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
-from glovecal_models.sampling.catalogue import Equipment
+from glovecal_models.sampling.catalogue import Equipment, steps_for_layout
 from glovecal_models.sampling.growing import NextSteps
 from glovecal_models.sampling.key_poses import verification_steps
-from glovecal_models.sampling.catalogue import steps_for_layout
 from glovecal_models.sampling.state import SamplingState
 from glovecal_models.sampling.step import Step
 
@@ -24,23 +25,26 @@ MOST_SKIPPED = 2
 
 
 class NextStep:
-    """``NextSteps`` of a sampling, from its state and nothing else; the answer to one state is one answer."""
+    """Chooses for a sampling from its state and nothing else, so that one state has one answer."""
 
-    def __init__(self, layout: Layout, equipment: Equipment | None = None) -> None:
-        self._layout, self._equipment = layout, equipment
+    def __init__(self, layout: Layout) -> None:
+        self._layout = layout
 
     def __call__(self, state: SamplingState) -> NextSteps:
-        left = still_possible(candidate_steps(self._layout, self._equipment), state)
+        equipment = Equipment.from_document(state.protocol.equipment)
+        left = still_possible(candidate_steps(self._layout, equipment), state)
         if state.capture_s >= LONGEST_CAPTURE_S:
             return self._ending(f"{state.capture_s:.0f} s of capture are the most that is asked for.")
         try:
             found = propose(self._layout, known_from_state(state), left)
-        except BadInput as error:
-            return self._ending(f"Nothing can be proposed: {error}.")
+        except (BadInput, np.linalg.LinAlgError) as error:
+            return self._ending(f"Nothing can be proposed: {error}")
         if found.is_enough:
             return self._ending(found.verdict(), found.to_document(most=0))
         best = found.ranked[0]
-        return NextSteps((_named_anew(best.step, state),), False, gain_sentence(best, found), told(found, best))
+        return NextSteps(
+            (_named_anew(best.step, state),), False, gain_sentence(best, found), told(found, best)
+        )
 
     def _ending(self, sentence: str, document: dict[str, Any] | None = None) -> NextSteps:
         last = tuple(steps_for_layout(verification_steps("end"), self._layout))

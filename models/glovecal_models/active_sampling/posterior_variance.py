@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import block_diag, cho_factor, cho_solve, solve_triangular
 
 from glovecal_models.active_sampling.assumed_process import AssumedProcess
 
@@ -45,14 +45,7 @@ class PosteriorVariance:
     def __init__(self, process: AssumedProcess, u: np.ndarray, sampled: Sequence[SampledPoints]) -> None:
         self._process, self._u = process, u
         self._points = np.concatenate([np.empty((0, u.shape[1])), *(each.points for each in sampled)])
-        matrix = process.between(self._points, self._points)
-        at = 0
-        for each in sampled:
-            rows = slice(at, at + len(each.points))
-            matrix[rows, rows] += each.errors
-            at = rows.stop
-        matrix[np.diag_indices(at)] += ROUNDING * matrix.diagonal().max(initial=0.0)
-        self._lower = np.linalg.cholesky(matrix) if at else matrix
+        self._lower = self._root([each.errors for each in sampled])
         self._white = self._whitened(u)
         self.variance = np.maximum(process.alone(u) - (self._white**2).sum(axis=0), 0.0)
         """At u, shape (U,), degrees squared, without the noise of a frame."""
@@ -64,8 +57,16 @@ class PosteriorVariance:
         inside = self._process.between(more.points, more.points) - white.T @ white + more.errors
         return np.einsum("um,mu->u", between, cho_solve(cho_factor(inside, lower=True), between.T))
 
-    def _whitened(self, points: np.ndarray) -> np.ndarray:
-        to_points = self._process.between(self._points, points)
+    def _root(self, errors: Sequence[np.ndarray]) -> np.ndarray:
+        """Lower root of K + N."""
         if not len(self._points):
-            return to_points
+            return np.empty((0, 0))
+        matrix = self._process.between(self._points, self._points) + block_diag(*errors)
+        matrix[np.diag_indices(len(matrix))] += ROUNDING * matrix.diagonal().max()
+        return np.linalg.cholesky(matrix)
+
+    def _whitened(self, points: np.ndarray) -> np.ndarray:
+        if not len(self._points):
+            return np.empty((0, len(points)))
+        to_points = self._process.between(self._points, points)
         return solve_triangular(self._lower, to_points, lower=True, check_finite=False)

@@ -24,7 +24,7 @@ from glovecal_models.sampling.protocol import step_capture_s
 from glovecal_models.sampling.step import Step
 
 ENOUGH_DEG = 0.02
-"""A step that lowers the expected error of a frame, noise included, by less than this is not worth its time."""
+"""A step that lowers the expected error of a frame, noise included, by less is not worth its time."""
 USUAL_RATE_HZ = 60.0
 
 
@@ -90,9 +90,7 @@ class Proposal:
 
 def gain_sentence(best: ProposedStep, proposal: Proposal) -> str:
     """What is expected of a step, in degrees."""
-    falls = sorted(
-        best.sd_after_deg, key=lambda name: best.sd_after_deg[name] - proposal.sd_deg[name]
-    )[:4]
+    falls = sorted(best.sd_after_deg, key=lambda name: best.sd_after_deg[name] - proposal.sd_deg[name])[:4]
     told = ", ".join(f"{name} {proposal.sd_deg[name]:.1f} to {best.sd_after_deg[name]:.1f}" for name in falls)
     return (
         f"Expected standard deviation in degrees: {told}; over all rotations "

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
@@ -36,6 +37,18 @@ class Equipment:
     """Measured angles by pose."""
     rod_mm: tuple[float, ...] = (ROD_MM,)
 
+    def to_document(self) -> dict[str, Any]:
+        return {
+            "widget_deg": {name: list(angles) for name, angles in self.widget_deg.items()},
+            "pose_deg": {name: dict(angles) for name, angles in self.pose_deg.items()},
+            "rod_mm": list(self.rod_mm),
+        }
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> Equipment:
+        """Inverse of ``to_document``; an empty document is the usual equipment."""
+        return cls(**({**document, "rod_mm": tuple(document["rod_mm"])} if document else {}))
+
 
 def make_protocol(name: str, layout: Layout, equipment: Equipment | None = None) -> Protocol:
     """One of ``PROTOCOLS``, without what the layout has no sensor or rotation for.
@@ -47,7 +60,7 @@ def make_protocol(name: str, layout: Layout, equipment: Equipment | None = None)
     _check(own)
     if name == "active":
         first = [_loosen(6.0), *verification_steps("start")]
-        return Protocol(name, tuple(steps_for_layout(first, layout)), grows=True)
+        return Protocol(name, tuple(steps_for_layout(first, layout)), True, own.to_document())
     independent = [*key_pose_steps(POSE_ROUNDS, own.pose_deg), *widget_steps(layout, own.widget_deg)]
     touching = [*touch_steps(), *(rod_step(length) for length in own.rod_mm)]
     steps: dict[str, list[Step]] = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from glovecal_models.errors import BadInput
@@ -27,6 +27,8 @@ class Protocol:
     steps: tuple[Step, ...]
     grows: bool = False
     """Further steps are chosen when these are done."""
+    equipment: Mapping[str, Any] = field(default_factory=dict)
+    """What the person has (``Equipment.to_document()``), for steps that are still to be chosen."""
 
     def __post_init__(self) -> None:
         names = [step.name for step in self.steps]
@@ -54,9 +56,11 @@ class Protocol:
 
     def to_document(self) -> dict[str, Any]:
         steps = [step.to_document() for step in self.steps]
-        return {"name": self.name, "steps": steps, "grows": self.grows}
+        document = {"name": self.name, "steps": steps, "grows": self.grows}
+        return document | {"equipment": dict(self.equipment)}
 
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> Protocol:
         steps = tuple(Step.from_document(step) for step in document["steps"])
-        return cls(document["name"], steps, bool(document.get("grows", False)))
+        grows, equipment = document.get("grows", False), document.get("equipment", {})
+        return cls(document["name"], steps, bool(grows), equipment)
