@@ -22,6 +22,8 @@ ALIKE_FRAMES = 10
 FREE_ROWS, DENSE_ROWS, MOTION_ROWS = 64, 200, 12
 """Most readings taken from all free motion, from one take with a continuous reference, from one step."""
 LEAST_FREE = 8
+FEW_FREE = 200
+"""Frames without reference; with fewer, those with one show better where a glove is used."""
 
 
 @dataclass(frozen=True)
@@ -82,15 +84,24 @@ def known_from_takes(
 ) -> KnownReadings:
     """From stored takes: a stretch with one constant angle is a step, any other reference is dense.
 
-    Free motion is every frame of ``takes`` and of ``more_free``, whether its angles are known or not.
+    Free motion are the frames without reference, of ``takes`` and of ``more_free``; where there are few of
+    them, all frames. Raises BadInput for takes with hardly any frames.
     """
     every = [_columns(take, sensors) for take in (*takes, *more_free)]
-    frames = np.concatenate(every) if every else np.empty((0, len(sensors)))
-    blocks = [block for take in takes for block in _blocks(take, sensors)]
-    if not len(frames):
-        return KnownReadings(sensors, np.empty(0), np.empty(0), frames)
-    low, high = np.quantile(frames, [0.005, 0.995], axis=0)
-    return KnownReadings(sensors, low, high, spread_rows(frames, FREE_ROWS), tuple(blocks))
+    frames = np.concatenate([np.empty((0, len(sensors))), *every])
+    unlabelled = np.concatenate([np.zeros(0, bool), *(_unlabelled(take) for take in (*takes, *more_free))])
+    blocks = tuple(block for take in takes for block in _blocks(take, sensors))
+    free = spread_rows(frames[unlabelled] if unlabelled.sum() >= FEW_FREE else frames, FREE_ROWS)
+    nothing = np.empty(0)
+    low, high = np.quantile(frames, [0.005, 0.995], axis=0) if len(frames) else (nothing, nothing)
+    return KnownReadings(sensors, low, high, free, blocks)
+
+
+def _unlabelled(take: Take) -> np.ndarray:
+    """Frames (N,) at which no angle is known."""
+    if not take.rotations:
+        return np.ones(len(take.time_s), bool)
+    return ~np.isfinite(take.reference_at_frames(take.rotations)).any(axis=1)
 
 
 def spread_rows(readings: np.ndarray, most: int) -> np.ndarray:

@@ -12,31 +12,15 @@ the fall over many u is the criterion of Cohn 1996).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import block_diag, cho_factor, cho_solve, solve_triangular
 
 from glovecal_models.active_sampling.assumed_process import AssumedProcess
+from glovecal_models.active_sampling.sampled_points import SampledPoints
 
 ROUNDING = 1e-9
 """Added to the diagonal, in parts of its largest entry."""
-
-
-@dataclass(frozen=True)
-class SampledPoints:
-    """Inputs of one step, in the process' units, and the covariance of their errors."""
-
-    points: np.ndarray
-    """Shape (m, D + 1)."""
-    errors: np.ndarray
-    """Shape (m, m), degrees squared."""
-
-
-def step_errors(rows: int, samples: float, noise_sd_deg: float, shared_sd_deg: float) -> np.ndarray:
-    """Error covariance (m, m) of ``rows`` that stand for ``samples`` and have one error in common."""
-    own = noise_sd_deg**2 * rows / max(samples, 1.0)
-    return own * np.eye(rows) + shared_sd_deg**2
 
 
 class PosteriorVariance:

@@ -12,11 +12,11 @@ from glovecal_models.active_sampling.assumed_process import AssumedProcess, assu
 from glovecal_models.active_sampling.expected_readings import ExpectedReadings
 from glovecal_models.active_sampling.known_readings import (
     ALIKE_FRAMES,
-    KnownBlock,
     KnownReadings,
     shared_sd_deg,
 )
-from glovecal_models.active_sampling.posterior_variance import PosteriorVariance, SampledPoints, step_errors
+from glovecal_models.active_sampling.posterior_variance import PosteriorVariance
+from glovecal_models.active_sampling.sampled_points import SampledPoints, sampled_points, step_errors
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.regression.process_regressor import ProcessRegressor
@@ -139,18 +139,8 @@ def _state(
 ) -> tuple[AssumedProcess, PosteriorVariance]:
     process = assumed_process(item, known.low, known.high, known.sensors, trained.get(item.rotation))
     u = process.unit(item.input_columns(known.free, known.sensors))
-    sampled = [_sampled(block, item, process, known.sensors) for block in known.blocks]
+    sampled = [sampled_points(block, item, process, known.sensors) for block in known.blocks]
     return process, PosteriorVariance(process, u, [each for each in sampled if len(each.points)])
-
-
-def _sampled(
-    block: KnownBlock, item: Correspondence, process: AssumedProcess, sensors: tuple[str, ...]
-) -> SampledPoints:
-    angle = block.angles.get(item.rotation)
-    rows = np.isfinite(angle) if angle is not None else np.zeros(len(block.readings), bool)
-    points = process.unit(item.input_columns(block.readings[rows], sensors))
-    samples = block.samples * rows.mean()
-    return SampledPoints(points, step_errors(len(points), samples, process.noise_sd_deg, block.shared_sd_deg))
 
 
 def _fall(
