@@ -101,7 +101,7 @@ def _unlabelled(take: Take) -> np.ndarray:
     """Frames (N,) at which no angle is known."""
     if not take.rotations:
         return np.ones(len(take.time_s), bool)
-    return ~np.isfinite(take.reference_at_frames(take.rotations)).any(axis=1)
+    return np.asarray(np.isnan(take.reference_at_frames(take.rotations)).all(axis=1))
 
 
 def spread_rows(readings: np.ndarray, most: int) -> np.ndarray:

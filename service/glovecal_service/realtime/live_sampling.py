@@ -10,10 +10,13 @@ import zenoh
 
 from glovecal_client.keys import GloveKeys
 from glovecal_client.wire.frame import Frame
+from glovecal_models.active_sampling.next_step import NextStep
+from glovecal_models.layout import Layout
 from glovecal_models.sampling.engine import Sampling
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.state import OVER, SamplingState
 from glovecal_service.realtime.arrivals import Arrivals
+from glovecal_service.realtime.chosen_apart import ChosenApart
 from glovecal_service.realtime.recording_file import decoded
 from glovecal_service.store.errors import Conflict
 from glovecal_service.store.records import RecordingRecord, SamplingRecord
@@ -36,11 +39,13 @@ class LiveSampling:
         session: zenoh.Session,
         keys: GloveKeys,
         record: SamplingRecord,
+        layout: Layout,
         clock: Callable[[], float] = time.time,
     ) -> None:
         self.record = record
         self._clock = clock
-        self._sampling = Sampling(SamplingState.from_document(record.document))
+        self._choose = ChosenApart(NextStep(layout))
+        self._sampling = Sampling(SamplingState.from_document(record.document), choose=self._choose)
         self._sampling.recording = None
         self._saved = self._mark()
         self._sampling.interrupted(clock())
@@ -77,6 +82,7 @@ class LiveSampling:
 
     def close(self) -> None:
         self._arrivals.close()
+        self._choose.close()
 
     def _save(self, store: Store) -> None:
         kept = store.samplings.save(self.record, self.state.to_document())

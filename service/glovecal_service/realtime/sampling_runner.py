@@ -74,7 +74,8 @@ class SamplingRunner:
                     self._live[id].follow(record)
                 else:
                     keys = GloveKeys(self._site, record.glove)
-                    self._live[id] = LiveSampling(self._session, keys, record)
+                    layout = store.layouts.get(record.layout)
+                    self._live[id] = LiveSampling(self._session, keys, record, layout)
             except (GlovecalError, ClientError, KeyError, TypeError) as error:
                 self._give_up(store, record, f"the sampling cannot go on: {error}")
         self._revision = revision
