@@ -31,7 +31,7 @@ from glovecal_models.simulation.simulated_take import SimulatedTake, simulate_ta
 from glovecal_models.takes.take import Take
 
 FULL_S = 252.0
-SHARES = (0.4, 0.5, 0.6, 0.8)
+SHARES = (0.4, 0.5, 0.6, 0.7, 0.8)
 """Of the fixed protocol's capture time, at which models are compared; its end is one more."""
 FREE_S = 40.0
 WAYS = ("fixed", "fixed, any order", "any step", "active")

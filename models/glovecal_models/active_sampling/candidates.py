@@ -26,9 +26,13 @@ MakeCandidates = Callable[[Layout, Equipment], list[Step]]
 _makers: list[MakeCandidates] = []
 
 
-def register_candidates(make: MakeCandidates) -> None:
-    """Further steps for every proposal from now on; each names the rotations whose angles it knows."""
+def register_candidates(make: MakeCandidates) -> Callable[[], None]:
+    """Further steps for every proposal from now on, until the answer is called.
+
+    Each step names the rotations whose angles it knows.
+    """
     _makers.append(make)
+    return lambda: _makers.remove(make)
 
 
 def candidate_steps(layout: Layout, equipment: Equipment | None = None) -> list[Step]:

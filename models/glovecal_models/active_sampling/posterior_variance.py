@@ -19,9 +19,6 @@ from scipy.linalg import block_diag, cho_factor, cho_solve, solve_triangular
 from glovecal_models.active_sampling.assumed_process import AssumedProcess
 from glovecal_models.active_sampling.sampled_points import SampledPoints
 
-ROUNDING = 1e-9
-"""Added to the diagonal, in parts of its largest entry."""
-
 
 class PosteriorVariance:
     """Of one rotation, at the points ``u`` (U, D + 1) where it will be used."""
@@ -46,7 +43,6 @@ class PosteriorVariance:
         if not len(self._points):
             return np.empty((0, 0))
         matrix = self._process.between(self._points, self._points) + block_diag(*errors)
-        matrix[np.diag_indices(len(matrix))] += ROUNDING * matrix.diagonal().max()
         return np.linalg.cholesky(matrix)
 
     def _whitened(self, points: np.ndarray) -> np.ndarray:

@@ -54,18 +54,8 @@ JSON_LIMIT_BYTES = 8_000_000
 BODY_PATIENCE_S = 30.0
 ROUTERS = (
     *(subjects, gloves, clocks, holds, examinations, takes, uploads, recordings, sampling),
-    *(
-        training,
-        models,
-        next_steps,
-        predictions,
-        comparisons,
-        diagnosis,
-        model_effects,
-        effects,
-        improvements,
-    ),
-    quick_checks,
+    *(training, models, predictions, comparisons, diagnosis, model_effects, effects, improvements),
+    *(quick_checks, next_steps),
     *(jobs, job_reports, health, metrics_page),
 )
 
