@@ -7,7 +7,8 @@
     python3 do.py test      the test suite
     python3 do.py check     format, lint, types
     python3 do.py bench     speed against other libraries, as ratios, with a picture
-    python3 do.py study     the blind study of the diagnosis: figures, confusion matrix (hours)
+    python3 do.py study     the blind study of the diagnosis: figures, confusion matrix (hours);
+                            study active: active sampling against the fixed protocol (half an hour)
 
 uv is installed into .tools and the locked packages into .venv; nothing outside this folder is touched.
 """
@@ -74,6 +75,8 @@ def bench(arguments: list[str]) -> int:
 
 
 def study(arguments: list[str]) -> int:
+    if arguments[:1] == ["active"]:
+        return run("python", "tests/study/active_sampling.py", *arguments[1:])
     return run("python", "tests/study/study.py", *arguments)
 
 

@@ -35,7 +35,7 @@ def test_a_go_while_the_recording_is_asked_for_is_not_lost(
         record = store.samplings.create(
             glove=GLOVE, subject="anna", wearing="", layout=LAYOUT.name, document=state.to_document()
         )
-        live = LiveSampling(session, GloveKeys(settings.site, GLOVE), record, clock=lambda: 0.0)
+        live = LiveSampling(session, GloveKeys(settings.site, GLOVE), record, LAYOUT, clock=lambda: 0.0)
         request = store.recordings.request
 
         def meanwhile(*arguments, **options):

@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
+from functools import partial
 from typing import Any
 
 import httpx
@@ -201,6 +202,38 @@ def test_a_lost_glove_is_waited_for(service: RestClient, place: DemoPlace, worn:
     service.post(f"/sampling/{id}/stop")
     assert over(service, id)["phase"] == "stopped"
     assert service.get(f"/sampling/{id}")["takes"] == []
+
+
+def test_the_active_protocol_asks_for_what_teaches_most(service: RestClient) -> None:
+    """Free motion first; then steps are chosen from it, and what is left out is not proposed again."""
+    id = start(service, protocol="active", widget_deg={"T_IP": []})
+    done = walk(service, id, ("loosen",))
+    assert next(done) == "loosen"
+    asked = []
+    for _ in range(3):
+        view = eventually(partial(chosen, service, id, asked), "a step is chosen")
+        asked.append(view["step"]["name"])
+        assert view["expected"]["step"] == asked[-1]
+        assert "Expected standard deviation in degrees: " in view["say"]
+        service.post(f"/sampling/{id}/skip")
+    assert len(set(asked)) == 3
+    assert not any(name.startswith("T_IP") for name in asked)
+    view = eventually(partial(chosen, service, id, asked), "one more")
+    service.post(f"/sampling/{id}/undo")
+    assert service.get(f"/sampling/{id}")["step"]["name"] == asked[-1]
+    service.post(f"/sampling/{id}/stop")
+    assert over(service, id)["phase"] == "stopped"
+
+
+def chosen(service: RestClient, id: str, before: list[str]) -> dict[str, Any] | None:
+    """The view once it asks for a chosen step that is none of ``before``."""
+    view = service.get(f"/sampling/{id}")
+    if view["phase"] != "waiting" or view["step"]["name"] in before:
+        return None
+    if view["step"]["kind"] in ("range", "verification"):
+        service.post(f"/sampling/{id}/skip")
+        return None
+    return view
 
 
 def test_a_glove_of_the_other_hand_is_refused(service: RestClient) -> None:

@@ -29,6 +29,8 @@ class Attempt:
     """Mean reading by sensor."""
     response: float | None = None
     """What the sensor of a rotation held by a widget reads while its neighbours are half bent."""
+    kept: list[list[float]] = field(default_factory=list)
+    """Some of its readings, in the order of the sensors; only where the protocol grows."""
     withdrawn: bool = False
     """Undone."""
 

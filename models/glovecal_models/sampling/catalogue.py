@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
@@ -19,7 +20,7 @@ from glovecal_models.sampling.step import Step
 from glovecal_models.sampling.touches import rod_step, touch_steps
 from glovecal_models.sampling.widgets import WIDEST_DEG, WidgetAngles, widget_steps
 
-ProtocolName = Literal["new_subject", "fk_only", "ik_only", "second_wearing"]
+ProtocolName = Literal["new_subject", "fk_only", "ik_only", "second_wearing", "active"]
 PROTOCOLS: tuple[ProtocolName, ...] = get_args(ProtocolName)
 POSE_ROUNDS = 2
 ROD_MM = 60.0
@@ -36,14 +37,30 @@ class Equipment:
     """Measured angles by pose."""
     rod_mm: tuple[float, ...] = (ROD_MM,)
 
+    def to_document(self) -> dict[str, Any]:
+        return {
+            "widget_deg": {name: list(angles) for name, angles in self.widget_deg.items()},
+            "pose_deg": {name: dict(angles) for name, angles in self.pose_deg.items()},
+            "rod_mm": list(self.rod_mm),
+        }
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> Equipment:
+        """Inverse of ``to_document``; an empty document is the usual equipment."""
+        return cls(**({**document, "rod_mm": tuple(document["rod_mm"])} if document else {}))
+
 
 def make_protocol(name: str, layout: Layout, equipment: Equipment | None = None) -> Protocol:
     """One of ``PROTOCOLS``, without what the layout has no sensor or rotation for.
 
-    ``fk_only`` and ``ik_only`` are the paper's accuracy adaptation (section 8.2). Raises BadInput.
+    ``fk_only`` and ``ik_only`` are the paper's accuracy adaptation (section 8.2); ``active`` begins with free
+    motion and grows (``active_sampling``). Raises BadInput.
     """
     own = equipment or Equipment()
     _check(own)
+    if name == "active":
+        first = [_loosen(6.0), *verification_steps("start")]
+        return Protocol(name, tuple(steps_for_layout(first, layout)), True, own.to_document())
     independent = [*key_pose_steps(POSE_ROUNDS, own.pose_deg), *widget_steps(layout, own.widget_deg)]
     touching = [*touch_steps(), *(rod_step(length) for length in own.rod_mm)]
     steps: dict[str, list[Step]] = {
@@ -52,13 +69,13 @@ def make_protocol(name: str, layout: Layout, equipment: Equipment | None = None)
         "ik_only": touching,
     }
     if name == "second_wearing":
-        return Protocol(name, tuple(_for_layout([_loosen(3.0), *check_steps(KEY_POSES)], layout)))
+        return Protocol(name, tuple(steps_for_layout([_loosen(3.0), *check_steps(KEY_POSES)], layout)))
     if name not in steps:
         raise BadInput(f"no protocol {name!r}; there are {', '.join(PROTOCOLS)}")
-    asked = _for_layout(steps[name], layout)
+    asked = steps_for_layout(steps[name], layout)
     around = (
-        _for_layout([_loosen(6.0), *verification_steps("start")], layout),
-        _for_layout(verification_steps("end"), layout),
+        steps_for_layout([_loosen(6.0), *verification_steps("start")], layout),
+        steps_for_layout(verification_steps("end"), layout),
     )
     return Protocol(name, (*around[0], *asked, *around[1]) if asked else ())
 
@@ -68,7 +85,8 @@ def _loosen(seconds: float) -> Step:
     return Step("loosen", "range", "move", ask, seconds, "loosen")
 
 
-def _for_layout(steps: list[Step], layout: Layout) -> list[Step]:
+def steps_for_layout(steps: list[Step], layout: Layout) -> list[Step]:
+    """Those that can teach the layout something, without sensors and rotations that it has not."""
     fitting = [
         replace(
             step,

@@ -1,6 +1,7 @@
 """The protocol as a state machine, driven by (time, frame, event) and nothing else.
 
     waiting -> countdown -> settling (poses only) -> recording -> judged -> waiting ... -> done
+    choosing: a protocol that grows has no step left; ``choose`` is asked for more until it knows.
     lost: no frame came; goes on by itself when the glove is back.   paused, stopped: the user's wish.
 
 It has no clock, no thread and no file: whoever drives it gives the time, and keeps ``state`` after a change.
@@ -15,6 +16,7 @@ from typing import Literal, get_args
 from glovecal_models.errors import BadInput
 from glovecal_models.sampling import speech
 from glovecal_models.sampling.attempt import Attempt
+from glovecal_models.sampling.growing import Choose
 from glovecal_models.sampling.protocol import COUNTDOWN_S, SETTLE_S, Protocol
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.recent import RecentReadings
@@ -53,15 +55,22 @@ def begin_sampling(
     state = SamplingState(protocol, tuple(sensors), trigger, since_s=now_s)
     state.ranges = ActiveRanges.unknown(len(state.sensors), counts).to_document()
     state.step = state.first_unfinished()
-    state.say(speech.asking(state.now(), 1, len(protocol.steps)))
+    state.say(speech.asking(state.now(), 1, None if protocol.grows else len(protocol.steps)))
     return state
 
 
 class Sampling:
     """Drives one ``state``. Times are seconds of one clock that does not go back."""
 
-    def __init__(self, state: SamplingState, *, touch_check: TouchCheck | None = None) -> None:
+    def __init__(
+        self,
+        state: SamplingState,
+        *,
+        touch_check: TouchCheck | None = None,
+        choose: Choose | None = None,
+    ) -> None:
         self.state = state
+        self._choose = choose
         self.recording: str | None = ""
         """Name of the recording that the frames are written to; marked in each attempt. None: nobody writes
         them now, and no step is recorded until somebody does."""
@@ -77,7 +86,7 @@ class Sampling:
         self._accept_verdict(now_s)
         if self.state.phase == "judged" or self.state.phase in RUNNING[1:]:
             self._ask(now_s, speech.INTERRUPTED)
-        elif self.state.phase in ("waiting", "countdown"):
+        elif self.state.phase in ("waiting", "countdown", "choosing"):
             self.state.since_s = now_s
 
     def follow(self, state: SamplingState) -> None:
@@ -120,7 +129,7 @@ class Sampling:
         self._enter("countdown", now_s, speech.COUNTDOWN)
 
     def _redo(self, now_s: float, name: str | None, angle_deg: float | None) -> None:
-        if name is None and self.state.phase == "waiting":
+        if name is None and self.state.phase in ("waiting", "choosing"):
             done = [attempt.step for attempt in self.state.attempts if attempt.counts]
             if not done and angle_deg is None:
                 raise NotNow("nothing was recorded yet that could be done again")
@@ -143,6 +152,8 @@ class Sampling:
         self._next(now_s, speech.UNDONE)
 
     def _skip(self, now_s: float) -> None:
+        if not self.state.step:
+            raise NotNow("there is nothing to leave out: the next step is being chosen")
         self._leave(now_s)
         self.state.attempts.append(Attempt(self.state.step, "skipped", ("the user left it out.",)))
         self._next(now_s, speech.SKIPPED)
@@ -201,6 +212,8 @@ class Sampling:
         waited = now_s - state.since_s
         if state.phase == "waiting":
             self._maybe_begin(now_s, waited)
+        elif state.phase == "choosing":
+            self._maybe_chosen(now_s)
         elif state.phase == "countdown" and waited >= COUNTDOWN_S and self.recording is not None:
             self._after_countdown(now_s)
         elif state.phase == "settling":
@@ -287,14 +300,29 @@ class Sampling:
 
     def _next(self, now_s: float, said: str = "") -> None:
         self.state.step = self.state.first_unfinished()
-        if self.state.step:
+        if self.state.step or self.state.protocol.grows:
             self._ask(now_s, said)
         else:
             self._end("done", now_s, speech.DONE)
 
+    def _maybe_chosen(self, now_s: float) -> None:
+        chosen = None if self._choose is None else self._choose(self.state)
+        if chosen is None:
+            return
+        protocol = self.state.protocol
+        self.state.protocol = replace(
+            protocol, steps=(*protocol.steps, *chosen.steps), grows=not chosen.are_last
+        )
+        self.state.expected = chosen.document
+        self._next(now_s, chosen.sentence)
+
     def _ask(self, now_s: float, said: str = "") -> None:
+        if not self.state.step:
+            self._enter("choosing", now_s, f"{said} {speech.CHOOSING}".strip())
+            return
         steps = [step.name for step in self.state.protocol.steps]
-        asked = speech.asking(self.state.now(), steps.index(self.state.step) + 1, len(steps))
+        count = None if self.state.protocol.grows else len(steps)
+        asked = speech.asking(self.state.now(), steps.index(self.state.step) + 1, count)
         self._recent.moved = False
         self._enter("waiting", now_s, f"{said} {asked}".strip())
 

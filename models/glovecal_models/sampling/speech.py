@@ -5,8 +5,9 @@ from __future__ import annotations
 from glovecal_models.sampling.step import Step
 
 
-def asking(step: Step, place: int, count: int) -> str:
-    return f"Step {place} of {count}. {step.ask}"
+def asking(step: Step, place: int, count: int | None) -> str:
+    """``count`` None: nobody knows how many there will be."""
+    return f"Step {place}{f' of {count}' if count else ''}. {step.ask}"
 
 
 def recording(step: Step) -> str:
@@ -25,6 +26,7 @@ BACK = "The glove is back."
 PAUSED = "Pause."
 SKIPPED = "Left out."
 UNDONE = "Taken back."
+CHOOSING = "One moment."
 DONE = "Done. Thank you."
 STOPPED = "Stopped."
 INTERRUPTED = "The service was interrupted; this step begins again."

@@ -13,7 +13,16 @@ from glovecal_models.sampling.step import Step
 
 VERSION = 1
 Phase = Literal[
-    "waiting", "countdown", "settling", "recording", "judged", "lost", "paused", "done", "stopped"
+    "choosing",
+    "waiting",
+    "countdown",
+    "settling",
+    "recording",
+    "judged",
+    "lost",
+    "paused",
+    "done",
+    "stopped",
 ]
 RUNNING: tuple[Phase, ...] = ("countdown", "settling", "recording")
 OVER: tuple[Phase, ...] = ("done", "stopped")
@@ -43,6 +52,8 @@ class SamplingState:
     said: str = ""
     said_number: int = 0
     """Grows with each sentence, so that each is read out once."""
+    expected: dict[str, Any] = field(default_factory=dict)
+    """What the chosen step is expected to teach; only where the protocol grows."""
     sentences: list[str] = field(default_factory=list)
     """What the end found."""
 
@@ -72,6 +83,7 @@ class SamplingState:
             "attempts": [attempt.to_document() for attempt in self.attempts],
             "ranges": self.ranges,
             "capture_s": self.capture_s,
+            "expected": self.expected,
             "said": self.said,
             "said_number": self.said_number,
             "sentences": list(self.sentences),

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from glovecal_models.sampling.attempt import Attempt
+from glovecal_models.sampling.growing import kept_readings
 from glovecal_models.sampling.quality import faults, missing_frames
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.state import SamplingState
@@ -49,6 +50,8 @@ def verdict(
     if readings:
         percent = 100 * np.ptp([reading.values for reading in readings], axis=0) / ranges.span
         attempt.moved_percent = float(percent.max())
+    if state.protocol.grows:
+        attempt.kept = kept_readings(step, readings)
     if not attempt.reasons:
         _widen(ranges, readings)
         attempt.reasons = _contradictions(state, readings, ranges, attempt, touch_check)

@@ -10,6 +10,7 @@ import numpy as np
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.sampling.engine import Sampling, begin_sampling
+from glovecal_models.sampling.growing import Choose
 from glovecal_models.sampling.protocol import Protocol
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.state import OVER, SamplingState
@@ -45,6 +46,7 @@ def asked_session(
     rate_hz: float = 60.0,
     disturb: Disturb | None = None,
     touch_check: TouchCheck | None = None,
+    choose: Choose | None = None,
     does: Callable[[Step], Step] = lambda step: step,
     patience: int = 3,
     skeleton: Skeleton | None = None,
@@ -53,7 +55,7 @@ def asked_session(
     it does not come to an end. ``does``: what the person does who is asked for a step. ``skeleton``: the
     person's hand, where tips shall really touch."""
     state = begin_sampling(protocol, glove.sensors, trigger="timer", counts=glove.layout.counts)
-    sampling = Sampling(state, touch_check=touch_check)
+    sampling = Sampling(state, touch_check=touch_check, choose=choose)
     sampling.recording = RECORDING
     touches = None if skeleton is None else RealTouches(glove.hand, skeleton)
     hand, random = AskedHand(seed, touches), np.random.default_rng([seed, 43, glove.wearing])

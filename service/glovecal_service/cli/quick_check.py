@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from glovecal_service.cli.active_model import active_model
 from glovecal_service.cli.connection import connect
 from glovecal_service.cli.options import AsJson, OnlyLayout, OnlySubject, model_id
 from glovecal_service.cli.printing import out, print_json, print_table
-from glovecal_service.cli.refusal import Refusal
 from glovecal_service.cli.takes_named import find_takes
 
 if TYPE_CHECKING:
-    from glovecal_client.rest import RestClient
+    pass
 
 POSES = {"pose": "pose", "angles": "angles", "before_deg": "error (°)", "left_out_deg": "from the others (°)"}
 SENSORS = {
@@ -56,7 +56,7 @@ def quick_check(
     if not take:
         raise typer.BadParameter("name the takes with the poses: --take NAME")
     with connect() as service:
-        chosen = model or _active_model(service, subject, layout)
+        chosen = model or active_model(service, subject, layout)
         rows = find_takes(service.get("/takes"), take)
         body = {"takes": [row["id"] for row in rows], "activate": activate}
         found = service.post(f"/models/{chosen}/quick-check", body)
@@ -64,19 +64,6 @@ def quick_check(
         print_json(found)
     else:
         _print(found)
-
-
-def _active_model(service: RestClient, subject: str | None, layout: str | None) -> str:
-    if subject is None:
-        raise typer.BadParameter("name a model, or a subject with --subject")
-    query = {"subject": subject} | ({"layout": layout} if layout else {})
-    active = [row for row in service.get("/models", query) if row["active"]]
-    if len(active) > 1:
-        layouts = ", ".join(row["layout"] for row in active)
-        raise Refusal(f"subject {subject} has active models of {layouts}; choose one with --layout")
-    if not active:
-        raise Refusal(f"subject {subject} has no active model; train one: glovecal train --subject {subject}")
-    return active[0]["id"]
 
 
 def _print(found: dict[str, Any]) -> None:

@@ -15,6 +15,7 @@ from glovecal_service.cli.connection import connect
 from glovecal_service.cli.options import AsJson, identifier
 from glovecal_service.cli.printing import moment, out, print_json, print_table
 from glovecal_service.cli.refusal import Refusal
+from glovecal_service.cli.sample_next import next_steps
 from glovecal_service.cli.sample_options import pose_angles, sampling_id, widget_angles
 from glovecal_service.cli.sample_walk import walk
 
@@ -92,6 +93,9 @@ def list_samplings(
     headings = {"id": "id", "glove": "glove", "subject": "subject", "protocol": "protocol", "phase": "phase"}
     more = {"done": "steps done", "takes": "takes", "began": "began"}
     print_table(rows, headings | more, empty="No sampling yet: glovecal sample --glove G --subject S.")
+
+
+app.command("next")(next_steps)
 
 
 @app.command("resume")

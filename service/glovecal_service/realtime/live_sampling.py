@@ -10,11 +10,14 @@ import zenoh
 
 from glovecal_client.keys import GloveKeys
 from glovecal_client.wire.frame import Frame
+from glovecal_models.active_sampling.next_step import NextStep
+from glovecal_models.layout import Layout
 from glovecal_models.sampling.engine import Sampling
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.state import OVER, SamplingState
 from glovecal_models.sampling.verdict import TouchCheck
 from glovecal_service.realtime.arrivals import Arrivals
+from glovecal_service.realtime.chosen_apart import ChosenApart
 from glovecal_service.realtime.recording_file import decoded
 from glovecal_service.store.errors import Conflict
 from glovecal_service.store.records import RecordingRecord, SamplingRecord
@@ -37,12 +40,15 @@ class LiveSampling:
         session: zenoh.Session,
         keys: GloveKeys,
         record: SamplingRecord,
+        layout: Layout,
         touch_check: TouchCheck | None = None,
         clock: Callable[[], float] = time.time,
     ) -> None:
         self.record = record
         self._clock = clock
-        self._sampling = Sampling(SamplingState.from_document(record.document), touch_check=touch_check)
+        self._choose = ChosenApart(NextStep(layout))
+        state = SamplingState.from_document(record.document)
+        self._sampling = Sampling(state, touch_check=touch_check, choose=self._choose)
         self._sampling.recording = None
         self._saved = self._mark()
         self._sampling.interrupted(clock())
@@ -79,6 +85,7 @@ class LiveSampling:
 
     def close(self) -> None:
         self._arrivals.close()
+        self._choose.close()
 
     def _save(self, store: Store) -> None:
         kept = store.samplings.save(self.record, self.state.to_document())

@@ -14,6 +14,7 @@ from glovecal_client.errors import ClientError
 from glovecal_client.keys import GloveKeys
 from glovecal_models.errors import GlovecalError
 from glovecal_models.guided.touch_watch import TouchWatch
+from glovecal_models.layout import Layout
 from glovecal_service.realtime.live_sampling import LiveSampling
 from glovecal_service.realtime.sampling_takes import keep_sampled_takes
 from glovecal_service.settings import Settings
@@ -75,7 +76,9 @@ class SamplingRunner:
                     self._live[id].follow(record)
                 else:
                     keys = GloveKeys(self._site, record.glove)
-                    self._live[id] = LiveSampling(self._session, keys, record, _touch_watch(store, record))
+                    layout = store.layouts.get(record.layout)
+                    watch = _touch_watch(store, record, layout)
+                    self._live[id] = LiveSampling(self._session, keys, record, layout, watch)
             except (GlovecalError, ClientError, KeyError, TypeError, ValueError) as error:
                 self._give_up(store, record, f"the sampling cannot go on: {error}")
         self._revision = revision
@@ -108,7 +111,7 @@ class SamplingRunner:
             live.close()
 
 
-def _touch_watch(store: Store, record: SamplingRecord) -> TouchWatch | None:
+def _touch_watch(store: Store, record: SamplingRecord, layout: Layout) -> TouchWatch | None:
     """None where nobody measured the subject's hand: then no touch can be judged."""
     subject = store.subjects.get(record.subject)
-    return TouchWatch(store.layouts.get(record.layout), subject.skeleton()) if subject.dimensions else None
+    return TouchWatch(layout, subject.skeleton()) if subject.dimensions else None

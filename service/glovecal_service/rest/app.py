@@ -26,6 +26,7 @@ from glovecal_service.rest import (
     metrics_page,
     model_effects,
     models,
+    next_steps,
     predictions,
     quick_checks,
     recordings,
@@ -54,7 +55,7 @@ BODY_PATIENCE_S = 30.0
 ROUTERS = (
     *(subjects, gloves, clocks, holds, examinations, takes, uploads, recordings, sampling),
     *(training, models, predictions, comparisons, diagnosis, model_effects, effects, improvements),
-    quick_checks,
+    *(quick_checks, next_steps),
     *(jobs, job_reports, health, metrics_page),
 )
 

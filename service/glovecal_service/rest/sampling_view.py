@@ -58,6 +58,9 @@ class SamplingView(BaseModel):
     still_percent: float = Field(STILL_PERCENT, description="What is still.")
     capture_s: float = Field(description="Spent in countdowns, settling and recording so far.")
     capture_of_s: float = Field(description="What the whole takes of somebody who does every step at once.")
+    expected: dict[str, Any] = Field(
+        description="Protocol `active`: what the chosen step is expected to teach, and its rivals."
+    )
     sentences: list[str] = Field(description="What the end found.")
     problem: str
     open: bool = Field(description="Until its takes are stored.")
@@ -88,6 +91,7 @@ def sampling_view(record: SamplingRecord) -> SamplingView:
         still_percent=STILL_PERCENT,
         capture_s=round(state.capture_s, 2),
         capture_of_s=round(state.protocol.capture_s, 2),
+        expected=state.expected,
         sentences=state.sentences,
         problem=record.problem,
         open=record.open,

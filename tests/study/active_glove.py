@@ -1,0 +1,165 @@
+"""One simulated glove sampled in several ways, and how wrong its models are after equal capture time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from glovecal_models.active_sampling.candidates import candidate_steps
+from glovecal_models.active_sampling.known_readings import known_from_takes
+from glovecal_models.active_sampling.next_step import NextStep
+from glovecal_models.active_sampling.posterior_mean import assumed_angles
+from glovecal_models.calibration.predictor import GlovePredictor
+from glovecal_models.calibration.training import train
+from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.errors import NotTrainable
+from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
+from glovecal_models.layout import Layout
+from glovecal_models.sampling.catalogue import make_protocol
+from glovecal_models.sampling.growing import Choose, NextSteps
+from glovecal_models.sampling.protocol import Protocol
+from glovecal_models.sampling.reading import GloveReading
+from glovecal_models.sampling.sampled_takes import sampled_takes
+from glovecal_models.sampling.state import SamplingState
+from glovecal_models.simulation.asked_session import RECORDING, AskedSession, asked_session
+from glovecal_models.simulation.protocol import evaluation_segment, free_segment
+from glovecal_models.simulation.simulated_glove import SimulatedGlove
+from glovecal_models.simulation.simulated_take import SimulatedTake, simulate_take
+from glovecal_models.takes.take import Take
+
+FULL_S = 252.0
+SHARES = (0.4, 0.5, 0.6, 0.7, 0.8)
+"""Of the fixed protocol's capture time, at which models are compared; its end is one more."""
+FREE_S = 40.0
+WAYS = ("fixed", "fixed, any order", "any step", "active")
+
+
+@dataclass(frozen=True)
+class ActiveGlove:
+    seed: int
+
+
+def glove_answer(glove: ActiveGlove) -> dict[str, Any]:
+    """Points of every way: capture seconds, samples, errors in degrees."""
+    worn = SimulatedGlove(glove.seed)
+    tests = [
+        simulate_take(worn, segment, seed=900 + glove.seed, rate_hz=60)
+        for segment in (evaluation_segment(900 + glove.seed), free_segment(900 + glove.seed, FREE_S))
+    ]
+    return {way: list(_points(way, worn, glove.seed, tests)) for way in WAYS}
+
+
+def _points(
+    way: str, worn: SimulatedGlove, seed: int, tests: list[SimulatedTake]
+) -> Iterator[dict[str, Any]]:
+    session, ends = sampled(way, worn, seed)
+    whole = session.state.capture_s
+    cuts = [share * FULL_S for share in SHARES if share * FULL_S < whole] if way != "fixed" else []
+    for cut_s in [*cuts, whole]:
+        attempts = [each for each, at in zip(session.state.attempts, ends, strict=True) if at <= cut_s]
+        takes = _takes(session, replace(session.state, attempts=attempts))
+        loosen = session.state.finished()["loosen"]
+        yield {"capture_s": cut_s, "is_end": cut_s == whole, **_errors(worn, takes, tests, session, loosen)}
+
+
+def sampled(way: str, worn: SimulatedGlove, seed: int) -> tuple[AskedSession, list[float]]:
+    """The session, and the capture time at which each attempt ended."""
+    ends: list[float] = []
+
+    def watch(state: SamplingState, reading: GloveReading) -> GloveReading:
+        ends.extend([state.capture_s] * (len(state.attempts) - len(ends)))
+        return reading
+
+    protocol, choose = _protocol(way, worn.layout, np.random.default_rng([seed, 77]))
+    session = asked_session(protocol, worn, seed=seed, choose=choose, disturb=watch)
+    return session, ends + [session.state.capture_s] * (len(session.state.attempts) - len(ends))
+
+
+def _protocol(way: str, layout: Layout, random: np.random.Generator) -> tuple[Protocol, Choose | None]:
+    if way == "active":
+        return make_protocol("active", layout), NextStep(layout)
+    if way == "any step":
+        return make_protocol("active", layout), _at_random(candidate_steps(layout), random)
+    fixed = make_protocol("fk_only", layout)
+    if way == "fixed":
+        return fixed, None
+    first, rest, last = fixed.steps[:3], list(fixed.steps[3:-2]), fixed.steps[-2:]
+    order = [rest[place] for place in random.permutation(len(rest))]
+    return replace(fixed, steps=(*first, *order, *last)), None
+
+
+def _at_random(steps: list, random: np.random.Generator) -> Callable[[SamplingState], NextSteps]:
+    """Candidates of the active protocol in any order, none twice, for as long as the fixed protocol takes."""
+    waiting = [steps[place] for place in random.permutation(len(steps))]
+
+    def choose(state: SamplingState) -> NextSteps:
+        over = not waiting or state.capture_s > FULL_S
+        return NextSteps((), True, "") if over else NextSteps((waiting.pop(),), False, "")
+
+    return choose
+
+
+def _takes(session: AskedSession, state: SamplingState) -> list[Take]:
+    found = sampled_takes(state, {RECORDING: session.take}, name="s")
+    return [each.take for each in found if each.take.rotations]
+
+
+def _errors(
+    worn: SimulatedGlove, takes: list[Take], tests: list[SimulatedTake], session: AskedSession, loosen: Any
+) -> dict[str, Any]:
+    """RMSE over the rotations that sensors read; one without a model counts as the middle of its range."""
+    frames = session.take.time_s
+    moving = (frames >= loosen.begins_s) & (frames <= loosen.ends_s)
+    free = replace(session.take, time_s=frames[moving], readings=session.take.readings[moving])
+    known = known_from_takes(takes, worn.sensors, [free])
+    answer: dict[str, Any] = {
+        "samples": sum(
+            int(np.isfinite(take.reference_at_frames(take.rotations)).any(1).sum()) for take in takes
+        )
+    }
+    predictor = _trained(takes, worn.layout)
+    for name, test in zip(("poses_deg", "free_deg"), tests, strict=True):
+        readings = test.take.readings
+        assumed = assumed_angles(worn.layout, known, readings)
+        trained = {} if predictor is None else _columns(predictor, readings)
+        for how, angles in (("trained", trained), ("assumed", assumed)):
+            answer[f"{how}_{name}"] = _rmse(worn, angles, test.truth)
+    return answer
+
+
+def _trained(takes: list[Take], layout: Layout) -> GlovePredictor | None:
+    """Of the rotations that were held at more than one angle."""
+    angles: dict[str, set[float]] = {}
+    for take in takes:
+        for rotation, column in zip(take.rotations, take.reference.T, strict=True):
+            angles.setdefault(rotation, set()).update(np.unique(column[np.isfinite(column)]).tolist())
+    usable = [_only(take, [name for name in take.rotations if len(angles[name]) > 1]) for take in takes]
+    try:
+        model = train([take for take in usable if take.rotations], layout, "s", TrainingSettings(folds=0))
+    except NotTrainable:
+        return None
+    return GlovePredictor(model)
+
+
+def _only(take: Take, rotations: list[str]) -> Take:
+    columns = [take.rotations.index(name) for name in rotations]
+    if not columns:
+        return replace(take, rotations=(), reference_time_s=np.empty(0), reference=np.empty((0, 0)))
+    return replace(take, rotations=tuple(rotations), reference=take.reference[:, columns])
+
+
+def _columns(predictor: GlovePredictor, readings: np.ndarray) -> dict[str, np.ndarray]:
+    return dict(zip(predictor.rotations, predictor.predict(readings).mean.T, strict=True))
+
+
+def _rmse(worn: SimulatedGlove, angles: dict[str, np.ndarray], truth: np.ndarray) -> float:
+    squares = []
+    for item in worn.layout.correspondences:
+        if item.simulated is None and item.kind != "MSMR":
+            middle = np.full(len(truth), np.mean(ACTIVE_RANGE_DEG[item.rotation]))
+            true = truth[:, worn.rotations.index(item.rotation)]
+            squares.append(np.mean((angles.get(item.rotation, middle) - true) ** 2))
+    return float(np.sqrt(np.mean(squares)))
