@@ -10,17 +10,13 @@ of the best. The real recordings are looked for in ../shared/data.
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "models" / "calibration"))
-
-from unknown_sensors import (  # pyright: ignore[reportMissingImports]
+from unknown_sensors import (
     LAYOUT,
     LINEAR_GLOVE,
     POLYNOMIAL_GLOVE,

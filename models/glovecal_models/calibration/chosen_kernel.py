@@ -38,14 +38,14 @@ def fit_chosen(
     base = fit_weighted(samples, seed=settings.seed, cancelled=cancelled, report=_part(report, 0.0, 0.2))
     if kept == LMC:
         return base.regressor
-    scores, search = None, {}
+    chosen, scores, search = candidates[0], None, {}
     if len(candidates) > 1:
         tried = try_candidates(
             samples, candidates, sample_weight=base.weight, thorough=thorough, seed=settings.seed,
             cancelled=cancelled, report=_part(report, 0.2, 0.7),
         )  # fmt: skip
-        scores, search = tried.scores, {"start": tried.optimum[tried.scores.chosen.name]}
-    chosen = candidates[0] if scores is None else CANDIDATE[scores.chosen.name]
+        scores, chosen = tried.scores, CANDIDATE[tried.scores.chosen.name]
+        search = {"start": tried.optimum[chosen.name]}
     process = base.regressor
     if chosen.name != LMC:
         if report:
