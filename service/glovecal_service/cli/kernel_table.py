@@ -9,30 +9,21 @@ KERNEL_COLUMNS = {
     "rotation": "rotation",
     "kernel": "kernel",
     "chosen": "chosen",
+    "held_out_rmse_deg": "error (°)",
     "nlml": "NLML (nats)",
-    "evidence_gain": "evidence gain (nats)",
-    "held_out_rmse_deg": "error on takes left out (°)",
+    "evidence_gain": "evidence (nats)",
 }
+SCALE = (("mean angle", "spread_deg"), ("straight line", "straight_line_deg"))
+"""What the candidates' errors are to be read against."""
 
 
 def kernel_rows(rotations: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """One row a candidate; before them what their errors are to be read against."""
+    """One row a candidate, after those of the scale."""
     rows: list[dict[str, Any]] = []
     for rotation in rotations:
-        found = rotation["kernel_choice"]
+        found, name = rotation["kernel_choice"], {"rotation": rotation["rotation"]}
         if found is None:
             continue
-        for words, error in (("always the mean", "spread_deg"), ("a straight line", "straight_line_deg")):
-            rows.append(
-                {"rotation": rotation["rotation"], "kernel": words, "held_out_rmse_deg": found[error]}
-            )
-        rows += [
-            {
-                **item,
-                "rotation": rotation["rotation"],
-                "kernel": item["words"],
-                "chosen": item["chosen"] or None,
-            }
-            for item in found["candidates"]
-        ]
+        rows += [{**name, "kernel": words, "held_out_rmse_deg": found[error]} for words, error in SCALE]
+        rows += [{**item, **name, "chosen": item["chosen"] or None} for item in found["candidates"]]
     return rows

@@ -70,10 +70,11 @@ def show(model: Model, as_json: AsJson = False) -> None:
     tried = kernel_rows(document["rotations"])
     if tried:
         out.print()
+        out.print("Kernels tried: errors on takes left out, evidence over the first")
         print_table(tried, KERNEL_COLUMNS, empty="")
         for row in document["rotations"]:
             if row["kernel_choice"]:
-                out.print(row["kernel_choice"]["sentence"])
+                err.print(row["kernel_choice"]["sentence"])
     if document["effect_details"]:
         out.print()
         print_table(effect_rows(document["effect_details"]), EFFECT_COLUMNS, empty="")
