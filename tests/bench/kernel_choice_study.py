@@ -1,6 +1,6 @@
 """How good the automatic choice of a kernel is, on takes that had no part in anything.
 
-    python tests/bench/kernel_choice_study.py [flex|cyberglove|gait|ankle|thumb] [--seeds N]
+    python tests/bench/kernel_choice_study.py {flex|cyberglove|gait|ankle|thumb|static} [--seeds 10 11]
 
 Each rotation's kernel is chosen on the training takes; every candidate is then trained on all of them and
 measured on takes left out. A table of errors (degrees), and how often the choice is the best or within 5 %
@@ -46,10 +46,10 @@ Split = tuple[str, Layout, Sequence[str], list[Take], list[Take]]
 """Name, layout, rotations, training takes, takes left out of everything."""
 
 
-def flex(seeds: int) -> Iterator[Split]:
+def flex(seeds: Sequence[int]) -> Iterator[Split]:
     gloves = {"linear": LINEAR_GLOVE, "polynomial": POLYNOMIAL_GLOVE, "unknown": UNKNOWN_GLOVE}
     for name, responses in gloves.items():
-        for seed in range(seeds):
+        for seed in seeds:
             for takes, frames in ((4, 60), (8, 150)):
                 product = 0.0 if name == "linear" else 1.0
                 every = flex_takes(responses, seed, takes + 6, frames, product=product)
@@ -57,8 +57,8 @@ def flex(seeds: int) -> Iterator[Split]:
                 yield label, LAYOUT, LAYOUT.rotations, every[:takes], every[takes:]
 
 
-def cyberglove(seeds: int) -> Iterator[Split]:
-    for seed in range(seeds):
+def cyberglove(seeds: Sequence[int]) -> Iterator[Split]:
+    for seed in seeds:
         glove = SimulatedGlove(seed)
         segments = sampling_protocol(seed)
         training = [
@@ -77,7 +77,7 @@ def thirds(name: str, layout: Layout, rotations: Sequence[str], takes: list[Take
         yield f"{name} without {start + 1}", layout, rotations, rest, takes[start::3]
 
 
-def gait(seeds: int) -> Iterator[Split]:
+def gait(seeds: Sequence[int]) -> Iterator[Split]:
     for person in ("P002", "P003"):
         for side in "LR":
             files = sorted((DATA / "gait").glob(f"{person}-*-{side}-*.csv"))
@@ -86,7 +86,7 @@ def gait(seeds: int) -> Iterator[Split]:
             yield from thirds(f"gait {person} {side}", layout, layout.rotations, takes)
 
 
-def ankle(seeds: int) -> Iterator[Split]:
+def ankle(seeds: Sequence[int]) -> Iterator[Split]:
     """Three placements of four motions each, clocks aligned."""
     for person in ("P300", "P301", "P302", "P303", "P304"):
         takes = [
@@ -97,7 +97,7 @@ def ankle(seeds: int) -> Iterator[Split]:
         yield from thirds(f"ankle {person}", layout, layout.rotations, takes)
 
 
-def thumb(seeds: int) -> Iterator[Split]:
+def thumb(seeds: Sequence[int]) -> Iterator[Split]:
     layout = Layout.from_toml(
         'name = "thumb"\nsensors = ["G00", "G01", "G02", "G03"]\n[rotations]\n'
         + "\n".join(f'{name} = ["G00", "G01", "G02", "G03"]' for name in ("A12", "A13", "A14", "A15"))
@@ -107,6 +107,19 @@ def thumb(seeds: int) -> Iterator[Split]:
         frames = len(take.time_s)
         parts = [piece(take, k * frames // 9, (k + 1) * frames // 9) for k in range(9)]
         yield from thirds(f"thumb {path.stem}", layout, layout.rotations, parts)
+
+
+def static(seeds: Sequence[int]) -> Iterator[Split]:
+    """A flex sensor at ten known angles, 500 readings each: angles that were left out are foretold."""
+    take = read_takes(next((DATA / "flex-static").glob("*.csv")))[0]
+    angle = take.reference[:, 0]
+    ends = np.flatnonzero(np.diff(angle)) + 1
+    parts = [
+        piece(take, start, end)
+        for start, end in zip([0, *ends.tolist()], [*ends.tolist(), len(angle)], strict=True)
+    ]
+    layout = Layout.from_columns("static", take.sensors, take.rotations)
+    yield from thirds("static", layout, layout.rotations, parts)
 
 
 def piece(take: Take, start: int, end: int) -> Take:
@@ -160,7 +173,7 @@ def samples_of(takes: Sequence[Take], correspondence: Correspondence, most: int 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("what", nargs="+", choices=list(SPLITS))
-    parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--seeds", type=int, nargs="+", default=[10, 11], help="of simulated gloves")
     wanted = parser.parse_args()
     pin_blas_to_one_thread()
     rows = []
@@ -205,7 +218,14 @@ def summary(rows: Sequence[Row]) -> None:
     print(f"another than {names[0]} in {len(moved)}; its error over that of {names[0]}: {np.round(moved, 2)}")
 
 
-SPLITS = {"flex": flex, "cyberglove": cyberglove, "gait": gait, "ankle": ankle, "thumb": thumb}
+SPLITS = {
+    "flex": flex,
+    "cyberglove": cyberglove,
+    "gait": gait,
+    "ankle": ankle,
+    "thumb": thumb,
+    "static": static,
+}
 
 if __name__ == "__main__":
     main()
