@@ -91,12 +91,12 @@ class KernelScores:
         error = f"{chosen.held_out_rmse_deg:.2f} degrees on takes left out"
         line = "" if self.straight_line_deg is None else f" (a straight line: {self.straight_line_deg:.2f})"
         if chosen is default:
-            return (
-                f"{rotation}: {stays} stays, {error}{line}; "
-                "no other kernel is clearly better in both evidence and error."
-            )
+            why = "no other kernel is clearly better in both evidence and error"
+            if self.spread_deg and min(map(_rmse, self.scores)) > LOST * self.spread_deg:
+                why = "no kernel foretells these takes, so none is chosen by them; record more that are alike"
+            return f"{rotation}: {stays} stays, {error}{line}; {why}."
         return (
-            f"{rotation}: {CANDIDATE[chosen.name].words} fits this sensor best: {error} against "
+            f"{rotation}: {CANDIDATE[chosen.name].words} fits best: {error} against "
             f"{default.held_out_rmse_deg:.2f} for {stays}{line}; its evidence is "
             f"{self.evidence_gain(chosen):.0f} nats better on the same {self.samples} samples."
         )

@@ -33,7 +33,7 @@ def test_clearly_better_in_both_is_taken_and_said() -> None:
     found = scores(score("polynomial_3", 462.0, 1.2, lower(0.6)))
     assert found.chosen.name == "polynomial_3"
     assert found.sentence("I_PIP") == (
-        "I_PIP: a polynomial of degree 3 fits this sensor best: 1.20 degrees on takes left out against "
+        "I_PIP: a polynomial of degree 3 fits best: 1.20 degrees on takes left out against "
         "1.90 for LMC-GPR (a straight line: 4.10); its evidence is 38 nats better on the same 400 samples."
     )
 
@@ -80,7 +80,7 @@ def test_a_weight_of_less_than_one_makes_parameters_cheaper() -> None:
 def test_sentences_name_each_change_and_gather_the_rest() -> None:
     changed, same = scores(score("polynomial_2", 460.0, 1.2, lower(0.6))), scores()
     said = kernel_sentences({"I_MCP": same, "I_PIP": changed, "IM_ABD": same})
-    assert said[0].startswith("I_PIP: a polynomial of degree 2 fits this sensor best")
+    assert said[0].startswith("I_PIP: a polynomial of degree 2 fits best")
     assert said[1].startswith("LMC-GPR stays for I_MCP, IM_ABD: no other kernel is clearly better there")
     untold = KernelScores((CandidateScore("lmc_gpr", 1.0, 5),), 20, 1.0, None, None)
     assert "nothing to judge other kernels on" in kernel_sentences({"I_PIP": untold})[0]

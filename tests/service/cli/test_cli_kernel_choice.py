@@ -11,7 +11,7 @@ from cli_running import glovecal
 from unknown_sensors import LAYOUT, POLYNOMIAL_GLOVE, flex_takes
 
 ROTATIONS = ("I_PIP", "P_PIP")
-SENTENCE = "I_PIP: a polynomial of degree 2 fits this sensor best: "
+SENTENCE = "I_PIP: a polynomial of degree 2 fits best: "
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +42,7 @@ def test_training_says_what_was_chosen_and_why(flex) -> None:
     assert "(auto) for anna" in trained.out
     assert SENTENCE in trained.said
     assert "degrees on takes left out against" in trained.said
-    assert "P_PIP: a polynomial of degree 3 fits this sensor best: " in trained.said
+    assert "P_PIP: a polynomial of degree 3 fits best: " in trained.said
 
 
 def test_the_model_shows_each_candidate_with_its_evidence_and_error(flex) -> None:
