@@ -1,6 +1,6 @@
 """How good the automatic choice of a kernel is, on takes that had no part in anything.
 
-    python tests/bench/kernel_choice_study.py {flex|cyberglove|gait|ankle|thumb|static} [--seeds 10 11]
+    python tests/bench/kernel_choice_study.py {flex|sleeve|cyberglove|gait|ankle|thumb|static} [--seeds 10 11]
 
 Each rotation's kernel is chosen on the training takes; every candidate is then trained on all of them and
 measured on takes left out. A table of errors (degrees), and how often the choice is the best or within 5 %
@@ -20,8 +20,10 @@ from unknown_sensors import (
     LAYOUT,
     LINEAR_GLOVE,
     POLYNOMIAL_GLOVE,
+    SLEEVE,
     UNKNOWN_GLOVE,
     flex_takes,
+    sleeve_takes,
 )
 
 from glovecal_models.calibration.kernel_choice import try_candidates
@@ -55,6 +57,14 @@ def flex(seeds: Sequence[int]) -> Iterator[Split]:
                 every = flex_takes(responses, seed, takes + 6, frames, product=product)
                 label = f"{name} {takes}x{frames} seed {seed}"
                 yield label, LAYOUT, LAYOUT.rotations, every[:takes], every[takes:]
+
+
+def sleeve(seeds: Sequence[int]) -> Iterator[Split]:
+    for seed in seeds:
+        for takes, frames in ((4, 50), (6, 80)):
+            every = sleeve_takes(seed, takes + 6, frames)
+            label = f"sleeve {takes}x{frames} seed {seed}"
+            yield label, SLEEVE, SLEEVE.rotations, every[:takes], every[takes:]
 
 
 def cyberglove(seeds: Sequence[int]) -> Iterator[Split]:
@@ -220,6 +230,7 @@ def summary(rows: Sequence[Row]) -> None:
 
 SPLITS = {
     "flex": flex,
+    "sleeve": sleeve,
     "cyberglove": cyberglove,
     "gait": gait,
     "ankle": ankle,

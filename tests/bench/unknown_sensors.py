@@ -100,3 +100,37 @@ def _take(
         reference=angles + random.normal(scale=noise_deg, size=angles.shape),
         simulated=True,
     )
+
+
+SLEEVE = Layout.from_toml("""
+name = "sleeve"
+sensors = ["A", "B", "C", "D"]
+[rotations]
+BEND = ["A", "B", "C", "D"]
+""")
+
+
+def sleeve_takes(seed: int, takes: int = 6, frames: int = 80, *, noise_deg: float = 1.0) -> list[Take]:
+    """An elbow sleeve of four stretch sensors that pull at each other: the angle is quadratic in all four."""
+    return [_sleeve_take(seed, number, frames, noise_deg) for number in range(takes)]
+
+
+def _sleeve_take(seed: int, number: int, frames: int, noise_deg: float) -> Take:
+    random = np.random.default_rng([seed, number, 7])
+    time = np.arange(frames) / 20
+    speed, phase = random.uniform(0.15, 0.6, (2, 4)), random.uniform(0, 2 * np.pi, (2, 4))
+    wave = np.sin(2 * np.pi * time[:, None, None] * speed + phase).mean(axis=1)
+    a, b, c, d = np.clip(0.5 + 0.55 * wave, 0, 1).T
+    angle = 40 * a - 25 * b + 45 * a * c + 30 * b * d - 25 * c**2 + 20 * d
+    readings = 100 + 800 * np.column_stack([a, b, c, d]) + random.normal(scale=3.0, size=(frames, 4))
+    return Take(
+        name=f"free-{number}",
+        wearing="first",
+        sensors=SLEEVE.sensors,
+        time_s=time,
+        readings=np.round(readings).clip(0, 1023),
+        rotations=SLEEVE.rotations,
+        reference_time_s=time,
+        reference=(angle + random.normal(scale=noise_deg, size=frames))[:, None],
+        simulated=True,
+    )

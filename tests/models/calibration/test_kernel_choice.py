@@ -8,8 +8,10 @@ from unknown_sensors import (
     LAYOUT,
     LINEAR_GLOVE,
     POLYNOMIAL_GLOVE,
+    SLEEVE,
     UNKNOWN_GLOVE,
     flex_takes,
+    sleeve_takes,
 )
 
 from glovecal_models.calibration.artifact import dump, load, model_id, read_manifest
@@ -77,6 +79,14 @@ def test_polynomial_sensors_are_named_and_new_takes_are_predicted_no_worse(polyn
     assert mine.over_all.rmse_deg < theirs.over_all.rmse_deg
     for rotation in polynomial.rotations:
         assert 0.55 < mine.rotations[rotation.rotation].coverage < 0.85  # 0.68 is truthful
+
+
+def test_a_product_of_four_sensors_learned_from_little_halves_the_error() -> None:
+    every = sleeve_takes(10, 8, 50)
+    model = train(every[:4], SLEEVE, "anna", AUTO)
+    plain = train(every[:4], SLEEVE, "anna", TrainingSettings(method="lmc_gpr", folds=0))
+    assert kernels(model) == {"BEND": "polynomial_2"}
+    assert compare(model, every[4:]).over_all.rmse_deg < 0.7 * compare(plain, every[4:]).over_all.rmse_deg
 
 
 def test_steps_and_sigmoids_are_not_taken_for_polynomials() -> None:

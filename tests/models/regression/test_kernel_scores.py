@@ -59,9 +59,9 @@ def test_lmc_gpr_stays_unless_another_is_clearly_better_in_both(other: Candidate
 
 
 def test_where_takes_left_out_are_beyond_all_kernels_nothing_is_chosen() -> None:
-    assert (
-        scores(score("general", 460.0, 11.0, lower(0.6)), default=14.0, spread=16.0).chosen.name == "lmc_gpr"
-    )
+    found = scores(score("general", 460.0, 11.0, lower(0.6)), default=14.0, spread=16.0)
+    assert found.chosen.name == "lmc_gpr"
+    assert "no kernel foretells these takes" in found.sentence("I_PIP")
 
 
 def test_of_about_equal_ones_the_simplest_is_taken() -> None:
