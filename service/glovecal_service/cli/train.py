@@ -16,14 +16,18 @@ from glovecal_service.cli.waiting import wait_for_job
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
 
-Method = Literal["raw", "linear", "lmc_gpr", "spgp"]
+Method = Literal["raw", "linear", "lmc_gpr", "spgp", "auto", "polynomial_gpr", "general_gpr"]
 
 
 def train(
     subject: Subject,
     layout: OnlyLayout = None,
     method: Annotated[
-        Method, typer.Option(help="raw is no calibration at all: the scale to read the others against.")
+        Method,
+        typer.Option(
+            help="auto chooses each rotation's kernel by evidence and error, for hardware nobody knows. "
+            "raw is no calibration at all: the scale to read the others against."
+        ),
     ] = "lmc_gpr",
     take: Annotated[
         list[str] | None,

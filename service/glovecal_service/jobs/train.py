@@ -16,6 +16,9 @@ from glovecal_models.calibration.training import assemble
 from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput, NotTrainable
+from glovecal_models.regression.kept_choice import choice_of
+from glovecal_models.regression.kernel_candidates import CHOOSING
+from glovecal_models.regression.kernel_scores import kernel_sentences
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult
 from glovecal_service.jobs.training_takes import TrainingTakes
@@ -23,7 +26,7 @@ from glovecal_service.store import Store
 from glovecal_service.store.records import JobRecord, TakeRecord
 
 _OWN_KEYS = {"subject", "layout", "takes", "activate", "parent"}
-_SETTINGS = {field.name for field in fields(TrainingSettings)}
+_SETTINGS = {field.name for field in fields(TrainingSettings)} - {"kernels"}
 
 
 class TrainJob:
@@ -64,7 +67,11 @@ class TrainJob:
 
 def fit(task: FitTask, cancelled: Callable[[], bool], report: Report) -> TaskResult:
     """One fit, run in a worker. Raises Cancelled, NotTrainable."""
-    result = run_fit(task, cancelled=cancelled)
+
+    def say(sentence: str, share: float) -> None:
+        report(f"{_label(task)}: {sentence}", 0.0)  # fits run side by side: what counts is how many are done
+
+    result = run_fit(task, cancelled=cancelled, report=say if task.settings.method in CHOOSING else None)
     facts = {
         "rotation": result.rotation,
         "fold": result.fold,
@@ -144,9 +151,14 @@ def _facts(
         "held_out_rmse_deg": model.error_estimate.get("rmse_deg"),
         "held_out_how": model.error_estimate.get("how"),
         "per_rotation": {item.rotation: item.held_out_rmse_deg for item in model.rotations},
-        "sentences": [*said, *plan.sentences, *_weight_sentences(model)],
+        "sentences": [*said, *plan.sentences, *_kernel_sentences(model), *_weight_sentences(model)],
         "simulated": model.simulated,
     }
+
+
+def _kernel_sentences(model: CalibrationModel) -> list[str]:
+    choices = {item.rotation: choice_of(item.regressor) for item in model.rotations}
+    return kernel_sentences({name: found for name, found in choices.items() if found is not None})
 
 
 def _weight_sentences(model: CalibrationModel) -> list[str]:

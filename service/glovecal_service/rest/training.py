@@ -27,7 +27,7 @@ MOST_TAKES = 1000
 class Training(StrictBody):
     subject: Identifier
     layout: Identifier
-    method: Method = "lmc_gpr"
+    method: Method = Field("lmc_gpr", description="`auto` chooses a kernel for each rotation.")
     takes: Annotated[list[Id], Field(min_length=1, max_length=MOST_TAKES)] | None = Field(
         None,
         description="None: all takes of the subject and layout that have a "
