@@ -88,7 +88,7 @@ def assumed_process(
     """
     ends = correspondence.input_columns(np.array([low, high], float), sensors)
     span = np.maximum(np.abs(ends[1] - ends[0]), 1e-9)
-    range_deg = float(np.ptp(ACTIVE_RANGE_DEG.get(correspondence.rotation, (0.0, USUAL_RANGE_DEG))))
+    range_deg = rotation_range_deg(correspondence.rotation)
     learned = trained is not None and np.sqrt(trained.noise_variance) >= LEAST_NOISE_DEG
     if trained is not None and learned:
         bend, relevance = float(trained.theta[-len(span) - 1]), trained.theta[-len(span) :]
@@ -100,6 +100,11 @@ def assumed_process(
     line = 2 * np.log(range_deg * np.array([*[SLOPE] * len(span), LEVEL]))
     theta = np.concatenate([line, [bend], relevance, [_NONE]])
     return AssumedProcess(correspondence, ends.mean(axis=0), span, theta, noise_deg, bool(learned))
+
+
+def rotation_range_deg(rotation: str) -> float:
+    """How far it goes, of a usual hand."""
+    return float(np.ptp(ACTIVE_RANGE_DEG.get(rotation, (0.0, USUAL_RANGE_DEG))))
 
 
 def _usual_bend(correspondence: Correspondence, range_deg: float) -> tuple[float, np.ndarray]:

@@ -56,15 +56,17 @@ def told(found: Proposal, best: ProposedStep) -> dict[str, Any]:
 
 
 def still_possible(candidates: list[Step], state: SamplingState) -> list[Step]:
-    """Without what this person left out."""
-    skipped = [
-        state.protocol.step(name) for name, each in state.finished().items() if each.outcome == "skipped"
-    ]
+    """Without what this person left out, and without widgets that were recorded: a widget that is not quite
+    at its angle is as far off the next time, another angle is not."""
+    finished = [(state.protocol.step(name), each.outcome) for name, each in state.finished().items()]
+    skipped = [step for step, outcome in finished if outcome == "skipped"]
+    done = [step for step, outcome in finished if outcome == "good" and step.motion == "move"]
     parts = [step.part for step in skipped]
     return [
         step
         for step in candidates
-        if not any(_same(step, other) for other in skipped) and parts.count(step.part) < MOST_SKIPPED
+        if not any(_same(step, other) for other in (*skipped, *done))
+        and parts.count(step.part) < MOST_SKIPPED
     ]
 
 

@@ -8,7 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.active_sampling.assumed_process import AssumedProcess, assumed_process
+from glovecal_models.active_sampling.assumed_process import (
+    AssumedProcess,
+    assumed_process,
+    rotation_range_deg,
+)
 from glovecal_models.active_sampling.expected_readings import ExpectedReadings
 from glovecal_models.active_sampling.known_readings import (
     ALIKE_FRAMES,
@@ -130,8 +134,7 @@ def propose(
         ranked.append(_proposed(step, now, after, noise))
     ranked.sort(key=lambda each: -each.fall_per_s)
     learned = tuple(name for name, (process, _) in states.items() if process.learned)
-    sd = {name: float(np.sqrt(variance)) for name, variance in now.items()}
-    return Proposal(tuple(ranked), sd, noise, learned)
+    return Proposal(tuple(ranked), _told_sd_deg(now), noise, learned)
 
 
 def _state(
@@ -163,13 +166,23 @@ def _proposed(
 ) -> ProposedStep:
     frame = float(np.mean(np.square(list(noise.values()))))
     before_all, after_all = (float(np.mean(list(each.values()))) for each in (now, after))
+    told = _told_sd_deg(after)
     return ProposedStep(
         step,
         step_capture_s(step),
-        {name: float(np.sqrt(after[name])) for name in step.angles if name in after},
-        float(np.sqrt(after_all)),
+        {name: told[name] for name in step.angles if name in told},
+        float(np.sqrt(np.mean(np.square(list(told.values()))))),
         float(np.sqrt(before_all + frame) - np.sqrt(after_all + frame)),
     )
+
+
+def _told_sd_deg(variance: Mapping[str, float]) -> dict[str, float]:
+    """What is left to know of an angle that lies within its range anyway: precisions add."""
+    told = {}
+    for name, value in variance.items():
+        in_range = rotation_range_deg(name) ** 2 / 12
+        told[name] = float(np.sqrt(value * in_range / (value + in_range)))
+    return told
 
 
 def _step_document(each: ProposedStep, proposal: Proposal) -> dict[str, Any]:

@@ -90,7 +90,7 @@ def test_what_was_expected_of_a_step_comes_true(proposals: list[NextSteps], acti
     after = [each["steps"][0]["rms_sd_after_deg"] for each in told[:-1]]
     found = [each["rms_sd_deg"] for each in told[1:]]
     assert np.median(np.abs(np.array(found) / after - 1)) < 0.05
-    assert found[-1] < 0.1 * found[0]
+    assert found[-1] < 0.2 * found[0] < 0.2 * 90 / np.sqrt(12)
     assert told[3]["sentences"][-1].startswith(f"Next: {told[3]['steps'][0]['name']}. Expected standard dev")
 
 
@@ -122,11 +122,18 @@ def with_skipped(state: SamplingState, *names: str) -> SamplingState:
 
 
 def test_what_a_person_left_out_is_not_proposed_again(active: AskedSession) -> None:
+    """Nor is a widget that was recorded; poses are, their errors are new each time."""
     steps = candidate_steps(LAYOUT)
     asked = [step for step in active.state.protocol.steps if step.part == "W_FLEX"]
-    once = still_possible(steps, with_skipped(active.state, asked[0].name))
-    assert asked[0].angles not in [step.angles for step in once if step.part == "W_FLEX"]
-    assert any(step.part == "W_FLEX" for step in once)
+    fresh = still_possible(steps, begin_sampling(make_protocol("active", LAYOUT), LAYOUT.sensors))
+    assert fresh == steps
+    now = [step.name for step in still_possible(steps, active.state)]
+    assert {step.name for step in steps} - set(now) == {
+        step.name for step in active.state.protocol.steps if step.kind == "fk_cross_couple"
+    }
+    assert any(name.startswith("W_FLEX") for name in now)
+    poses = with_skipped(active.state, "fist")
+    assert "fist" not in [step.name for step in still_possible(steps, poses)]
     twice = still_possible(steps, with_skipped(active.state, asked[0].name, asked[1].name))
     assert not any(step.part == "W_FLEX" for step in twice)
 
