@@ -16,6 +16,7 @@ import statistics
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -133,6 +134,7 @@ def table_2(seed: int = 1, every: int = 1, report: Report | None = None) -> list
     return rows
 
 
+@cache
 def tuples(seed: int, every: int = 1) -> Tuples:
     glove = SimulatedGlove(seed)
     columns = [glove.sensors.index(name) for name in SENSORS]
