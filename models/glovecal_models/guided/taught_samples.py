@@ -1,0 +1,118 @@
+"""What takes with known angles teach: one sample for each pose that was held, one for each frame of a widget.
+
+All frames of a hold share one error, that of the pose: a person takes a pose 2.5 degrees from where it was
+last. Seventy frames of it are one sample, not seventy. Trained on frames, a process finds ten clusters of
+readings that each say one angle, takes their scatter for the noise of the sensor, and bends through all ten:
+that is why LMC-GPR lost to a line where a rotation was known from key poses alone.
+A widget holds its angle, and the readings change: there each frame is a sample of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from glovecal_models.calibration.pose_book import REPEAT_SD_DEG
+from glovecal_models.guided.taught_take import TaughtTake
+from glovecal_models.inverse_kinematics.steadied import steadied
+from glovecal_models.takes.take import Take
+
+LEAST_HOLDS = 3
+SEEN_BEFORE = 2.0
+"""The usual spread of poses counts as if it had been seen so often."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """One hold."""
+
+    take: Take
+    frame: int
+    """Its middle row."""
+    readings: np.ndarray
+    """(S,), means, in the take's order of sensors."""
+    angles: dict[str, float]
+    """Degrees by rotation."""
+
+
+@dataclass(frozen=True)
+class Moved:
+    """Frames of one take with known angles while the rest of the hand moved."""
+
+    take: Take
+    readings: np.ndarray
+    """(N, S), without the sensors' noise; all frames of the take."""
+
+
+@dataclass(frozen=True)
+class TaughtSamples:
+    holds: tuple[Held, ...]
+    moved: tuple[Moved, ...]
+
+    def of_holds(self, rotation: str, sensors: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+        """Mean readings (N, len(sensors)) and angles (N,)."""
+        own = [held for held in self.holds if rotation in held.angles]
+        rows = [held.readings[[held.take.sensors.index(name) for name in sensors]] for held in own]
+        angles = np.array([held.angles[rotation] for held in own])
+        return np.array(rows).reshape(len(own), len(sensors)), angles
+
+    def of_widgets(self, rotation: str, sensors: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+        """Steadied readings (N, len(sensors)) and angles (N,)."""
+        rows, angles = [np.empty((0, len(sensors)))], [np.empty(0)]
+        for moved in self.moved:
+            angle = moved.take.reference_at_frames([rotation])[:, 0]
+            known = np.isfinite(angle)
+            columns = [moved.take.sensors.index(name) for name in sensors]
+            rows.append(moved.readings[known][:, columns])
+            angles.append(angle[known])
+        return np.concatenate(rows), np.concatenate(angles)
+
+    @property
+    def rotations(self) -> tuple[str, ...]:
+        held = [name for each in self.holds for name in each.angles]
+        return tuple(dict.fromkeys([*held, *(name for each in self.moved for name in each.take.rotations)]))
+
+
+def taught_samples(takes: Iterable[TaughtTake]) -> TaughtSamples:
+    holds: list[Held] = []
+    moved: list[Moved] = []
+    for taught in takes:
+        if taught.kind == "fk_independent":
+            holds += [_held(taught.take, rows) for rows in taught.steps()]
+        elif taught.kind == "fk_cross_couple":
+            moved.append(Moved(taught.take, steadied(taught.take.time_s, taught.take.readings.astype(float))))
+    return TaughtSamples(tuple(holds), tuple(moved))
+
+
+def hold_sd_deg(samples: TaughtSamples) -> float:
+    """How far poses are from the angles they are said to have: the scatter about a line, over all rotations.
+
+    Leans on the usual spread of 2.5 degrees where little was held.
+    """
+    squared, freedom = SEEN_BEFORE * REPEAT_SD_DEG**2, SEEN_BEFORE
+    for rotation in samples.rotations:
+        if not _read(samples, rotation):
+            continue
+        readings, angles = samples.of_holds(rotation, (rotation,))
+        if len(angles) > LEAST_HOLDS and np.ptp(readings) > 0:
+            line = np.polyfit(readings[:, 0], angles, 1)
+            squared += float(np.sum((np.polyval(line, readings[:, 0]) - angles) ** 2))
+            freedom += len(angles) - 2
+    return float(np.sqrt(squared / freedom))
+
+
+def _read(samples: TaughtSamples, rotation: str) -> bool:
+    return bool(samples.holds) and rotation in samples.holds[0].take.sensors
+
+
+def _held(take: Take, rows: np.ndarray) -> Held:
+    known = take.reference_at_frames(take.rotations)[rows[0]]
+    angles = {name: float(angle) for name, angle in zip(take.rotations, known, strict=True)}
+    return Held(
+        take,
+        int(rows[len(rows) // 2]),
+        take.readings[rows].mean(axis=0),
+        {name: angle for name, angle in angles.items() if np.isfinite(angle)},
+    )
