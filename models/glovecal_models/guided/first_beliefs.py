@@ -8,7 +8,7 @@ joint's (section 5.2.2).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -34,23 +34,20 @@ RULE_OFFSET_DEG, RULE_SLOPE_DEG, RULE_BOW_DEG = 1.0, 5.0, 2.0
 RANGE_SLOPE_DEG = 15.0
 """How far a joint's range on this hand is from the usual."""
 MOST_SAMPLES = 300
-LEAST_MOVED = 40
-"""Frames of widgets that carry a process."""
 
 
 def first_beliefs(
     layout: Layout,
     samples: TaughtSamples,
     ranges: Mapping[str, tuple[float, float]],
-    cancelled: Callable[[], bool] | None = None,
 ) -> dict[str, RotationBelief]:
     """Of every rotation that the hand has or the layout reads; ``ranges``: lowest and highest reading by
-    sensor. Raises Cancelled."""
-    held_sd = hold_sd_deg(samples)
+    sensor."""
+    held_sd = hold_sd_deg(samples, layout)
     names = dict.fromkeys(
         [*HAND_ROTATIONS, *(name for name in layout.rotations if name in samples.rotations)]
     )
-    return {name: _belief(name, layout, samples, ranges, held_sd, cancelled) for name in names}
+    return {name: _belief(name, layout, samples, ranges, held_sd) for name in names}
 
 
 def _belief(
@@ -59,7 +56,6 @@ def _belief(
     samples: TaughtSamples,
     ranges: Mapping[str, tuple[float, float]],
     held_sd: float,
-    cancelled: Callable[[], bool] | None,
 ) -> RotationBelief:
     sensors = layout.correspondence(rotation).sensors if rotation in layout.rotations else ()
     low, high = np.array([ranges[name] for name in sensors]).reshape(-1, 2).T

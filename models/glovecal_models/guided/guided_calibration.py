@@ -21,6 +21,7 @@ from glovecal_models.calibration.training_settings import Report, TrainingSettin
 from glovecal_models.errors import Cancelled, NotTrainable
 from glovecal_models.guided.first_beliefs import first_beliefs, reading_ranges
 from glovecal_models.guided.second_pass import (
+    Lesson,
     SampleCount,
     counted,
     known_lessons,
@@ -35,9 +36,33 @@ from glovecal_models.guided.taught_take import FK, TaughtTake
 from glovecal_models.guided.touch_posterior import TouchPosterior
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.layout import Layout
+from glovecal_models.takes.take import Take
 
+SAMPLES_SHARE = 0.3
+"""Of the work that goes before the training."""
 FRAMES_A_TOUCH = 100
 """Of each touch that the search for the likeliest calibration looks at."""
+
+
+@dataclass(frozen=True)
+class GuidedSamples:
+    """What a sampling teaches, ready for training; a service may spread the fits and call ``finished``."""
+
+    takes: tuple[Take, ...]
+    """With the angles of the second pass."""
+    layout: Layout
+    """To train by: the glove's own but for joints without a sensor."""
+    glove_layout: Layout
+    samples: tuple[SampleCount, ...]
+    refused: tuple[RefusedTouch, ...]
+    sentences: tuple[str, ...]
+    lessons: tuple[Lesson, ...]
+    posterior: TouchPosterior
+    """The likeliest calibration before any training."""
+
+    def finished(self, model: CalibrationModel) -> CalibrationModel:
+        """A ``model`` trained on ``takes`` by ``layout``, as it is to be kept."""
+        return with_live_noise(replace(model, layout=self.glove_layout), self.lessons, self.posterior)
 
 
 @dataclass(frozen=True)
@@ -46,6 +71,56 @@ class GuidedCalibration:
     samples: tuple[SampleCount, ...]
     refused: tuple[RefusedTouch, ...]
     sentences: tuple[str, ...]
+
+
+def guided_samples(
+    takes: Sequence[TaughtTake],
+    layout: Layout,
+    skeleton: Skeleton | None,
+    *,
+    cancelled: Callable[[], bool] | None = None,
+    report: Report | None = None,
+) -> GuidedSamples:
+    """Both passes but for the training; see ``guided_calibration``. Raises as it does."""
+    say = report or (lambda sentence, fraction: None)
+    for taught in takes:
+        require_layout(taught.take, layout)
+    used = [_in_order(taught, layout) for taught in takes]
+    known = [taught for taught in used if taught.kind in FK]
+    touching = [taught for taught in used if taught.contacts]
+    if not known and not touching:
+        raise NotTrainable(nothing_left(skeleton is not None, 0, ()))
+    say("what poses and widgets tell", 0.0)
+    samples = taught_samples(known)
+    readings = np.concatenate([taught.take.readings[taught.take.lead_in_frames :] for taught in used])
+    beliefs = first_beliefs(layout, samples, reading_ranges(layout.sensors, readings))
+    seen: list[SeenTouch] = []
+    refused: list[RefusedTouch] = []
+    if touching and skeleton is not None:
+        say("first pass: which touches can be seen in what poses and widgets taught", 0.1)
+        first = TouchPosterior(beliefs, layout.sensors, skeleton, ())
+        seen, refused = seen_touches(touching, first, skeleton)
+        _stop_if(cancelled)
+    say("what all touches tell together", 0.5)
+    touches = [touch.some(FRAMES_A_TOUCH) for touch in seen]
+    posterior = TouchPosterior(beliefs, layout.sensors, skeleton, touches, cancelled)
+    inferred, told = touch_lessons(seen, posterior, layout.rotations)
+    lessons = (*known_lessons(known, posterior), *inferred)
+    if not lessons:
+        raise NotTrainable(nothing_left(skeleton is not None, len(touching), refused))
+    said = [hold_sentence(len(samples.holds), hold_sd_deg(samples, layout))] if samples.holds else []
+    said += guided_sentences(seen, refused, told, posterior, skeleton)
+    say("second pass: all samples have their angles", 1.0)
+    return GuidedSamples(
+        takes=tuple(lesson.take for lesson in lessons),
+        layout=taught_layout(layout, told),
+        glove_layout=layout,
+        samples=counted(lessons, told),
+        refused=tuple(refused),
+        sentences=tuple(said),
+        lessons=lessons,
+        posterior=posterior,
+    )
 
 
 def guided_calibration(
@@ -67,64 +142,31 @@ def guided_calibration(
     train on, with the reason of every touch that was refused, LayoutMismatch, Cancelled.
     """
     settings = settings or TrainingSettings()
-    say = report or (lambda sentence, fraction: None)
-    for taught in takes:
-        require_layout(taught.take, layout)
-    known = [taught for taught in takes if taught.kind in FK]
+    how = {"take_hashes": take_hashes, "parent": parent, "cancelled": cancelled}
     if settings.method in ("raw", "linear"):
-        how = {"take_hashes": take_hashes, "parent": parent, "cancelled": cancelled, "report": report}
-        return _plain(known, layout, subject, settings, **how)
-    used = [_in_order(taught, layout) for taught in takes]
-    known = [taught for taught in used if taught.kind in FK]
-    say("what the poses and widgets tell", 0.0)
-    samples = taught_samples(known)
-    readings = np.concatenate([taught.take.readings[taught.take.lead_in_frames :] for taught in used])
-    beliefs = first_beliefs(layout, samples, reading_ranges(layout.sensors, readings), cancelled)
-    seen: list[SeenTouch] = []
-    refused: list[RefusedTouch] = []
-    touching = [taught for taught in used if taught.contacts]
-    if touching and skeleton is not None:
-        say("first pass: which touches can be seen in what poses and widgets taught", 0.1)
-        first = TouchPosterior(beliefs, layout.sensors, skeleton, ())
-        seen, refused = seen_touches(touching, first, skeleton)
-        _stop_if(cancelled)
-    say("what all touches tell together", 0.4)
-    touches = [touch.some(FRAMES_A_TOUCH) for touch in seen]
-    posterior = TouchPosterior(beliefs, layout.sensors, skeleton, touches, cancelled)
-    lessons, told = touch_lessons(seen, posterior, layout.rotations)
-    lessons = [*known_lessons(known, posterior), *lessons]
-    if not lessons:
-        raise NotTrainable(nothing_left(skeleton is not None, len(touching), refused))
-    say("second pass: training on all samples", 0.5)
-    model = train(
-        [each.take for each in lessons],
-        taught_layout(layout, told),
-        subject,
-        settings,
-        take_hashes=take_hashes,
-        parent=parent,
-        cancelled=cancelled,
-        report=lambda sentence, fraction: say(sentence, 0.5 + 0.5 * fraction),
-    )
-    model = with_live_noise(replace(model, layout=layout), lessons, posterior)
+        return _plain(takes, layout, subject, settings, report=report, **how)
+    say = report or (lambda sentence, fraction: None)
+
+    def first(sentence: str, fraction: float) -> None:
+        say(sentence, SAMPLES_SHARE * fraction)
+
+    def then(sentence: str, fraction: float) -> None:
+        say(f"second pass: {sentence}", SAMPLES_SHARE + (1 - SAMPLES_SHARE) * fraction)
+
+    found = guided_samples(takes, layout, skeleton, cancelled=cancelled, report=first)
+    model = found.finished(train(found.takes, found.layout, subject, settings, report=then, **how))
     say("trained", 1.0)
-    said = [hold_sentence(len(samples.holds), hold_sd_deg(samples))] if samples.holds else []
-    said += guided_sentences(seen, refused, told, posterior, skeleton)
-    return GuidedCalibration(model, counted(lessons, told), tuple(refused), tuple(said))
+    return GuidedCalibration(model, found.samples, found.refused, found.sentences)
 
 
 def _plain(
-    known: Sequence[TaughtTake],
-    layout: Layout,
-    subject: str,
-    settings: TrainingSettings,
-    **how: Any,
+    takes: Sequence[TaughtTake], layout: Layout, subject: str, settings: TrainingSettings, **how: Any
 ) -> GuidedCalibration:
     """A baseline: known angles as they are."""
-    takes = [taught.take for taught in known if taught.take.rotations]
-    if not takes:
+    known = [taught for taught in takes if taught.kind in FK and taught.take.rotations]
+    if not known:
         raise NotTrainable(f"method {settings.method} needs poses or widgets; touches are not used by it")
-    model = train(takes, layout, subject, settings, **how)
+    model = train([taught.take for taught in known], layout, subject, settings, **how)
     samples = taught_samples(known)
     counts = [
         SampleCount(

@@ -17,6 +17,7 @@ import numpy as np
 from glovecal_models.calibration.pose_book import REPEAT_SD_DEG
 from glovecal_models.guided.taught_take import TaughtTake
 from glovecal_models.inverse_kinematics.steadied import steadied
+from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
 LEAST_HOLDS = 3
@@ -86,25 +87,17 @@ def taught_samples(takes: Iterable[TaughtTake]) -> TaughtSamples:
     return TaughtSamples(tuple(holds), tuple(moved))
 
 
-def hold_sd_deg(samples: TaughtSamples) -> float:
-    """How far poses are from the angles they are said to have: the scatter about a line, over all rotations.
-
-    Leans on the usual spread of 2.5 degrees where little was held.
-    """
+def hold_sd_deg(samples: TaughtSamples, layout: Layout) -> float:
+    """How far poses are from the angles they are said to have: the scatter about a line of the rotations that
+    one sensor reads by itself. Leans on the usual spread of 2.5 degrees where little was held."""
     squared, freedom = SEEN_BEFORE * REPEAT_SD_DEG**2, SEEN_BEFORE
-    for rotation in samples.rotations:
-        if not _read(samples, rotation):
-            continue
-        readings, angles = samples.of_holds(rotation, (rotation,))
-        if len(angles) > LEAST_HOLDS and np.ptp(readings) > 0:
+    for item in layout.correspondences:
+        readings, angles = samples.of_holds(item.rotation, item.sensors)
+        if item.kind == "1S1R" and len(angles) > LEAST_HOLDS and np.ptp(readings) > 0:
             line = np.polyfit(readings[:, 0], angles, 1)
             squared += float(np.sum((np.polyval(line, readings[:, 0]) - angles) ** 2))
             freedom += len(angles) - 2
     return float(np.sqrt(squared / freedom))
-
-
-def _read(samples: TaughtSamples, rotation: str) -> bool:
-    return bool(samples.holds) and rotation in samples.holds[0].take.sensors
 
 
 def _held(take: Take, rows: np.ndarray) -> Held:
