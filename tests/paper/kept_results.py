@@ -46,7 +46,7 @@ class KeptResults:
             return None  # stopped while it was written
         if document.pop("programs") != self._programs:
             return None
-        return PaperResult(**document | {"rows": tuple(document["rows"])})
+        return PaperResult(**document)
 
     def keep(self, result: PaperResult) -> None:
         document = {"programs": self._programs} | asdict(result)

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from kept_results import KeptResults, programs_hash
-from paper_job import PaperResult
+from paper_job import PaperJob, PaperResult
 from paper_machine import commit
 from paper_page.page import paper_page
 from paper_parts import PARTS
@@ -49,7 +49,7 @@ def compute(
     parts: Sequence[str], kept: KeptResults, seed: int, quick: bool, again: bool, workers: int
 ) -> list[str]:
     """The jobs of ``parts`` that are not kept yet; the names of those that failed."""
-    jobs = [job for part in parts for job in PARTS[part].jobs]
+    jobs = _jobs(parts)
     waiting = [job for job in jobs if again or kept.get(job.name, seed, quick) is None]
     if len(waiting) < len(jobs):
         print(f"{len(jobs) - len(waiting)} of {len(jobs)} are known; --again computes them anew")
@@ -57,12 +57,15 @@ def compute(
     return work_off(waiting, seed, quick, workers, kept.keep)
 
 
-def results(kept: KeptResults, seed: int, quick: bool) -> dict[str, list[PaperResult]]:
-    """What is known of every part, now or from before."""
-    return {
-        name: [result for job in part.jobs if (result := kept.get(job.name, seed, quick)) is not None]
-        for name, part in PARTS.items()
-    }
+def results(kept: KeptResults, seed: int, quick: bool) -> dict[str, PaperResult]:
+    """What is known by the name of the job, computed now or before."""
+    known = {job.name: kept.get(job.name, seed, quick) for job in _jobs(list(PARTS))}
+    return {name: result for name, result in known.items() if result is not None}
+
+
+def _jobs(parts: Sequence[str]) -> list[PaperJob]:
+    """Each once, though parts share them."""
+    return list({job.name: job for part in parts for job in PARTS[part].jobs}.values())
 
 
 def _parser() -> argparse.ArgumentParser:

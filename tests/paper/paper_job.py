@@ -11,13 +11,13 @@ from paper_machine import commit, computer
 
 from glovecal_models.calibration.training_settings import Report
 
-Rows = Callable[[int, bool, Report], Sequence[Any]]
-"""Seed, quick, and where to report progress -> dataclass rows."""
+Rows = Callable[[int, bool, Report], Mapping[str, Sequence[Any]]]
+"""Seed, quick, and where to report progress -> dataclass rows by their kind."""
 
 
 @dataclass(frozen=True)
 class PaperJob:
-    """A part is one job, or several where they are long and can run side by side."""
+    """Parts share a job where they share a training; a part has several where they can run side by side."""
 
     name: str
     rows: Rows
@@ -32,7 +32,7 @@ class PaperResult:
     job: str
     seed: int
     quick: bool
-    rows: tuple[Mapping[str, Any], ...]
+    rows: Mapping[str, Sequence[Mapping[str, Any]]]
     took_s: float
     computed: str
     """Local date and time."""
@@ -42,7 +42,8 @@ class PaperResult:
 
 def run_job(job: PaperJob, seed: int, quick: bool, report: Report) -> PaperResult:
     begin = time.monotonic()
-    rows = tuple(asdict(row) for row in job.rows(seed, quick, report))
+    found = job.rows(seed, quick, report)
+    rows = {kind: [asdict(row) for row in some] for kind, some in found.items()}
     took_s = time.monotonic() - begin
     computed = time.strftime("%Y-%m-%d %H:%M")
     return PaperResult(job.name, seed, quick, rows, took_s, computed, commit(), computer())

@@ -1,10 +1,10 @@
 """Table 4 and Figure 14 of Wang & Neff 2013: time and accuracy of SPGP by its number of pseudo-inputs M.
 
-One simulated glove, trained as the paper trains (key poses, widgets, thumb and wrist, then touches with
-angles from inverse kinematics), tried in another wearing: the nine poses of Table 3, and thumb and each
+The subject of ``paper_session``, tried in another wearing: the nine poses of Table 3, and thumb and each
 finger touching. Times are CPU seconds of one thread. Of Figure 14 the paper prints curves without numbers. A
 rotation that is read from one sensor has at most as many pseudo-inputs as this sensor has readings, so from
-M = 300 on only rotations of several sensors grow. The noise guard decides for each rotation whether its
+M = 300 on only rotations of several sensors grow. All searches start from the exact process, whose training
+counts in each of them, and take at most 100 steps. The noise guard decides for each rotation whether its
 trained pseudo-inputs are kept (``noise_guard``).
 
     python tests/paper/table_4.py
@@ -13,27 +13,22 @@ trained pseudo-inputs are kept (``noise_guard``).
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from paper_session import PaperSession, paper_session
 
+from glovecal_models.calibration.fit_task import FitResult
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_models.calibration.training import train
+from glovecal_models.calibration.sample_weight import Recorded, Weighted, fit_weighted
+from glovecal_models.calibration.training import assemble
+from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
-from glovecal_models.hand.dimensions import HandDimensions
-from glovecal_models.hand.skeleton import Skeleton, hand_skeleton
-from glovecal_models.inverse_kinematics.contact import Touch
-from glovecal_models.inverse_kinematics.ik_samples import ik_samples
-from glovecal_models.inverse_kinematics.predicted_hand import predicted_hand
-from glovecal_models.inverse_kinematics.tip_chains import TipChains
-from glovecal_models.simulation.protocol import evaluation_segment, sampling_protocol
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import SimulatedTake, simulate_take
-from glovecal_models.simulation.touching import touching_segment
-from glovecal_models.takes.take import Take
+from glovecal_models.regression.process_regressor import ProcessRegressor
+from glovecal_models.regression.spgp import fit_spgp
 from glovecal_models.threads import pin_blas_to_one_thread
 
 SIZES = (20, 50, 100, 300, 500, 1000)
@@ -46,9 +41,10 @@ PAPER: dict[int, tuple[float, float]] = {
     20: (6.224, 0.016),
 }
 """Training time of a glove and prediction time of a frame, seconds; 0.016 stands for "at most 0.016"."""
-QUICK_SAMPLES, SAMPLES = 120, 2000
-HAND_MM = 182.0
-RATE_HZ, TOUCH_S = 60.0, 176 / 60.0
+STEPS = 100
+SIZES_HZ, SIZES_SAMPLES = 60.0, 2000
+"""Of the sampling: what M = 1000 can still be trained on in minutes."""
+WEARING = 1
 TIMED_FRAMES = 300
 FINGERS = "IMRP"
 """That the thumb touches."""
@@ -74,82 +70,91 @@ class Table4Row:
 
 
 @dataclass(frozen=True)
-class Trial:
-    """What is trained on, and what is tried."""
+class Started:
+    """The exact processes of all rotations, from which the searches start."""
 
-    takes: Sequence[Take]
-    poses: SimulatedTake
-    touches: dict[str, SimulatedTake]
-    glove: SimulatedGlove
-    hand: Skeleton
+    session: PaperSession
+    plan: TrainingPlan
+    processes: Mapping[str, Weighted]
+    train_s: float
+    """CPU seconds."""
 
 
-def table_4(seed: int = 1, quick: bool = False, report: Report | None = None) -> list[Table4Row]:
+def table_4(seed: int = 1, report: Report | None = None) -> list[Table4Row]:
     """The paper's rows, smallest M first, and the exact process."""
     sizes: tuple[int | None, ...] = (*SIZES, None)
     rows = []
     for done, size in enumerate(sizes):
         if report:
             report("LMC-GPR" if size is None else f"M = {size}", done / len(sizes))
-        rows.append(size_row(trial(seed), size, QUICK_SAMPLES if quick else SAMPLES))
+        rows.append(size_row(started(paper_session(seed, rate_hz=SIZES_HZ, samples=SIZES_SAMPLES)), size))
     return rows
 
 
 @cache
-def trial(seed: int, fingers: str = FINGERS) -> Trial:
-    first, second = SimulatedGlove(seed), SimulatedGlove(seed, wearing=1)
-    hand = hand_skeleton(HandDimensions.from_measured({"hand_length": HAND_MM}))
-    segments = sampling_protocol(seed)
-    fk = [_measured(simulate_take(first, segment, seed=seed, rate_hz=RATE_HZ).take) for segment in segments]
-    before = train(fk, first.layout, "subject", TrainingSettings(samples=300, folds=0))
-    ik = [
-        ik_samples(_touching(first, hand, finger, seed).take, before, hand, Touch(("T", finger))).take
-        for finger in fingers
-    ]
-    poses = simulate_take(second, evaluation_segment(seed), seed=seed, rate_hz=RATE_HZ)
-    touches = {finger: _touching(second, hand, finger, seed + 1) for finger in fingers}
-    return Trial((*fk, *ik), poses, touches, second, hand)
+def started(session: PaperSession) -> Started:
+    """Trained exactly."""
+    settings = TrainingSettings(method="spgp", samples=session.samples, folds=0)
+    begin = time.process_time()
+    plan = plan_training(session.taught.takes, session.taught.layout, "anna", settings)
+    processes = {
+        task.rotation: fit_weighted(Recorded(task.inputs, task.target, task.take, task.position), seed=0)
+        for task in plan.tasks
+    }
+    return Started(session, plan, processes, time.process_time() - begin)
 
 
 def size_row(
-    made: Trial, size: int | None, samples: int = SAMPLES, report: Report | None = None
+    begun: Started, size: int | None, report: Report | None = None, fingers: str = FINGERS
 ) -> Table4Row:
     """Train with ``size`` pseudo-inputs (None: exactly) and try."""
-    settings = TrainingSettings(method="lmc_gpr", samples=samples, folds=0)
-    if size is not None:
-        settings = replace(settings, method="spgp", pseudo_inputs=size)
     begin = time.process_time()
-    model = train(made.takes, made.glove.layout, "subject", settings, report=report)
-    train_s = time.process_time() - begin
-    paper = (None, None) if size is None else PAPER[size]
-    guarded = [
-        rotation.regressor.settings()["evidence"]["guard"]["accepted"]
-        for rotation in model.rotations
-        if rotation.regressor.method == "spgp"
+    trained = _exact(begun) if size is None else _sparse(begun, size, report)
+    train_s = begun.train_s + time.process_time() - begin
+    results = [
+        FitResult(name, None, regressor.arrays(), regressor.settings(), 0.0, 0)
+        for name, regressor in trained.items()
     ]
+    model = begun.session.taught.finished(assemble(begun.plan, results, take_hashes=()))
+    paper = (None, None) if size is None else PAPER[size]
+    poses = begun.session.held_poses(WEARING, visit=0)
+    found = begun.session.angles("spgp", poses.take.readings, model)
     return Table4Row(
         size=size,
         paper_train_s=paper[0],
         train_s=train_s,
         paper_frame_s=paper[1],
-        frame_s=_frame_s(model, made.poses.take.readings),
-        fk_deg=_fk_deg(model, made),
-        ik_cm=float(np.mean([_apart_cm(model, made, finger) for finger in made.touches])),
-        rotations=len(model.rotations),
-        kept=sum(guarded),
+        frame_s=_frame_s(model, poses.take.readings),
+        fk_deg=float(np.sqrt(np.mean((found - begun.session.truth(poses)) ** 2))),
+        ik_cm=float(np.mean([_apart_cm(begun.session, model, finger) for finger in fingers])),
+        rotations=len(trained),
+        kept=sum(_is_kept(regressor) for regressor in trained.values()),
     )
 
 
-def _measured(take: Take) -> Take:
-    """Without the joints that have no sensor: nobody measures these before the touches."""
-    names = [name for name in take.rotations if not name.endswith(("DIP", "VIR"))]
-    columns = [take.rotations.index(name) for name in names]
-    return replace(take, rotations=tuple(names), reference=take.reference[:, columns])
+def _exact(begun: Started) -> dict[str, ProcessRegressor]:
+    return {name: process.regressor for name, process in begun.processes.items()}
 
 
-def _touching(glove: SimulatedGlove, hand: Skeleton, finger: str, seed: int) -> SimulatedTake:
-    segment = touching_segment(glove.hand, hand, finger, seed, TOUCH_S)
-    return simulate_take(glove, segment, seed=seed, rate_hz=RATE_HZ)
+def _sparse(begun: Started, size: int, report: Report | None) -> dict[str, ProcessRegressor]:
+    trained = {}
+    for done, task in enumerate(begun.plan.tasks):
+        if report:
+            report(f"M = {size}: {task.rotation}", done / len(begun.plan.tasks))
+        start = begun.processes[task.rotation]
+        trained[task.rotation] = fit_spgp(
+            task.inputs,
+            task.target,
+            pseudo_inputs=size,
+            iterations=STEPS,
+            start=start.regressor,
+            sample_weight=start.weight,
+        )
+    return trained
+
+
+def _is_kept(regressor: ProcessRegressor) -> bool:
+    return bool(regressor.evidence.get("guard", {}).get("accepted"))
 
 
 def _frame_s(model: CalibrationModel, readings: np.ndarray) -> float:
@@ -161,19 +166,9 @@ def _frame_s(model: CalibrationModel, readings: np.ndarray) -> float:
     return (time.process_time() - begin) / TIMED_FRAMES
 
 
-def _fk_deg(model: CalibrationModel, made: Trial) -> float:
-    names = [name for name in model.rotation_names if name in made.glove.rotations]
-    predicted = GlovePredictor(model).predict(made.poses.take.readings).mean
-    found = predicted[:, [model.rotation_names.index(name) for name in names]]
-    true = made.poses.truth[:, [made.glove.rotations.index(name) for name in names]]
-    return float(np.sqrt(np.mean((found - true) ** 2)))
-
-
-def _apart_cm(model: CalibrationModel, made: Trial, finger: str) -> float:
-    chains = TipChains(made.hand, ("T", finger))
-    angles = predicted_hand(made.touches[finger].take, model).mean_deg[:, chains.columns]
-    tips = chains.tips_mm(angles)
-    return float(np.linalg.norm(tips[:, 0] - tips[:, 1], axis=1).mean()) / 10
+def _apart_cm(session: PaperSession, model: CalibrationModel, finger: str) -> float:
+    readings = session.touching(finger, WEARING).take.readings
+    return float(session.tip_distance_cm(finger, session.angles("spgp", readings, model)).mean())
 
 
 def main() -> None:

@@ -51,7 +51,7 @@ def test_results_of_other_programs_are_not_shown(folder) -> None:
     kept = KeptResults(folder, programs_hash())
     result = kept.get("table-1", 1, True)
     assert result is not None
-    assert len(result.rows) == 25
+    assert len(result.rows["table-1"]) == 25
     assert result.computer
     assert KeptResults(folder, "of yesterday").get("table-1", 1, True) is None
     assert kept.get("table-1", 2, True) is None

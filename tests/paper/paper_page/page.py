@@ -19,32 +19,36 @@ REMARK = (
 )
 
 
-def paper_page(found: Mapping[str, Sequence[PaperResult]], *, date: str, commit: str) -> str:
-    """``found``: results of each part's jobs, in order; a part without all of them is told to be missing."""
+def paper_page(found: Mapping[str, PaperResult], *, date: str, commit: str) -> str:
+    """``found``: results by the name of the job; a part without all of its jobs is told to be missing."""
     sections = {
-        name: _section(PARTS[name], results)
-        for name, results in found.items()
-        if len(results) == len(PARTS[name].jobs)
+        name: _section(part, [found[job.name] for job in part.jobs])
+        for name, part in PARTS.items()
+        if all(job.name in found for job in part.jobs)
     }
-    results = [result for part in found.values() for result in part]
     parts = [
         "<h1>Wang &amp; Neff 2013 on a simulated glove</h1>",
         f'<p class="note">{REMARK}</p>',
-        _quick(results),
-        f"<p>{escape(_facts(results, date, commit))}</p>",
+        _quick(list(found.values())),
+        f"<p>{escape(_facts(list(found.values()), date, commit))}</p>",
         _demands(list(sections.values())),
     ]
     for name, part in PARTS.items():
         parts.append(f"<h2>{escape(part.title)}</h2>")
         if name in sections:
-            parts += [*sections[name].parts, f"<p><small>{escape(_computed(found[name]))}</small></p>"]
+            results = [found[job.name] for job in part.jobs]
+            parts += [*sections[name].parts, f"<p><small>{escape(_computed(results))}</small></p>"]
         else:
             parts.append(f"<p>Not computed: <code>python3 do.py paper --part {name}</code>.</p>")
     return whole_page("the paper's tables and figures", parts)
 
 
 def _section(part: PaperPart, results: Sequence[PaperResult]) -> Section:
-    return part.section([part.row(**row) for result in results for row in result.rows])
+    """Rows of each kind from all jobs, in the order of the jobs."""
+    rows = [
+        [kind(**row) for result in results for row in result.rows[name]] for name, kind in part.kinds.items()
+    ]
+    return part.section(*rows)
 
 
 def _quick(results: Sequence[PaperResult]) -> str:

