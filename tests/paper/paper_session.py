@@ -12,8 +12,10 @@ poses (section 7.1).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
+from typing import Any
 
 import numpy as np
 from scipy.signal import savgol_filter
@@ -34,7 +36,7 @@ from glovecal_models.sampling.catalogue import Equipment, make_protocol
 from glovecal_models.sampling.sampled_takes import sampled_takes
 from glovecal_models.simulation.asked_session import RECORDING, asked_session
 from glovecal_models.simulation.postures import KEY_POSES, POSTURES
-from glovecal_models.simulation.protocol import cross_couple_segment, evaluation_segment
+from glovecal_models.simulation.protocol import Segment, cross_couple_segment, evaluation_segment
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.simulation.simulated_take import SimulatedTake, simulate_take
 from glovecal_models.simulation.touching import touching_segment
@@ -68,6 +70,8 @@ class PaperSession:
     """At most, for one rotation, in training."""
     models: dict[tuple[str, int], CalibrationModel] = field(default_factory=dict)
     """Trained so far."""
+    recorded: dict[tuple[Any, ...], SimulatedTake] = field(default_factory=dict)
+    """For evaluation, so far."""
 
     def glove(self, wearing: int = 0) -> SimulatedGlove:
         """The subject's glove; it was sampled in wearing 0."""
@@ -109,19 +113,29 @@ class PaperSession:
     def held_poses(self, wearing: int, visit: int) -> SimulatedTake:
         """The nine poses of Table 3, each held for a second, never quite as before."""
         seed = 1000 * (self.seed + 1) + visit
-        return simulate_take(self.glove(wearing), evaluation_segment(seed), seed=seed, rate_hz=EVALUATION_HZ)
+        return self._recorded(lambda: evaluation_segment(seed), wearing, seed)
 
     def fixed_abduction(self, angle_deg: float, wearing: int) -> SimulatedTake:
         """Fingers bending freely while all gaps between them are held; four seconds (Figure 11)."""
         seed = 5000 + self.seed
-        motion = cross_couple_segment(seed, angle_deg)
-        return simulate_take(self.glove(wearing), motion, seed=seed, rate_hz=EVALUATION_HZ)
+        return self._recorded(lambda: cross_couple_segment(seed, angle_deg), wearing, seed, angle_deg)
 
     def touching(self, finger: str, wearing: int) -> SimulatedTake:
         """176 frames in which thumb and ``finger`` touch, other than any in training (Figure 12)."""
-        seed, glove = 9000 + self.seed, self.glove(wearing)
-        motion = touching_segment(glove.hand, self.skeleton, finger, seed, TOUCHING_FRAMES / EVALUATION_HZ)
-        return simulate_take(glove, motion, seed=seed, rate_hz=EVALUATION_HZ)
+        seed, seconds = 9000 + self.seed, TOUCHING_FRAMES / EVALUATION_HZ
+        hand = self.glove(wearing).hand
+        return self._recorded(
+            lambda: touching_segment(hand, self.skeleton, finger, seed, seconds), wearing, seed, finger
+        )
+
+    def _recorded(
+        self, motion: Callable[[], Segment], wearing: int, seed: int, what: object = None
+    ) -> SimulatedTake:
+        key = (wearing, seed, what)
+        if key not in self.recorded:
+            glove = self.glove(wearing)
+            self.recorded[key] = simulate_take(glove, motion(), seed=seed, rate_hz=EVALUATION_HZ)
+        return self.recorded[key]
 
     def tip_distance_cm(self, finger: str, angles_deg: np.ndarray) -> np.ndarray:
         """(N,) between the tips of thumb and ``finger``, from angles (N, 22)."""
@@ -149,4 +163,4 @@ def paper_session(seed: int = 1, *, rate_hz: float = SAMPLING_HZ, samples: int =
 def offline(angles_deg: np.ndarray, rate_hz: float = EVALUATION_HZ) -> np.ndarray:
     """Angles (N, R) without the sensors' noise, as a recording may be cleaned afterwards."""
     window = 2 * round(OFFLINE_S * rate_hz / 2) + 1
-    return savgol_filter(angles_deg, window, 2, axis=0)
+    return np.asarray(savgol_filter(angles_deg, window, 2, axis=0))

@@ -27,7 +27,7 @@ from glovecal_models.guided.second_pass import (
     known_lessons,
     taught_layout,
     touch_lessons,
-    with_live_noise,
+    with_open_variance,
 )
 from glovecal_models.guided.seen_touches import RefusedTouch, SeenTouch, seen_touches
 from glovecal_models.guided.sentences import guided_sentences, hold_sentence, nothing_left
@@ -62,7 +62,7 @@ class GuidedSamples:
 
     def finished(self, model: CalibrationModel) -> CalibrationModel:
         """A ``model`` trained on ``takes`` by ``layout``, as it is to be kept."""
-        return with_live_noise(replace(model, layout=self.glove_layout), self.lessons, self.posterior)
+        return with_open_variance(replace(model, layout=self.glove_layout), self.lessons, self.posterior)
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def guided_samples(
     if not known and not touching:
         raise NotTrainable(nothing_left(skeleton is not None, 0, ()))
     say("what poses and widgets tell", 0.0)
-    samples = taught_samples(known)
+    samples = taught_samples(used)
     readings = np.concatenate([taught.take.readings[taught.take.lead_in_frames :] for taught in used])
     beliefs = first_beliefs(layout, samples, reading_ranges(layout.sensors, readings))
     seen: list[SeenTouch] = []

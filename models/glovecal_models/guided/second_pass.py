@@ -2,8 +2,9 @@
 
 Every frame gets the angle that the likeliest calibration of the whole session reads there. A widget's own
 four angles would teach a process a staircase: readings scatter about each step while the angle does not, and
-the likeliest process is flat there. Readings are without the sensors' noise, which would flatten every map a
-little; how far a single live frame is off is measured afterwards, on the readings as they came.
+the likeliest process is flat there. So the noise goes where it does no harm (Berkson 1950): the angle is what
+the calibration reads from the frame as it came, the readings are those without the noise. The map keeps its
+slope, and the noise that a process learns is that of a live frame.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ from glovecal_models.regression.rule_regressor import RuleRegressor
 from glovecal_models.sampling.step import Kind
 from glovecal_models.takes.take import Take
 
+LOOKED_AT = 40
+"""Frames of a take that stand for all."""
 LEAST_TOLD = 0.05
 """Of what was not known of a joint; a touch that tells less only repeats the calibration."""
 
@@ -41,11 +44,9 @@ class SampleCount:
 
 @dataclass(frozen=True)
 class Lesson:
-    """A take to train on, and the readings as they came."""
+    """A take to train on: readings without noise, angles of the likeliest calibration."""
 
     take: Take
-    """Readings without noise, angles known or inferred."""
-    raw: np.ndarray
     kind: Kind
 
 
@@ -56,7 +57,7 @@ def known_lessons(takes: Iterable[TaughtTake], posterior: TouchPosterior) -> lis
         if not taught.take.rotations or taught.kind not in ("fk_independent", "fk_cross_couple"):
             continue
         take, smooth = taught.take, steadied(taught.take.time_s, taught.take.readings.astype(float))
-        reference = _as_read(take.reference_at_frames(take.rotations), take.rotations, smooth, posterior)
+        reference = _as_read(take, posterior)
         lessons.append(_lesson(take, smooth, take.rotations, reference, taught.kind))
     return lessons
 
@@ -68,12 +69,12 @@ def touch_lessons(
     lessons: list[Lesson] = []
     told: dict[str, float] = {}
     for touch in seen:
-        some = touch.some(40).readings
+        some = touch.some(LOOKED_AT).readings
         shares = {name: posterior.told(name, some) for name in touch.rotations if name in rotations}
         names = tuple(name for name, share in shares.items() if share >= LEAST_TOLD)
         reference = np.full((len(touch.take.time_s), len(names)), np.nan)
         for column, name in enumerate(names):
-            reference[touch.rows, column] = posterior.angles(name, touch.readings)
+            reference[touch.rows, column] = posterior.angles(name, touch.take.readings[touch.rows])
             told[name] = max(told.get(name, 0.0), shares[name])
         smooth = touch.take.readings.astype(float)
         smooth[touch.rows] = touch.readings
@@ -107,43 +108,34 @@ def taught_layout(layout: Layout, told: Iterable[str]) -> Layout:
     return replace(layout, correspondences=tuple(items))
 
 
-def with_live_noise(
+def with_open_variance(
     model: CalibrationModel, lessons: Sequence[Lesson], posterior: TouchPosterior
 ) -> CalibrationModel:
-    """The model claiming what a single frame is off by as it came, and what the session left open."""
+    """The model claiming, beside the noise of a frame, what the session left open."""
     return replace(model, rotations=tuple(_claiming(item, lessons, posterior) for item in model.rotations))
 
 
 def _claiming(item: RotationModel, lessons: Sequence[Lesson], posterior: TouchPosterior) -> RotationModel:
-    if isinstance(item.regressor, RuleRegressor):
+    regressor = item.regressor
+    if isinstance(regressor, RuleRegressor):
         return item
-    squared, open_variance = [np.empty(0)], [np.empty(0)]
+    left = [np.empty(0)]
     for lesson in lessons:
-        if item.rotation not in lesson.take.rotations:
-            continue
-        angle = lesson.take.reference[:, lesson.take.rotations.index(item.rotation)]
-        known = np.isfinite(angle)
-        read = item.regressor.predict(
-            item.correspondence.input_columns(lesson.raw[known], lesson.take.sensors)
-        )
-        squared.append((read.mean - angle[known]) ** 2)
-        some = lesson.take.readings[known][:: max(1, int(known.sum()) // 20)]
-        if lesson.kind != "fk_cross_couple":
-            open_variance.append(posterior.variance(item.rotation, some))
-    variance = float(np.concatenate(squared).mean())
-    unknown = np.concatenate(open_variance)
-    variance = max(item.regressor.noise_variance, variance + (float(unknown.mean()) if len(unknown) else 0.0))
-    regressor = replace(item.regressor, noise_variance=variance)  # type: ignore[type-var]
-    return replace(item, regressor=regressor, uncertain_above_deg=uncertain_above(variance))
+        if item.rotation in lesson.take.rotations:
+            angle = lesson.take.reference[:, lesson.take.rotations.index(item.rotation)]
+            some = lesson.take.readings[np.isfinite(angle)]
+            left.append(posterior.variance(item.rotation, some[:: max(1, len(some) // LOOKED_AT)]))
+    variance = regressor.noise_variance + float(np.concatenate(left).mean())
+    claiming = replace(regressor, noise_variance=variance)  # type: ignore[type-var]
+    return replace(item, regressor=claiming, uncertain_above_deg=uncertain_above(variance))
 
 
-def _as_read(
-    reference: np.ndarray, rotations: Sequence[str], readings: np.ndarray, posterior: TouchPosterior
-) -> np.ndarray:
-    found = reference.copy()
-    for column, name in enumerate(rotations):
-        known = np.isfinite(reference[:, column])
-        found[known, column] = posterior.angles(name, readings[known])
+def _as_read(take: Take, posterior: TouchPosterior) -> np.ndarray:
+    """(N, R): what the likeliest calibration reads where an angle is known."""
+    found = take.reference_at_frames(take.rotations)
+    for column, name in enumerate(take.rotations):
+        known = np.isfinite(found[:, column])
+        found[known, column] = posterior.angles(name, take.readings[known])
     return found
 
 
@@ -153,4 +145,4 @@ def _lesson(
     taught = replace(
         take, readings=readings, rotations=rotations, reference_time_s=take.time_s, reference=reference
     )
-    return Lesson(taught, take.readings.astype(float), kind)
+    return Lesson(taught, kind)

@@ -9,7 +9,7 @@ A widget holds its angle, and the readings change: there each frame is a sample 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,8 +30,7 @@ class Held:
     """One hold."""
 
     take: Take
-    frame: int
-    """Its middle row."""
+    pose: str
     readings: np.ndarray
     """(S,), means, in the take's order of sensors."""
     angles: dict[str, float]
@@ -76,14 +75,24 @@ class TaughtSamples:
         return tuple(dict.fromkeys([*held, *(name for each in self.moved for name in each.take.rotations)]))
 
 
-def taught_samples(takes: Iterable[TaughtTake]) -> TaughtSamples:
-    holds: list[Held] = []
-    moved: list[Moved] = []
+def taught_samples(takes: Sequence[TaughtTake]) -> TaughtSamples:
+    """Poses that verify the glove's place are samples too, where other takes know the angles of that pose."""
+    holds = [
+        _held(taught.take, rows, _known(taught.take, rows))
+        for taught in takes
+        if taught.kind == "fk_independent"
+        for rows in taught.steps()
+    ]
+    known = {held.pose: held.angles for held in holds}
     for taught in takes:
-        if taught.kind == "fk_independent":
-            holds += [_held(taught.take, rows) for rows in taught.steps()]
-        elif taught.kind == "fk_cross_couple":
-            moved.append(Moved(taught.take, steadied(taught.take.time_s, taught.take.readings.astype(float))))
+        if taught.kind == "verification":
+            runs = [(pose, taught.frames(pose)) for pose in known if pose]
+            holds += [_held(taught.take, rows, known[pose]) for pose, rows in runs if len(rows)]
+    moved = [
+        Moved(taught.take, steadied(taught.take.time_s, taught.take.readings.astype(float)))
+        for taught in takes
+        if taught.kind == "fk_cross_couple"
+    ]
     return TaughtSamples(tuple(holds), tuple(moved))
 
 
@@ -100,12 +109,12 @@ def hold_sd_deg(samples: TaughtSamples, layout: Layout) -> float:
     return float(np.sqrt(squared / freedom))
 
 
-def _held(take: Take, rows: np.ndarray) -> Held:
+def _held(take: Take, rows: np.ndarray, angles: dict[str, float]) -> Held:
+    pose = "" if take.poses is None else take.poses[int(rows[0])]
+    return Held(take, pose, take.readings[rows].mean(axis=0), angles)
+
+
+def _known(take: Take, rows: np.ndarray) -> dict[str, float]:
     known = take.reference_at_frames(take.rotations)[rows[0]]
-    angles = {name: float(angle) for name, angle in zip(take.rotations, known, strict=True)}
-    return Held(
-        take,
-        int(rows[len(rows) // 2]),
-        take.readings[rows].mean(axis=0),
-        {name: angle for name, angle in angles.items() if np.isfinite(angle)},
-    )
+    angles = zip(take.rotations, known.tolist(), strict=True)
+    return {name: angle for name, angle in angles if np.isfinite(angle)}
