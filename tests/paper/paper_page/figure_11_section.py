@@ -18,7 +18,8 @@ HEADS = ("held at", "wearing", "calibration", "|bias|", "sd", "sd offline", "mus
 NOTE = (
     "Mean over subjects, degrees, frame by frame. The paper draws curves without numbers and says that raw "
     "and linear are unstable and that at 25 degrees, which no widget of training has, the prediction is "
-    "slightly too small. sd offline: of the same angles cleaned over half a second, what the calibration itself leaves."
+    "slightly too small. sd offline: of the same angles cleaned over half a second, what the "
+    "calibration itself leaves."
 )
 SENTENCE = (
     "IM_ABD of the first subject in another wearing, while the fingers bend freely; black: where the widget "

@@ -17,8 +17,8 @@ HEADS = ("pose", "calibration", "paper", "ours", "same wearing", "the wearing al
 NOTE = (
     "Absolute error over 22 rotations, degrees, mean ± standard deviation, in wearings and motions that "
     "training has not seen. Same wearing: the mean in the wearing of training. The wearing alone: the mean "
-    "by which putting the glove on again moves the angles, which no calibration of another wearing can avoid. "
-    "LMC-GPR and SPGP must be at or below the paper's mean."
+    "by which putting the glove on again moves the angles, which no calibration of another wearing can "
+    "avoid. LMC-GPR and SPGP must be at or below the paper's mean."
 )
 
 
