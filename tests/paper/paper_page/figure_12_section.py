@@ -20,8 +20,8 @@ AT_MOST_CM = {"lmc_gpr": 0.1, "spgp": 0.5}
 NOTE = (
     "Mean distance of the tips in 176 frames of a touching motion that was not among the samples; the ideal "
     "is 0. The paper gives numbers for thumb and index finger alone, and does not say whether that motion "
-    "was among its samples. Offline: the same angles cleaned over half a second; what must be reached is judged "
-    "frame by frame, where the noise of ten sensors alone puts tips about 0.25 cm apart."
+    "was among its samples. Offline: the same angles cleaned over half a second; what must be reached is "
+    "judged frame by frame, where the noise of ten sensors alone puts tips about 0.25 cm apart."
 )
 SENTENCE = "Quartiles of the distance in the wearing of training, first subject; logarithmic."
 

@@ -24,7 +24,7 @@ NOTE = (
 
 def table_3_section(rows: Sequence[Table3Row]) -> Section:
     subjects = len(rows) // len({(row.pose, row.calibration) for row in rows})
-    found = _pooled(rows)
+    found = pooled(rows)
     demands = {
         (row.pose, row.calibration): Demand(
             f"{row.pose}, {CALIBRATION_NAMES[row.calibration]}", row.mean_deg, row.paper_mean_deg, "degrees"
@@ -48,14 +48,14 @@ def table_3_section(rows: Sequence[Table3Row]) -> Section:
     return Section((picture, table(HEADS, cells), f"<p>{NOTE}</p>"), tuple(demands.values()))
 
 
-def _pooled(rows: Sequence[Table3Row]) -> list[Table3Row]:
+def pooled(rows: Sequence[Table3Row]) -> list[Table3Row]:
     """Over subjects, who have equally many errors each."""
-    pooled = []
+    together = []
     for pose, calibration in dict.fromkeys((row.pose, row.calibration) for row in rows):
         own = [row for row in rows if (row.pose, row.calibration) == (pose, calibration)]
         mean = float(np.mean([row.mean_deg for row in own]))
         square = float(np.mean([row.sd_deg**2 + row.mean_deg**2 for row in own]))
-        pooled.append(
+        together.append(
             Table3Row(
                 pose,
                 own[0].calibration,
@@ -67,7 +67,7 @@ def _pooled(rows: Sequence[Table3Row]) -> list[Table3Row]:
                 float(np.mean([row.wearing_deg for row in own])),
             )
         )
-    return pooled
+    return together
 
 
 def _sentence(rows: Sequence[Table3Row], subjects: int) -> str:
