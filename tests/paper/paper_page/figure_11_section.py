@@ -72,6 +72,7 @@ def _picture(curves: Sequence[Curve]) -> str:
                         color=COLOURS[curve.calibration],
                         label=CALIBRATION_NAMES[curve.calibration],
                         linewidth=1.1,
+                        linestyle="--" if curve.calibration == "spgp" else "-",
                     )
             axes.axhline(fixed, color=MEASURED, linewidth=0.9)
             axes.set(title=f"held at {fixed:g} degrees", xlabel="seconds")

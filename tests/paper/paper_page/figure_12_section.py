@@ -12,7 +12,7 @@ from paper_page.calibrations import CALIBRATION_NAMES, COLOURS
 from paper_page.section import Demand, Section
 
 from glovecal_models.hand.rotations import FINGERS
-from glovecal_service.report.drawing import figure_svg
+from glovecal_service.report.drawing import MEASURED, figure_svg
 from glovecal_service.report.html import figure, table
 
 HEADS = ("thumb and", "wearing", "calibration", "paper", "ours", "ours, offline", "must reach")
@@ -23,7 +23,8 @@ NOTE = (
     "was among its samples. Offline: the same angles cleaned over half a second; what must be reached is "
     "judged frame by frame, where the noise of ten sensors alone puts tips about 0.25 cm apart."
 )
-SENTENCE = "Quartiles of the distance in the wearing of training, first subject; logarithmic."
+TICKS_CM = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
+SENTENCE = "Quartiles of the distance in the wearing of training, first subject; black: the paper's means."
 
 
 def figure_12_section(rows: Sequence[Figure12Row]) -> Section:
@@ -57,13 +58,19 @@ def _picture(rows: Sequence[Figure12Row]) -> str:
     def draw(figure: Figure) -> None:
         every = figure.subplots(1, len(fingers), sharey=True, squeeze=False)[0]
         for axes, finger in zip(every, fingers, strict=True):
-            for place, row in enumerate(row for row in first if row.finger == finger):
+            own = [row for row in first if row.finger == finger]
+            for place, row in enumerate(own):
+                if row.paper_cm is not None:
+                    axes.hlines(row.paper_cm, place - 0.4, place + 0.4, color=MEASURED)
                 low, middle, high = row.quartiles_cm
                 axes.bar(place, high - low, 0.6, bottom=low, color=COLOURS[row.calibration])
                 axes.hlines(middle, place - 0.3, place + 0.3, color="white")
             axes.set_xticks(range(len(CALIBRATION_NAMES)), list(CALIBRATION_NAMES.values()), rotation=40)
             axes.set_title(f"thumb and {FINGERS[finger]}")
             axes.set_yscale("log")
+            axes.set_yticks(TICKS_CM, [f"{tick:g}" for tick in TICKS_CM])
+            axes.minorticks_off()
+            axes.set_ylim(min(0.05, min(row.quartiles_cm[0] for row in first)), 12)
         every[0].set_ylabel("distance of the tips, cm")
 
     return figure_svg(draw, 9.5, 3.6)

@@ -14,6 +14,7 @@ from glovecal_service.report.drawing import MEASURED, figure_svg
 from glovecal_service.report.html import figure, table
 
 HEADS = ("pose", "calibration", "paper", "ours", "same wearing", "the wearing alone", "must reach")
+TICKS_DEG = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
 NOTE = (
     "Absolute error over 22 rotations, degrees, mean ± standard deviation, in wearings and motions that "
     "training has not seen. Same wearing: the mean in the wearing of training. The wearing alone: the mean "
@@ -96,6 +97,8 @@ def _picture(rows: Sequence[Table3Row]) -> str:
             axes.hlines(paper, at - 0.09, at + 0.09, color=MEASURED, label="" if place else "paper")
         axes.set_xticks(range(len(poses)), poses)
         axes.set_yscale("log")
+        axes.set_yticks(TICKS_DEG, [f"{tick:g}" for tick in TICKS_DEG])
+        axes.minorticks_off()
         axes.set_ylabel("mean |error|, degrees")
         axes.legend(frameon=False, ncols=5, loc="lower left", bbox_to_anchor=(0, 1))
 
