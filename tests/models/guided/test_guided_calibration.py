@@ -157,7 +157,7 @@ def test_what_the_model_claims_is_what_it_is_off_by() -> None:
 def test_a_touch_that_never_happened_is_refused_and_the_rest_goes_on() -> None:
     """The take says little finger, it was the middle one."""
     asked = [
-        replace(each, contacts=each.contacts | {"touch-M": Touch(("T", "P"))})
+        replace(each, contacts={**each.contacts, "touch-M": Touch(("T", "P"))})
         if "touch-M" in each.contacts
         else each
         for each in sampled()
