@@ -31,7 +31,8 @@ def test_a_belief_is_scikit_learns_process() -> None:
     sd, at = random.uniform(0.5, 3.0, 30), random.uniform(40, 160, (12, 2))
 
     def bow(x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        return 4.0**2 * np.asarray(RBF(0.5)(x, z))
+        apart = (x[:, None] - z[None]) / 0.5
+        return 4.0**2 * np.exp(-0.5 * (apart**2).sum(axis=2))
 
     middle, span = np.full(2, 100.0), np.full(2, 100.0)
     prior = Prior(("A", "B"), middle, span, np.zeros(2), 0.0, 30.0, 60.0, bow)
