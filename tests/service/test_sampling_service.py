@@ -124,7 +124,7 @@ def test_a_second_wearing_by_events_and_what_is_said(service: RestClient, place:
     assert said[0].startswith("Step 1 of 5. Open and close the hand")
     assert said[-1] == "Done. Thank you."
     assert {"Ready.", "Hold still.", "Good."} <= set(said)
-    assert view["capture_s"] < 30
+    assert view["capture_of_s"] < 30  # a busy computer does steps again
     (take,) = [service.get(f"/takes/{take}") for take in view["takes"]]
     assert (take["wearing"], take["simulated"], take["rotations"]) == ("w1", True, [])
     assert take["accounting"]["sampling"]["steps"][0]["pose"] == "flat"

@@ -41,7 +41,7 @@ class TrainingTakes:
         plain = tuple(
             store.takes.load(record.id)
             for record in records
-            if record not in sampled and record.has_reference
+            if record not in sampled and (record.has_reference or not record.sampling)
         )
         if not sampled:
             return cls(plain, layout, settings)
