@@ -70,11 +70,12 @@ def checked(session: PaperSession, model: CalibrationModel, wearing: int) -> Cal
         rate_hz=CHECK_HZ,
         skeleton=SKELETON,
     )
-    takes = [each.take for each in sampled_takes(held.state, {RECORDING: held.take}, name="check")]
+    cut = sampled_takes(held.state, {RECORDING: held.take}, name="check")
+    takes = [each.take for each in cut if each.kind == "verification"]
     sensitivity = sensor_sensitivity(model)
     ranges = dict(zip(sensitivity.sensors, sensitivity.range.tolist(), strict=True))
     known = own_poses([each.take for each in session.takes], ranges)
-    return quick_check(model, takes[1:], known=known).model
+    return quick_check(model, takes, known=known).model
 
 
 def mean_error_deg(session: PaperSession, model: CalibrationModel, wearing: int, visits: int) -> float:
