@@ -106,7 +106,7 @@ def guided_samples(
         posterior, seen, strange = closing_touches(beliefs, layout.sensors, skeleton, seen, cancelled)
         refused += strange
     inferred, told = touch_lessons(seen, posterior, layout.rotations)
-    lessons = (*known_lessons(known, posterior), *inferred)
+    lessons = (*known_lessons(known, posterior, told), *inferred)
     if not lessons:
         raise NotTrainable(nothing_left(skeleton is not None, len(touching), refused))
     said = [hold_sentence(len(samples.holds), hold_sd_deg(samples, layout))] if samples.holds else []
