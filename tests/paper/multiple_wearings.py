@@ -42,27 +42,24 @@ class WearingRow:
     """0 is that of training."""
     mean_deg: float
     checked_deg: float | None
-    """After the quick check; None in the wearing of training, which needs none."""
+    """After the quick check; None in the wearing of training, and where no pose was held still."""
 
 
 def multiple_wearings(
     session: PaperSession, wearings: Sequence[int] = WEARINGS, visits: int = 2
 ) -> list[WearingRow]:
     """By LMC-GPR."""
-    model = session.model("lmc_gpr")
-    return [
-        WearingRow(
-            session.seed,
-            wearing,
-            mean_error_deg(session, model, wearing, visits),
-            mean_error_deg(session, checked(session, model, wearing), wearing, visits) if wearing else None,
-        )
-        for wearing in wearings
-    ]
+    model, rows = session.model("lmc_gpr"), []
+    for wearing in wearings:
+        after = checked(session, model, wearing) if wearing else None
+        error = mean_error_deg(session, model, wearing, visits)
+        checked_error = None if after is None else mean_error_deg(session, after, wearing, visits)
+        rows.append(WearingRow(session.seed, wearing, error, checked_error))
+    return rows
 
 
-def checked(session: PaperSession, model: CalibrationModel, wearing: int) -> CalibrationModel:
-    """After the protocol of a second wearing."""
+def checked(session: PaperSession, model: CalibrationModel, wearing: int) -> CalibrationModel | None:
+    """After the protocol of a second wearing; None where no pose of it was held still."""
     held = asked_session(
         make_protocol("second_wearing", LAYOUT),
         session.glove(wearing),
@@ -70,11 +67,12 @@ def checked(session: PaperSession, model: CalibrationModel, wearing: int) -> Cal
         rate_hz=CHECK_HZ,
         skeleton=SKELETON,
     )
-    takes = [each.take for each in sampled_takes(held.state, {RECORDING: held.take}, name="check")]
+    cut = sampled_takes(held.state, {RECORDING: held.take}, name="check")
+    takes = [each.take for each in cut if each.kind == "verification"]
     sensitivity = sensor_sensitivity(model)
     ranges = dict(zip(sensitivity.sensors, sensitivity.range.tolist(), strict=True))
     known = own_poses([each.take for each in session.takes], ranges)
-    return quick_check(model, takes[1:], known=known).model
+    return quick_check(model, takes, known=known).model if takes else None
 
 
 def mean_error_deg(session: PaperSession, model: CalibrationModel, wearing: int, visits: int) -> float:

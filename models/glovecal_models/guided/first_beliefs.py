@@ -32,7 +32,8 @@ BOW_LENGTH = 0.5
 """Of the range over which the curve changes."""
 WIDE_DEG = 300.0
 RULE_OFFSET_DEG, RULE_SLOPE_DEG, RULE_BOW_DEG = 1.0, 5.0, 2.0
-"""How far a person's joints are from their rule: straight fingers are straight, bent ones differ."""
+"""How far a person's joints are from their rule where it says 0, how much more at the end of the range, and
+how far from a line: straight fingers are straight, bent ones differ."""
 RANGE_SLOPE_DEG = 15.0
 """How far a joint's range on this hand is from the usual."""
 MOST_SAMPLES = 300
@@ -86,7 +87,8 @@ def _untaught(
     if rotation in RULES and (not sensors or layout.correspondence(rotation).simulated):
         bow = _squared_exponential(RULE_BOW_DEG, count)
         offset, slope = RULE_OFFSET_DEG, RULE_SLOPE_DEG
-        return Prior(sensors, middle, span, nothing, 0.0, offset, slope, bow, RULES[rotation])
+        straight = middle - span / 2
+        return Prior(sensors, straight, span, nothing, 0.0, offset, slope, bow, RULES[rotation])
     if not sensors:
         rest = REST_DEG[rotation]
         still = _squared_exponential(0.0, 0)

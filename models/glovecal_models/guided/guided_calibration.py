@@ -124,7 +124,7 @@ def guided_samples(
         posterior, seen, strange = closing_touches(beliefs, layout.sensors, skeleton, seen, cancelled)
         refused += strange
     inferred, told = touch_lessons(seen, posterior, layout.rotations)
-    lessons = (*known_lessons(known, posterior), *inferred)
+    lessons = (*known_lessons(known, posterior, told), *inferred)
     if not lessons:
         raise NotTrainable(nothing_left(skeleton is not None, len(touching), refused))
     say("how well the session tells what is left out of it", 0.8)

@@ -48,16 +48,30 @@ class Lesson:
 
     take: Take
     kind: Kind
+    ruled: tuple[str, ...] = ()
+    """Rotations that nobody knows here but by rule: they keep a map from going astray between touches."""
 
 
-def known_lessons(takes: Iterable[TaughtTake], posterior: TouchPosterior) -> list[Lesson]:
-    """From takes with known angles."""
+def known_lessons(
+    takes: Iterable[TaughtTake], posterior: TouchPosterior, told: Iterable[str] = ()
+) -> list[Lesson]:
+    """From takes with known angles. In held poses also joints without a sensor that touches ``told`` of: a
+    straight finger is straight, and no touch shows that."""
+    ruled = tuple(name for name in told if posterior.beliefs[name].prior.follows)
     lessons = []
     for taught in takes:
         if not taught.take.rotations or taught.kind not in ("fk_independent", "fk_cross_couple"):
             continue
         take, smooth = taught.take, steadied(taught.take.time_s, taught.take.readings.astype(float))
         reference = _as_read(take, posterior)
+        if taught.kind == "fk_independent" and ruled:
+            held = np.isfinite(reference).any(axis=1)
+            column = np.full((len(held), len(ruled)), np.nan)
+            for index, name in enumerate(ruled):
+                column[held, index] = posterior.angles(name, take.readings[held])
+            names, reference = (*take.rotations, *ruled), np.hstack([reference, column])
+            lessons.append(_lesson(take, smooth, names, reference, taught.kind, ruled))
+            continue
         lessons.append(_lesson(take, smooth, take.rotations, reference, taught.kind))
     return lessons
 
@@ -87,6 +101,8 @@ def counted(lessons: Iterable[Lesson], told: dict[str, float]) -> tuple[SampleCo
     counts: dict[tuple[str, Kind], int] = {}
     for lesson in lessons:
         for column, name in enumerate(lesson.take.rotations):
+            if name in lesson.ruled:
+                continue
             count = int(np.isfinite(lesson.take.reference[:, column]).sum())
             counts[name, lesson.kind] = counts.get((name, lesson.kind), 0) + count
     return tuple(
@@ -140,9 +156,14 @@ def _as_read(take: Take, posterior: TouchPosterior) -> np.ndarray:
 
 
 def _lesson(
-    take: Take, readings: np.ndarray, rotations: tuple[str, ...], reference: np.ndarray, kind: Kind
+    take: Take,
+    readings: np.ndarray,
+    rotations: tuple[str, ...],
+    reference: np.ndarray,
+    kind: Kind,
+    ruled: tuple[str, ...] = (),
 ) -> Lesson:
     taught = replace(
         take, readings=readings, rotations=rotations, reference_time_s=take.time_s, reference=reference
     )
-    return Lesson(taught, kind)
+    return Lesson(taught, kind, ruled)
