@@ -148,7 +148,9 @@ def test_it_ends_when_nothing_is_left_or_the_time_is_up(active: AskedSession) ->
     found = propose(LAYOUT, certain, [step for step in candidate_steps(LAYOUT) if step.name == "flat"])
     assert found.is_enough
     assert found.verdict().startswith("Enough: the next step, flat, would lower the expected error by less")
-    assert "below the noise" in found.to_document()["sentences"][-1]
+    assert "is below a frame's noise of 1.3." in found.to_document()["sentences"][-1]
+    poses = propose(LAYOUT, replace(certain, blocks=certain.blocks[:2] * 200), [found.ranked[0].step])
+    assert "degrees are left (a frame's noise: 1.3)" in poses.verdict()
 
 
 def test_without_free_motion_nothing_can_be_proposed() -> None:
