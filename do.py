@@ -7,6 +7,7 @@
     python3 do.py test      the test suite
     python3 do.py check     format, lint, types
     python3 do.py bench     speed against other libraries, as ratios, with a picture
+    python3 do.py paper     Wang & Neff 2013 reproduced: every table and figure, as one page (15 minutes)
     python3 do.py study     the blind study of the diagnosis: figures, confusion matrix (hours);
                             study active: active sampling against the fixed protocol (half an hour)
 
@@ -74,6 +75,10 @@ def bench(arguments: list[str]) -> int:
     return run("python", "tests/bench/bench.py", *arguments, groups=("bench",))
 
 
+def paper(arguments: list[str]) -> int:
+    return run("python", "tests/paper/paper.py", *arguments)
+
+
 def study(arguments: list[str]) -> int:
     if arguments[:1] == ["active"]:
         return run("python", "tests/study/active_sampling.py", *arguments[1:])
@@ -100,6 +105,7 @@ VERBS = {
     "test": test,
     "check": check,
     "bench": bench,
+    "paper": paper,
     "study": study,
 }
 

@@ -13,8 +13,10 @@ import numpy as np
 
 from glovecal_client.errors import ClientError
 from glovecal_client.rest import RestClient
+from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.sampling.step import Step
 from glovecal_models.simulation.asked_hand import AskedHand
+from glovecal_models.simulation.asked_touch import PreparedTouches, RealTouches
 from glovecal_models.simulation.simulated_hand import DRIVEN, ROTATIONS, SimulatedHand
 
 DEFAULT_SERVICE = "http://127.0.0.1:8600"
@@ -26,6 +28,7 @@ class AskedPerson:
     """Rotations as a function of time that only goes on; what is asked is looked up in a thread.
 
     The newest open sampling counts. While the service does not answer, the person goes on with the last step.
+    The hand is a usual one, 190 mm long.
     """
 
     def __init__(
@@ -34,7 +37,9 @@ class AskedPerson:
         """Raises BadName for an address that is none."""
         RestClient(service).close()
         self._rules = hand
-        self._hand = AskedHand(seed + 1_000_003 * wearing)
+        number = seed + 1_000_003 * wearing
+        self.touches = PreparedTouches(RealTouches(hand, hand_skeleton()), number)
+        self._hand = AskedHand(number, self.touches)
         self._order = [ROTATIONS.index(rotation) for rotation in rotations]
         self.asked: Step | None = None
         threading.Thread(target=_look, args=(weakref.ref(self), service), daemon=True).start()
@@ -53,7 +58,10 @@ def _look(person: weakref.ref[AskedPerson], service: str) -> None:
     with RestClient(service, patience_s=5.0) as client:
         while (there := person()) is not None:
             with suppress(ClientError):  # the service may be starting; look again
-                there.asked = _asked(client.get("/sampling", {"only_open": True}))
+                asked = _asked(client.get("/sampling", {"only_open": True}))
+                if asked is not None:
+                    there.touches.prepare(asked)
+                there.asked = asked
             del there
             time.sleep(LOOK_EVERY_S)
 

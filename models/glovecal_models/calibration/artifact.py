@@ -21,6 +21,7 @@ from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.calibration.regressor_kinds import restore_regressor
 from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.layout import Layout
+from glovecal_models.regression.kept_choice import choice_of
 
 FORMAT = "glovecal.model.v1"
 LARGEST_HEADER_BYTES = 8 << 20
@@ -138,9 +139,11 @@ def _restore_rotation(item: Mapping[str, Any], tensors: Mapping[str, np.ndarray]
     rotation = str(item["rotation"])
     own = {key.split(".", 1)[1]: array for key, array in tensors.items() if key.split(".", 1)[0] == rotation}
     held_out = item["held_out_rmse_deg"]
+    regressor = restore_regressor(own, item["regressor"])
+    choice_of(regressor)  # what is told of the choice must be of this process
     return RotationModel(
         correspondence=Layout.from_document(item["correspondence"]).correspondences[0],
-        regressor=restore_regressor(own, item["regressor"]),
+        regressor=regressor,
         input_low=tensors[f"{rotation}:input_low"],
         input_high=tensors[f"{rotation}:input_high"],
         uncertain_above_deg=float(item["uncertain_above_deg"]),

@@ -15,9 +15,11 @@ from typing import Any
 
 import numpy as np
 
+from glovecal_models.calibration.chosen_kernel import fit_chosen
 from glovecal_models.calibration.sample_weight import Recorded, fit_weighted
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
+from glovecal_models.regression.kernel_candidates import CHOOSING
 from glovecal_models.regression.linear_regressor import fit_linear
 from glovecal_models.regression.regressor import Regressor
 from glovecal_models.regression.rescaling import rescale_readings
@@ -86,6 +88,11 @@ def _fit(task: FitTask, cancelled: Callable[[], bool] | None, report: Report | N
     if settings.method == "linear":
         return fit_linear(task.inputs, task.target, sensor_names=task.sensors, cancelled=cancelled)
     samples = Recorded(task.inputs, task.target, task.take, task.position)
+    if settings.method in CHOOSING:
+        thorough = task.fold is None  # what a user is shown; a fold only repeats the choice
+        return fit_chosen(
+            samples, task.rotation, settings, thorough=thorough, cancelled=cancelled, report=report
+        )
     start = fit_weighted(samples, seed=settings.seed, cancelled=cancelled, report=report)
     if settings.method == "lmc_gpr":
         return start.regressor

@@ -44,7 +44,7 @@ class CalibrationModel:
     layout: Layout
     subject: str
     method: str
-    """``linear``, ``lmc_gpr`` or ``spgp``; single rotations may be ``rule``."""
+    """How it was trained; single rotations may be ``rule``, and under ``auto`` each has its own."""
     rotations: tuple[RotationModel, ...]
     takes: tuple[str, ...]
     """sha256 of each training take's artifact (or the file's, when trained from files)."""

@@ -17,6 +17,8 @@ _KINDS: dict[str, type[Regressor]] = {
     "linear": LinearRegressor,
     "lmc_gpr": ProcessRegressor,
     "gpr": ProcessRegressor,
+    "polynomial_gpr": ProcessRegressor,
+    "general_gpr": ProcessRegressor,
     "spgp": ProcessRegressor,
     "rule": RuleRegressor,
 }

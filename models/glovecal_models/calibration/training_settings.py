@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from glovecal_models.calibration.representative import DEFAULT_SAMPLES
 from glovecal_models.errors import BadInput
 
-Method = Literal["raw", "linear", "lmc_gpr", "spgp"]
-METHODS: tuple[Method, ...] = ("raw", "linear", "lmc_gpr", "spgp")
-"""``raw`` is no calibration at all, the scale that the others are read against."""
+Method = Literal["raw", "linear", "lmc_gpr", "spgp", "auto", "polynomial_gpr", "general_gpr"]
+METHODS: tuple[Method, ...] = get_args(Method)
+"""``raw`` is no calibration at all, the scale that the others are read against; ``auto`` takes for each
+rotation what fits it (``kernel_choice``), ``polynomial_gpr`` and ``general_gpr`` insist on a kind of kernel.
+"""
 Report = Callable[[str, float], None]
 """Called with a sentence and the fraction done, 0 to 1."""
 
@@ -28,8 +30,12 @@ class TrainingSettings:
     pseudo_inputs: int = 100
     iterations: int = 200
     seed: int = 0
+    kernels: tuple[tuple[str, str], ...] = ()
+    """(rotation, candidate kernel) already chosen: when a model is trained again, with an effect for example,
+    its kernels stay, so that a change of the error is the effect's."""
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "kernels", tuple((str(name), str(kernel)) for name, kernel in self.kernels))
         if self.folds < 0 or self.folds == 1:
             raise BadInput(
                 f"folds is {self.folds}: one fold would hold out everything; 0 trains without an error "

@@ -15,6 +15,7 @@ from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.improvement.effect_fit import EffectFit, correspondence_for
 from glovecal_models.improvement.held_out_check import HeldOutErrors
 from glovecal_models.improvement.prepared_takes import PreparedTakes
+from glovecal_models.regression.kept_choice import keeping_choice
 
 
 def child_model(
@@ -29,7 +30,7 @@ def child_model(
 ) -> CalibrationModel:
     """``parent`` with the regressors of ``fit`` in place of its own, and with ``effects``."""
     fresh = {name: _rotation_model(takes, name, fit, errors, settings) for name in fit.results}
-    rotations = tuple(fresh.get(item.rotation, item) for item in parent.rotations)
+    rotations = tuple(_renewed(item, fresh.get(item.rotation)) for item in parent.rotations)
     estimate: Mapping[str, Any] = {
         "how": "whole takes left out" if len(takes.takes) > 1 else "stretches of the only take left out",
         "folds": max(settings.folds, 2),
@@ -46,6 +47,13 @@ def child_model(
         sensor_scale=takes.scale.scale,
         simulated=parent.simulated or any(take.simulated for take in takes.takes),
     )
+
+
+def _renewed(before: RotationModel, fresh: RotationModel | None) -> RotationModel:
+    """``fresh`` where there is one; how its kernel was chosen stays told."""
+    if fresh is None:
+        return before
+    return replace(fresh, regressor=keeping_choice(before.regressor, fresh.regressor))
 
 
 def _rotation_model(

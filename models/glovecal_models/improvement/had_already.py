@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.quick_check import is_only_checked
@@ -10,6 +11,8 @@ from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.effects.clock_scan import aligned
 from glovecal_models.effects.signature_effect import SignatureEffect
 from glovecal_models.improvement.wanted_effect import WantedEffect
+from glovecal_models.regression.kept_choice import kernel_of
+from glovecal_models.regression.kernel_candidates import CHOOSING
 from glovecal_models.regression.rule_regressor import RuleRegressor
 from glovecal_models.takes.take import Take
 
@@ -45,5 +48,9 @@ def repaired_takes(takes: Sequence[Take], wanted: Sequence[WantedEffect]) -> lis
 
 
 def settings_of(model: CalibrationModel, settings: TrainingSettings | None) -> TrainingSettings:
-    """How the model was trained, as far as it tells."""
-    return settings or TrainingSettings(method=model.method)  # pyright: ignore[reportArgumentType]
+    """How the model was trained, as far as it tells; kernels that were chosen for it stay."""
+    settings = settings or TrainingSettings(method=model.method)  # pyright: ignore[reportArgumentType]
+    if settings.method not in CHOOSING:
+        return settings
+    kernels = {item.rotation: kernel_of(item.regressor) for item in model.rotations}
+    return replace(settings, kernels=tuple((name, kind) for name, kind in kernels.items() if kind))

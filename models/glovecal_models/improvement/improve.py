@@ -21,7 +21,7 @@ from glovecal_models.improvement.addition import Addition
 from glovecal_models.improvement.baselines import baselines
 from glovecal_models.improvement.clocks import clock_settings, coarse_clock_settings
 from glovecal_models.improvement.decoy_share import share_in
-from glovecal_models.improvement.had_already import repaired_takes, trained_rotations, wanted_of
+from glovecal_models.improvement.had_already import repaired_takes, settings_of, trained_rotations, wanted_of
 from glovecal_models.improvement.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.improvement.improvement import CLOCK, Improvement, Step, added_document
 from glovecal_models.improvement.known_effects import known_effects
@@ -108,6 +108,7 @@ class _Walk:
             self.takes, self.layout, self.subject, replace(self.settings, folds=0),
             take_hashes=self.hashes, cancelled=self.cancelled,
         )  # fmt: skip
+        self.settings = settings_of(model, self.settings)
         self._say("measuring the base on takes left out", 0.1)
         self.errors = self._held_out(model)
         self._step(model, None)

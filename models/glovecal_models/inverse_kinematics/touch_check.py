@@ -32,6 +32,14 @@ COMPARED_FRAMES = 20
 AT_LIMIT_DEG = 0.01
 
 
+class TouchNotSeen(BadInput):
+    """The tips were elsewhere. ``brief`` is what to say to the person."""
+
+    def __init__(self, message: str, brief: str) -> None:
+        super().__init__(message)
+        self.brief = brief
+
+
 @dataclass(frozen=True)
 class TouchVerdict:
     """Of N frames."""
@@ -70,7 +78,7 @@ def judged(chains: TipChains, contact: Touch | Rod, shape: HandShape, found: Fol
 def require_happened(
     verdict: TouchVerdict, contact: Touch | Rod, hand: PredictedHand, skeleton: Skeleton
 ) -> None:
-    """Raise BadInput where the tips cannot have touched in most frames, or another finger's did."""
+    """Raise TouchNotSeen where the tips cannot have touched in most frames, or another finger's did."""
     share, misfit = float(verdict.believable.mean()), float(np.median(verdict.misfit))
     other = _better_finger(contact, misfit, hand, skeleton) if misfit > SUSPICIOUS_MISFIT else None
     if share >= LEAST_SHARE and other is None:
@@ -81,13 +89,18 @@ def require_happened(
         f"{np.median(verdict.apart_mm):.0f} mm off (median), {misfit:.1f} times what the calibration may be "
         f"wrong by (at most {MOST_MISFIT:g})"
     )
+    brief = f"{_tips(contact)} were {np.median(verdict.apart_mm):.0f} mm from where they should be"
     if other is None:
-        raise BadInput(
+        raise TouchNotSeen(
             f"{said}. Repeat the motion with the tips together, check the hand's dimensions, or calibrate "
-            "better before"
+            "better before",
+            f"{brief}: keep them {'at the rod' if isinstance(contact, Rod) else 'together'}.",
         )
     finger, needed = other
-    raise BadInput(f"{said}. For the {FINGERS[finger]} it is {needed:.1f} times: was that the finger?")
+    raise TouchNotSeen(
+        f"{said}. For the {FINGERS[finger]} it is {needed:.1f} times: was that the finger?",
+        f"{brief}: was that the {FINGERS[finger]}?",
+    )
 
 
 def _better_finger(
@@ -105,6 +118,11 @@ def _better_finger(
         found.append((float(np.median(shape.misfit(angles))), finger))
     best, finger = min(found)
     return (finger, best) if best < min(MOST_MISFIT, CLEARLY_BETTER * misfit) else None
+
+
+def _tips(contact: Touch | Rod) -> str:
+    first, second = (FINGERS[finger] for finger in contact.fingers)
+    return f"the tips of {first} and {second}"
 
 
 def _what(contact: Touch | Rod) -> str:

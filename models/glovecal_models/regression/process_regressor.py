@@ -21,8 +21,8 @@ from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.regression.regressor import Prediction
 from glovecal_models.regression.stored_number import stored_number
 
-METHODS = ("lmc_gpr", "spgp", "gpr")
-"""``gpr`` is any exact process other than the paper's linear mean and covariance."""
+METHODS = ("lmc_gpr", "spgp", "polynomial_gpr", "general_gpr", "gpr")
+"""``gpr`` is any other exact process."""
 
 _ROWS_AT_ONCE = 2048
 """Prediction works through long recordings in blocks, to bound its memory."""

@@ -30,7 +30,7 @@ class Regressor(Protocol):
 
     @property
     def method(self) -> str:
-        """``linear``, ``lmc_gpr``, ``spgp`` or ``rule``."""
+        """``linear``, ``lmc_gpr``, ``polynomial_gpr``, ``general_gpr``, ``spgp`` or ``rule``."""
         ...
 
     @property

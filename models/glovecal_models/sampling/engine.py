@@ -9,29 +9,19 @@ It has no clock, no thread and no file: whoever drives it gives the time, and ke
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal, get_args
 
-import numpy as np
-
-from glovecal_models.errors import BadInput
 from glovecal_models.sampling import speech
 from glovecal_models.sampling.attempt import Attempt
-from glovecal_models.sampling.growing import Choose, kept_readings
+from glovecal_models.sampling.growing import Choose
 from glovecal_models.sampling.protocol import COUNTDOWN_S, SETTLE_S, Protocol
-from glovecal_models.sampling.quality import faults, missing_frames
 from glovecal_models.sampling.reading import GloveReading
-from glovecal_models.sampling.recent import RecentReadings
-from glovecal_models.sampling.state import OVER, RUNNING, Phase, SamplingState, Trigger
-from glovecal_models.sampling.steadiness import STILL_PERCENT, ActiveRanges, block_means
-from glovecal_models.sampling.step import Step
-from glovecal_models.sampling.verification import moved_since_start
-from glovecal_models.sampling.widget_check import inconsistent_widgets, response
-from glovecal_models.sampling.widgets import WIDEST_DEG
+from glovecal_models.sampling.state import OVER, RUNNING, SamplingState, Trigger
+from glovecal_models.sampling.steadiness import STILL_PERCENT, ActiveRanges
+from glovecal_models.sampling.user_events import NotNow, UserEvents
+from glovecal_models.sampling.verdict import TouchCheck, verdict
 
-Event = Literal["go", "redo", "undo", "skip", "pause", "resume", "stop"]
-EVENTS: tuple[Event, ...] = get_args(Event)
 LOST_AFTER_S = 1.0
 BACK_AFTER_S = 0.3
 SETTLE_PATIENCE_S = 8.0
@@ -40,13 +30,6 @@ GESTURE_STILL_S = 1.0
 SHOWN_S = 0.6
 """A good verdict is shown for so long."""
 MOVING_PERCENT = 3 * STILL_PERCENT
-
-TouchCheck = Callable[[Step, Sequence[GloveReading]], str | None]
-"""Why the fingertips of a step did not touch, in a sentence, or None: inverse kinematics can tell."""
-
-
-class NotNow(BadInput):
-    """The event has no meaning in this phase."""
 
 
 def begin_sampling(
@@ -65,8 +48,8 @@ def begin_sampling(
     return state
 
 
-class Sampling:
-    """Drives one ``state``. Times are seconds of one clock that does not go back."""
+class Sampling(UserEvents):
+    """Drives one ``state`` by time and frames; ``event`` is the user's."""
 
     def __init__(
         self,
@@ -75,15 +58,9 @@ class Sampling:
         touch_check: TouchCheck | None = None,
         choose: Choose | None = None,
     ) -> None:
-        self.state = state
-        self._choose = choose
-        self.recording: str | None = ""
-        """Name of the recording that the frames are written to; marked in each attempt. None: nobody writes
-        them now, and no step is recorded until somebody does."""
+        super().__init__(state)
         self._touch_check = touch_check
-        self._ranges = ActiveRanges.from_document(state.ranges)
-        self._recent = RecentReadings()
-        self._heard_s: float | None = None
+        self._choose = choose
         self._heard_since_s: float | None = None
         self._button = False
 
@@ -106,81 +83,6 @@ class Sampling:
     def steadiness_percent(self) -> float | None:
         """How far the hand moved in the last half second; still is ``STILL_PERCENT`` or less."""
         return self._recent.percent(SETTLE_S, self._ranges)
-
-    # Events ------------------------------------------------------------------------------------------------
-
-    def event(
-        self, now_s: float, name: str, *, step: str | None = None, angle_deg: float | None = None
-    ) -> None:
-        """What the user wants. ``step`` and ``angle_deg`` are for ``redo``: which step, and the angle that
-        its widget really has. Raises NotNow, BadInput for no event or step of that name; then nothing
-        changed."""
-        if name not in EVENTS:
-            raise BadInput(f"no event {name!r}; there are {', '.join(EVENTS)}")
-        if self.state.phase in OVER:
-            raise NotNow(f"this sampling is {self.state.phase}; {name} comes too late")
-        if self.state.phase == "paused" and name not in ("resume", "stop"):
-            raise NotNow(f"the sampling is paused: resume it before {name}")
-        if (step is not None or angle_deg is not None) and name != "redo":
-            raise BadInput(f"{name} takes neither step nor angle; they are for redo")
-        if name == "redo":
-            self._redo(now_s, step, angle_deg)
-        else:
-            getattr(self, f"_{name}")(now_s)
-
-    def _go(self, now_s: float) -> None:
-        failed = self.state.phase == "judged" and not self.state.attempts[-1].counts
-        if self.state.phase != "waiting" and not failed:
-            raise NotNow(f"go has no meaning while the step is {self.state.phase}")
-        self._enter("countdown", now_s, speech.COUNTDOWN)
-
-    def _redo(self, now_s: float, name: str | None, angle_deg: float | None) -> None:
-        if name is None and self.state.phase in ("waiting", "choosing"):
-            done = [attempt.step for attempt in self.state.attempts if attempt.counts]
-            if not done and angle_deg is None:
-                raise NotNow("nothing was recorded yet that could be done again")
-            name = done[-1] if done else self.state.step
-        name = name or self.state.step
-        step = self.state.protocol.step(name)
-        if angle_deg is not None:
-            self.state.protocol = _with_angle(self.state.protocol, step, angle_deg)
-        self._leave(now_s)
-        self.state.step = name
-        self._ask(now_s)
-
-    def _undo(self, now_s: float) -> None:
-        """The last result is taken back; an earlier one of the same step counts again."""
-        counted = [attempt for attempt in self.state.attempts if attempt.counts]
-        if not counted:
-            raise NotNow("there is nothing to undo")
-        counted[-1].withdrawn = True
-        self._leave(now_s)
-        self._next(now_s, speech.UNDONE)
-
-    def _skip(self, now_s: float) -> None:
-        if not self.state.step:
-            raise NotNow("there is nothing to leave out: the next step is being chosen")
-        self._leave(now_s)
-        self.state.attempts.append(Attempt(self.state.step, "skipped", ("the user left it out.",)))
-        self._next(now_s, speech.SKIPPED)
-
-    def _pause(self, now_s: float) -> None:
-        self._leave(now_s)
-        self._accept_verdict(now_s)
-        if self.state.phase not in OVER:
-            self._enter("paused", now_s, speech.PAUSED)
-
-    def _resume(self, now_s: float) -> None:
-        if self.state.phase not in ("paused", "lost"):
-            raise NotNow(f"the sampling is not paused but {self.state.phase}")
-        self._heard_s = None
-        self._ask(now_s)
-
-    def _stop(self, now_s: float) -> None:
-        self._leave(now_s)
-        self._end("stopped", now_s, speech.STOPPED)
-
-    # Time and frames ---------------------------------------------------------------------------------------
 
     def frame(self, now_s: float, reading: GloveReading) -> None:
         """One frame, in the order they came; ones of another length are left out."""
@@ -283,88 +185,14 @@ class Sampling:
         elif self.state.trigger != "key" and waited >= TIMER_S:
             self._ask(now_s)
 
-    def _accept_verdict(self, now_s: float) -> None:
-        """A good verdict stands, whatever comes before it was shown long enough."""
-        if self.state.phase == "judged" and self.state.attempts[-1].counts:
-            self._next(now_s)
-
     def _maybe_recorded(self, now_s: float) -> None:
         over = now_s - self.state.since_s >= self.state.now().seconds
         # A glove that fell silent may be lost: that verdict comes first.
         if over and self._heard_s is not None and now_s - self._heard_s <= BACK_AFTER_S:
             readings = self._leave(now_s)
-            self._judged(now_s, self._judge(readings))
-
-    # Verdicts ----------------------------------------------------------------------------------------------
-
-    def _judge(self, readings: list[GloveReading]) -> Attempt:
-        step, sensors = self.state.now(), self.state.sensors
-        attempt = Attempt(step.name, "good", recording=self.recording or "", frames=len(readings))
-        if readings:
-            attempt.begins_s, attempt.ends_s = readings[0].time_s, readings[-1].time_s
-            attempt.missing = missing_frames(readings)
-            means = np.mean([reading.values for reading in readings], axis=0)
-            attempt.means = dict(zip(sensors, means.tolist(), strict=True))
-        if step.kind == "range":
-            self._learn_ranges(readings)
-        attempt.reasons = faults(step, readings, sensors, self._ranges, self._flat())
-        if readings:
-            percent = 100 * np.ptp([reading.values for reading in readings], axis=0) / self._ranges.span
-            attempt.moved_percent = float(percent.max())
-        if self.state.protocol.grows:
-            attempt.kept = kept_readings(step, readings)
-        if not attempt.reasons:
-            self._learn_ranges(readings)
-            attempt.reasons = self._contradictions(step, readings, attempt)
-        attempt.outcome = "bad" if attempt.reasons else "good"
-        return attempt
-
-    def _learn_ranges(self, readings: list[GloveReading]) -> None:
-        self._ranges.widen(block_means(readings)[:-1])  # the last block may be as noisy as a frame
-        self.state.ranges = self._ranges.to_document()
-
-    def _contradictions(self, step: Step, readings: list[GloveReading], attempt: Attempt) -> tuple[str, ...]:
-        """What only the other steps, or inverse kinematics, can tell."""
-        if step.kind == "fk_cross_couple":
-            attempt.response = response(step, readings, self.state.sensors, self._ranges)
-            (rotation,) = step.angles
-            sentence = inconsistent_widgets(rotation, self._responses(rotation, step, attempt))
-            return (sentence,) if sentence else ()
-        if step.touches and self._touch_check is not None:
-            sentence = self._touch_check(step, readings)
-            return (sentence,) if sentence else ()
-        return ()
-
-    def _responses(self, rotation: str, step: Step, attempt: Attempt) -> dict[float, float]:
-        tried = {**self.state.finished(), step.name: attempt}
-        responses: dict[float, float] = {}
-        for other in self.state.protocol.steps:
-            found = tried.get(other.name)
-            same = other.kind == "fk_cross_couple" and rotation in other.angles
-            if same and found is not None and found.response is not None:
-                responses[other.angles[rotation]] = found.response
-        return responses
-
-    def _flat(self) -> dict[str, float] | None:
-        finished = self.state.finished()
-        for step in self.state.protocol.steps:
-            if step.pose == "flat" and step.name in finished and finished[step.name].means:
-                return finished[step.name].means
-        return None
-
-    def _judged(self, now_s: float, attempt: Attempt) -> None:
-        self.state.attempts.append(attempt)
-        said = speech.again(attempt.reasons) if attempt.outcome == "bad" else speech.GOOD
-        self._enter("judged", now_s, said)
-
-    # Moving on ---------------------------------------------------------------------------------------------
-
-    def _next(self, now_s: float, said: str = "") -> None:
-        self.state.step = self.state.first_unfinished()
-        if self.state.step or self.state.protocol.grows:
-            self._ask(now_s, said)
-        else:
-            self._end("done", now_s, speech.DONE)
+            attempt = verdict(self.state, readings, self._ranges, self.recording or "", self._touch_check)
+            self.state.ranges = self._ranges.to_document()
+            self._judged(now_s, attempt)
 
     def _maybe_chosen(self, now_s: float) -> None:
         chosen = None if self._choose is None else self._choose(self.state)
@@ -376,42 +204,3 @@ class Sampling:
         )
         self.state.expected = chosen.document
         self._next(now_s, chosen.sentence)
-
-    def _ask(self, now_s: float, said: str = "") -> None:
-        if not self.state.step:
-            self._enter("choosing", now_s, f"{said} {speech.CHOOSING}".strip())
-            return
-        steps = [step.name for step in self.state.protocol.steps]
-        count = None if self.state.protocol.grows else len(steps)
-        asked = speech.asking(self.state.now(), steps.index(self.state.step) + 1, count)
-        self._recent.moved = False
-        self._enter("waiting", now_s, f"{said} {asked}".strip())
-
-    def _end(self, phase: Phase, now_s: float, said: str) -> None:
-        self.state.sentences = moved_since_start(self.state, self._ranges)
-        self._recent.forget()
-        self._enter(phase, now_s, said)
-
-    def _enter(self, phase: Phase, now_s: float, said: str) -> None:
-        self.state.phase, self.state.since_s = phase, now_s
-        self.state.say(said)
-
-    def _leave(self, now_s: float) -> list[GloveReading]:
-        """Count the running phase as capture time; the frames that were recorded in it."""
-        if self.state.phase in RUNNING:
-            self.state.capture_s += max(0.0, now_s - self.state.since_s)
-        return self._recent.end()
-
-
-def _with_angle(protocol: Protocol, step: Step, angle_deg: float) -> Protocol:
-    """The widget of ``step`` has another angle; the step keeps its name."""
-    if not abs(angle_deg) <= WIDEST_DEG:
-        raise BadInput(f"a widget of {angle_deg:g} degrees; up to {WIDEST_DEG:g} are possible")
-    if step.kind != "fk_cross_couple":
-        raise BadInput(f"step {step.name} has no widget whose angle could be corrected")
-    (rotation,) = step.angles
-    widget = f"the {angle_deg:g} degree widget"
-    changed = replace(
-        step, angles={rotation: angle_deg}, ask=step.ask.replace(step.needs, widget), needs=widget
-    )
-    return replace(protocol, steps=tuple(changed if each is step else each for each in protocol.steps))

@@ -14,6 +14,7 @@ from glovecal_models.sampling.step import Step
 
 KEY_POSES = ("flat", "spread", "fist", "overbend")
 HOLD_S = 1.2
+CHECK_PART = "quick-check"
 PoseAngles = Mapping[str, Mapping[str, float]]
 
 _ASK = {
@@ -56,7 +57,7 @@ def verification_steps(when: str) -> list[Step]:
 
 def check_steps(poses: tuple[str, ...]) -> list[Step]:
     """Poses of a new wearing: their angles are those that the subject's own takes know."""
-    return [_held(pose, "verification", pose, {}, "quick-check") for pose in poses]
+    return [_held(pose, "verification", pose, {}, CHECK_PART) for pose in poses]
 
 
 def _held(name: str, kind, pose: str, angles: Mapping[str, float], part: str) -> Step:  # kind: step.Kind

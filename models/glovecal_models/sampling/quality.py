@@ -12,6 +12,8 @@ from glovecal_models.sampling.step import Step
 
 MOVED_PERCENT = 25.0
 """A sensor that had to move went at least so far."""
+TOUCHING_PERCENT = 12.0
+"""That of a finger whose tip stays on the thumb's: ring and little finger get no further than 20 %."""
 JUMP_PERCENT = 12.0
 FASTEST_PERCENT_S = 1500.0
 """A finger's hundred degrees in a fifteenth of a second: faster is no hand."""
@@ -97,7 +99,8 @@ def _not_still(moved: Mapping[str, float]) -> tuple[str, ...]:
 
 
 def _hardly_moved(step: Step, moved: Mapping[str, float]) -> tuple[str, ...]:
-    lazy = [sensor for sensor in step.moves if moved[sensor] < MOVED_PERCENT]
+    needed = TOUCHING_PERCENT if step.touches else MOVED_PERCENT
+    lazy = [sensor for sensor in step.moves if moved[sensor] < needed]
     thumb = [sensor for sensor in step.moves if sensor.startswith("T")]
     other = [sensor for sensor in moved if sensor.startswith("P_") and moved[sensor] >= 2 * MOVED_PERCENT]
     if thumb and len(lazy) == len(step.moves) and other:
@@ -106,7 +109,7 @@ def _hardly_moved(step: Step, moved: Mapping[str, float]) -> tuple[str, ...]:
             "is this a glove of the other hand?",
         )
     return tuple(
-        f"{sensor} went through {moved[sensor]:.0f} % of its range only; {MOVED_PERCENT:g} % are needed."
+        f"{sensor} went through {moved[sensor]:.0f} % of its range only; {needed:g} % are needed."
         for sensor in lazy
     )
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from glovecal_models.errors import BadInput
 from glovecal_models.sampling.attempt import Attempt
+from glovecal_models.sampling.key_poses import CHECK_PART
 from glovecal_models.sampling.state import SamplingState
 from glovecal_models.sampling.step import Kind, Step
 from glovecal_models.takes.take import Take
@@ -71,6 +72,11 @@ def sampled_takes(state: SamplingState, recorded: Mapping[str, Take], *, name: s
         number = f"-again-{names[part]}" if names[part] > 1 else ""
         takes.append(_cut(whole, marks, f"{name}-{part}{number}"))
     return takes
+
+
+def is_lesson(document: Mapping[str, Any]) -> bool:
+    """Whether a take with this document belongs to a calibration; the check of a later wearing does not."""
+    return document["kind"] != "range" and document["part"] != CHECK_PART
 
 
 def for_other_subject(take: Take, document: Mapping[str, Any], subject: str) -> tuple[Take, dict[str, Any]]:

@@ -1,8 +1,8 @@
 """A simulated person who does what a sampling protocol asks, as soon as it is asked.
 
 Poses are taken as far from the usual angles as people take them (2.5 degrees), widgets hold exactly, and
-nothing is ever quite still. The tips of a touch are near each other, not on each other: this hand has no
-skin, so its touches serve the protocol and not the inverse kinematics.
+nothing is ever quite still. With ``Touches`` the tips of a touch are on each other. Without, they are
+near each other: this hand has no skin, so its touches serve the protocol and not the inverse kinematics.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from glovecal_models.sampling.step import Step
+from glovecal_models.simulation.asked_touch import Touches
 from glovecal_models.simulation.hand_motion import (
     HandMotion,
     PostureSequence,
@@ -43,7 +44,8 @@ _SPEEDS_HZ = (0.5, 1.2)
 class AskedHand:
     """The hand's driven rotations as a function of time that only goes on."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, touches: Touches | None = None) -> None:
+        self._touches = touches
         self._random = np.random.default_rng([seed, 41])
         self._unrest = Unrest(np.random.default_rng([seed, 42]))
         self._from = posture_vector(POSTURES["rest"])
@@ -69,7 +71,7 @@ class AskedHand:
         share = minimum_jerk(since / MOVE_S)[:, None]
         unrest = self._unrest.driven(time_s)
         if not isinstance(self._motion, PostureSequence):
-            unrest[:, self._held] = 0.0  # clamped by the widget
+            unrest[:, self._held] = 0.0  # clamped by the widget, or by skin on skin
         return within_range(self._from + share * (angles - self._from) + unrest)
 
     def _rest(self) -> HandMotion:
@@ -84,6 +86,9 @@ class AskedHand:
         posture |= {name: angle for name, angle in step.angles.items() if name in posture}
         if step.motion == "hold":
             return self._still(posture_vector(posture), step.pose)
+        if step.touches and self._touches is not None:
+            self._held = [column for column, name in enumerate(DRIVEN) if name[0] in step.touches]
+            return self._touches.motion(step, int(self._random.integers(1 << 30)))
         if step.touches:
             near = [name for name in DRIVEN if name.split("_")[0] in step.touches]
             swings = {name: (posture[name] - 14.0, posture[name] + 14.0) for name in near}

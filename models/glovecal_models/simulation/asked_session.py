@@ -8,13 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.sampling.engine import Sampling, TouchCheck, begin_sampling
+from glovecal_models.hand.skeleton import Skeleton
+from glovecal_models.sampling.engine import Sampling, begin_sampling
 from glovecal_models.sampling.growing import Choose
 from glovecal_models.sampling.protocol import Protocol
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.state import OVER, SamplingState
 from glovecal_models.sampling.step import Step
+from glovecal_models.sampling.verdict import TouchCheck
 from glovecal_models.simulation.asked_hand import AskedHand
+from glovecal_models.simulation.asked_touch import RealTouches
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.simulation.simulated_hand import DRIVEN, ROTATIONS
 from glovecal_models.takes.take import Take
@@ -46,13 +49,16 @@ def asked_session(
     choose: Choose | None = None,
     does: Callable[[Step], Step] = lambda step: step,
     patience: int = 3,
+    skeleton: Skeleton | None = None,
 ) -> AskedSession:
     """Run the protocol on its timer. A step that is bad ``patience`` times is left out. Raises BadInput when
-    it does not come to an end. ``does``: what the person does who is asked for a step."""
+    it does not come to an end. ``does``: what the person does who is asked for a step. ``skeleton``: the
+    person's hand, where tips shall really touch."""
     state = begin_sampling(protocol, glove.sensors, trigger="timer", counts=glove.layout.counts)
     sampling = Sampling(state, touch_check=touch_check, choose=choose)
     sampling.recording = RECORDING
-    hand, random = AskedHand(seed), np.random.default_rng([seed, 43, glove.wearing])
+    touches = None if skeleton is None else RealTouches(glove.hand, skeleton)
+    hand, random = AskedHand(seed, touches), np.random.default_rng([seed, 43, glove.wearing])
     order = [ROTATIONS.index(rotation) for rotation in glove.rotations]
     truths, frames = [], []
     chunk = max(1, round(AT_ONCE_S * rate_hz))

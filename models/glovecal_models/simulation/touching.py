@@ -6,13 +6,14 @@ Its tips touch by the person's own rules for joints that no sensor reads, not by
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.forward_kinematics import forward_kinematics
-from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS
+from glovecal_models.hand.rotations import FINGERS
 from glovecal_models.hand.skeleton import Skeleton
+from glovecal_models.inverse_kinematics.tip_chains import TipChains
 from glovecal_models.simulation.hand_motion import Unrest, posture_vector, within_range
 from glovecal_models.simulation.postures import POSTURES
 from glovecal_models.simulation.protocol import GAPS, Segment
@@ -26,6 +27,8 @@ TOUCHING_MM = 1e-3
 MOST_STEPS = 200
 SLOPE_STEP_DEG = 1e-4
 LONGEST_STEP_DEG = 8.0
+SINGULAR = 1e-3
+"""A rod holds one direction only: what moves the tips in others is left alone."""
 _THUMB = ("T_TMC", "TI_ABD", "T_MCP", "T_IP")
 _NEAR_TOUCH = {
     "I": {**dict(zip(_THUMB, (36.0, 22.0, 13.0, 14.0), strict=True)), "I_MCP": 46.0, "I_PIP": 56.0},
@@ -57,64 +60,100 @@ class TouchingMotion:
 
 
 def touching_segment(
-    hand: SimulatedHand, skeleton: Skeleton, finger: str, seed: int, duration_s: float = 3.0
+    hand: SimulatedHand,
+    skeleton: Skeleton,
+    finger: str,
+    seed: int,
+    duration_s: float = 3.0,
+    *,
+    rod_mm: float = 0.0,
+    eagerness: float = 1.0,
 ) -> Segment:
-    """Thumb and ``finger`` ("I", "M", "R" or "P") touching from beginning to end.
+    """Thumb and ``finger`` ("I", "M", "R" or "P") touching from beginning to end, or a rod between them.
+
+    ``eagerness`` makes the waves larger and quicker.
 
     Raises BadInput for another finger, and for a hand of ``skeleton`` whose tips cannot stay together.
     """
     if finger not in _NEAR_TOUCH:
         raise BadInput(f"the thumb touches {', '.join(_NEAR_TOUCH)}, not {finger!r}")
     random = np.random.default_rng([seed, 15, list(FINGERS).index(finger)])
-    name = f"touch_{FINGERS[finger]}"
+    name = f"rod_{FINGERS[finger]}" if rod_mm else f"touch_{FINGERS[finger]}"
+    tips = _Tips(hand, skeleton, finger, rod_mm)
     near = posture_vector(POSTURES["ok"] | _NEAR_TOUCH[finger] | dict.fromkeys(GAPS, 4.0))
-    touching = _brought_together(near[None], hand, skeleton, finger)
-    meant = _waving(touching, finger, random, int(np.ceil(duration_s * TABLE_HZ)) + 1)
-    table = _brought_together(meant, hand, skeleton, finger)
+    touching = _brought_together(near[None], tips)
+    meant = _waving(touching, finger, random, int(np.ceil(duration_s * TABLE_HZ)) + 1, eagerness)
+    table = _brought_together(meant, tips)
     return Segment(name, TouchingMotion(table, name), Unrest(random, held=DRIVEN))
 
 
-def _waving(posture: np.ndarray, finger: str, random: np.random.Generator, frames: int) -> np.ndarray:
+def _waving(
+    posture: np.ndarray, finger: str, random: np.random.Generator, frames: int, eagerness: float
+) -> np.ndarray:
     """Slow waves of the two fingers about ``posture`` (1, len(DRIVEN))."""
     table = np.tile(posture, (frames, 1))
     time = np.arange(frames) / TABLE_HZ
     for column, name in enumerate(DRIVEN):
         size = WAVES_DEG.get(name.partition("_")[2], 0.0) if name[0] in ("T", finger) else 0.0
-        speed, phase = random.uniform(*WAVES_HZ), random.uniform(0, 2 * np.pi)
+        size, speed = eagerness * size, eagerness * random.uniform(*WAVES_HZ)
+        phase = random.uniform(0, 2 * np.pi)
         table[:, column] += size * np.sin(2 * np.pi * speed * time + phase)
     return within_range(table)
 
 
-def _brought_together(table: np.ndarray, hand: SimulatedHand, skeleton: Skeleton, finger: str) -> np.ndarray:
+@dataclass(frozen=True)
+class _Tips:
+    """Of the thumb and one finger of a person, and the rod between them."""
+
+    hand: SimulatedHand
+    skeleton: Skeleton
+    finger: str
+    rod_mm: float
+
+    @cached_property
+    def chains(self) -> TipChains:
+        return TipChains(self.skeleton, ("T", self.finger))
+
+    @cached_property
+    def _columns(self) -> list[int]:
+        return [ROTATIONS.index(name) for name in self.chains.rotations]
+
+    @property
+    def moving(self) -> list[int]:
+        """Columns of ``DRIVEN``."""
+        joints = (*self.skeleton.chain("T"), *self.skeleton.chain(self.finger))
+        return [column for column, name in enumerate(DRIVEN) if name in joints]
+
+    def gap_mm(self, driven: np.ndarray) -> np.ndarray:
+        """What is to go from where the finger should be to the tip of the thumb, (N, 3)."""
+        angles = self.hand.complete(dict(zip(DRIVEN, driven.T, strict=True)))
+        thumb, finger = self.chains.tips_mm(angles[:, self._columns]).transpose(1, 0, 2)
+        apart = thumb - finger
+        if not self.rod_mm:
+            return apart
+        return apart * (1 - self.rod_mm / np.linalg.norm(apart, axis=1, keepdims=True))
+
+
+def _brought_together(table: np.ndarray, tips: _Tips) -> np.ndarray:
     """Each frame changed as little as it takes for the tips to touch; joints stay within their ranges."""
-    moving = [
-        column
-        for column, name in enumerate(DRIVEN)
-        if name in (*skeleton.chain("T"), *skeleton.chain(finger))
-    ]
-    gap = _gap_mm(table, hand, skeleton, finger)
+    moving, table = tips.moving, table.copy()
+    gap = tips.gap_mm(table)
     for _ in range(MOST_STEPS):
-        slopes = np.empty((len(table), 3, len(moving)))
-        for place, column in enumerate(moving):
-            ahead = table.copy()
-            ahead[:, column] += SLOPE_STEP_DEG
-            slopes[:, :, place] = (_gap_mm(ahead, hand, skeleton, finger) - gap) / SLOPE_STEP_DEG
-        step = -(np.linalg.pinv(slopes) @ gap[:, :, None])[:, :, 0]
-        table = table.copy()
-        table[:, moving] += np.clip(step, -LONGEST_STEP_DEG, LONGEST_STEP_DEG)
-        table = within_range(table)
-        gap = _gap_mm(table, hand, skeleton, finger)
-        if np.abs(gap).max() < TOUCHING_MM:
+        apart = np.flatnonzero(np.abs(gap).max(axis=1) >= TOUCHING_MM)
+        if not len(apart):
             return table
+        now = table[apart]
+        slopes = np.empty((len(apart), 3, len(moving)))
+        for place, column in enumerate(moving):
+            ahead = now.copy()
+            ahead[:, column] += SLOPE_STEP_DEG
+            slopes[:, :, place] = (tips.gap_mm(ahead) - gap[apart]) / SLOPE_STEP_DEG
+        step = -(np.linalg.pinv(slopes, rcond=SINGULAR) @ gap[apart][:, :, None])[:, :, 0]
+        now[:, moving] += np.clip(step, -LONGEST_STEP_DEG, LONGEST_STEP_DEG)
+        table[apart] = within_range(now)
+        gap[apart] = tips.gap_mm(table[apart])
     furthest = np.linalg.norm(gap, axis=1).max()
     raise BadInput(
-        f"thumb and {FINGERS[finger]} of this hand cannot stay together: {furthest:.1f} mm are between them"
+        f"thumb and {FINGERS[tips.finger]} of this hand cannot stay together: {furthest:.1f} mm are between "
+        "them"
     )
-
-
-def _gap_mm(driven: np.ndarray, hand: SimulatedHand, skeleton: Skeleton, finger: str) -> np.ndarray:
-    """From fingertip to the tip of the thumb, (N, 3)."""
-    angles = hand.complete(dict(zip(DRIVEN, driven.T, strict=True)))
-    columns = [ROTATIONS.index(name) for name in HAND_ROTATIONS]
-    tips = forward_kinematics(skeleton, angles[:, columns]).tips_mm
-    return tips[:, 0] - tips[:, list(FINGERS).index(finger)]

@@ -31,7 +31,7 @@ STOPPED = {
     "not_better": "the next effect did not pay on takes left out and was undone",
 }
 STEPS = {"model": "model", "added": "added", "rmse_deg": "error (°)"}
-Method = Literal["lmc_gpr", "linear", "spgp"]
+Method = Literal["lmc_gpr", "linear", "spgp", "auto", "polynomial_gpr", "general_gpr"]
 
 
 class SeveralFiles(TyperCommand):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from glovecal_service.cli.connection import connect
+from glovecal_service.cli.kernel_table import KERNEL_COLUMNS, kernel_rows
 from glovecal_service.cli.model_effects import EFFECT_COLUMNS, effect_rows
 from glovecal_service.cli.options import AsJson, Model, OnlyLayout, OnlySubject, Subject
 from glovecal_service.cli.printing import err, moment, out, print_facts, print_json, print_table
@@ -66,6 +67,14 @@ def show(model: Model, as_json: AsJson = False) -> None:
         "sensors": "sensors",
     }
     print_table(document["rotations"], columns, empty="No rotations.")
+    tried = kernel_rows(document["rotations"])
+    if tried:
+        out.print()
+        out.print("Kernels tried: errors on takes left out, evidence over the first")
+        print_table(tried, KERNEL_COLUMNS, empty="")
+        for row in document["rotations"]:
+            if row["kernel_choice"]:
+                err.print(row["kernel_choice"]["sentence"])
     if document["effect_details"]:
         out.print()
         print_table(effect_rows(document["effect_details"]), EFFECT_COLUMNS, empty="")

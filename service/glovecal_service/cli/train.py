@@ -16,18 +16,24 @@ from glovecal_service.cli.waiting import wait_for_job
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
 
-Method = Literal["raw", "linear", "lmc_gpr", "spgp"]
+Method = Literal["raw", "linear", "lmc_gpr", "spgp", "auto", "polynomial_gpr", "general_gpr"]
 
 
 def train(
     subject: Subject,
     layout: OnlyLayout = None,
     method: Annotated[
-        Method, typer.Option(help="raw is no calibration at all: the scale to read the others against.")
+        Method,
+        typer.Option(
+            help="auto chooses each rotation's kernel by evidence and error, for hardware nobody knows. "
+            "raw is no calibration at all: the scale to read the others against."
+        ),
     ] = "lmc_gpr",
     take: Annotated[
         list[str] | None,
-        typer.Option("--take", "-t", help="Take to train on; repeat. Default: all with reference."),
+        typer.Option(
+            "--take", "-t", help="Take to train on; repeat. Default: all with reference or touches."
+        ),
     ] = None,
     leave_out: Annotated[list[str] | None, typer.Option(help="Take to keep for testing; repeat.")] = None,
     pseudo_inputs: Annotated[
@@ -82,9 +88,12 @@ def _say_model(result: dict[str, Any], document: dict[str, Any]) -> None:
     for sentence in result.get("sentences", []):
         err.print(sentence)
     error = result.get("held_out_rmse_deg")
+    how = str(document["error_estimate"].get("how"))
     told = f"error on left-out takes {error:.2f} degrees" if error is not None else "error not estimated"
-    if error is not None and "takes" not in str(document["error_estimate"].get("how")):
+    if error is not None and "takes" not in how:
         told = f"error on left-out parts of its takes {error:.2f} degrees"
+    if error is not None and "widgets" in how:
+        told = f"error on widgets left out, one at a time, {error:.2f} degrees"
     active = "Active." if document["active"] else "Not active."
     out.print(
         f"Model {document['id'][:12]} ({document['method']}) for {document['subject']}, {told}. {active}"
@@ -98,9 +107,9 @@ def _choose(
     service.get(f"/subjects/{subject}")
     rows = service.get("/takes", {"subject": subject})
     without = {row["id"] for row in find_takes(rows, left_out)}
-    chosen = find_takes(rows, wanted) or [row for row in rows if row["rotations"]]
+    chosen = find_takes(rows, wanted) or [row for row in rows if row["teaches"]]
     for row in chosen:
-        if not row["rotations"]:
+        if not row["teaches"]:
             raise Refusal(
                 f"take {row['name']} ({row['id']}) has no reference angles; attach some with "
                 f"glovecal take reference {row['id']} FILE"

@@ -16,17 +16,21 @@ from glovecal_models.calibration.training import assemble
 from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput, NotTrainable
+from glovecal_models.regression.kept_choice import choice_of
+from glovecal_models.regression.kernel_candidates import CHOOSING
+from glovecal_models.regression.kernel_scores import kernel_sentences
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult
+from glovecal_service.jobs.training_takes import TrainingTakes
 from glovecal_service.store import Store
 from glovecal_service.store.records import JobRecord, TakeRecord
 
 _OWN_KEYS = {"subject", "layout", "takes", "activate", "parent"}
-_SETTINGS = {field.name for field in fields(TrainingSettings)}
+_SETTINGS = {field.name for field in fields(TrainingSettings)} - {"kernels"}
 
 
 class TrainJob:
-    """Payload: ``subject``, ``layout``, ``takes`` (ids, or None for all with a reference), ``activate``,
+    """Payload: ``subject``, ``layout``, ``takes`` (ids, or None for all that teach), ``activate``,
     ``parent`` (model id or None), and any of ``TrainingSettings``.
 
     Result: ``model``, ``held_out_rmse_deg``, ``per_rotation`` (held-out degrees, None for a rule),
@@ -38,18 +42,19 @@ class TrainJob:
         payload = job.payload
         subject, layout_name = _text(payload, "subject"), _text(payload, "layout")
         settings = _settings(payload)
-        store.subjects.get(subject)
+        person = store.subjects.get(subject)
         layout = store.layouts.get(layout_name)
         parent = payload.get("parent")
         parent = None if parent is None else store.models.get(parent).id
         records = _takes(store, payload.get("takes"), subject, layout_name)
-        plan = plan_training([store.takes.load(record.id) for record in records], layout, subject, settings)
+        taught = TrainingTakes.of(store, records, layout, person, settings)
+        plan = plan_training(taught.takes, taught.layout, subject, taught.settings)
 
         def finish(results: Sequence[TaskResult]) -> dict[str, Any]:
             hashes = [record.artifact for record in records]
             fits = [_fit_result(result) for result in results]
-            model = assemble(plan, fits, take_hashes=hashes, parent=parent)
-            facts = _facts(model, plan, records) | {"settings": asdict(settings)}
+            model = taught.finished(assemble(plan, fits, take_hashes=hashes, parent=parent))
+            facts = _facts(model, plan, records, taught.sentences) | {"settings": asdict(settings)}
             return _keep(store, model, layout_name, facts, activate=bool(payload.get("activate", False)))
 
         return JobPlan(
@@ -62,7 +67,11 @@ class TrainJob:
 
 def fit(task: FitTask, cancelled: Callable[[], bool], report: Report) -> TaskResult:
     """One fit, run in a worker. Raises Cancelled, NotTrainable."""
-    result = run_fit(task, cancelled=cancelled)
+
+    def say(sentence: str, share: float) -> None:
+        report(f"{_label(task)}: {sentence}", 0.0)  # fits run side by side: what counts is how many are done
+
+    result = run_fit(task, cancelled=cancelled, report=say if task.settings.method in CHOOSING else None)
     facts = {
         "rotation": result.rotation,
         "fold": result.fold,
@@ -106,7 +115,7 @@ def _stepper(plan: TrainingPlan) -> Callable[[int, Mapping[int, TaskResult]], St
 
 def _takes(store: Store, ids: Sequence[str] | None, subject: str, layout: str) -> list[TakeRecord]:
     if ids is None:
-        records = [take for take in store.takes.list(subject, layout) if take.has_reference]
+        records = [take for take in store.takes.list(subject, layout) if take.teaches]
         if not records:
             raise NotTrainable(
                 f"subject {subject!r} has no take with reference angles for layout {layout!r}; import one,"
@@ -134,15 +143,22 @@ def _settings(payload: Mapping[str, Any]) -> TrainingSettings:
     return TrainingSettings(**chosen)
 
 
-def _facts(model: CalibrationModel, plan: TrainingPlan, records: Sequence[TakeRecord]) -> dict[str, Any]:
+def _facts(
+    model: CalibrationModel, plan: TrainingPlan, records: Sequence[TakeRecord], said: Sequence[str]
+) -> dict[str, Any]:
     return {
         "takes": [{"id": record.id, "name": record.name, "artifact": record.artifact} for record in records],
         "held_out_rmse_deg": model.error_estimate.get("rmse_deg"),
         "held_out_how": model.error_estimate.get("how"),
         "per_rotation": {item.rotation: item.held_out_rmse_deg for item in model.rotations},
-        "sentences": [*plan.sentences, *_weight_sentences(model)],
+        "sentences": [*said, *plan.sentences, *_kernel_sentences(model), *_weight_sentences(model)],
         "simulated": model.simulated,
     }
+
+
+def _kernel_sentences(model: CalibrationModel) -> list[str]:
+    choices = {item.rotation: choice_of(item.regressor) for item in model.rotations}
+    return kernel_sentences({name: found for name, found in choices.items() if found is not None})
 
 
 def _weight_sentences(model: CalibrationModel) -> list[str]:

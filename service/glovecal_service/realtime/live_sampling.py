@@ -15,6 +15,7 @@ from glovecal_models.layout import Layout
 from glovecal_models.sampling.engine import Sampling
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.state import OVER, SamplingState
+from glovecal_models.sampling.verdict import TouchCheck
 from glovecal_service.realtime.arrivals import Arrivals
 from glovecal_service.realtime.chosen_apart import ChosenApart
 from glovecal_service.realtime.recording_file import decoded
@@ -40,12 +41,14 @@ class LiveSampling:
         keys: GloveKeys,
         record: SamplingRecord,
         layout: Layout,
+        touch_check: TouchCheck | None = None,
         clock: Callable[[], float] = time.time,
     ) -> None:
         self.record = record
         self._clock = clock
         self._choose = ChosenApart(NextStep(layout))
-        self._sampling = Sampling(SamplingState.from_document(record.document), choose=self._choose)
+        state = SamplingState.from_document(record.document)
+        self._sampling = Sampling(state, touch_check=touch_check, choose=self._choose)
         self._sampling.recording = None
         self._saved = self._mark()
         self._sampling.interrupted(clock())
@@ -116,7 +119,7 @@ class LiveSampling:
         failed = last is not None and last.state == "failed"
         try:
             asked = store.recordings.request(
-                mine.glove, name=name, subject=mine.subject, wearing=mine.wearing
+                mine.glove, name=name, subject=mine.subject, wearing=mine.wearing or None
             )
         except Conflict as error:
             store.samplings.note(mine.id, problem=str(error))
@@ -125,7 +128,7 @@ class LiveSampling:
         problem = last.facts.get("sentence", "") if last is not None and failed else ""
         recordings = [*mine.recordings[: -1 if failed else None], asked.id]
         store.samplings.note(mine.id, recordings=recordings, problem=problem)
-        self.record = store.samplings.get(mine.id)
+        self.follow(store.samplings.get(mine.id))
 
     def _tell(self, store: Store) -> None:
         now = time.monotonic()

@@ -13,6 +13,8 @@ from sqlalchemy.exc import SQLAlchemyError
 from glovecal_client.errors import ClientError
 from glovecal_client.keys import GloveKeys
 from glovecal_models.errors import GlovecalError
+from glovecal_models.guided.touch_watch import TouchWatch
+from glovecal_models.layout import Layout
 from glovecal_service.realtime.live_sampling import LiveSampling
 from glovecal_service.realtime.sampling_takes import keep_sampled_takes
 from glovecal_service.settings import Settings
@@ -75,8 +77,9 @@ class SamplingRunner:
                 else:
                     keys = GloveKeys(self._site, record.glove)
                     layout = store.layouts.get(record.layout)
-                    self._live[id] = LiveSampling(self._session, keys, record, layout)
-            except (GlovecalError, ClientError, KeyError, TypeError) as error:
+                    watch = _touch_watch(store, record, layout)
+                    self._live[id] = LiveSampling(self._session, keys, record, layout, watch)
+            except (GlovecalError, ClientError, KeyError, TypeError, ValueError) as error:
                 self._give_up(store, record, f"the sampling cannot go on: {error}")
         self._revision = revision
 
@@ -87,8 +90,9 @@ class SamplingRunner:
                 self._finish(store, live)
         except (StoreUnavailable, StorageFull, SQLAlchemyError, OSError):
             raise
-        except (GlovecalError, ClientError) as error:
-            self._give_up(store, live.record, str(error))
+        except Exception as error:  # one sampling that fails must end neither the others nor this thread
+            _log.exception("sampling %s fails", live.record.id)
+            self._give_up(store, live.record, str(error) or type(error).__name__)
 
     def _recordings_are_done(self, store: Store, record: SamplingRecord) -> bool:
         return not any(store.recordings.get(id).is_open for id in record.recordings)
@@ -105,3 +109,9 @@ class SamplingRunner:
         live = self._live.pop(record.id, None)
         if live is not None:
             live.close()
+
+
+def _touch_watch(store: Store, record: SamplingRecord, layout: Layout) -> TouchWatch | None:
+    """None where nobody measured the subject's hand: then no touch can be judged."""
+    subject = store.subjects.get(record.subject)
+    return TouchWatch(layout, subject.skeleton()) if subject.dimensions else None

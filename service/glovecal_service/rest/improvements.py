@@ -27,7 +27,7 @@ class ImprovementWanted(StrictBody):
     holdout: TakesNamed | None = Field(
         None, description="Errors are on these; null: on takes left out of each fit."
     )
-    method: Literal["linear", "lmc_gpr", "spgp"] = "lmc_gpr"
+    method: Literal["linear", "lmc_gpr", "spgp", "auto", "polynomial_gpr", "general_gpr"] = "lmc_gpr"
     samples: Annotated[int, Field(ge=10, le=5000)] = Field(2000, description="At most, for one rotation.")
     max_steps: Annotated[int, Field(ge=0, le=20)] = Field(6, description="Effects to add at most.")
     seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(0, description="Of decoys and floors.")

@@ -14,6 +14,7 @@ from glovecal_service.plain import plain
 from glovecal_service.rest.answers import change_problems, problems
 from glovecal_service.rest.dependencies import PartsNeeded, StoreNeeded
 from glovecal_service.rest.effect_view import EffectView, effect_view
+from glovecal_service.rest.kernel_view import KernelChoiceView, kernel_view
 from glovecal_service.rest.names import Identifier, LayoutFilter, ModelInPath, SubjectFilter
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.records import Activation, ModelRecord
@@ -45,6 +46,7 @@ class Rotation(BaseModel):
     noise_deg: float | None = Field(description="Standard deviation of the measurement noise.")
     uncertain_above_deg: float
     samples: int
+    kernel_choice: KernelChoiceView | None = Field(description="Of a model trained with `auto`, else null.")
 
 
 class ModelInFull(Model):
@@ -167,4 +169,5 @@ def _rotation(item: RotationModel) -> dict[str, Any]:
         "noise_deg": plain(float(np.sqrt(item.regressor.noise_variance))),
         "uncertain_above_deg": item.uncertain_above_deg,
         "samples": item.samples,
+        "kernel_choice": kernel_view(item.rotation, item.regressor),
     }

@@ -11,9 +11,11 @@ from fastapi import APIRouter, Depends, Header, Query, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import BaseModel, Field, FiniteFloat
 
+from glovecal_models.guided.touch_watch import require_possible_touches
 from glovecal_models.sampling.catalogue import ROD_MM, Equipment, ProtocolName, make_protocol
-from glovecal_models.sampling.engine import Event, NotNow, Sampling, begin_sampling
+from glovecal_models.sampling.engine import Sampling, begin_sampling
 from glovecal_models.sampling.state import SamplingState, Trigger
+from glovecal_models.sampling.user_events import Event, NotNow
 from glovecal_service.rest.answers import change_problems, problems
 from glovecal_service.rest.dependencies import StoreNeeded
 from glovecal_service.rest.names import IDENTIFIER, Channel, Identifier, IdInPath, WearingName
@@ -75,16 +77,21 @@ class Reused(BaseModel):
     responses=change_problems(409),
 )
 def start_sampling(body: NewSampling, store: StoreNeeded, response: Response) -> SamplingView:
-    """404 when the glove was never seen, 409 while it is in another sampling or of the other hand."""
+    """404 when the glove was never seen, 409 while it is in another sampling or of the other hand, 422 for a
+    touch that the subject's hand cannot do."""
     glove = store.gloves.get(body.glove)
     _require_same_hand(store, glove, body.subject)
     if glove.layout is None:
         raise Conflict(f"glove {glove.name!r} has not said which layout it has; is its capture running?")
     layout = store.layouts.get(glove.layout)
     equipment = Equipment(body.widget_deg, body.pose_deg, tuple(body.rod_mm))
+    protocol = make_protocol(body.protocol, layout, equipment)
+    person = store.subjects.get(body.subject)
+    if person.dimensions:
+        require_possible_touches(protocol, person.skeleton())
     sensors = [str(sensor) for sensor in glove.meta.get("sensors") or layout.sensors]
     state = begin_sampling(
-        make_protocol(body.protocol, layout, equipment),
+        protocol,
         sensors,
         trigger=body.trigger,
         counts=layout.counts,

@@ -61,6 +61,7 @@ class Take(BaseModel):
     context: list[str]
     frames: int
     reference_rows: int
+    teaches: bool = Field(description="Whether a calibration can learn from it.")
     duration_s: float
     simulated: bool
     recording: str | None

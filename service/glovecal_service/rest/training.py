@@ -27,9 +27,11 @@ MOST_TAKES = 1000
 class Training(StrictBody):
     subject: Identifier
     layout: Identifier
-    method: Method = "lmc_gpr"
+    method: Method = Field("lmc_gpr", description="`auto` chooses a kernel for each rotation.")
     takes: Annotated[list[Id], Field(min_length=1, max_length=MOST_TAKES)] | None = Field(
-        None, description="None: all takes of the subject and layout that have a reference."
+        None,
+        description="None: all takes of the subject and layout that have a "
+        "reference, or in which fingertips were kept together.",
     )
     activate: bool = Field(True, description="Predict live with the model once it is trained.")
     pseudo_inputs: Annotated[int, Field(ge=2, le=1000)] = Field(100, description="SPGP only.")
@@ -67,7 +69,7 @@ def train(body: Training, store: StoreNeeded, response: Response) -> JobRecord:
 
 def _chosen_takes(store: Store, body: Training) -> list[TakeRecord]:
     if body.takes is None:
-        takes = [t for t in store.takes.list(subject=body.subject, layout=body.layout) if t.has_reference]
+        takes = [t for t in store.takes.list(subject=body.subject, layout=body.layout) if t.teaches]
     else:
         takes = [store.takes.get(id) for id in dict.fromkeys(body.takes)]
     for take in takes:
@@ -79,7 +81,7 @@ def _chosen_takes(store: Store, body: Training) -> list[TakeRecord]:
             raise LayoutMismatch(
                 f"take {take.id} ({take.name!r}) has layout {take.layout!r}, not {body.layout!r}"
             )
-    if not any(take.has_reference for take in takes):
+    if not any(take.teaches for take in takes):
         raise NotTrainable(
             f"no take of subject {body.subject!r} with layout {body.layout!r} has reference angles; "
             "import some with r.ROTATION columns, or attach a reference to a recording"

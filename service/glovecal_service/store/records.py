@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import Handedness, Skeleton, hand_skeleton
+from glovecal_models.sampling.sampled_takes import is_lesson
 
 RecordingState = Literal["requested", "recording", "stopping", "done", "failed"]
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]
@@ -93,6 +94,17 @@ class TakeRecord:
     @property
     def has_reference(self) -> bool:
         return self.reference_rows > 0 and bool(self.rotations)
+
+    @property
+    def sampling(self) -> dict[str, Any] | None:
+        """What a guided sampling asked for in this take; None when it is of none."""
+        return (self.accounting or {}).get("sampling")
+
+    @property
+    def teaches(self) -> bool:
+        """Whether a calibration can learn from it: from angles, or as a part of a whole guided sampling (a
+        check of a later wearing is none)."""
+        return self.has_reference or (self.sampling is not None and is_lesson(self.sampling))
 
 
 @dataclass(frozen=True)

@@ -22,11 +22,12 @@ from glovecal_models.errors import BadInput, NotTrainable
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.attempt import Attempt
 from glovecal_models.sampling.catalogue import Equipment, make_protocol
-from glovecal_models.sampling.engine import NotNow, Sampling, begin_sampling
+from glovecal_models.sampling.engine import Sampling, begin_sampling
 from glovecal_models.sampling.growing import NextSteps
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.sampled_takes import sampled_takes
 from glovecal_models.sampling.state import SamplingState
+from glovecal_models.sampling.user_events import NotNow
 from glovecal_models.simulation.asked_session import RECORDING, AskedSession, asked_session
 from glovecal_models.simulation.protocol import free_segment
 from glovecal_models.simulation.simulated_glove import SimulatedGlove

@@ -101,10 +101,18 @@ def test_a_touch_that_never_happened() -> None:
     assert reasons(rod_step(60.0), frames, flat=None) == ""
 
 
+class NeverTouching:
+    def learn(self, state, step, readings) -> None:
+        pass
+
+    def why_not(self, state, step, readings) -> str:
+        return f"the tips of {step.touches} stay 9 mm apart."
+
+
 def test_the_touch_check_of_inverse_kinematics_has_the_last_word(bench) -> None:
     step = Step("touch", "ik", "move", "Touch.", 3.0, "touch", moves=("I_MCP",), touches=("T", "I"))
     it: Bench = bench((STEPS[0], step))
-    it.sampling._touch_check = lambda step, frames: f"the tips of {step.touches} stay 9 mm apart."
+    it.sampling._touch_check = NeverTouching()
     it.event("go")
     it.pass_time(5.9, moving)
     it.event("go")

@@ -1,0 +1,64 @@
+"""What a training job trains on: takes with measured angles, and the lessons of guided samplings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.guided.guided_calibration import BASELINES, GuidedSamples, guided_samples
+from glovecal_models.guided.taught_take import TaughtTake
+from glovecal_models.layout import Layout
+from glovecal_models.takes.take import Take
+from glovecal_service.store import Store
+from glovecal_service.store.records import SubjectRecord, TakeRecord
+
+
+@dataclass(frozen=True)
+class TrainingTakes:
+    takes: tuple[Take, ...]
+    layout: Layout
+    """How rotations are read in training."""
+    settings: TrainingSettings
+    sentences: tuple[str, ...] = ()
+    _guided: GuidedSamples | None = None
+
+    @classmethod
+    def of(
+        cls,
+        store: Store,
+        records: Sequence[TakeRecord],
+        layout: Layout,
+        subject: SubjectRecord,
+        settings: TrainingSettings,
+    ) -> TrainingTakes:
+        """Raises NotTrainable, LayoutMismatch, BadInput, DamagedArtifact.
+
+        A session with no reference system has an error estimate of its own.
+        """
+        sampled = [record for record in records if record.sampling and settings.method not in BASELINES]
+        plain = tuple(
+            store.takes.load(record.id)
+            for record in records
+            if record not in sampled and record.has_reference
+        )
+        if not sampled:
+            return cls(plain, layout, settings)
+        taught = [
+            TaughtTake.from_document(store.takes.load(record.id), record.sampling or {}) for record in sampled
+        ]
+        measured = subject.skeleton() if subject.dimensions else None
+        guided = guided_samples(taught, layout, measured)
+        said = [*guided.sentences]
+        if measured is None and any(each.contacts for each in taught):
+            said.append(
+                f"Touches are not used: nobody measured {subject.name}'s hand. Its length is enough: "
+                f"glovecal subject measure {subject.name} --hand-length-mm 190"
+            )
+        settings = settings if plain else replace(settings, folds=0)
+        return cls((*guided.takes, *plain), guided.layout, settings, tuple(said), guided)
+
+    def finished(self, model: CalibrationModel) -> CalibrationModel:
+        """``model`` as it is kept."""
+        return model if self._guided is None else self._guided.finished(model)

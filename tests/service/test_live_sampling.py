@@ -1,0 +1,48 @@
+"""A sampling in the recorder process, when the user acts in the middle of what it does."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from realtime_support import LAYOUT
+from recorder_support import GLOVE, recorder_settings, store_with_glove
+
+from glovecal_client.keys import GloveKeys
+from glovecal_client.session import open_router
+from glovecal_models.sampling.catalogue import make_protocol
+from glovecal_models.sampling.engine import Sampling, begin_sampling
+from glovecal_models.sampling.state import SamplingState
+from glovecal_service.realtime.live_sampling import LiveSampling
+from glovecal_service.store import Store
+
+
+def goes_on(store: Store, id: str) -> None:
+    """The user's go, as the web process keeps it."""
+    record = store.samplings.get(id)
+    sampling = Sampling(SamplingState.from_document(record.document))
+    sampling.event(0.0, "go")
+    assert store.samplings.save(record, sampling.state.to_document())
+
+
+def test_a_go_while_the_recording_is_asked_for_is_not_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = recorder_settings(tmp_path)
+    with store_with_glove(settings) as store, open_router([settings.zenoh]) as session:
+        store.subjects.create("anna")
+        state = begin_sampling(make_protocol("fk_only", LAYOUT), LAYOUT.sensors)
+        record = store.samplings.create(
+            glove=GLOVE, subject="anna", wearing="", layout=LAYOUT.name, document=state.to_document()
+        )
+        live = LiveSampling(session, GloveKeys(settings.site, GLOVE), record, LAYOUT, clock=lambda: 0.0)
+        request = store.recordings.request
+
+        def meanwhile(*arguments, **options):
+            goes_on(store, record.id)
+            return request(*arguments, **options)
+
+        monkeypatch.setattr(store.recordings, "request", meanwhile)
+        live.look(store)
+        assert live.state.phase == "countdown"
+        live.close()
