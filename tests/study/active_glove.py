@@ -13,9 +13,9 @@ from glovecal_models.active_sampling.known_readings import known_from_takes
 from glovecal_models.active_sampling.next_step import NextStep
 from glovecal_models.active_sampling.posterior_mean import assumed_angles
 from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import NotTrainable
+from glovecal_models.guided.guided_calibration import guided_calibration
+from glovecal_models.guided.taught_take import TaughtTake
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.catalogue import make_protocol
@@ -28,7 +28,6 @@ from glovecal_models.simulation.asked_session import RECORDING, AskedSession, as
 from glovecal_models.simulation.protocol import evaluation_segment, free_segment
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.simulation.simulated_take import SimulatedTake, simulate_take
-from glovecal_models.takes.take import Take
 
 FULL_S = 252.0
 SHARES = (0.4, 0.5, 0.6, 0.7, 0.8)
@@ -60,9 +59,9 @@ def _points(
     cuts = [share * FULL_S for share in SHARES if share * FULL_S < whole] if way != "fixed" else []
     for cut_s in [*cuts, whole]:
         attempts = [each for each, at in zip(session.state.attempts, ends, strict=True) if at <= cut_s]
-        takes = _takes(session, replace(session.state, attempts=attempts))
+        taught = _taught(session, replace(session.state, attempts=attempts))
         loosen = session.state.finished()["loosen"]
-        yield {"capture_s": cut_s, "is_end": cut_s == whole, **_errors(worn, takes, tests, session, loosen)}
+        yield {"capture_s": cut_s, "is_end": cut_s == whole, **_errors(worn, taught, tests, session, loosen)}
 
 
 def sampled(way: str, worn: SimulatedGlove, seed: int) -> tuple[AskedSession, list[float]]:
@@ -102,25 +101,29 @@ def _at_random(steps: list, random: np.random.Generator) -> Callable[[SamplingSt
     return choose
 
 
-def _takes(session: AskedSession, state: SamplingState) -> list[Take]:
-    found = sampled_takes(state, {RECORDING: session.take}, name="s")
-    return [each.take for each in found if each.take.rotations]
+def _taught(session: AskedSession, state: SamplingState) -> list[TaughtTake]:
+    return [TaughtTake.of(each) for each in sampled_takes(state, {RECORDING: session.take}, name="s")]
 
 
 def _errors(
-    worn: SimulatedGlove, takes: list[Take], tests: list[SimulatedTake], session: AskedSession, loosen: Any
+    worn: SimulatedGlove,
+    taught: list[TaughtTake],
+    tests: list[SimulatedTake],
+    session: AskedSession,
+    loosen: Any,
 ) -> dict[str, Any]:
     """RMSE over the rotations that sensors read; one without a model counts as the middle of its range."""
     frames = session.take.time_s
     moving = (frames >= loosen.begins_s) & (frames <= loosen.ends_s)
     free = replace(session.take, time_s=frames[moving], readings=session.take.readings[moving])
+    takes = [each.take for each in taught if each.take.rotations]
     known = known_from_takes(takes, worn.sensors, [free])
     answer: dict[str, Any] = {
         "samples": sum(
             int(np.isfinite(take.reference_at_frames(take.rotations)).any(1).sum()) for take in takes
         )
     }
-    predictor = _trained(takes, worn.layout)
+    predictor = _trained(taught, worn.layout)
     for name, test in zip(("poses_deg", "free_deg"), tests, strict=True):
         readings = test.take.readings
         assumed = assumed_angles(worn.layout, known, readings)
@@ -130,25 +133,12 @@ def _errors(
     return answer
 
 
-def _trained(takes: list[Take], layout: Layout) -> GlovePredictor | None:
-    """Of the rotations that were held at more than one angle."""
-    angles: dict[str, set[float]] = {}
-    for take in takes:
-        for rotation, column in zip(take.rotations, take.reference.T, strict=True):
-            angles.setdefault(rotation, set()).update(np.unique(column[np.isfinite(column)]).tolist())
-    usable = [_only(take, [name for name in take.rotations if len(angles[name]) > 1]) for take in takes]
+def _trained(taught: list[TaughtTake], layout: Layout) -> GlovePredictor | None:
+    """As ``glovecal train`` does it."""
     try:
-        model = train([take for take in usable if take.rotations], layout, "s", TrainingSettings(folds=0))
+        return GlovePredictor(guided_calibration(taught, layout, "s", None).model)
     except NotTrainable:
         return None
-    return GlovePredictor(model)
-
-
-def _only(take: Take, rotations: list[str]) -> Take:
-    columns = [take.rotations.index(name) for name in rotations]
-    if not columns:
-        return replace(take, rotations=(), reference_time_s=np.empty(0), reference=np.empty((0, 0)))
-    return replace(take, rotations=tuple(rotations), reference=take.reference[:, columns])
 
 
 def _columns(predictor: GlovePredictor, readings: np.ndarray) -> dict[str, np.ndarray]:

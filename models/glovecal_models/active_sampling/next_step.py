@@ -1,4 +1,4 @@
-"""Asks for the step that teaches most, again and again, until what is left is below the noise."""
+"""Asks for the step that teaches most, again and again, until none is worth its time."""
 
 from __future__ import annotations
 

@@ -86,10 +86,18 @@ class Proposal:
         if self.is_enough:
             return (
                 f"Enough: the next step, {best.step.name}, would lower the expected error by less than "
-                f"{ENOUGH_DEG:g} degrees; what is left is below the noise of a frame "
-                f"({np.mean(list(self.noise_deg.values())):.1f} degrees)."
+                f"{ENOUGH_DEG:g} degrees. {self._left()}"
             )
         return f"Next: {best.step.name}. {gain_sentence(best, self)}"
+
+    def _left(self) -> str:
+        noise = float(np.sqrt(np.mean(np.square(list(self.noise_deg.values())))))
+        if self.rms_deg <= noise:
+            return f"What is left, {self.rms_deg:.1f} degrees, is below a frame's noise of {noise:.1f}."
+        return (
+            f"{self.rms_deg:.1f} degrees are left (a frame's noise: {noise:.1f}); more of these steps hardly "
+            "lower them."
+        )
 
 
 def gain_sentence(best: ProposedStep, proposal: Proposal) -> str:

@@ -43,7 +43,8 @@ def plan_training(
     """Gather samples, choose representatives, lay out the folds. Raises NotTrainable, LayoutMismatch.
 
     A rotation that no take measured is left out of the model, unless the layout gives it a rule whose
-    rotations are trained; the plan's sentences say which.
+    rotations are trained; so is one that was held at a single angle, as when a sampling was stopped early.
+    The plan's sentences say which.
     """
     settings = settings or TrainingSettings()
     if settings.method not in METHODS:
@@ -54,6 +55,7 @@ def plan_training(
     chosen: dict[str, Correspondence] = {}
     ranges: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     unmeasured: list[Correspondence] = []
+    at_one_angle: dict[str, Samples] = {}
     for correspondence in layout.correspondences:
         if settings.method in ("raw", "linear"):
             correspondence = linear_correspondence(correspondence)
@@ -61,10 +63,15 @@ def plan_training(
         if len(samples) == 0:
             unmeasured.append(correspondence)
             continue
+        if np.ptp(samples.target) == 0:
+            at_one_angle[correspondence.rotation] = samples
+            continue
         check_samples(samples.inputs, samples.target, correspondence.inputs)
         chosen[correspondence.rotation] = correspondence
         ranges[correspondence.rotation] = (samples.inputs.min(axis=0), samples.inputs.max(axis=0))
         tasks.extend(_tasks(correspondence, samples, settings))
+    for samples in at_one_angle.values() if not tasks else ():
+        check_samples(samples.inputs, samples.target)
     if not tasks:
         raise NotTrainable(
             f"no reference angle for any rotation of layout {layout.name!r} in {len(takes)} takes; "
@@ -79,7 +86,7 @@ def plan_training(
         correspondences=chosen,
         rules=rules,
         ranges=ranges,
-        sentences=tuple(_sentences(takes, tasks, unmeasured, rules)),
+        sentences=(*_sentences(takes, tasks, unmeasured, rules), *_one_angle_sentences(at_one_angle)),
         take_count=len(takes),
         simulated=any(take.simulated for take in takes),
     )
@@ -152,3 +159,11 @@ def _sentences(
     if left_out:
         sentences.append(f"No take measured {', '.join(left_out)}: left out of the model.")
     return sentences
+
+
+def _one_angle_sentences(at_one_angle: Mapping[str, Samples]) -> list[str]:
+    return [
+        f"{rotation} was measured at {samples.target[0]:g} degrees only: left out of the model until there "
+        "is another angle."
+        for rotation, samples in at_one_angle.items()
+    ]

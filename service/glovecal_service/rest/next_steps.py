@@ -50,7 +50,7 @@ class NextStepsView(BaseModel):
     rms_sd_deg: float = Field(description="Root mean variance over everyday readings and rotations, now.")
     sd_deg: dict[str, float]
     noise_deg: dict[str, float] = Field(description="Of a single frame.")
-    enough: bool = Field(description="What is left is below the noise.")
+    enough: bool = Field(description="No step is worth its time any more.")
     steps: list[ProposedStepView] = Field(description="The one that teaches most for its time first.")
     diagnosed: DiagnosedTakeView | None = Field(
         description="What the newest diagnosis of the model asks for."

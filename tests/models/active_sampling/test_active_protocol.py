@@ -16,8 +16,9 @@ from glovecal_models.active_sampling.next_step import LONGEST_CAPTURE_S, NextSte
 from glovecal_models.active_sampling.posterior_mean import assumed_angles
 from glovecal_models.active_sampling.proposal import propose
 from glovecal_models.calibration.training import train
+from glovecal_models.calibration.training_plan import plan_training
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.errors import BadInput
+from glovecal_models.errors import BadInput, NotTrainable
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.attempt import Attempt
 from glovecal_models.sampling.catalogue import Equipment, make_protocol
@@ -148,7 +149,9 @@ def test_it_ends_when_nothing_is_left_or_the_time_is_up(active: AskedSession) ->
     found = propose(LAYOUT, certain, [step for step in candidate_steps(LAYOUT) if step.name == "flat"])
     assert found.is_enough
     assert found.verdict().startswith("Enough: the next step, flat, would lower the expected error by less")
-    assert "below the noise" in found.to_document()["sentences"][-1]
+    assert "is below a frame's noise of 1.3." in found.to_document()["sentences"][-1]
+    poses = propose(LAYOUT, replace(certain, blocks=certain.blocks[:2] * 200), [found.ranked[0].step])
+    assert "degrees are left (a frame's noise: 1.3)" in poses.verdict()
 
 
 def test_without_free_motion_nothing_can_be_proposed() -> None:
@@ -248,6 +251,22 @@ def test_what_a_model_learned_goes_before_what_is_assumed() -> None:
     assert found.learned == ("I_PIP",)
     assert found.noise_deg["I_PIP"] == pytest.approx(np.sqrt(model.rotations[0].regressor.noise_variance))
     assert found.sd_deg["I_PIP"] < found.noise_deg["I_PIP"] < found.sd_deg["T_IP"]
+
+
+def test_a_sampling_stopped_early_trains_what_it_can() -> None:
+    """A rotation that was held at one angle only is left out, with a sentence; alone it is refused."""
+    take = replace(
+        take_of(60),
+        rotations=("I_PIP", "W_ABD"),
+        reference_time_s=np.arange(60) / 60,
+        reference=np.column_stack([np.linspace(0, 90, 60), np.full(60, 15.0)]),
+    )
+    plan = plan_training([take], LAYOUT, "a", TrainingSettings(method="linear", folds=0))
+    assert [task.rotation for task in plan.tasks] == ["I_PIP"]
+    assert "W_ABD was measured at 15 degrees only" in plan.sentences[-1]
+    alone = replace(take, rotations=("W_ABD",), reference=take.reference[:, 1:])
+    with pytest.raises(NotTrainable, match="is 15 degrees in all 60 samples"):
+        plan_training([alone], LAYOUT, "a", TrainingSettings(method="linear", folds=0))
 
 
 def test_a_diagnosis_asks_for_its_own_take() -> None:
