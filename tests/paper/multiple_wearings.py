@@ -42,7 +42,8 @@ class WearingRow:
     """0 is that of training."""
     mean_deg: float
     checked_deg: float | None
-    """After the quick check; None in the wearing of training, which needs none."""
+    """After the quick check; None in the wearing of training, which needs none, and where no pose was held
+    steadily enough for the protocol to accept it."""
 
 
 def multiple_wearings(
@@ -55,14 +56,19 @@ def multiple_wearings(
             session.seed,
             wearing,
             mean_error_deg(session, model, wearing, visits),
-            mean_error_deg(session, checked(session, model, wearing), wearing, visits) if wearing else None,
+            _checked_deg(session, model, wearing, visits) if wearing else None,
         )
         for wearing in wearings
     ]
 
 
-def checked(session: PaperSession, model: CalibrationModel, wearing: int) -> CalibrationModel:
-    """After the protocol of a second wearing."""
+def _checked_deg(session: PaperSession, model: CalibrationModel, wearing: int, visits: int) -> float | None:
+    after = checked(session, model, wearing)
+    return None if after is None else mean_error_deg(session, after, wearing, visits)
+
+
+def checked(session: PaperSession, model: CalibrationModel, wearing: int) -> CalibrationModel | None:
+    """After the protocol of a second wearing; None where it accepted no pose."""
     held = asked_session(
         make_protocol("second_wearing", LAYOUT),
         session.glove(wearing),
@@ -70,11 +76,14 @@ def checked(session: PaperSession, model: CalibrationModel, wearing: int) -> Cal
         rate_hz=CHECK_HZ,
         skeleton=SKELETON,
     )
-    takes = [each.take for each in sampled_takes(held.state, {RECORDING: held.take}, name="check")]
+    cut = sampled_takes(held.state, {RECORDING: held.take}, name="check")
+    takes = [each.take for each in cut if each.kind != "range"]
+    if not takes:
+        return None
     sensitivity = sensor_sensitivity(model)
     ranges = dict(zip(sensitivity.sensors, sensitivity.range.tolist(), strict=True))
     known = own_poses([each.take for each in session.takes], ranges)
-    return quick_check(model, takes[1:], known=known).model
+    return quick_check(model, takes, known=known).model
 
 
 def mean_error_deg(session: PaperSession, model: CalibrationModel, wearing: int, visits: int) -> float:
