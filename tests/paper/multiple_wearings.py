@@ -77,7 +77,7 @@ def checked(session: PaperSession, model: CalibrationModel, wearing: int) -> Cal
         skeleton=SKELETON,
     )
     cut = sampled_takes(held.state, {RECORDING: held.take}, name="check")
-    takes = [each.take for each in cut if each.kind != "range"]
+    takes = [each.take for each in cut if each.kind == "verification"]
     if not takes:
         return None
     sensitivity = sensor_sensitivity(model)

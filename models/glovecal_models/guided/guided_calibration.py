@@ -19,6 +19,7 @@ from glovecal_models.calibration.samples import require_layout
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
 from glovecal_models.errors import Cancelled, NotTrainable
+from glovecal_models.guided.closing_touches import closing_touches
 from glovecal_models.guided.first_beliefs import first_beliefs, reading_ranges
 from glovecal_models.guided.second_pass import (
     Lesson,
@@ -40,8 +41,6 @@ from glovecal_models.takes.take import Take
 
 SAMPLES_SHARE = 0.3
 """Of the work that goes before the training."""
-FRAMES_A_TOUCH = 100
-"""Of each touch that the search for the likeliest calibration looks at."""
 
 
 @dataclass(frozen=True)
@@ -102,8 +101,10 @@ def guided_samples(
         seen, refused = seen_touches(touching, first, skeleton)
         _stop_if(cancelled)
     say("what all touches tell together", 0.5)
-    touches = [touch.some(FRAMES_A_TOUCH) for touch in seen]
-    posterior = TouchPosterior(beliefs, layout.sensors, skeleton, touches, cancelled)
+    posterior = TouchPosterior(beliefs, layout.sensors, skeleton, (), cancelled)
+    if seen and skeleton is not None:
+        posterior, seen, strange = closing_touches(beliefs, layout.sensors, skeleton, seen, cancelled)
+        refused += strange
     inferred, told = touch_lessons(seen, posterior, layout.rotations)
     lessons = (*known_lessons(known, posterior), *inferred)
     if not lessons:

@@ -25,7 +25,9 @@ from glovecal_models.inverse_kinematics.tip_chains import TipChains
 CONTACT_SD_MM = 0.3
 """How far tips that touch are from one point."""
 STILL_DEG = 0.02
-MOST_STEPS = 12
+MOST_STEPS = 15
+LEAST_SHARE = 0.02
+"""Of a step that is tried."""
 
 
 @dataclass(frozen=True)
@@ -107,52 +109,98 @@ class TouchPosterior:
         return np.concatenate([np.empty((0, len(columns))), *rows])
 
     def _search(self, cancelled: Callable[[], bool] | None) -> None:
+        """Angles are prior + covariance times ``force`` (N,) of each rotation; steps that do not help are
+        shortened."""
         names = [name for name, at in self._at.items() if len(at)]
+        if not names:
+            return
         prior = {name: self.beliefs[name].mean(self._at[name]) for name in names}
         covariance = {name: self.beliefs[name].covariance(self._at[name], self._at[name]) for name in names}
-        found = {name: angles.copy() for name, angles in prior.items()}
-        for _ in range(MOST_STEPS if names else 0):
+        force = {name: np.zeros(len(prior[name])) for name in names}
+        found = prior
+        for _ in range(MOST_STEPS):
             if cancelled is not None and cancelled():
                 raise Cancelled("the touches were not worked out to the end")
-            missing, slopes, noise = self._conditions(found)
+            conditions = self._conditions(found)
+            missing, slopes, noise = _stacked(conditions, {name: len(found[name]) for name in names})
             towards = {name: slopes[name] @ covariance[name] for name in names}
             together = noise + sum(towards[name] @ slopes[name].T for name in names)
-            self._together = cho_factor(together)
+            self._together, self._slopes = cho_factor(together), slopes
             moved = sum(slopes[name] @ (found[name] - prior[name]) for name in names)
-            force = cho_solve(self._together, missing + moved)
-            after = {name: prior[name] + towards[name].T @ force for name in names}
+            pull = cho_solve(self._together, missing + moved)
+            wanted = {name: slopes[name].T @ pull for name in names}
+            noises = [each.noise for each in conditions]
+            before, share = self._cost(force, covariance, conditions, noises), 1.0
+            while True:
+                tried = {name: force[name] + share * (wanted[name] - force[name]) for name in names}
+                after = {name: prior[name] + covariance[name] @ tried[name] for name in names}
+                if share < LEAST_SHARE:
+                    break
+                if self._cost(tried, covariance, self._conditions(after), noises) <= before:
+                    break
+                share /= 2
             furthest = max(float(np.abs(after[name] - found[name]).max()) for name in names)
-            found, self._slopes = after, slopes
-            self._by_touch = {name: slopes[name].T @ force for name in names}
+            force, found = tried, after
             if furthest < STILL_DEG:
                 break
+        self._by_touch = force
 
-    def _conditions(
-        self, found: Mapping[str, np.ndarray]
-    ) -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray]:
-        """What is missing (M,) in mm, slopes (M, N) of what the tips do by rotation, and noise (M, M)."""
+    def _conditions(self, found: Mapping[str, np.ndarray]) -> list[_Conditions]:
+        """Of each contact, at angles (N,) by rotation in the order of ``_frames_of``."""
         used = dict.fromkeys(found, 0)
-        missing, parts, noises = [], [], []
+        conditions = []
         for each in self._touches:
             count = len(each.readings)
             rows = {name: slice(used[name], used[name] + count) for name in each.functions}
-            gaps, slopes = each.conditions({name: found[name][rows[name]] for name in each.functions})
-            for name in each.functions:
+            conditions.append(each.conditions({name: found[name][rows[name]] for name in rows}, rows))
+            for name in rows:
                 used[name] += count
-            missing.append(gaps.ravel())
-            parts.append((slopes, rows, gaps.shape[1]))
-            noises.append(each.noise(slopes))
-        total = sum(len(part) for part in missing)
-        matrix = {name: np.zeros((total, len(angles))) for name, angles in found.items()}
-        noise, start = np.zeros((total, total)), 0
-        for (slopes, rows, size), own in zip(parts, noises, strict=True):
-            for frame in range(len(own)):
-                block = slice(start, start + size)
-                noise[block, block] = own[frame]
-                for name, slope in slopes.items():
-                    matrix[name][block, rows[name].start + frame] = slope[frame]
-                start += size
-        return np.concatenate(missing), matrix, noise
+        return conditions
+
+    def _cost(
+        self,
+        force: Mapping[str, np.ndarray],
+        covariance: Mapping[str, np.ndarray],
+        conditions: Sequence[_Conditions],
+        noises: Sequence[np.ndarray],
+    ) -> float:
+        """Twice the negative log probability, but for constants."""
+        shape = sum(float(each @ covariance[name] @ each) for name, each in force.items())
+        pairs = zip(conditions, noises, strict=True)
+        left = [float((c.missing * np.linalg.solve(n, c.missing[..., None])[..., 0]).sum()) for c, n in pairs]
+        return shape + sum(left)
+
+
+@dataclass(frozen=True)
+class _Conditions:
+    """Of N frames of one contact with C components."""
+
+    missing: np.ndarray
+    """(N, C), mm."""
+    slopes: dict[str, np.ndarray]
+    """(N, C) by rotation, mm per degree."""
+    noise: np.ndarray
+    """(N, C, C), mm squared."""
+    rows: dict[str, slice]
+    """Where each rotation has these frames."""
+
+
+def _stacked(
+    conditions: Sequence[_Conditions], lengths: Mapping[str, int]
+) -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray]:
+    """All M components: missing (M,), slopes (M, N) by rotation, noise (M, M)."""
+    total = sum(each.missing.size for each in conditions)
+    slopes = {name: np.zeros((total, length)) for name, length in lengths.items()}
+    noise, start = np.zeros((total, total)), 0
+    for each in conditions:
+        size = each.missing.shape[1]
+        for frame, own in enumerate(each.noise):
+            block = slice(start, start + size)
+            noise[block, block] = own
+            for name, slope in each.slopes.items():
+                slopes[name][block, each.rows[name].start + frame] = slope[frame]
+            start += size
+    return np.concatenate([each.missing.ravel() for each in conditions]), slopes, noise
 
 
 class _Chained:
@@ -164,21 +212,22 @@ class _Chained:
         followed = [rule for name in chains.rotations for rule in beliefs[name].prior.follows]
         self.functions = tuple(dict.fromkeys([*chains.rotations, *followed]))
 
-    def conditions(self, found: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        """What is missing (N, C) in mm and slopes (N, C) by function, mm per degree."""
+    def conditions(self, found: Mapping[str, np.ndarray], rows: dict[str, slice]) -> _Conditions:
         angles = np.column_stack([self._angle(name, found) for name in self._chains.rotations])
         tips, slopes = self._chains.tips_and_slopes(angles)
-        missing, rows = zip(*(self.contact.missing(each, i) for i, each in enumerate(tips)), strict=True)
-        by_angle = np.einsum("ngcfx,nfxk->ngck", np.stack(rows), slopes)
+        missing, onto = zip(*(self.contact.missing(each, i) for i, each in enumerate(tips)), strict=True)
+        by_angle = np.einsum("ngcfx,nfxk->ngck", np.stack(onto), slopes)
         by_angle = by_angle.reshape(len(tips), -1, len(self._chains.rotations))
         by_function = {name: np.zeros(by_angle.shape[:2]) for name in self.functions}
         for column, name in enumerate(self._chains.rotations):
             by_function[name] += by_angle[:, :, column]
             for rule, weight in self._beliefs[name].prior.follows.items():
                 by_function[rule] += weight * by_angle[:, :, column]
-        return np.stack(missing).reshape(len(tips), -1), by_function
+        return _Conditions(
+            np.stack(missing).reshape(len(tips), -1), by_function, self._noise(by_function), rows
+        )
 
-    def noise(self, slopes: Mapping[str, np.ndarray]) -> np.ndarray:
+    def _noise(self, slopes: Mapping[str, np.ndarray]) -> np.ndarray:
         """(N, C, C), mm squared: skin, and what is new in each frame of every joint."""
         size = next(iter(slopes.values())).shape[1]
         noise = np.tile(CONTACT_SD_MM**2 * np.eye(size), (len(self.readings), 1, 1))
