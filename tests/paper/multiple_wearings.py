@@ -42,24 +42,33 @@ class WearingRow:
     """0 is that of training."""
     mean_deg: float
     checked_deg: float | None
-    """After the quick check; None in the wearing of training, and where no pose was held still."""
+    """After the quick check; None in the wearing of training, which needs none, and where no pose was held
+    steadily enough for the protocol to accept it."""
 
 
 def multiple_wearings(
     session: PaperSession, wearings: Sequence[int] = WEARINGS, visits: int = 2
 ) -> list[WearingRow]:
     """By LMC-GPR."""
-    model, rows = session.model("lmc_gpr"), []
-    for wearing in wearings:
-        after = checked(session, model, wearing) if wearing else None
-        error = mean_error_deg(session, model, wearing, visits)
-        checked_error = None if after is None else mean_error_deg(session, after, wearing, visits)
-        rows.append(WearingRow(session.seed, wearing, error, checked_error))
-    return rows
+    model = session.model("lmc_gpr")
+    return [
+        WearingRow(
+            session.seed,
+            wearing,
+            mean_error_deg(session, model, wearing, visits),
+            _checked_deg(session, model, wearing, visits) if wearing else None,
+        )
+        for wearing in wearings
+    ]
+
+
+def _checked_deg(session: PaperSession, model: CalibrationModel, wearing: int, visits: int) -> float | None:
+    after = checked(session, model, wearing)
+    return None if after is None else mean_error_deg(session, after, wearing, visits)
 
 
 def checked(session: PaperSession, model: CalibrationModel, wearing: int) -> CalibrationModel | None:
-    """After the protocol of a second wearing; None where no pose of it was held still."""
+    """After the protocol of a second wearing; None where it accepted no pose."""
     held = asked_session(
         make_protocol("second_wearing", LAYOUT),
         session.glove(wearing),
@@ -69,10 +78,12 @@ def checked(session: PaperSession, model: CalibrationModel, wearing: int) -> Cal
     )
     cut = sampled_takes(held.state, {RECORDING: held.take}, name="check")
     takes = [each.take for each in cut if each.kind == "verification"]
+    if not takes:
+        return None
     sensitivity = sensor_sensitivity(model)
     ranges = dict(zip(sensitivity.sensors, sensitivity.range.tolist(), strict=True))
     known = own_poses([each.take for each in session.takes], ranges)
-    return quick_check(model, takes, known=known).model if takes else None
+    return quick_check(model, takes, known=known).model
 
 
 def mean_error_deg(session: PaperSession, model: CalibrationModel, wearing: int, visits: int) -> float:

@@ -65,7 +65,7 @@ def known_lessons(
         take, smooth = taught.take, steadied(taught.take.time_s, taught.take.readings.astype(float))
         reference = _as_read(take, posterior)
         if taught.kind == "fk_independent" and ruled:
-            held = np.isfinite(reference).any(axis=1)
+            held = np.asarray(np.isfinite(reference).any(axis=1))
             column = np.full((len(held), len(ruled)), np.nan)
             for index, name in enumerate(ruled):
                 column[held, index] = posterior.angles(name, take.readings[held])
