@@ -19,11 +19,12 @@ from paper_page.table_2_section import table_2_section
 from paper_page.table_3_section import table_3_section
 from paper_page.table_4_section import table_4_section
 from paper_page.wearings_section import wearings_section
+from paper_session import paper_session
 from paper_subject import Curve, subject_rows, subject_session
 from table_1 import Table1Row, table_1
 from table_2 import Table2Row, table_2
 from table_3 import Table3Row
-from table_4 import SIZES, Table4Row, size_row, started
+from table_4 import SIZES, SIZES_HZ, SIZES_SAMPLES, Table4Row, size_row, started
 
 from glovecal_models.calibration.training_settings import Report
 
@@ -53,7 +54,11 @@ def _table_2(seed: int, quick: bool, report: Report) -> Mapping[str, Sequence[Ta
 
 def _table_4(size: int | None, seed: int, quick: bool, report: Report) -> Mapping[str, Sequence[Table4Row]]:
     report("sampling the subject, training exactly", 0.0)
-    return {"table-4": [size_row(started(subject_session(seed, quick)), size, report)]}
+    if quick:
+        session = subject_session(seed, quick)
+    else:
+        session = paper_session(seed, rate_hz=SIZES_HZ, samples=SIZES_SAMPLES)
+    return {"table-4": [size_row(started(session), size, report)]}
 
 
 _SUBJECTS = tuple(
