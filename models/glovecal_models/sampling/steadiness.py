@@ -17,6 +17,11 @@ from glovecal_models.sampling.reading import GloveReading
 BLOCK_S = 0.1
 STILL_PERCENT = 5.0
 """Of the active range: what moves less is still. As for poses that are found held in takes."""
+FEW_BLOCKS = 3
+NOISE_SPAN = 3.5
+"""From lowest to highest of a dozen means that only noise moves, in their standard deviations."""
+SD_PER_MEDIAN = 1.4826
+"""Of normally distributed numbers: standard deviation over the median of their sizes."""
 LEAST_SHARE_OF_COUNTS = 0.1
 """A sensor that has shown less than this share of what the hardware can send is judged by it."""
 
@@ -82,6 +87,19 @@ def block_means(readings: Sequence[GloveReading]) -> np.ndarray:
 
 
 def moved_percent(readings: Sequence[GloveReading], ranges: ActiveRanges) -> np.ndarray:
-    """How far each sensor went, shape (S,), percent of its active range."""
+    """How far each sensor went, shape (S,), percent of its active range; what its noise does is taken off."""
     means = block_means(readings)
-    return 100 * np.ptp(means, axis=0) / ranges.span if len(means) else np.empty(0)
+    if not len(means):
+        return np.empty(0)
+    by_noise = NOISE_SPAN * _noise(readings) / np.sqrt(len(readings) / len(means))
+    means = means[:-1] if len(means) > FEW_BLOCKS else means  # the last may be as noisy as a frame
+    went = np.ptp(means, axis=0)
+    return 100 * np.sqrt(np.maximum(went**2 - by_noise**2, 0.0)) / ranges.span
+
+
+def _noise(readings: Sequence[GloveReading]) -> np.ndarray:
+    """Standard deviation of one frame, shape (S,): second differences leave motion out."""
+    if len(readings) < 3:
+        return np.zeros(len(readings[0].values))
+    bends = np.diff([reading.values for reading in readings], n=2, axis=0)
+    return SD_PER_MEDIAN * np.median(np.abs(bends), axis=0) / np.sqrt(6)

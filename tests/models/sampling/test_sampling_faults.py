@@ -47,6 +47,14 @@ def test_a_still_hand_is_good() -> None:
     assert reasons(pose("flat"), readings(still())) == ""
 
 
+def test_noise_is_no_motion_and_hides_none() -> None:
+    noisy = still(40) + 2.4 * np.random.default_rng(1).standard_normal((40, 5))
+    assert reasons(pose("flat"), readings(noisy, rate_hz=30)) == ""
+    drifting = noisy.copy()
+    drifting[:, 2] += np.linspace(0, 15, 40)
+    assert reasons(pose("flat"), readings(drifting, rate_hz=30)).startswith("the hand moved: I_MCP by ")
+
+
 @pytest.mark.parametrize("moves", [False, True])
 def test_a_jump_in_the_middle_is_named_with_its_time(moves: bool) -> None:
     step = touch_steps()[0] if moves else pose("flat")
