@@ -92,13 +92,14 @@ def _joint(direction: Direction, joint: int, cells: np.ndarray, block_rows: int)
 
 
 def block_starts(lengths: Sequence[int], block_rows: int) -> np.ndarray:
-    """First row of each block when every take is cut into blocks of about ``block_rows``."""
+    """First row of each block when every take is cut into blocks of about ``block_rows``; a take that has no
+    row of this joint has no block."""
     starts, first = [], 0
     for length in lengths:
-        parts = max(1, round(length / block_rows))
+        parts = max(1, round(length / block_rows)) if length else 0
         starts.extend(first + np.arange(parts) * length // parts)
         first += length
-    return np.array(starts)
+    return np.array(starts, dtype=int)
 
 
 def _slope(base: np.ndarray, coefficients: np.ndarray, own: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from glovecal_models.diagnosis.delays import block_starts
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.errors import BadInput, Cancelled
 from glovecal_models.layout import Layout
@@ -96,3 +97,7 @@ def test_a_few_seconds_are_too_little(clean):
     )  # fmt: skip
     told = diagnose([short], LAYOUT).to_document()["sentences"]
     assert any(sentence.startswith("Too little was recorded") for sentence in told)
+
+
+def test_a_take_without_a_row_of_a_joint_has_no_block() -> None:
+    assert block_starts([6, 0, 4, 0], 3).tolist() == [0, 3, 6]
