@@ -18,7 +18,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
@@ -30,6 +29,7 @@ from glovecal_models.guided.taught_take import TaughtTake
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import HAND_ROTATIONS, completed
 from glovecal_models.hand.skeleton import Skeleton, hand_skeleton
+from glovecal_models.inverse_kinematics.steadied import steadied
 from glovecal_models.inverse_kinematics.tip_chains import TipChains
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.catalogue import Equipment, make_protocol
@@ -162,5 +162,4 @@ def paper_session(seed: int = 1, *, rate_hz: float = SAMPLING_HZ, samples: int =
 
 def offline(angles_deg: np.ndarray, rate_hz: float = EVALUATION_HZ) -> np.ndarray:
     """Angles (N, R) without the sensors' noise, as a recording may be cleaned afterwards."""
-    window = 2 * round(OFFLINE_S * rate_hz / 2) + 1
-    return np.asarray(savgol_filter(angles_deg, window, 2, axis=0))
+    return steadied(np.arange(len(angles_deg)) / rate_hz, angles_deg, OFFLINE_S)

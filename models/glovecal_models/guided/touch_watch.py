@@ -68,7 +68,7 @@ def require_possible_touches(protocol: Protocol, skeleton: Skeleton) -> None:
             try:
                 require_possible(TipChains(skeleton, contact.fingers), contact, skeleton)
             except BadInput as error:
-                raise BadInput(f"step {step.name}: {error}") from error
+                raise BadInput(f"step {step.name}: {error}. Protocol fk_only asks for no touch") from error
 
 
 def _taught(state: SamplingState, step: Step, readings: Sequence[GloveReading]) -> TaughtTake:

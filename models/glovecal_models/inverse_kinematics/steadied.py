@@ -17,8 +17,9 @@ GAP = 3.0
 """Frames this many usual intervals apart do not belong to one curve."""
 
 
-def steadied(time_s: np.ndarray, angles_deg: np.ndarray) -> np.ndarray:
-    """Each frame's place on the parabola through its neighbours (Savitzky & Golay 1964), shape (N, R).
+def steadied(time_s: np.ndarray, angles_deg: np.ndarray, window_s: float = WINDOW_S) -> np.ndarray:
+    """Each frame's place on the parabola through its neighbours of ``window_s`` (Savitzky & Golay 1964),
+    shape (N, R).
 
     Stretches that are too short, or frames too rare, for more than a parabola's own points stay as they are.
     """
@@ -26,7 +27,7 @@ def steadied(time_s: np.ndarray, angles_deg: np.ndarray) -> np.ndarray:
         return angles_deg
     intervals = np.diff(time_s)
     usual = float(np.median(intervals))
-    window = 2 * round(WINDOW_S / usual / 2) + 1
+    window = 2 * round(window_s / usual / 2) + 1
     if window < DEGREE + 2:
         return angles_deg
     smooth = angles_deg.copy()

@@ -10,6 +10,7 @@ from pydantic import BaseModel, Field, FiniteFloat
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.errors import BadInput, LayoutMismatch
+from glovecal_models.inverse_kinematics.steadied import steadied
 from glovecal_service.plain import plain
 from glovecal_service.rest.answers import change_problems
 from glovecal_service.rest.dependencies import PartsNeeded
@@ -21,6 +22,7 @@ router = APIRouter(prefix="/models", tags=["models"])
 MOST_FRAMES = 20_000
 MOST_SENSORS = 512
 MOST_CONTEXT = 256
+LONGEST_STEADIED_S = 2.0
 
 
 class Readings(StrictBody):
@@ -48,6 +50,13 @@ class Readings(StrictBody):
         description="Columns such as `supply_v` or `power_on_s`, a value for each frame, null where unknown.",
     )
     wearing: WearingName | None = Field(None, description="The donning in which all frames were read.")
+    steadied_s: float = Field(
+        0.0,
+        ge=0.0,
+        le=LONGEST_STEADIED_S,
+        description="Take the sensors' noise off afterwards, as live poses cannot: each angle is the middle "
+        "of a parabola over so many seconds; needs time_s. `sd_deg` stays that of a single frame.",
+    )
 
 
 class Angles(BaseModel):
@@ -86,6 +95,8 @@ def predict(id: ModelInPath, body: Readings, parts: PartsNeeded) -> dict[str, An
             f"model {record.id[:12]} has {', '.join(effects.needing_time)}, for which it matters when "
             f"the frames were read: send time_s, seconds for each of the {len(readings)} frames, increasing"
         )
+    if body.steadied_s and body.time_s is None:
+        raise BadInput("steadied_s needs time_s, seconds for each of the frames, increasing")
     context = _context(body)
     time_s = _time_s(body)
     with parts.predictors.one_at_a_time:
@@ -95,7 +106,7 @@ def predict(id: ModelInPath, body: Readings, parts: PartsNeeded) -> dict[str, An
     return {
         "model": record.id,
         "rotations": list(predictor.rotations),
-        "mean_deg": plain(angles.mean),
+        "mean_deg": plain(steadied(time_s, angles.mean, body.steadied_s) if body.steadied_s else angles.mean),
         "sd_deg": plain(angles.sd),
         "flags": angles.flags.tolist(),
         "effects": list(effects.names),

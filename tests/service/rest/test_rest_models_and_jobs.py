@@ -87,6 +87,25 @@ def test_predict_compare_and_export_agree_with_the_artifact(client: RestClient) 
     assert found["rotations"]["I_PIP"]["rmse_deg"] < 1e-3
 
 
+def test_a_recording_is_predicted_without_the_sensors_noise(client: RestClient) -> None:
+    model = trained(client)
+    time_s = np.arange(120) / 60
+    clean = 120 + 40 * np.sin(2 * np.pi * 0.4 * time_s)
+    noisy = np.column_stack([clean, clean]) + 2.0 * np.random.default_rng(2).standard_normal((120, 2))
+    body = {"readings": noisy.tolist(), "time_s": time_s.tolist()}
+    truth, live, steadied = (
+        np.array(client.post(f"/models/{model}/predict", asked)["mean_deg"])
+        for asked in (
+            {"readings": np.column_stack([clean, clean]).tolist()},
+            body,
+            {**body, "steadied_s": 0.5},
+        )
+    )
+    assert np.std(steadied - truth) < 0.5 * np.std(live - truth)
+    with pytest.raises(Refused, match="steadied_s needs time_s"):
+        client.post(f"/models/{model}/predict", {"readings": noisy.tolist(), "steadied_s": 0.5})
+
+
 def test_readings_of_another_glove(client: RestClient) -> None:
     model = trained(client)
     for body, says in [
