@@ -22,6 +22,7 @@ from glovecal_models.calibration.pose_errors import pose_errors
 from glovecal_models.calibration.samples import require_layout
 from glovecal_models.calibration.sensor_sensitivity import SensorSensitivity, sensor_sensitivity
 from glovecal_models.calibration.shift_report import ShiftReport, shift_report
+from glovecal_models.calibration.shift_scale import scaled_to_poses
 from glovecal_models.calibration.wearing_shift import WearingShift, prior_shift
 from glovecal_models.effects.donning_shift import (
     DonningShift,
@@ -102,9 +103,12 @@ def quick_check(
             + (f" ({reasons})" if reasons else "")
         )
     effect = _effect_with_columns(before, sensitivity)
-    prior = prior_shift(sensitivity, _learned_sd(before, sensitivity))
+    learned = _learned_sd(before, sensitivity)
+    prior = prior_shift(sensitivity, learned)
     observed = pose_errors(before, effect.settings, found, sensitivity, known)
     used, contradicted = checked_poses(observed, prior, sensitivity.rotations, known)
+    if learned is None:
+        prior = scaled_to_poses(prior, [item.witness for item in used])
     shift = prior.after(item.witness for item in used)
     refused = (*(RefusedPose(item.label, item.reason) for item in missed), *contradicted)
     report = shift_report(before, sensitivity, prior, shift, used)
