@@ -27,10 +27,10 @@ def sampled(dispatched) -> Store:
         make_protocol("new_subject", LAYOUT), GLOVE, seed=5, rate_hz=30, skeleton=skeleton
     )
     store.layouts.put(LAYOUT)
-    for name, dimensions in (("anna", {"hand_length": 190.0}), ("bea", {})):
+    for name, dimensions in (("measured-anna", {"hand_length": 190.0}), ("bea", {})):
         store.subjects.create(name, dimensions=dimensions)
         for each in sampled_takes(session.state, {RECORDING: session.take}, name=name):
-            if each.kind != "range" and (name == "anna" or each.kind != "fk_cross_couple"):
+            if each.kind != "range" and (name == "measured-anna" or each.kind != "fk_cross_couple"):
                 told = {"sampling": {"id": "0" * 12, **each.to_document()}}
                 store.takes.add(
                     each.take, subject=name, layout=LAYOUT.name, source="sampling", accounting=told
@@ -44,7 +44,7 @@ def trained(store: Store, subject: str, **more):
 
 
 def test_touches_teach_and_the_error_is_of_what_was_left_out(sampled: Store) -> None:
-    result = trained(sampled, "anna")
+    result = trained(sampled, "measured-anna")
     said = " ".join(result["sentences"])
     assert "Tips of thumb and index: read " in said
     assert "Touches left out, one at a time, miss by (mm, median): touch-I " in said
@@ -66,6 +66,6 @@ def test_without_a_measured_hand_touches_wait_and_the_user_is_told(sampled: Stor
 
 
 def test_a_baseline_takes_the_known_angles_as_they_are(sampled: Store) -> None:
-    result = trained(sampled, "anna", method="linear")
+    result = trained(sampled, "measured-anna", method="linear")
     assert not any("Tips" in each for each in result["sentences"])
     assert result["held_out_rmse_deg"] is not None

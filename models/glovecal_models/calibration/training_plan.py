@@ -55,7 +55,7 @@ def plan_training(
     chosen: dict[str, Correspondence] = {}
     ranges: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     unmeasured: list[Correspondence] = []
-    at_one_angle: dict[str, Samples] = {}
+    at_one_angle: list[tuple[Correspondence, Samples]] = []
     for correspondence in layout.correspondences:
         if settings.method in ("raw", "linear"):
             correspondence = linear_correspondence(correspondence)
@@ -64,14 +64,14 @@ def plan_training(
             unmeasured.append(correspondence)
             continue
         if np.ptp(samples.target) == 0:
-            at_one_angle[correspondence.rotation] = samples
+            at_one_angle.append((correspondence, samples))
             continue
         check_samples(samples.inputs, samples.target, correspondence.inputs)
         chosen[correspondence.rotation] = correspondence
         ranges[correspondence.rotation] = (samples.inputs.min(axis=0), samples.inputs.max(axis=0))
         tasks.extend(_tasks(correspondence, samples, settings))
-    for samples in at_one_angle.values() if not tasks else ():
-        check_samples(samples.inputs, samples.target)
+    for correspondence, samples in at_one_angle if not tasks else ():
+        check_samples(samples.inputs, samples.target, correspondence.inputs)
     if not tasks:
         raise NotTrainable(
             f"no reference angle for any rotation of layout {layout.name!r} in {len(takes)} takes; "
@@ -161,9 +161,9 @@ def _sentences(
     return sentences
 
 
-def _one_angle_sentences(at_one_angle: Mapping[str, Samples]) -> list[str]:
+def _one_angle_sentences(at_one_angle: Sequence[tuple[Correspondence, Samples]]) -> list[str]:
     return [
-        f"{rotation} was measured at {samples.target[0]:g} degrees only: left out of the model until there "
+        f"{correspondence.rotation} was measured at {samples.target[0]:g} degrees only: left out of the model until there "
         "is another angle."
-        for rotation, samples in at_one_angle.items()
+        for correspondence, samples in at_one_angle
     ]
