@@ -7,7 +7,7 @@
     python3 do.py test      the test suite
     python3 do.py check     format, lint, types
     python3 do.py bench     speed against other libraries, as ratios, with a picture
-    python3 do.py paper     Wang & Neff 2013 reproduced: every table and figure, as one page (15 minutes)
+    python3 do.py paper     Wang & Neff 2013 reproduced: every table and figure, as one page (5 minutes)
     python3 do.py study     the blind study of the diagnosis: figures, confusion matrix (hours);
                             study active: active sampling against the fixed protocol (half an hour)
 

@@ -163,7 +163,7 @@ def _sentences(
 
 def _one_angle_sentences(at_one_angle: Sequence[tuple[Correspondence, Samples]]) -> list[str]:
     return [
-        f"{correspondence.rotation} was measured at {samples.target[0]:g} degrees only: left out of the model until there "
-        "is another angle."
+        f"{correspondence.rotation} was measured at {samples.target[0]:g} degrees only: left out of the "
+        "model until there is another angle."
         for correspondence, samples in at_one_angle
     ]
