@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from multiprocessing import connection, get_context, parent_process
+from multiprocessing import get_context
 from queue import Empty
 from typing import Any
 
 from paper_job import PaperJob, PaperResult, run_job
 
-from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_models.worker_process import begin_worker
 
 LOOK_S = 0.5
 LOG_EVERY_S = 20.0
@@ -53,19 +51,9 @@ def work_off(
 
 
 def _start_worker(told: Any) -> None:
-    """One BLAS thread; no word at Ctrl-C, which the parent answers; no life without the parent."""
     global _told
     _told = told
-    pin_blas_to_one_thread()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
-
-
-def _end_with(sentinel: int) -> None:
-    connection.wait([sentinel])
-    os._exit(1)
+    begin_worker()
 
 
 def _run(job: PaperJob, seed: int, quick: bool) -> PaperResult:

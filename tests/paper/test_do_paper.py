@@ -6,11 +6,12 @@ import json
 import math
 import re
 from pathlib import Path
+from typing import cast
 
 import pytest
 from kept_results import KeptResults, programs_hash
 from paper import main
-from paper_job import PaperJob
+from paper_job import PaperJob, Rows
 from paper_page.section import Demand
 from paper_parts import PARTS
 from paper_workers import work_off
@@ -61,7 +62,7 @@ def test_results_of_other_programs_are_not_shown(folder) -> None:
 
 def test_jobs_that_fail_are_told_and_keep_nothing(capsys) -> None:
     finished = []
-    jobs = [PaperJob(name, math.sqrt) for name in ("wrong", "too")]  # type: ignore[arg-type]
+    jobs = [PaperJob(name, cast(Rows, math.sqrt)) for name in ("wrong", "too")]
     assert work_off(jobs, 1, True, 1, finished.append) == ["wrong", "too"]
     assert not finished
     assert "wrong: failed: TypeError" in capsys.readouterr().err

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
+from threading import Event
 
 import pytest
 from realtime_support import LAYOUT
@@ -14,7 +16,11 @@ from glovecal_models.sampling.catalogue import make_protocol
 from glovecal_models.sampling.engine import Sampling, begin_sampling
 from glovecal_models.sampling.state import SamplingState
 from glovecal_service.realtime.live_sampling import LiveSampling
+from glovecal_service.realtime.sampling_runner import SamplingRunner
 from glovecal_service.store import Store
+
+ENDED = Event()
+ENDED.set()
 
 
 def goes_on(store: Store, id: str) -> None:
@@ -46,3 +52,27 @@ def test_a_go_while_the_recording_is_asked_for_is_not_lost(
         live.look(store)
         assert live.state.phase == "countdown"
         live.close()
+
+
+def test_a_sampling_that_fails_is_closed_with_the_reason_and_the_next_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = recorder_settings(tmp_path)
+    with store_with_glove(settings) as store, open_router([settings.zenoh]) as session:
+        store.subjects.create("anna")
+        store.layouts.put(LAYOUT)
+        state = begin_sampling(make_protocol("fk_only", LAYOUT), LAYOUT.sensors)
+        made = {"glove": GLOVE, "subject": "anna", "wearing": "", "layout": LAYOUT.name}
+        first = store.samplings.create(**made, document=state.to_document())
+        runner = SamplingRunner(session, settings, lambda: Store.open(settings))
+        with monkeypatch.context() as broken:
+            broken.setattr(LiveSampling, "look", lambda self, store: 1 // 0)
+            runner.look()
+        failed = store.samplings.get(first.id)
+        assert (failed.open, failed.problem) == (False, "integer division or modulo by zero")
+        second = store.samplings.create(**made, document=state.to_document())
+        runner.look()
+        time.sleep(0.2)  # the store is followed ten times a second
+        runner.look()
+        assert store.samplings.get(second.id).recordings
+        runner.run(ENDED)

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from multiprocessing import connection, get_context, parent_process
+from multiprocessing import get_context
 from typing import Any
 
 from blind_glove import BlindGlove
 from finished_gloves import FinishedGloves
 
-from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_models.worker_process import begin_worker
 
 WORKERS = 2
 Job = Callable[[BlindGlove], dict[str, Any]]
@@ -29,7 +26,7 @@ def answers(
     waiting = [glove for glove in gloves if finished.get(glove.key) is None]
     progress = _Progress(label, len(gloves), len(gloves) - len(waiting))
     if waiting:
-        with ProcessPoolExecutor(workers, get_context("spawn"), _start_worker) as pool:
+        with ProcessPoolExecutor(workers, get_context("spawn"), begin_worker) as pool:
             running: dict[Future[dict[str, Any]], BlindGlove] = {}
             while waiting or running:
                 while waiting and len(running) <= workers:  # few, so that Ctrl-C has little to wait for
@@ -41,20 +38,6 @@ def answers(
                     progress.step(f"{glove.truth} {glove.number}")
     progress.end()
     return [(glove, answer) for glove in gloves if (answer := finished.get(glove.key)) is not None]
-
-
-def _start_worker() -> None:
-    """One BLAS thread; no word at Ctrl-C, which the parent answers; no life without the parent."""
-    pin_blas_to_one_thread()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
-
-
-def _end_with(sentinel: int) -> None:
-    connection.wait([sentinel])
-    os._exit(1)
 
 
 def _keep(future: Future[dict[str, Any]], glove: BlindGlove, finished: FinishedGloves) -> None:

@@ -21,7 +21,8 @@ from glovecal_models.guided.taught_take import TaughtTake
 from glovecal_models.guided.touch_posterior import TouchPosterior
 from glovecal_models.inverse_kinematics.steadied import steadied
 from glovecal_models.layout import Correspondence, Layout
-from glovecal_models.regression.rule_regressor import RuleRegressor
+from glovecal_models.regression.linear_regressor import LinearRegressor
+from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.sampling.step import Kind
 from glovecal_models.takes.take import Take
 
@@ -133,8 +134,8 @@ def with_open_variance(
 
 def _claiming(item: RotationModel, lessons: Sequence[Lesson], posterior: TouchPosterior) -> RotationModel:
     regressor = item.regressor
-    if isinstance(regressor, RuleRegressor):
-        return item
+    if not isinstance(regressor, LinearRegressor | ProcessRegressor):
+        return item  # a rule has the noise of what it follows
     left = [np.empty(0)]
     for lesson in lessons:
         if item.rotation in lesson.take.rotations:
@@ -142,7 +143,7 @@ def _claiming(item: RotationModel, lessons: Sequence[Lesson], posterior: TouchPo
             some = lesson.take.readings[np.isfinite(angle)]
             left.append(posterior.variance(item.rotation, some[:: max(1, len(some) // LOOKED_AT)]))
     variance = regressor.noise_variance + float(np.concatenate(left).mean())
-    claiming = replace(regressor, noise_variance=variance)  # type: ignore[type-var]
+    claiming = replace(regressor, noise_variance=variance)
     return replace(item, regressor=claiming, uncertain_above_deg=uncertain_above(variance))
 
 
