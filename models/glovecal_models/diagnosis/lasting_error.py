@@ -2,8 +2,8 @@
 
 Means of neighbouring seconds are multiplied: noise that is forgotten within a second averages to nothing,
 whatever its size; an error that lasts gives its mean square. How far the products differ from one stretch of
-the recording to the next says how much can be known: few stretches, or an error that is large only once,
-give a low bound.
+the recording to the next says how much can be known: few stretches, an error that is large only once, or one
+that hardly exceeds the noise give a low bound, down to 0.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.stats import chi2, t
 
 from glovecal_models.diagnosis.second_means import SecondMeans
 
@@ -21,6 +21,8 @@ SHORTEST_S = 4
 """A shorter take says nothing of what lasts."""
 FEWEST_STRETCHES = 5
 CONFIDENCE = 0.95
+LEAST_FREEDOM = 1.0
+"""With fewer degrees of freedom the square itself is all but unknown: nothing is bounded."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,8 @@ class LastingError:
 
     size_deg: float
     at_least_deg: float
-    """Lower end of the one-sided 95 % interval."""
+    """Lower end of the one-sided 95 % interval, never above ``size_deg``; 0 where so little data bounds it by
+    nothing, since a mean square cannot be negative anyway."""
     noise_deg: float
     """From row to row."""
     stretches: int
@@ -41,13 +44,15 @@ class LastingError:
 
 def lasting_error(takes: Sequence[SecondMeans], residual: Sequence[np.ndarray]) -> LastingError:
     """``residual``: the same joint's error row by row, for its noise."""
-    products, weights = [], []
+    products, weights, squares = [], [], 0.0
     for take in takes:
         both = take.weight[1:] * take.weight[:-1] > 0
         weight = np.sqrt(take.weight[1:] * take.weight[:-1])[both]
         product = (take.mean_deg[1:] * take.mean_deg[:-1])[both] * weight
         if len(weight) < SHORTEST_S - 1:
             continue
+        square = 0.5 * (take.mean_deg[1:] ** 2 + take.mean_deg[:-1] ** 2)[both]
+        squares += float(weight @ square)
         for part in np.array_split(np.arange(len(weight)), max(1, round(len(weight) / STRETCH_S))):
             products.append(float(product[part].sum()))
             weights.append(float(weight[part].sum()))
@@ -58,13 +63,31 @@ def lasting_error(takes: Sequence[SecondMeans], residual: Sequence[np.ndarray]) 
     square = max(sum(products) / total, 0.0)
     differing = np.array(products) - square * np.array(weights)
     variance = count / max(count - 1, 1) * float(np.sum(differing**2)) / total**2
-    return LastingError(_root(square), _root(_lower(square, variance, count)), noise, count)
+    forgotten = max(squares / total - square, 0.0)
+    lower = _lower(square, variance, forgotten**2 / total, count)
+    return LastingError(_root(square), _root(lower), noise, count)
 
 
-def _lower(square: float, variance: float, count: int) -> float:
-    """Of a mean square whose estimate varies so much: as of a scaled chi squared (Satterthwaite 1946)."""
-    freedom = min(2 * square**2 / max(variance, 1e-30), count - 1.0)
-    return square * freedom / float(chi2.ppf(CONFIDENCE, freedom)) if freedom > 0 else 0.0
+def _lower(square: float, variance: float, of_noise: float, count: int) -> float:
+    """Of a mean square from ``count`` stretches, whose estimate varies by ``variance``.
+
+    ``of_noise`` of that is products of noise, as much below zero as above: Student's t. The rest varies with
+    the square itself: a scaled chi squared (Satterthwaite 1946). The two distances from the estimate are added
+    in squares, as for differences of variances (Graybill and Wang 1980). Chi squared alone claims more than
+    there is in up to half of the recordings with nothing but noise, and exceeds the estimate below 0.1 degrees
+    of freedom.
+    """
+    if square <= 0 or count < 2:
+        return 0.0
+    of_noise = min(of_noise, variance)
+    lasting = variance - of_noise
+    most = count - 1.0
+    freedom = min(2 * square**2 / lasting, most) if lasting > 2 * square**2 / most else most
+    if freedom < LEAST_FREEDOM:
+        return 0.0
+    of_lasting = square * (1.0 - min(freedom / float(chi2.ppf(CONFIDENCE, freedom)), 1.0))
+    distance = float(np.hypot(t.ppf(CONFIDENCE, count - 1) * np.sqrt(of_noise), of_lasting))
+    return max(square - distance, 0.0)
 
 
 def _root(square: float) -> float:
