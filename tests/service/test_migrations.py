@@ -16,12 +16,13 @@ from glovecal_service.store.database import Database
 from glovecal_service.store.migrate import NewerSchema
 from glovecal_service.store.tables import metadata
 
+NEWEST = schema.newest_revision()
 SECOND = """
 import sqlalchemy as sa
 from alembic import op
 
-revision = "0004"
-down_revision = "0003"
+revision = "9999"
+down_revision = "{newest}"
 
 
 def upgrade() -> None:
@@ -40,12 +41,12 @@ def second_schema(tmp_path, monkeypatch):
     def write(last: str) -> None:
         folder = tmp_path / "later"
         folder.mkdir(exist_ok=True)
-        (folder / "0004_later.py").write_text(SECOND.format(last=last))
+        (folder / "9999_later.py").write_text(SECOND.format(last=last, newest=NEWEST))
         config = original()
         own = f"{config.get_main_option('script_location')}/versions"
         config.set_main_option("version_locations", f"{own}:{folder}")
         monkeypatch.setattr(migrate, "_config", lambda: config)
-        monkeypatch.setattr(schema, "newest_revision", lambda: "0004")
+        monkeypatch.setattr(schema, "newest_revision", lambda: "9999")
 
     return write
 
@@ -75,12 +76,12 @@ def test_an_upgrade_keeps_the_rows_and_a_backup(store_settings, second_schema):
     second_schema("pass")
     with Store.open(store_settings) as store, store.database.read() as connection:
         assert connection.execute(text("SELECT name, notes FROM subjects")).all() == [("anna", "none")]
-    backups = list(store_settings.data.glob("*.before-0004"))
+    backups = list(store_settings.data.glob("*.before-9999"))
     assert len(backups) == (0 if store_settings.database else 1)
     for backup in backups:
         with closing(sqlite3.connect(backup)) as connection:
             assert connection.execute("SELECT name FROM subjects").fetchall() == [("anna",)]
-            assert connection.execute("SELECT version_num FROM alembic_version").fetchall() == [("0003",)]
+            assert connection.execute("SELECT version_num FROM alembic_version").fetchall() == [(NEWEST,)]
 
 
 def test_an_upgrade_that_fails_leaves_everything_as_it_was(store_settings, second_schema, monkeypatch):

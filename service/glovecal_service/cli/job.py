@@ -53,6 +53,8 @@ def show(job: Job, as_json: AsJson = False) -> None:
             "finished": moment(document["finished_at"]),
         }
     )
+    if document["traceback"]:
+        out.print(f"\n{document['traceback'].rstrip()}")
 
 
 @app.command("wait")

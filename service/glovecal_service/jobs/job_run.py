@@ -76,6 +76,7 @@ class JobRun:
     def _end(self) -> Callable[[], object]:
         """Do the work; the write that ends it."""
         jobs, id, attempt = self._store.jobs, self._job.id, self._job.attempt
+        trace = None
         try:
             result = self._result()
             return lambda: jobs.finish(id, attempt, result)
@@ -90,9 +91,10 @@ class JobRun:
         except GlovecalError as error:
             message = str(error)
         except Exception as error:
-            log.error("job failed", job=id, kind=self._job.kind, trace=traceback.format_exc())
+            trace = traceback.format_exc()
+            log.error("job failed", job=id, kind=self._job.kind, trace=trace)
             message = f"an error in Glovecal itself: {type(error).__name__}: {error}"
-        return lambda: jobs.fail(id, attempt, message)
+        return lambda: jobs.fail(id, attempt, message, trace)
 
     def _result(self) -> dict:
         plan = self._kind.plan(self._store, self._job)

@@ -39,6 +39,9 @@ class Job(BaseModel):
     detail: dict[str, Any]
     result: dict[str, Any] | None
     error: str | None
+    traceback: str | None = Field(
+        description="Python's, of a job that failed by an error in Glovecal itself; at most 8,000 characters."
+    )
     created_at: datetime
     started_at: datetime | None
     finished_at: datetime | None

@@ -24,6 +24,8 @@ from glovecal_service.store.records import FINISHED_JOB_STATES, JobEvent, JobRec
 LEASE_S = 30.0
 MOST_LOSSES = 3
 LONGEST_SENTENCE = 2000
+LONGEST_TRACEBACK = 8000
+"""Characters; the innermost calls stand at its end."""
 _HIDDEN = ("lease_until", "losses")
 
 
@@ -114,9 +116,13 @@ class Jobs:
         """The job is done. Raises Conflict if the attempt is over."""
         return self._end(id, attempt, "done", "done", result=dict(result), fraction=1.0)
 
-    def fail(self, id: str, attempt: int, error: str) -> JobRecord:
-        """The job cannot be done; ``error`` is a sentence for the user. Raises Conflict."""
-        return self._end(id, attempt, "failed", error, error=_plain(error))
+    def fail(self, id: str, attempt: int, error: str, traceback: str | None = None) -> JobRecord:
+        """The job cannot be done; ``error`` is a sentence for the user. Raises Conflict.
+
+        ``traceback``: of an error that nobody foresaw; its last 8,000 characters are kept.
+        """
+        kept = None if traceback is None else _plain_text(traceback)[-LONGEST_TRACEBACK:]
+        return self._end(id, attempt, "failed", error, error=_plain(error), traceback=kept)
 
     def cancelled(self, id: str, attempt: int) -> JobRecord:
         """The job was stopped as requested. Raises Conflict if the attempt is over."""
@@ -221,7 +227,11 @@ class Jobs:
 
 def _plain(sentence: str) -> str:
     """Text that both databases can keep, whatever an exception's message holds."""
-    return sentence.encode("utf-8", "replace").decode().replace("\0", "")[:LONGEST_SENTENCE]
+    return _plain_text(sentence)[:LONGEST_SENTENCE]
+
+
+def _plain_text(text: str) -> str:
+    return text.encode("utf-8", "replace").decode().replace("\0", "")
 
 
 def _after_loss(row: Row) -> dict[str, Any]:

@@ -202,6 +202,8 @@ class JobRecord:
     started_at: datetime | None
     finished_at: datetime | None
     updated_at: datetime
+    traceback: str | None = None
+    """Of a job that failed by an error that nobody foresaw; its last part where it is long."""
 
     @property
     def is_finished(self) -> bool:

@@ -203,6 +203,7 @@ jobs = Table(
     Column("started_at", UtcTime),
     Column("finished_at", UtcTime),
     Column("updated_at", UtcTime, nullable=False),
+    Column("traceback", Text),
     Index(None, "state", "created_at"),
 )
 
