@@ -83,7 +83,7 @@ def run_task(
 def _fit(task: FitTask, cancelled: Callable[[], bool] | None, report: Report | None) -> Regressor:
     settings = task.settings
     if settings.method == "raw":
-        span = ACTIVE_RANGE_DEG.get(task.rotation) or (float(task.target.min()), float(task.target.max()))
+        span = ACTIVE_RANGE_DEG.get(task.rotation)
         return rescale_readings(task.inputs, task.target, span, sensor_names=task.sensors)
     if settings.method == "linear":
         return fit_linear(task.inputs, task.target, sensor_names=task.sensors, cancelled=cancelled)

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import wilcoxon
 
+from glovecal_models.diagnosis.held_out import saved_share
+
 LEAST_CONTRAST = 0.04
 """Share of the squared error a cause must save beyond its decoy."""
 LEAST_SESSION_CONTRAST = 0.12
@@ -39,16 +41,16 @@ class JointErrors:
     decoy: np.ndarray
     """(B,), with its decoy."""
     rows: int
-    take: np.ndarray | None = None
+    take: np.ndarray
     """(B,), the take each block lies in."""
 
     @property
     def saved(self) -> float:
-        return float(1 - self.added.sum() / self.base.sum())
+        return saved_share(self.base, self.added)
 
     @property
     def decoy_saved(self) -> float:
-        return float(1 - self.decoy.sum() / self.base.sum())
+        return saved_share(self.base, self.decoy)
 
     @property
     def contrast(self) -> float:
@@ -127,14 +129,34 @@ def signed_rank(values: np.ndarray) -> float:
     return float(found.pvalue)
 
 
+def over_joints(
+    values: Sequence[np.ndarray], takes: Sequence[np.ndarray], *, by_take: bool = False
+) -> np.ndarray:
+    """(B, ...) of each joint summed over joints; ``takes``: for each joint (B,), the take of each block.
+
+    Joints that were measured in different takes have no blocks in common: they are summed take by take.
+    """
+    if not by_take and _are_in_step(takes):
+        return np.sum(values, axis=0)
+    total = np.zeros((1 + max(int(take.max()) for take in takes), *values[0].shape[1:]))
+    for value, take in zip(values, takes, strict=True):
+        np.add.at(total, take, value)
+    return total[np.unique(np.concatenate(takes))]
+
+
+def _are_in_step(takes: Sequence[np.ndarray]) -> bool:
+    return all(np.array_equal(take, takes[0]) for take in takes)
+
+
 def pooled_errors(errors: Sequence[JointErrors]) -> JointErrors:
     """All joints together, each block in units of its joint's mean."""
-    length = min(len(item.base) for item in errors)
-    scale = [item.base.sum() for item in errors]
+    takes = [item.take for item in errors]
+    scale = [float(item.base.sum()) or 1.0 for item in errors]
     return JointErrors(
         *(
-            np.sum([getattr(item, part)[:length] / s for item, s in zip(errors, scale, strict=True)], axis=0)
+            over_joints([getattr(item, part) / s for item, s in zip(errors, scale, strict=True)], takes)
             for part in ("base", "added", "decoy")
         ),
         rows=sum(item.rows for item in errors),
+        take=takes[0] if _are_in_step(takes) else np.unique(np.concatenate(takes)),
     )

@@ -153,7 +153,7 @@ def _delays(direction: Direction) -> list[Assessment]:
     rows = [int(products.count.sum()) for products in direction.products]
     clock = clock_choice(grids)
     offsets = [
-        JointErrors(b, b - grid.unmoved + moved, b - grid.unmoved + mirrored, n)
+        JointErrors(b, b - grid.unmoved + moved, b - grid.unmoved + mirrored, n, grid.take)
         for b, grid, moved, mirrored, n in zip(base, grids, *clock.errors(grids), rows, strict=True)
     ]
     lags, taus = [], []
@@ -163,7 +163,11 @@ def _delays(direction: Direction) -> list[Assessment]:
         )
         lags.append(
             JointErrors(
-                b, b - grid.unmoved + grid.blocks[:, true], b - grid.unmoved + grid.blocks[:, decoy], n
+                b,
+                b - grid.unmoved + grid.blocks[:, true],
+                b - grid.unmoved + grid.blocks[:, decoy],
+                n,
+                grid.take,
             )
         )
         taus.append(np.array([grid.cells[true, 1]]))

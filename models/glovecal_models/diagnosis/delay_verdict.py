@@ -13,6 +13,7 @@ from typing import Literal
 
 import numpy as np
 
+from glovecal_models.diagnosis.assessment import over_joints
 from glovecal_models.diagnosis.delays import DelayErrors
 
 SHAPE_SMOOTHING = 25
@@ -54,7 +55,7 @@ class ClockChoice:
 def clock_choice(grids: Sequence[DelayErrors]) -> ClockChoice:
     """One offset for all takes, unless their own save clearly more (each judged on other blocks)."""
     clock, takes = grids[0].clock, int(max(grid.take.max() for grid in grids)) + 1
-    share = [grid.blocks[:, clock] / grid.unmoved.sum() for grid in grids]
+    share = [grid.blocks[:, clock] / grid.whole for grid in grids]
     each = np.array(
         [
             sum(part[grid.take == t].sum(axis=0) for part, grid in zip(share, grids, strict=True))
@@ -99,12 +100,10 @@ def delay_kind(
     if clock.is_per_take:
         return "clock_offset", -CLEAR
     cells = grids[0].clock
-    own = sum(
-        grid.blocks[:, cells[np.argmin(grid.blocks[:, cells].sum(axis=0))]] / grid.unmoved.sum()
-        for grid in grids
-    )
-    shared = sum(grid.blocks[:, cells[clock.cell[0]]] / grid.unmoved.sum() for grid in grids)
-    differ = _score(np.asarray(shared), np.asarray(own))
+    takes = [grid.take for grid in grids]
+    own = [grid.blocks[:, cells[np.argmin(grid.blocks[:, cells].sum(axis=0))]] / grid.whole for grid in grids]
+    shared = [grid.blocks[:, cells[clock.cell[0]]] / grid.whole for grid in grids]
+    differ = _score(over_joints(shared, takes), over_joints(own, takes))
     shape = _shape_score(strongly_smoothed)
     if differ > 2 * CLEAR and shape > -CLEAR:
         return "lag", differ
@@ -117,11 +116,14 @@ def delay_kind(
 
 def _shape_score(grids: Sequence[DelayErrors]) -> float:
     """How much better one low pass for all joints does than one delay for all, in standard errors."""
-    clock = np.sum([grid.blocks[:, grid.clock] / grid.unmoved.sum() for grid in grids], axis=0)
-    lag = np.sum([grid.blocks[:, grid.lag] / grid.unmoved.sum() for grid in grids], axis=0)
+    takes = [grid.take for grid in grids]
+    clock = over_joints([grid.blocks[:, grid.clock] / grid.whole for grid in grids], takes)
+    lag = over_joints([grid.blocks[:, grid.lag] / grid.whole for grid in grids], takes)
     return _score(clock[:, np.argmin(clock.sum(axis=0))], lag[:, np.argmin(lag.sum(axis=0))])
 
 
 def _score(worse: np.ndarray, better: np.ndarray) -> float:
     gain = worse - better
+    if len(gain) < 2:
+        return 0.0
     return float(gain.mean() / max(gain.std(ddof=1) / np.sqrt(len(gain)), 1e-12))

@@ -40,6 +40,11 @@ class DelayErrors:
     """(B,), the take each block lies in."""
 
     @property
+    def whole(self) -> float:
+        """The sum without delay and low pass, to tell shares of it; 1 where there is no error at all."""
+        return float(self.unmoved.sum()) or 1.0
+
+    @property
     def clock(self) -> np.ndarray:
         """Cells of a mere delay."""
         return np.flatnonzero(self.cells[:, 1] == 0)
@@ -105,7 +110,8 @@ def block_starts(lengths: Sequence[int], block_rows: int) -> np.ndarray:
 def _slope(base: np.ndarray, coefficients: np.ndarray, own: np.ndarray) -> np.ndarray:
     """Of the base along the own angle, (N,): by a smooth curve through its values."""
     x = (own - own.mean()) / max(float(own.std()), 1e-9)
-    curve = np.polynomial.polynomial.polyfit(x, base @ coefficients, 3)
+    powers = np.polynomial.polynomial.polyvander(x, 3)
+    curve = np.linalg.lstsq(powers, base @ coefficients, rcond=None)[0]
     slope = np.polynomial.polynomial.polyval(x, np.polynomial.polynomial.polyder(curve))
     return slope / max(float(own.std()), 1e-9)
 

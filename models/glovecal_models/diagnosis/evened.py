@@ -38,7 +38,7 @@ class EvenTake:
 
 def evened(take: Take, sensors: Sequence[str], rotations: Sequence[str], shift_s: float = 0.0) -> EvenTake:
     """``shift_s``: the reference is read so much later than its time column says."""
-    if len(take.time_s) > 1 and float(np.median(np.diff(take.time_s))) > LONGEST_BRIDGED_S:
+    if len(take.time_s) < 2 or float(np.median(np.diff(take.time_s))) > LONGEST_BRIDGED_S:
         return _sparse(take, sensors, rotations)
     count = max(int(take.duration_s * RATE_HZ) + 1, 1)
     time = take.time_s[0] + np.arange(count) / RATE_HZ

@@ -14,6 +14,10 @@ import numpy as np
 BASE_RIDGE = 1e-6
 ALIKE_ROWS = 100.0
 """Rows that count for one: errors of neighbouring times are alike."""
+LEAST_RIDGE = 1e-9
+"""Of a column's own square: folds of a perfect fit stay solvable in spite of rounding."""
+LEAST_VARIANCE_DEG2 = 1e-12
+"""Of what is left: without it nothing would hold the weights of columns that are zero."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,13 @@ class HeldOut:
     @property
     def saved(self) -> float:
         """Share of the held-out squared error that the columns save; negative when they harm."""
-        return float(1.0 - self.added.sum() / self.base.sum())
+        return saved_share(self.base, self.added)
+
+
+def saved_share(before: np.ndarray, after: np.ndarray) -> float:
+    """Share of the squared errors ``before`` that is gone ``after``; 0 where there was no error to save."""
+    whole = float(before.sum())
+    return 1.0 - float(after.sum()) / whole if whole > 0 else 0.0
 
 
 class BaseProducts:
@@ -104,7 +114,10 @@ def held_out(
     ridge[:, :size, :size] = products.ridge
     diagonal = np.arange(size, size + added)
     variance = products.error.sum() / products.count.sum() if noise_variance is None else noise_variance
-    ridge[:, diagonal, diagonal] = ALIKE_ROWS * variance / prior_sd**2
+    variance = max(variance, LEAST_VARIANCE_DEG2)
+    ridge[:, diagonal, diagonal] = np.maximum(
+        ALIKE_ROWS * variance / prior_sd**2, LEAST_RIDGE * total[:, diagonal, diagonal]
+    )
     beta = np.linalg.solve(total - joint + ridge, (total_right - right)[..., None])[..., 0]
     training = (products.square.sum() - products.square)[:, None] + _quadratic(
         total - joint, total_right - right, beta

@@ -72,10 +72,10 @@ def _lower(square: float, variance: float, of_noise: float, count: int) -> float
     """Of a mean square from ``count`` stretches, whose estimate varies by ``variance``.
 
     ``of_noise`` of that is products of noise, as much below zero as above: Student's t. The rest varies with
-    the square itself: a scaled chi squared (Satterthwaite 1946). The two distances from the estimate are added
-    in squares, as for differences of variances (Graybill and Wang 1980). Chi squared alone claims more than
-    there is in up to half of the recordings with nothing but noise, and exceeds the estimate below 0.1 degrees
-    of freedom.
+    the square itself: a scaled chi squared (Satterthwaite 1946). The two distances from the estimate are
+    added in squares, as for differences of variances (Graybill and Wang 1980). Chi squared alone claims more
+    than there is in up to half of the recordings with nothing but noise, and with a small fraction of a
+    degree of freedom more than the estimate.
     """
     if square <= 0 or count < 2:
         return 0.0

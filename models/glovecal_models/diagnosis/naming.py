@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glovecal_models.diagnosis.assessment import Assessment
+from glovecal_models.diagnosis.assessment import Assessment, over_joints
 
 BEATEN = 2.5
 """Standard errors by which a rival must be worse to leave the confidence set."""
@@ -40,10 +40,12 @@ def _beaten(item: Assessment, best: Assessment) -> bool:
     witnesses of those.
     """
     joints = sorted({*best.touched, *item.touched})
-    worse = np.sum(
-        [(item.errors[j].added - best.errors[j].added) / best.errors[j].base.sum() for j in joints], axis=0
-    )
-    take = best.errors[0].take
-    if take is not None and item.probability is not None and best.probability is not None:
-        worse = np.bincount(take, worse)
+    worse = [
+        (item.errors[j].added - best.errors[j].added) / (best.errors[j].base.sum() or 1.0) for j in joints
+    ]
+    takes = [best.errors[j].take for j in joints]
+    by_take = item.probability is not None and best.probability is not None
+    worse = over_joints(worse, takes, by_take=by_take)
+    if len(worse) < 2:
+        return False
     return bool(worse.mean() > BEATEN * worse.std(ddof=1) / np.sqrt(len(worse)))

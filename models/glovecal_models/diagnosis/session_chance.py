@@ -143,6 +143,8 @@ def _explained(columns: np.ndarray, base: np.ndarray, target: np.ndarray, prior:
     """Share of the target's square that columns save beside the base, weights held by their prior."""
     left = columns - base @ (base.T @ columns)
     square = float(target @ target)
+    if square <= 0:
+        return 0.0
     gram = left.T @ left + np.diag(square / len(target) / prior**2 * 4.0)
     right = left.T @ target
     return float(right @ np.linalg.solve(gram, right)) / square

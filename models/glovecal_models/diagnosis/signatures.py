@@ -135,7 +135,8 @@ def static_errors(takes: Sequence[Take], sensor_of: dict[str, str]) -> list[np.n
         if known.sum() < 50 or np.ptp(every[known]) == 0:
             continue
         low, span = float(every.min()), max(float(np.ptp(every)), 1e-9)
-        curve = np.polynomial.legendre.legfit(2 * (every[known] - low) / span - 1, target[known], 7)
+        columns = np.polynomial.legendre.legvander(2 * (every[known] - low) / span - 1, 7)
+        curve = np.linalg.lstsq(columns, target[known], rcond=None)[0]
         for part, reading, angle in zip(result, x, y, strict=True):
             part[:, column] = np.polynomial.legendre.legval(2 * (reading - low) / span - 1, curve) - angle
     return result

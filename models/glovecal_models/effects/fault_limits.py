@@ -61,7 +61,9 @@ def _sound(take: Take, sensors: Sequence[str], found: Sequence[Finding]) -> np.n
 
 
 def _interval(takes: Sequence[Take]) -> float:
-    return float(np.median(np.concatenate([np.diff(take.time_s) for take in takes])))
+    """Seconds between frames; 1 where no take has two."""
+    steps = np.concatenate([np.diff(take.time_s) for take in takes])
+    return float(np.median(steps)) if len(steps) else 1.0
 
 
 def _frame_lags(takes: Sequence[Take]) -> list[int]:
@@ -88,9 +90,14 @@ def _largest_surprises(
     steps = [
         max(smallest_step(part[:, column]) for part in readings) for column in range(readings[0].shape[1])
     ]
-    largest = [
-        CHANGE_MARGIN * np.nanquantile(np.concatenate(each), CHANGE_QUANTILE, axis=0) for each in found
-    ]
+    largest = []
+    for each in found:
+        changes = np.concatenate(each)
+        # Where no pair of sound frames lies so far apart, nothing is known but the sensor's whole range.
+        changes = np.where(
+            np.isfinite(changes).any(axis=0), changes, np.ptp(np.concatenate(readings), axis=0)
+        )
+        largest.append(CHANGE_MARGIN * np.nanquantile(changes, CHANGE_QUANTILE, axis=0))
     return np.maximum.accumulate(np.array(largest) + steps, axis=0).T
 
 

@@ -11,10 +11,14 @@ from glovecal_models.errors import BadInput
 
 
 def settle_joint_units(takes: Sequence[Signals]) -> Settings:
-    """Centre and scale of each lane, degrees, to be stored with an effect's settings."""
+    """Centre and scale of each lane, degrees, to be stored with an effect's settings.
+
+    Takes without a row say nothing; at least one has some.
+    """
+    own = [take.own for take in takes if len(take)]
     return {
-        "own_centre_deg": np.mean([take.own.mean(axis=0) for take in takes], axis=0).tolist(),
-        "own_scale_deg": np.sqrt(np.mean([take.own.var(axis=0) for take in takes], axis=0)).tolist(),
+        "own_centre_deg": np.mean([part.mean(axis=0) for part in own], axis=0).tolist(),
+        "own_scale_deg": np.sqrt(np.mean([part.var(axis=0) for part in own], axis=0)).tolist(),
     }
 
 

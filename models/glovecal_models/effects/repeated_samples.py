@@ -82,8 +82,11 @@ class RepeatedSamples(SignatureEffect):
 
 
 def repeats(values: np.ndarray) -> Repeats:
-    """Repeats among rows of (N, K) values; a value that is NaN in both rows counts as repeated."""
-    if len(values) < 3 or not values.size:
+    """Repeats among rows of (N, K) values; a value that is NaN in both rows counts as repeated.
+
+    Fewer rows than a movement takes say nothing.
+    """
+    if len(values) <= 2 * NEAR_FRAMES or not values.size:
         return Repeats(np.zeros(len(values), dtype=bool), 0, 0)
     steps = np.diff(values, axis=0)
     same = np.concatenate([[False], ((steps == 0) | (np.isnan(steps))).all(axis=1)])

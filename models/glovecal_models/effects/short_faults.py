@@ -94,7 +94,7 @@ def small_dropouts(
     jump = change - median_filter(change, 5)
     spread = 1.4826 * float(np.median(np.abs(jump[known])))
     limit = max(DROPOUT_SPREADS * spread, 4.0 * smallest_step(readings), DROPOUT_SHARE * span)
-    places = np.flatnonzero(np.abs(jump) > limit)
+    places = 1 + np.flatnonzero(np.abs(jump[1:]) > limit)
     level = np.cumsum(change)
     at = 0
     while at + 1 < len(places):

@@ -128,8 +128,8 @@ def frame_noise(errors: Sequence[np.ndarray], times: Sequence[np.ndarray]) -> fl
     total, count = 0.0, 0
     for time, error in zip(times, errors, strict=True):
         known = np.isfinite(error)
-        second = ((time - time[0]) / SHORT_S).astype(int)[known]
-        if len(second):
+        if known.any():
+            second = ((time - time[0]) / SHORT_S).astype(int)[known]
             frames = np.maximum(np.bincount(second), 1)
             left = error[known] - (np.bincount(second, error[known]) / frames)[second]
             total, count = total + float(np.sum(left**2)), count + len(left)

@@ -17,15 +17,18 @@ from glovecal_models.regression.training_check import check_samples
 def rescale_readings(
     inputs: np.ndarray,
     target: np.ndarray,
-    active_range_deg: tuple[float, float],
+    active_range_deg: tuple[float, float] | None,
     *,
     sensor_names: Sequence[str] | None = None,
 ) -> LinearRegressor:
     """The rescaling of the first input; inputs (N, D) counts, target (N,) degrees, range in degrees.
 
+    Without a range that of the target is taken.
+
     The target only tells which way the sensor counts and how large the error is. Raises NotTrainable.
     """
     inputs, target = check_samples(inputs, target, sensor_names)
+    active_range_deg = active_range_deg or (float(target.min()), float(target.max()))
     reading = inputs[:, 0]
     low, high = float(reading.min()), float(reading.max())
     rising = np.mean((reading - reading.mean()) * (target - target.mean())) >= 0

@@ -78,8 +78,8 @@ def test_the_lower_bound_holds_nineteen_times_in_twenty():
     assert np.mean(above) <= 0.09
 
 
-@pytest.mark.parametrize("takes, length", [(1, 51), (6, 40), (12, 40)])
-@pytest.mark.parametrize("size, noise", [(0.0, 1.0), (0.2, 1.0), (0.5, 1.0), (1.0, 0.2)])
+@pytest.mark.parametrize(("takes", "length"), [(1, 51), (6, 40), (12, 40)])
+@pytest.mark.parametrize(("size", "noise"), [(0.0, 1.0), (0.2, 1.0), (0.5, 1.0), (1.0, 0.2)])
 def test_the_lower_bound_holds_beside_noise(takes, length, size, noise):
     """95 % of the time where little lasts too: of noise alone a bound used to be stated half of the time."""
     random = np.random.default_rng(6)
