@@ -10,8 +10,9 @@ import numpy as np
 from glovecal_models.calibration.fit_task import FitTask
 from glovecal_models.calibration.folds import folds_over_takes
 from glovecal_models.calibration.linear_samples import linear_correspondence, linear_samples
+from glovecal_models.calibration.living_sensors import LivingSensors, living_sensors
 from glovecal_models.calibration.representative import representative_index
-from glovecal_models.calibration.samples import Samples, gather_samples, require_layout
+from glovecal_models.calibration.samples import Samples, gather_samples
 from glovecal_models.calibration.training_settings import METHODS, TrainingSettings
 from glovecal_models.errors import NotTrainable
 from glovecal_models.layout import Correspondence, Layout
@@ -44,24 +45,31 @@ def plan_training(
 
     A rotation that no take measured is left out of the model, unless the layout gives it a rule whose
     rotations are trained; so is one that was held at a single angle, as when a sampling was stopped early.
-    The plan's sentences say which.
+    Sensors that are dead or clipped are not read, and a rotation that has no other is left out. The plan's
+    sentences say which.
     """
     settings = settings or TrainingSettings()
     if settings.method not in METHODS:
         raise NotTrainable(f"unknown method {settings.method!r}; known are {', '.join(METHODS)}")
-    for take in takes:
-        require_layout(take, layout)
+    living = living_sensors(layout, takes)
+    if settings.keep_dead:
+        living = LivingSensors(layout, (), ())
+    layout = living.layout
     tasks: list[FitTask] = []
     chosen: dict[str, Correspondence] = {}
     ranges: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     unmeasured: list[Correspondence] = []
     at_one_angle: list[tuple[Correspondence, Samples]] = []
+    unreadable: list[str] = []
     for correspondence in layout.correspondences:
         if settings.method in ("raw", "linear"):
             correspondence = linear_correspondence(correspondence)
         samples = gather_samples(takes, correspondence)
         if len(samples) == 0:
             unmeasured.append(correspondence)
+            continue
+        if correspondence.rotation in living.unreadable:
+            unreadable.append(correspondence.rotation)
             continue
         if np.ptp(samples.target) == 0:
             at_one_angle.append((correspondence, samples))
@@ -72,6 +80,9 @@ def plan_training(
         tasks.extend(_tasks(correspondence, samples, settings))
     for correspondence, samples in at_one_angle if not tasks else ():
         check_samples(samples.inputs, samples.target, correspondence.inputs)
+    lost = living.sentences(unreadable)
+    if not tasks and unreadable:
+        raise NotTrainable(" ".join(lost))
     if not tasks:
         raise NotTrainable(
             f"no reference angle for any rotation of layout {layout.name!r} in {len(takes)} takes; "
@@ -86,7 +97,7 @@ def plan_training(
         correspondences=chosen,
         rules=rules,
         ranges=ranges,
-        sentences=(*_sentences(takes, tasks, unmeasured, rules), *_one_angle_sentences(at_one_angle)),
+        sentences=(*_sentences(takes, tasks, unmeasured, rules), *_one_angle_sentences(at_one_angle), *lost),
         take_count=len(takes),
         simulated=any(take.simulated for take in takes),
     )

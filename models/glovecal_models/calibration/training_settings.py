@@ -30,6 +30,9 @@ class TrainingSettings:
     pseudo_inputs: int = 100
     iterations: int = 200
     seed: int = 0
+    keep_dead: bool = False
+    """Whether sensors that are dead or clipped in the takes are kept, so that one that never changes is
+    refused; else they are left out (``living_sensors``)."""
     kernels: tuple[tuple[str, str], ...] = ()
     """(rotation, candidate kernel) already chosen: when a model is trained again, with an effect for example,
     its kernels stay, so that a change of the error is the effect's."""

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from glovecal_models.calibration.living_sensors import living_sensors
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
@@ -25,7 +26,6 @@ from glovecal_models.improvement.had_already import repaired_takes, settings_of,
 from glovecal_models.improvement.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.improvement.improvement import CLOCK, Improvement, Step, added_document
 from glovecal_models.improvement.known_effects import known_effects
-from glovecal_models.improvement.living_sensors import dead_sensors_sentence, without_dead_sensors
 from glovecal_models.improvement.prepared_takes import PreparedTakes
 from glovecal_models.improvement.pruning import pruned
 from glovecal_models.improvement.signature_steps import SignatureStep, repairs, widenings
@@ -84,7 +84,8 @@ class _Walk:
         report: Report | None,
     ) -> None:
         self.takes, self.subject, self.settings = list(takes), subject, settings
-        self.layout, dead = without_dead_sensors(layout, takes)
+        living = living_sensors(layout, takes)
+        self.layout = living.layout
         self.holdout, self.seed, self.hashes = holdout, seed, hashes
         self.cancelled, self.report = cancelled, report
         self.steps: list[Step] = []
@@ -92,7 +93,7 @@ class _Walk:
         alone = only_take_sentence(self.takes)
         self.sentences = [
             *take_warnings(self.takes),
-            *([dead_sensors_sentence(dead)] if dead else ()),
+            *living.sentences(layout.rotations),
             *([alone] if alone and not holdout else ()),
         ]
         self.stopped = "nothing_named"

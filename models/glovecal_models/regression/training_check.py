@@ -9,6 +9,8 @@ import numpy as np
 from glovecal_models.errors import NotTrainable
 
 _RELATIVE_STILLNESS = 1e-12
+MOST_NAMED = 8
+"""Sensors; more are counted."""
 
 
 def check_samples(
@@ -87,7 +89,10 @@ def _check_moving(inputs: np.ndarray, names: list[str]) -> None:
         return
     each = ", ".join(f"sensor {names[column]} reads {inputs[0, column] + 0.0:g}" for column in still)
     alive = [name for column, name in enumerate(names) if column not in still]
-    others = f"; name the others ({', '.join(alive)}) in a layout file" if alive else ""
+    others = ""
+    if alive:
+        named = ", ".join(alive) if len(alive) <= MOST_NAMED else f"{len(alive)} of them"
+        others = f"; name the others ({named}) in a layout file"
     raise NotTrainable(
         f"{each} in all {len(inputs)} samples; move the joint while recording, or leave the "
         f"sensor{'s' if len(still) > 1 else ''} out{others}"

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glovecal_models.takes.dead_sensor import dead_sensors
 from glovecal_models.takes.reference_check import frames_with_reference, reference_warnings
 from glovecal_models.takes.take import Take
 
@@ -104,10 +105,10 @@ def _frame_warnings(
             f"{who}: {gaps} gap{'s' if gaps > 1 else ''} in the frames, the longest of "
             f"{intervals[longest]:.3g} s at {take.time_s[longest]:g} s."
         )
-    still = [item for item in sensors if item.low == item.high]
-    if still and len(take.time_s) > 1:
-        named = ", ".join(f"{item.sensor} (always {item.low + 0.0:g})" for item in still)
-        warnings.append(f"{who}: sensors that never change: {named}. Is a wire broken?")
+    dead = dead_sensors([take], take.sensors) if len(take.time_s) > 1 else ()
+    if dead:
+        named = ", ".join(map(str, dead))
+        warnings.append(f"{who}: sensors that say nothing of the hand: {named}. Is a wire broken?")
     if repeated >= MOSTLY_REPEATED:
         warnings.append(
             f"{who}: {100 * repeated:.0f} % of the frames repeat the one before; did the hand hold still, "

@@ -47,6 +47,10 @@ def train(
         typer.Option(min=0, max=20, help="Held-out folds for the error estimate; 0: no estimate, fastest."),
     ] = 3,
     seed: Annotated[int, typer.Option(min=0, help="Of what is chosen at random.")] = 0,
+    keep_dead: Annotated[
+        bool,
+        typer.Option("--keep-dead", help="Refuse sensors that never move instead of leaving them out."),
+    ] = False,
     activate: Annotated[bool, typer.Option(help="Predict live with the new model.")] = True,
     wait: Annotated[bool, typer.Option(help="Wait for the model, else only start the job.")] = True,
     as_json: AsJson = False,
@@ -65,7 +69,8 @@ def train(
         chosen, layout = _choose(service, subject, layout, take or [], leave_out or [])
         body: dict[str, Any] = {"subject": subject, "layout": layout, "method": method, "takes": chosen}
         body |= {"activate": activate, "pseudo_inputs": pseudo_inputs, "samples": samples}
-        job = service.post("/models/train", body | {"folds": folds, "seed": seed})
+        body |= {"folds": folds, "seed": seed, "keep_dead": keep_dead}
+        job = service.post("/models/train", body)
         if not wait:
             _say_job(job, as_json)
             return

@@ -138,6 +138,8 @@ def _settings(payload: Mapping[str, Any]) -> TrainingSettings:
         raise BadInput(f"training does not know {sorted(unknown)[0]!r}; it knows {known}")
     chosen = {name: payload[name] for name in _SETTINGS if payload.get(name) is not None}
     for name, value in chosen.items():
+        if name == "keep_dead" and isinstance(value, bool):
+            continue
         if name != "method" and (not isinstance(value, int) or isinstance(value, bool) or value < 0):
             raise BadInput(f"{name} must be a whole number, not {value!r}")
     return TrainingSettings(**chosen)

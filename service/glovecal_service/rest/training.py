@@ -40,6 +40,9 @@ class Training(StrictBody):
     folds: Annotated[int, Field(ge=0, le=20)] = Field(3, description="Held-out folds; 0: no error estimate.")
     iterations: Annotated[int, Field(ge=1, le=2000)] = Field(200, description="SPGP only.")
     seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = 0
+    keep_dead: bool = Field(
+        False, description="Keep sensors that never move in the takes, or are clipped: they are refused."
+    )
 
     @field_validator("folds")
     @classmethod
