@@ -13,7 +13,7 @@ from glovecal_models.takes.take import Take
 
 @dataclass(frozen=True)
 class LivingSensors:
-    """What is left of a layout. The glove still sends all its sensors: only what is read from them changes."""
+    """What is left of a layout. The glove still sends all its sensors: only what is read of them changes."""
 
     layout: Layout
     """The same sensors; rotations are read from those that live."""

@@ -28,7 +28,7 @@ from glovecal_models.errors import Cancelled
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
-SINGLE_POSES = "the frames are single poses, too far apart"
+SINGLE_POSES = "the frames are single poses; record the movement from one to the next"
 
 
 def diagnose(

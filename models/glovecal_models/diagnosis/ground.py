@@ -9,7 +9,7 @@ import numpy as np
 
 from glovecal_models.diagnosis.delays import SMOOTHING
 from glovecal_models.diagnosis.directions import EVERY, Direction, forward
-from glovecal_models.diagnosis.evened import RATE_HZ, EvenTake, evened, shifted, smoothed
+from glovecal_models.diagnosis.evened import RATE_HZ, EvenTake, bridge_s, evened, shifted, smoothed
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.naming import Naming
 from glovecal_models.effects.catalogue import effect
@@ -34,13 +34,14 @@ class Ground:
         joints = measured_joints(takes, layout)
         if not joints:
             raise BadInput("no take measured a rotation of this layout; a diagnosis needs r.ROTATION columns")
-        joints = tuple(name for name in joints if _is_fitted(takes, layout, name))
+        bridge = bridge_s(takes)
+        joints = tuple(name for name in joints if _is_fitted(takes, layout, name, bridge))
         if not joints:
             raise BadInput(
                 f"no reference lasts for {SMOOTHING / RATE_HZ:.2g} s without a gap; a diagnosis needs"
                 " references that are measured several times a second"
             )
-        even = tuple(evened(take, layout.sensors, joints) for take in takes)
+        even = tuple(evened(take, layout.sensors, joints, bridge) for take in takes)
         return cls(even, layout, joints, linear, tuple(known))
 
     @property
@@ -71,9 +72,9 @@ class Ground:
         return self.beside(KnownEffect(effect(first.effect), where, shapes))
 
 
-def _is_fitted(takes: Sequence[Take], layout: Layout, joint: str) -> bool:
+def _is_fitted(takes: Sequence[Take], layout: Layout, joint: str, bridge_s: float) -> bool:
     """Whether enough is left of its reference on even times, smoothed."""
-    even = (smoothed(evened(take, layout.sensors, [joint]), SMOOTHING) for take in takes)
+    even = (smoothed(evened(take, layout.sensors, [joint], bridge_s), SMOOTHING) for take in takes)
     return sum(int(np.isfinite(take.reference[::EVERY]).sum()) for take in even) > 1
 
 

@@ -12,7 +12,7 @@ from glovecal_models.diagnosis.candidates import assessed
 from glovecal_models.diagnosis.delays import SMOOTHING
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.directions import forward
-from glovecal_models.diagnosis.evened import evened, smoothed
+from glovecal_models.diagnosis.evened import bridge_s, evened, smoothed
 from glovecal_models.diagnosis.ground import measured_joints
 from glovecal_models.effects.effect import Effect
 from glovecal_models.errors import Cancelled
@@ -39,7 +39,8 @@ def share_left_by_decoy(
     joints = [name for name in measured_joints(takes, model.layout) if name in rotations]
     if not joints:
         return None
-    even = [smoothed(evened(take, model.layout.sensors, joints), SMOOTHING) for take in takes]
+    bridge = bridge_s(takes)
+    even = [smoothed(evened(take, model.layout.sensors, joints, bridge), SMOOTHING) for take in takes]
     known = [item for item in known_effects(model) if item.effect.name != effect.name]
     linear = model.method in ("raw", "linear")
     direction = forward(even, model.layout, joints, linear=linear, known=known)

@@ -20,7 +20,7 @@ reference, share of those frames in which another sensor changes. Less, and the 
 
 @dataclass(frozen=True)
 class DeadSensor:
-    """``why`` continues a sentence: "always 7", "only 7 or 8", "at its end stop 255 in 93 % of the frames"."""
+    """``why``: "always 7", "only 7 or 8", or "at its end stop 255 in 93 % of the frames"."""
 
     sensor: str
     why: str

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 SHORT = 12
+LONG_ENOUGH_S = 60
+"""Of movement, to tell what is left from noise."""
 
 
 def next_command(model: str, found: Mapping[str, Any]) -> str:
@@ -21,8 +23,11 @@ def next_command(model: str, found: Mapping[str, Any]) -> str:
         return f"glovecal record GLOVE deciding --seconds {following['seconds']}"
     if named:
         return f"glovecal add-effect {short} {named['effect']}"
-    if (found.get("something_left") or {}).get("is_left"):
+    left = found.get("something_left") or {}
+    if left.get("is_left"):
         return f"glovecal where {short} --report where.html"
+    if left.get("not_judgeable"):
+        return f"glovecal record GLOVE free-motion --seconds {LONG_ENOUGH_S}"
     return f"glovecal model activate {short}"
 
 

@@ -92,6 +92,6 @@ def test_a_sensor_that_rests_at_its_end_with_its_joint_is_not_clipped():
 def test_the_check_of_a_take_names_them():
     (sentence,) = check_take(faulty()).sentences
     assert sentence == (
-        "Take 't0': sensors that say nothing of the hand: S08 (always 121), S16 (only 7 or 8), S30 (at its end"
-        " stop 255 in 90 % of the frames). Is a wire broken?"
+        "Take 't0': sensors that say nothing of the hand: S08 (always 121), S16 (only 7 or 8), S30 (at its"
+        " end stop 255 in 90 % of the frames). Is a wire broken?"
     )

@@ -64,7 +64,7 @@ def test_single_poses_of_a_robot_thumb_judge_nothing_that_lasts():
     assert found.to_document()["named"] is None
     why = {item.effect: item.why for item in found.not_judgeable}
     assert {"lag", "clock_offset", "creep", "hysteresis"} <= set(why)
-    assert why["creep"] == "the frames are single poses, too far apart"
+    assert why["creep"] == "the frames are single poses; record the movement from one to the next"
 
 
 @pytest.mark.parametrize("person", ["P301", "P304"])
