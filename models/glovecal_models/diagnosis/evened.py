@@ -22,10 +22,11 @@ SHORTEST_BRIDGE_S = 0.1
 """Frames so close are always taken for a movement."""
 BRIDGED_INTERVALS = 2.5
 """Longer is a gap, as when a take is checked: a frame is missing."""
-ALIKE_NEIGHBOURS = 0.2
+ALIKE_NEIGHBOURS = 0.25
 """Variance of steps between neighbouring frames, over that between frames drawn at random (median sensor),
-up to which a movement was recorded. Simulated and real recordings have 0.01 to 0.11 at 9 Hz, free motion
-0.04 and an ankle 0.12 at 5 Hz; a robot hand set to one pose after another 0.42, shuffled 0.83."""
+up to which a movement was recorded. At 9 Hz free motion of simulated hands has 0.01, two people walking 0.08
+and 0.11, five ankles 0.04 to 0.17; at 5 Hz 0.04, 0.18 to 0.27 and 0.11 to 0.41, the quickest of which are as
+unlike as poses. A robot hand set to one pose after another has 0.42, in a random order 0.83."""
 
 
 @dataclass(frozen=True)
