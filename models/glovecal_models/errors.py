@@ -30,11 +30,18 @@ class BadLayout(BadInput):
 class BadTakeTable(BadInput):
     """A take file cannot be read.
 
-    ``file``, ``line`` (1 is the header) and ``column`` are None where they do not apply.
+    ``file``, ``line`` (1 is the header), ``column`` and ``value`` (the cell's text) are None where they do
+    not apply.
     """
 
     def __init__(
-        self, problem: str, *, file: str | None = None, line: int | None = None, column: str | None = None
+        self,
+        problem: str,
+        *,
+        file: str | None = None,
+        line: int | None = None,
+        column: str | None = None,
+        value: str | None = None,
     ) -> None:
         place = ", ".join(
             text
@@ -50,6 +57,7 @@ class BadTakeTable(BadInput):
         self.file = file
         self.line = line
         self.column = column
+        self.value = value
 
 
 class NotTrainable(BadInput):

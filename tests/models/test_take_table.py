@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.equal_times import spread_equal_times
+from glovecal_models.takes.raw_table import LARGEST_ANGLE_DEG, LARGEST_VALUE, LONGEST_TAKE_S
 from glovecal_models.takes.table import read_reference, read_takes, reference_warnings, write_takes
 from glovecal_models.takes.take import Take
 
@@ -101,12 +102,14 @@ def test_spread_times_increase_and_move_no_frame_past_the_next_stamp(stamps):
 
 names = st.text(st.characters(categories=("L", "N", "P", "S")), min_size=1, max_size=12)
 channels = st.from_regex(r"[A-Za-z][A-Za-z0-9_]{0,8}", fullmatch=True)
-numbers = st.floats(allow_nan=False, allow_infinity=False)
+numbers = st.floats(-LARGEST_VALUE, LARGEST_VALUE)
 maybe_numbers = st.one_of(st.just(float("nan")), numbers)
+maybe_angles = st.one_of(st.just(float("nan")), st.floats(-LARGEST_ANGLE_DEG, LARGEST_ANGLE_DEG))
+seconds = st.floats(-LONGEST_TAKE_S / 2, LONGEST_TAKE_S / 2)
 
 
 def increasing(draw, rows: int) -> np.ndarray:
-    return np.sort(np.array(draw(st.lists(numbers, min_size=rows, max_size=rows, unique=True))) + 0.0)
+    return np.sort(np.array(draw(st.lists(seconds, min_size=rows, max_size=rows, unique=True))) + 0.0)
 
 
 def matrix(draw, values, rows: int, columns: int) -> np.ndarray:
@@ -132,7 +135,7 @@ def take_lists(draw) -> list[Take]:
             time = np.arange(rows) * 0.1
         reference_rows = draw(st.integers(1, 5)) if own_clock else rows
         labels = draw(st.lists(channels, max_size=3, unique=True))
-        rotations, reference = measured_only(labels, matrix(draw, maybe_numbers, reference_rows, len(labels)))
+        rotations, reference = measured_only(labels, matrix(draw, maybe_angles, reference_rows, len(labels)))
         context_names = draw(st.lists(channels.filter(lambda n: n != "simulated"), max_size=2, unique=True))
         kept, context = measured_only(context_names, matrix(draw, maybe_numbers, rows, len(context_names)))
         poses = tuple(draw(st.lists(st.one_of(st.just(""), names), min_size=rows, max_size=rows)))

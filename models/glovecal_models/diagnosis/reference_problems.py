@@ -9,11 +9,10 @@ import numpy as np
 from glovecal_models.diagnosis.contradictions import contradictions
 from glovecal_models.diagnosis.pose_labels import are_pose_labels
 from glovecal_models.layout import Layout
+from glovecal_models.takes.radians import radians_problem
 from glovecal_models.takes.take import Take
 
 STILL_DEG = 0.5
-LARGEST_RADIANS = 3.5
-LEAST_RADIANS = 0.2
 JUMP_DEG = 25.0
 """Between two frames, while the joint's sensor hardly moves."""
 SURE_CORRELATION = 0.5
@@ -37,28 +36,12 @@ def reference_problems(takes: Sequence[Take], layout: Layout) -> tuple[str, ...]
             problems.extend(_of_rotation(rotation, measured, inputs, has_own))
             if has_own:
                 problems.extend(contradictions(rotation, measured, inputs))
-    spans = _largest_span(takes)
-    if spans is not None and LEAST_RADIANS < spans <= LARGEST_RADIANS:
-        problems.insert(
-            0,
-            f"No reference angle spans more than {spans:.2f}: these look like radians. Angles are wanted in "
-            "degrees; multiply by 57.2958.",
-        )
-    return tuple(problems)
+    radians = radians_problem(takes)
+    return tuple(problems) if radians is None else (radians[0].upper() + radians[1:], *problems)
 
 
 def _in_order(take: Take, layout: Layout) -> np.ndarray:
     return take.readings[:, [take.sensors.index(name) for name in layout.sensors]]
-
-
-def _largest_span(takes: Sequence[Take]) -> float | None:
-    spans = [
-        float(np.nanmax(take.reference[:, i]) - np.nanmin(take.reference[:, i]))
-        for take in takes
-        for i in range(len(take.rotations))
-        if np.isfinite(take.reference[:, i]).any()
-    ]
-    return max(spans) if spans else None
 
 
 def _of_rotation(

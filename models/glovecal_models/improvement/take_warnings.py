@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.take_check import check_take
 
-NUMBER = re.compile(r"[0-9]+(\.[0-9]+)?(e-?[0-9]+)?")
+_NAME = re.compile(r"^Take (['\"]).*?\1")
+_NUMBER = re.compile(r"[0-9]+(\.[0-9]+)?(e[-+]?[0-9]+)?")
 
 
 def take_warnings(takes: Sequence[Take]) -> list[str]:
@@ -18,9 +19,13 @@ def take_warnings(takes: Sequence[Take]) -> list[str]:
         if not len(take.time_s):
             continue
         for sentence in check_take(take).sentences:
-            key = NUMBER.sub("#", sentence.removeprefix(f"Take {take.name!r}"))
-            alike.setdefault(key.replace("gaps", "gap"), []).append(sentence)
+            alike.setdefault(kind_of(sentence), []).append(sentence)
     return [_told(sentences) for sentences in alike.values()]
+
+
+def kind_of(sentence: str) -> str:
+    """The same text for warnings that differ in the take's name and in numbers alone."""
+    return _NUMBER.sub("#", _NAME.sub("", sentence)).replace("gaps", "gap").replace("takes", "take")
 
 
 def only_take_sentence(takes: Sequence[Take]) -> str | None:
@@ -36,4 +41,6 @@ def only_take_sentence(takes: Sequence[Take]) -> str | None:
 
 def _told(sentences: Sequence[str]) -> str:
     more = len(sentences) - 1
-    return sentences[0] if not more else f"{sentences[0]} So do {more} more takes."
+    return (
+        sentences[0] if not more else f"{sentences[0]} The same in {more} more take{'s' if more > 1 else ''}."
+    )

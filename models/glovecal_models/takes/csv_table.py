@@ -17,6 +17,7 @@ from glovecal_models.takes.raw_table import (
     unusable_number,
     unusable_text,
     what_is_right,
+    what_is_wrong,
 )
 
 _ROWS_AT_ONCE = 128  # small enough to stay in the cache; 4096 took a third longer
@@ -132,16 +133,16 @@ def _is_number(cell: str) -> bool:
 
 
 def _bad_cell(column: Column, cell: str, line: int, file: str) -> BadTakeTable:
-    if not cell.strip():
-        found = "the cell is empty"
-    elif _is_number(cell):
-        found = f"{cell.strip()[:60]} is not finite"
+    shown = cell.strip() if len(cell) <= 60 else f"{cell[:60]}... ({len(cell)} characters)"
+    if _is_number(cell):
+        problem = what_is_wrong(column, float(cell), shown)
+    elif not cell.strip():
+        problem = f"the cell is empty; {what_is_right(column)}"
     else:
-        shown = cell if len(cell) <= 60 else f"{cell[:60]}... ({len(cell)} characters)"
-        found = f"{shown!r} is not a number"
-        if _is_number(cell.replace(",", ".", 1)):
-            found += " (write a decimal point, not a comma)"
-    return BadTakeTable(f"{found}; {what_is_right(column)}", file=file, line=line, column=column.header)
+        comma = _is_number(cell.replace(",", ".", 1))
+        hint = " (write a decimal point, not a comma)" if comma else ""
+        problem = f"{shown!r} is not a number{hint}; {what_is_right(column)}"
+    return BadTakeTable(problem, file=file, line=line, column=column.header, value=cell[:60])
 
 
 def _checked_texts(column: Column, texts: Sequence[str], lines: Sequence[int], file: str) -> Sequence[str]:

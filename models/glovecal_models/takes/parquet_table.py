@@ -15,6 +15,7 @@ from glovecal_models.takes.raw_table import (
     unusable_number,
     unusable_text,
     what_is_right,
+    what_is_wrong,
 )
 
 MAGIC = b"PAR1"
@@ -71,9 +72,13 @@ def _numbers(pyarrow: Any, column: Column, values: Any, file: str) -> np.ndarray
     unusable = unusable_number(column, result)
     if unusable is not None:
         found = values[unusable].as_py()
-        shown = "the cell is empty" if found is None else f"{found} is not finite"
+        problem = (
+            f"the cell is empty; {what_is_right(column)}"
+            if found is None
+            else what_is_wrong(column, result[unusable], str(found)[:60])
+        )
         raise BadTakeTable(
-            f"row {unusable + 1}: {shown}; {what_is_right(column)}", file=file, column=column.header
+            f"row {unusable + 1}: {problem}", file=file, column=column.header, value=str(found)[:60]
         )
     return result
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,6 +14,15 @@ from glovecal_models.takes.columns import Column, ColumnKind
 MOST_CELLS = 50_000_000
 """Larger tables are refused: about three hours of an 18-sensor glove with its reference at 120 Hz."""
 LONGEST_TEXT = 200
+LARGEST_ANGLE_DEG = 360.0
+"""A joint turns less than once, however its zero is chosen; unwrapped angles of a tracker stay below too."""
+LARGEST_VALUE = float(np.finfo(np.float32).max)
+"""Live frames carry readings and context as float32."""
+LATEST_TIME_S = 1e11
+"""Seconds since 1970 reach this in the year 5138, seconds since the year 1 are below."""
+YEAR_S = 365.25 * 86400.0
+LONGEST_TAKE_S = YEAR_S
+"""A take lies inside one wearing."""
 
 
 @dataclass(frozen=True)
@@ -43,18 +53,37 @@ class RawTable:
             return np.empty((len(rows), 0))
         return np.column_stack([self.numbers[header][rows] for header in headers])
 
-    def error(self, problem: str, *, row: int | None = None, column: str | None = None) -> BadTakeTable:
-        """An error that names this file, the row's line and the column."""
+    def error(
+        self, problem: str, *, row: int | None = None, column: str | None = None, value: str | None = None
+    ) -> BadTakeTable:
+        """An error that names this file, the row's line, the column and the value."""
         if row is not None and self.lines is None:
             problem = f"row {row + 1}: {problem}"
         line = int(self.lines[row]) if row is not None and self.lines is not None else None
-        return BadTakeTable(problem, file=self.file, line=line, column=column)
+        return BadTakeTable(problem, file=self.file, line=line, column=column, value=value)
 
 
 def unusable_number(column: Column, values: np.ndarray) -> int | None:
     """Index of the first number the column must not hold, None if all are fine."""
-    bad = np.isinf(values) if column.may_be_empty else ~np.isfinite(values)
+    bad = ~(np.abs(values) <= _largest(column))
+    if column.may_be_empty:
+        bad &= ~np.isnan(values)
     return int(np.argmax(bad)) if bad.any() else None
+
+
+def what_is_wrong(column: Column, value: float, shown: str) -> str:
+    """Why ``value`` cannot stand in this numerical column, and what would be right: a sentence."""
+    if not math.isfinite(value):
+        return f"{shown} is not finite; {what_is_right(column)}"
+    right = what_is_right(column)
+    if column.kind == "rotation":
+        limit = f"{LARGEST_ANGLE_DEG:g} either way"
+        return f"{shown} is impossible for an angle in degrees (limit {limit}); {right}"
+    if column.kind == "time":
+        limit = f"{LATEST_TIME_S:g}: {LATEST_TIME_S / YEAR_S:.0f} years"
+        divide = "divide milliseconds by 1e3, microseconds by 1e6, nanoseconds by 1e9"
+        return f"{shown} is impossible for a time in seconds (limit {limit}); {right} ({divide})"
+    return f"{shown} is larger than a live frame can carry (float32, limit {LARGEST_VALUE:.3g}); {right}"
 
 
 def what_is_right(column: Column) -> str:
@@ -62,8 +91,16 @@ def what_is_right(column: Column) -> str:
     if column.kind == "time":
         return "write the time in seconds"
     if column.kind == "sensor":
-        return "every frame needs a finite reading"
+        return "every frame needs a finite reading, as the glove sends it"
+    if column.kind == "rotation":
+        return "write the angle in degrees, or leave it empty where nothing was measured"
     return "write a number, or leave it empty where nothing was measured"
+
+
+def _largest(column: Column) -> float:
+    if column.kind == "time":
+        return LATEST_TIME_S
+    return LARGEST_ANGLE_DEG if column.kind == "rotation" else LARGEST_VALUE
 
 
 def unusable_text(column: Column, texts: Sequence[str]) -> tuple[int, str] | None:

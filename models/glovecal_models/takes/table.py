@@ -21,9 +21,10 @@ from glovecal_models.takes.csv_table import read_csv_table
 from glovecal_models.takes.equal_times import spread_equal_times
 from glovecal_models.takes.parquet_table import MAGIC, read_parquet_table
 from glovecal_models.takes.pose_names import poses_at_frames
-from glovecal_models.takes.raw_table import RawTable
+from glovecal_models.takes.raw_table import LONGEST_TAKE_S, YEAR_S, RawTable
 from glovecal_models.takes.reference_check import reference_warnings
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.time_unit import unit_hint
 from glovecal_models.takes.write_table import SIMULATED_CONTEXT, write_takes
 
 __all__ = [
@@ -112,6 +113,7 @@ def _read_table(path: Path, equal_times: EqualTimes = "refuse") -> RawTable:
     if equal_times == "spread":
         table = _with_spread_times(table)
     _require_increasing_time(table)
+    _require_duration(table)
     return table
 
 
@@ -158,6 +160,23 @@ def _require_increasing_time(table: RawTable) -> None:
                 f"within a take{_time_hint(table.time_s[row] == table.time_s[before], take)}",
                 row=row,
                 column="time_s",
+            )
+
+
+def _require_duration(table: RawTable) -> None:
+    for rows in _rows_by_take(table).values():
+        time = table.time_s[rows]
+        lasts = float(time[-1] - time[0])
+        if lasts > LONGEST_TAKE_S:
+            steps = np.diff(time)
+            largest = int(steps.argmax())
+            row = int(rows[largest + 1 if steps[largest] > lasts / 2 else -1])
+            raise table.error(
+                f"{table.time_s[row]} is {lasts / YEAR_S:.3g} years after the first frame of its take, which "
+                f"is recorded in one wearing; write the time in seconds{unit_hint(float(np.median(steps)))}",
+                row=row,
+                column="time_s",
+                value=str(table.time_s[row]),
             )
 
 

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.takes.dead_sensor import dead_sensors
+from glovecal_models.takes.radians import radians_problem
 from glovecal_models.takes.reference_check import frames_with_reference, reference_warnings
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.time_unit import time_unit_warning
 
 GAP_INTERVALS = 2.5
 """An interval longer than this many median ones is a gap: at least one frame in between is missing."""
@@ -77,8 +79,17 @@ def check_take(take: Take) -> TakeCheck:
         rotations=tuple(
             item for index in range(len(take.rotations)) if (item := _rotation(take, index)) is not None
         ),
-        sentences=(*_frame_warnings(take, intervals, gaps, repeated, sensors), *reference_warnings(take)),
+        sentences=(
+            *_frame_warnings(take, intervals, gaps, repeated, sensors),
+            *reference_warnings(take),
+            *_radians(take),
+        ),
     )
+
+
+def _radians(take: Take) -> tuple[str, ...]:
+    found = radians_problem([take])
+    return () if found is None else (f"Take {take.name!r}: {found}",)
 
 
 def _sensor(take: Take, index: int, changed: np.ndarray) -> SensorRange:
@@ -99,6 +110,9 @@ def _frame_warnings(
     take: Take, intervals: np.ndarray, gaps: int, repeated: float, sensors: tuple[SensorRange, ...]
 ) -> list[str]:
     who, warnings = f"Take {take.name!r}", []
+    wrong_unit = time_unit_warning(float(np.median(intervals))) if len(intervals) else None
+    if wrong_unit:
+        warnings.append(f"{who}: {wrong_unit}")
     if gaps:
         longest = int(intervals.argmax())
         warnings.append(

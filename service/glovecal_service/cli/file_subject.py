@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from glovecal_client.errors import ServiceError
+from glovecal_service.cli.import_warnings import ImportWarnings
 from glovecal_service.cli.refusal import Refusal, exit_code_of, sentence_of
 from glovecal_service.cli.two_tables import frames_among, reference_beside
 
@@ -50,9 +51,12 @@ class FileSubject:
 
     def take_ids(self, files: Sequence[Path]) -> list[str]:
         """Ids of the takes in ``files``, imported unless they were. Raises Refusal that names the file."""
-        return [row["id"] for file in frames_among(files) for row in self._imported(file)]
+        warnings = ImportWarnings()
+        rows = [row for file in frames_among(files) for row in self._imported(file, warnings)]
+        warnings.print()
+        return [row["id"] for row in rows]
 
-    def _imported(self, file: Path) -> list[dict[str, Any]]:
+    def _imported(self, file: Path, warnings: ImportWarnings) -> list[dict[str, Any]]:
         self._require_layout(file)
         try:
             answer = self.service.upload_takes(
@@ -67,6 +71,7 @@ class FileSubject:
                 raise
             raise Refusal(f"{file}: {sentence_of(error)}") from error
         self.layout = answer["layout"]
+        warnings.add(file, answer["warnings"])
         return answer["takes"]
 
     def _require_layout(self, file: Path) -> None:

@@ -9,6 +9,7 @@ import typer
 
 from glovecal_client.errors import ServiceError
 from glovecal_service.cli.connection import connect
+from glovecal_service.cli.import_warnings import ImportWarnings
 from glovecal_service.cli.layout_file import layout_named
 from glovecal_service.cli.options import AsJson, Subject
 from glovecal_service.cli.printing import err, print_json
@@ -53,18 +54,20 @@ def import_takes(
         raise typer.BadParameter("--reference goes with one frames file")
     frames = frames_among(files)
     options = {"name": name, "wearing": wearing, "equal_times": "spread" if spread_equal_times else None}
-    rows, refused = [], 0
+    rows, refused, warnings = [], 0, ImportWarnings()
     with connect() as service:
         service.get(f"/subjects/{subject}")
         chosen = layout_named(service, layout)
         for file in frames:
             try:
-                rows += _import(service, file, reference or reference_beside(file), subject, chosen, options)
+                beside = reference or reference_beside(file)
+                rows += _import(service, file, beside, subject, chosen, options, warnings)
             except ServiceError as error:
                 if error.status >= SERVER_FAULT:
                     raise
                 refused += 1
                 err.print(f"{file}: not imported: {sentence_of(error)}", style="red")
+    warnings.print()
     if as_json:
         print_json(rows)
     elif rows or not refused:
@@ -80,11 +83,11 @@ def _import(
     subject: str,
     layout: str | None,
     options: dict[str, str | None],
+    warnings: ImportWarnings,
 ) -> list[dict[str, Any]]:
     given = {key: value for key, value in options.items() if value is not None}
     answer = service.upload_takes(file, reference=reference, subject=subject, layout=layout, **given)
     if not answer["imported"]:
         err.print(f"{file}: its takes were here already", style="yellow")
-    for sentence in answer["warnings"]:
-        err.print(f"{file}: {sentence}", style="yellow")
+    warnings.add(file, answer["warnings"])
     return answer["takes"]

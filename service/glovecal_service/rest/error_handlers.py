@@ -120,7 +120,7 @@ def _bad_input(error: BadInput) -> Problem:
                 file=error.file,
                 line=error.line,
                 column=error.column,
-                value=getattr(error, "value", None),
+                value=error.value,
             )
         case BadLayout():
             return Problem(422, "bad-layout", str(error), title="Layout cannot be used")

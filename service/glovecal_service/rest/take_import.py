@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 from glovecal_models.calibration.samples import require_layout
 from glovecal_models.errors import BadInput
+from glovecal_models.improvement.take_warnings import take_warnings
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
-from glovecal_models.takes.take_check import check_take
 from glovecal_service.store.errors import Conflict
 from glovecal_service.store.records import TakeRecord
 from glovecal_service.store.store import Store
@@ -63,12 +63,11 @@ def import_takes(
         new, subject=subject, layout=chosen.name, source="import", original_sha256=original_sha256
     )
     by_name = existing | {record.name: record for record in added}
-    warnings = [sentence for take in takes for sentence in check_take(take).sentences]
     return Import(
         chosen.name,
         [by_name[take.name] for take in takes],
         {record.id for record in existing.values()},
-        warnings,
+        take_warnings(takes),
     )
 
 

@@ -106,7 +106,7 @@ class ImportedTakes(BaseModel):
     existing: list[str] = Field(description="Ids of those that the same file had brought before.")
     layout: str
     original_sha256: str
-    warnings: list[str] = Field(description="What looks wrong with a reference, in sentences.")
+    warnings: list[str] = Field(description="What `check` says of the takes; like sentences once.")
 
 
 class ImportOptions(BaseModel):

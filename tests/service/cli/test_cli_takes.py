@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import Run
 
-from glovecal_models.takes.table import read_takes
+from glovecal_models.takes.table import read_takes, write_takes
 from glovecal_models.takes.take import Take
 
 
@@ -222,3 +223,23 @@ def test_a_file_written_has_the_rights_of_any_other(anna, tmp_path):
     other.touch()
     assert anna("take", "export", "cross", tmp_path / "x.csv").code == 0
     assert stat.S_IMODE((tmp_path / "x.csv").stat().st_mode) == stat.S_IMODE(other.stat().st_mode)
+
+
+def test_units_that_look_wrong_are_told_once_for_all_files_by_every_import(run: Run, tmp_path: Path) -> None:
+    files = []
+    for number in range(3):
+        degrees = 40 - (40 + number) * np.cos(np.arange(300) / 30)
+        time_s = np.arange(300) / 60
+        readings = np.round(60 + 1.2 * degrees)[:, None]
+        radians = np.radians(degrees)[:, None]
+        take = Take(f"t{number}", "w", ("I_PIP",), time_s, readings, ("I_PIP",), time_s, radians)
+        files += write_takes([take], tmp_path / f"t{number}.csv")
+    run("subject", "add", "anna")
+    imported = run("take", "import", *files, "-s", "anna")
+    assert imported.code == 0, imported.err
+    assert imported.err.count("look like radians") == 1
+    assert "multiply by 57.2958. The same in 2 more files.\n" in imported.err
+    improved = run("improve", "--takes", *files, "--method", "linear", "--max-steps", "0")
+    assert improved.code == 0, improved.err
+    assert f"{files[0]}: Take 't0': no reference angle spans more than" in improved.err
+    assert "The same in 2 more files.\n" in improved.err

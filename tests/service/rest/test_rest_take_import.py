@@ -349,3 +349,50 @@ def test_refusals_are_what_the_model_says(shared: RestClient, monkeypatch: pytes
     with pytest.raises(Refused, match="the reason") as refused:
         shared.get("/subjects")
     assert refused.value.status == 422
+
+
+def finger(file: Path, *, angle: str = "{deg}", reading: str = "{count}", seconds: float = 1 / 60) -> Path:
+    """A table of one finger that bends by 80 degrees; the last row's cells are given as they are."""
+    rows = ["time_s,s.I_PIP,r.I_PIP"]
+    for frame in range(300):
+        deg = 40 - 40 * np.cos(frame / 30)
+        rows.append(
+            f"{frame * seconds!r},{60 + 1.2 * deg:.0f},{np.radians(deg) if angle == 'rad' else deg:.5f}"
+        )
+    last = angle.format(deg="10") if angle != "rad" else "1.0"
+    rows.append(f"{300 * seconds!r},{reading.format(count=70)},{last}")
+    file.write_text("\n".join(rows) + "\n")
+    return file
+
+
+def test_units_that_look_wrong_are_told_at_once(client: RestClient, tmp_path: Path) -> None:
+    answer = client.upload_takes(finger(tmp_path / "right.csv"), subject="anna")
+    assert answer["warnings"] == []
+    answer = client.upload_takes(finger(tmp_path / "rad.csv", angle="rad", reading="71"), subject="anna")
+    assert len(answer["imported"]) == 1
+    [sentence] = answer["warnings"]
+    assert "look like radians" in sentence
+    for factor, unit in ((1e3, "milliseconds (60 Hz), divide by 1e3"), (1e6, "microseconds (60 Hz)")):
+        file = finger(tmp_path / f"times-{factor:g}.csv", seconds=factor / 60)
+        [sentence] = client.upload_takes(file, subject="anna")["warnings"]
+        assert f"time_s is wanted in seconds; if it is in {unit}" in sentence
+
+
+@pytest.mark.parametrize(
+    ("given", "column", "value", "says"),
+    [
+        ({"angle": "12000"}, "r.I_PIP", "12000", "write the angle in degrees"),
+        ({"reading": "1e300"}, "s.I_PIP", "1e300", "float32"),
+        ({"seconds": 1e9 / 60}, "time_s", "5000000000.0", "nanoseconds (60 Hz), divide by 1e9"),
+    ],
+)
+def test_what_is_impossible_is_refused_with_its_place(
+    shared: RestClient, tmp_path: Path, given: dict[str, Any], column: str, value: str, says: str
+) -> None:
+    with pytest.raises(Refused, match=r"finger\.csv, line 302") as refused:
+        shared.upload_takes(finger(tmp_path / "finger.csv", **given), subject="anna")
+    problem = refused.value.problem
+    assert (problem["status"], problem["line"], problem["column"]) == (422, 302, column)
+    assert problem["value"] == value
+    assert says in problem["detail"]
+    assert shared.get("/takes") == []
