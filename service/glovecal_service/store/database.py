@@ -31,6 +31,10 @@ from glovecal_service.store.errors import StorageFull, StoreDamaged, StoreUnavai
 from glovecal_service.store.json_text import json_text
 
 BUSY_TIMEOUT_MS = 5000
+_DAMAGED = ("malformed", "not a database", "unsupported file format", "no such table", "no such column")
+"""SQLite's words; the schema was looked at when the store was opened, so a table that is gone is damage."""
+_DAMAGED_STATES = ("XX001", "XX002")
+"""PostgreSQL's data_corrupted and index_corrupted."""
 
 
 class Database:
@@ -106,6 +110,8 @@ def _engine(url: str) -> Engine:
 
 def _configure_sqlite(connection: sqlite3.Connection, _record: object) -> None:
     connection.isolation_level = None
+    # text that is no UTF-8 any more is noticed by its row's hash instead of failing the whole statement
+    connection.text_factory = lambda content: content.decode("utf-8", "surrogateescape")
     cursor = connection.cursor()
     cursor.execute(f"PRAGMA busy_timeout = {BUSY_TIMEOUT_MS}")
     _switch_to_write_ahead_log(cursor)
@@ -138,7 +144,7 @@ def _meaning(error: DatabaseError, database: Database) -> Exception:
         return StorageFull(f"no room left for the database {name}; nothing was changed: free some disk space")
     if isinstance(error, DataError):
         return BadInput(f"a value cannot be stored: {text.strip()}")
-    if "malformed" in text or "not a database" in text:
+    if any(words in text for words in _DAMAGED) or getattr(error.orig, "sqlstate", None) in _DAMAGED_STATES:
         return StoreDamaged(f"the database {name} is damaged ({text}); restore a backup of it")
     if isinstance(error, OperationalError):
         return StoreUnavailable(f"the database {name} does not answer now: {text.strip()}")

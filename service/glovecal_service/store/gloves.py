@@ -15,6 +15,7 @@ from glovecal_service.store.clock import now
 from glovecal_service.store.database import Database
 from glovecal_service.store.errors import NotFound
 from glovecal_service.store.records import GloveRecord
+from glovecal_service.store.row_hash import sound_row, sound_rows
 from glovecal_service.store.subjects import require_subject
 from glovecal_service.store.texts import check_text
 
@@ -44,18 +45,18 @@ class Gloves:
                 _change(connection, glove, said)
                 if any(said[name] != getattr(earlier, name) for name in _WEARER):
                     revision.grow(connection)
-            return _record(_require(connection, glove))
+            return _record(sound_row(tables.gloves, _require(connection, glove)))
 
     def get(self, name: str) -> GloveRecord:
         """Raises NotFound."""
         with self._database.read() as connection:
-            return _record(_require(connection, name))
+            return _record(sound_row(tables.gloves, _require(connection, name)))
 
     def list(self) -> list[GloveRecord]:
         """All gloves by name."""
         with self._database.read() as connection:
-            rows = connection.execute(select(tables.gloves).order_by(tables.gloves.c.name))
-            return [_record(row) for row in rows]
+            statement = select(tables.gloves).order_by(tables.gloves.c.name)
+            return sound_rows(connection, tables.gloves, statement, _record)
 
     def assign(self, glove: str, subject: str | None, wearing: str | None = None) -> GloveRecord:
         """Say who wears the glove from now on; None for nobody. The glove need not have been seen yet.
@@ -79,7 +80,7 @@ class Gloves:
             }
             _change(connection, glove, chosen)
             revision.grow(connection)
-            return _record(_require(connection, glove))
+            return _record(sound_row(tables.gloves, _require(connection, glove)))
 
 
 def _said(glove: str, meta: Mapping[str, Any]) -> dict[str, Any]:
@@ -144,6 +145,6 @@ def _require(connection: Connection, glove: str) -> Row:
     return row
 
 
-def _record(row: Row) -> GloveRecord:
+def _record(values: Mapping[str, Any]) -> GloveRecord:
     hidden = ("run_id", "assigned_run_id")
-    return GloveRecord(**{name: value for name, value in row._mapping.items() if name not in hidden})
+    return GloveRecord(**{name: value for name, value in values.items() if name not in hidden})

@@ -9,17 +9,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from datetime import datetime
+from functools import partial
 from typing import Any
 
-from sqlalchemy import Connection, Row, insert, select, update
+from sqlalchemy import Connection, insert, select
 
 from glovecal_models.names import check_identifier
 from glovecal_service.store import tables
 from glovecal_service.store.clock import new_id, now
 from glovecal_service.store.database import Database
-from glovecal_service.store.errors import Conflict, NotFound
+from glovecal_service.store.errors import Conflict, NotFound, StoreDamaged
 from glovecal_service.store.records import FINISHED_JOB_STATES, JobEvent, JobRecord
+from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
 
 LEASE_S = 30.0
 MOST_LOSSES = 3
@@ -53,7 +56,7 @@ class Jobs:
             "updated_at": at,
         }
         with self._database.write() as connection:
-            connection.execute(insert(tables.jobs).values(**values))
+            add_row(connection, tables.jobs, values)
             return _noted(connection, id)
 
     def claim(self, owner: str) -> JobRecord | None:
@@ -67,25 +70,28 @@ class Jobs:
                 return None
         with self._database.write() as connection:
             self._requeue(connection, table.c.lease_until < self._clock())
-            oldest = select(table.c.id).where(table.c.state == "queued")
-            oldest = (
-                oldest.order_by(table.c.created_at, table.c.id).limit(1).with_for_update(skip_locked=True)
+            queued = table.c.state == "queued"
+            ids = connection.scalars(
+                select(table.c.id).where(queued).order_by(table.c.created_at, table.c.id)
             )
-            id = connection.scalar(oldest)
-            if id is None:
-                return None
-            at = now()
-            statement = update(table).where((table.c.id == id) & (table.c.state == "queued"))
-            statement = statement.values(
-                state="running",
-                attempt=table.c.attempt + 1,
-                owner=owner,
-                lease_until=self._clock() + LEASE_S,
-                sentence="starting",
-                started_at=at,
-                updated_at=at,
-            )
-            return _noted(connection, id) if connection.execute(statement).rowcount else None
+            for id in ids.all():
+                mine = (table.c.id == id) & queued
+                with suppress(StoreDamaged):  # the job stays where it is, and lists name it
+                    if change_rows(connection, table, mine, partial(self._claimed, owner), skip_locked=True):
+                        return _noted(connection, id)
+        return None
+
+    def _claimed(self, owner: str, row: Mapping[str, Any]) -> dict[str, Any]:
+        at = now()
+        return {
+            "state": "running",
+            "attempt": row["attempt"] + 1,
+            "owner": owner,
+            "lease_until": self._clock() + LEASE_S,
+            "sentence": "starting",
+            "started_at": at,
+            "updated_at": at,
+        }
 
     def heartbeat(self, id: str, attempt: int) -> JobRecord:
         """Extend the lease; the record says whether to cancel. Raises Conflict if the attempt is over."""
@@ -138,7 +144,7 @@ class Jobs:
         with self._database.write() as connection:
             self._write(connection, id, attempt, {**values, "lease_until": None})
             if _require(connection, id).cancel_requested:
-                connection.execute(update(table).where(table.c.id == id).values(**_cancelled()))
+                change_rows(connection, table, table.c.id == id, _cancelled())
             return _noted(connection, id)
 
     def request_cancel(self, id: str) -> JobRecord:
@@ -148,14 +154,12 @@ class Jobs:
         """
         table, at = tables.jobs, now()
         with self._database.write() as connection:
-            queued = update(table).where((table.c.id == id) & (table.c.state == "queued"))
-            queued = queued.values(
-                state="cancelled", sentence="cancelled", cancel_requested=True, finished_at=at, updated_at=at
-            )
-            if connection.execute(queued).rowcount:
+            asked = {"cancel_requested": True, "updated_at": at}
+            queued = (table.c.id == id) & (table.c.state == "queued")
+            if change_rows(connection, table, queued, {**_cancelled(), **asked}):
                 return _noted(connection, id)
-            running = update(table).where((table.c.id == id) & (table.c.state == "running"))
-            connection.execute(running.values(cancel_requested=True, updated_at=at))
+            running = (table.c.id == id) & (table.c.state == "running")
+            change_rows(connection, table, running, asked)
             return _require(connection, id)
 
     def requeue_of(self, owner: str) -> int:
@@ -180,7 +184,7 @@ class Jobs:
         statement = select(table).where((table.c.job == id) & (table.c.id > after)).order_by(table.c.id)
         with self._database.read() as connection:
             _require(connection, id)
-            return [JobEvent(**row._mapping) for row in connection.execute(statement)]
+            return sound_rows(connection, table, statement, lambda values: JobEvent(**values))
 
     def list(self, *, subject: str | None = None, only_unfinished: bool = False) -> list[JobRecord]:
         """Jobs, newest first."""
@@ -191,7 +195,7 @@ class Jobs:
         if only_unfinished:
             statement = statement.where(table.c.state.not_in(FINISHED_JOB_STATES))
         with self._database.read() as connection:
-            return [_record(row) for row in connection.execute(statement)]
+            return sound_rows(connection, table, statement, _record)
 
     def _end(self, id: str, attempt: int, state: str, sentence: str, **values: Any) -> JobRecord:
         at: datetime = now()
@@ -208,7 +212,7 @@ class Jobs:
     def _write(self, connection: Connection, id: str, attempt: int, values: Mapping[str, Any]) -> None:
         table = tables.jobs
         mine = (table.c.id == id) & (table.c.attempt == attempt) & (table.c.state == "running")
-        if not connection.execute(update(table).where(mine).values(**values, updated_at=now())).rowcount:
+        if not change_rows(connection, table, mine, {**values, "updated_at": now()}):
             record = _require(connection, id)
             raise Conflict(
                 f"attempt {attempt} of job {id} is over: it is {record.state} in attempt {record.attempt}"
@@ -216,13 +220,15 @@ class Jobs:
 
     def _requeue(self, connection: Connection, condition: Any) -> int:
         table = tables.jobs
-        lost = select(table).where((table.c.state == "running") & condition).with_for_update(skip_locked=True)
-        rows = connection.execute(lost).all()
-        for row in rows:
-            mine = (table.c.id == row.id) & (table.c.attempt == row.attempt) & (table.c.state == "running")
-            connection.execute(update(table).where(mine).values(**_after_loss(row), updated_at=now()))
-            _noted(connection, row.id)
-        return len(rows)
+        ids = connection.scalars(select(table.c.id).where((table.c.state == "running") & condition))
+        requeued = 0
+        for id in ids.all():
+            mine = (table.c.id == id) & (table.c.state == "running") & condition
+            with suppress(StoreDamaged):  # the job stays where it is, and lists name it
+                if change_rows(connection, table, mine, _after_loss, skip_locked=True):
+                    _noted(connection, id)
+                    requeued += 1
+        return requeued
 
 
 def _plain(sentence: str) -> str:
@@ -234,11 +240,12 @@ def _plain_text(text: str) -> str:
     return text.encode("utf-8", "replace").decode().replace("\0", "")
 
 
-def _after_loss(row: Row) -> dict[str, Any]:
+def _after_loss(row: Mapping[str, Any]) -> dict[str, Any]:
     """What becomes of a running job whose runner died."""
-    if row.cancel_requested:
-        return _cancelled()
-    losses = row.losses + 1
+    at = now()
+    if row["cancel_requested"]:
+        return {**_cancelled(), "updated_at": at}
+    losses = row["losses"] + 1
     if losses >= MOST_LOSSES:
         sentence = f"given up: the process that ran it died {losses} times"
         return {
@@ -246,11 +253,13 @@ def _after_loss(row: Row) -> dict[str, Any]:
             "losses": losses,
             "sentence": sentence,
             "error": sentence,
-            "finished_at": now(),
+            "finished_at": at,
+            "updated_at": at,
             "lease_until": None,
         }
     return {
         "state": "queued",
+        "updated_at": at,
         "losses": losses,
         "owner": None,
         "lease_until": None,
@@ -274,8 +283,8 @@ def _require(connection: Connection, id: str) -> JobRecord:
     row = connection.execute(select(tables.jobs).where(tables.jobs.c.id == id)).one_or_none()
     if row is None:
         raise NotFound(f"there is no job {id!r}")
-    return _record(row)
+    return _record(sound_row(tables.jobs, row))
 
 
-def _record(row: Row) -> JobRecord:
-    return JobRecord(**{name: value for name, value in row._mapping.items() if name not in _HIDDEN})
+def _record(values: Mapping[str, Any]) -> JobRecord:
+    return JobRecord(**{name: value for name, value in values.items() if name not in _HIDDEN})

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from sqlalchemy import Connection, delete, exists, insert, select
 
 from glovecal_models.errors import BadInput
@@ -12,6 +15,7 @@ from glovecal_service.store.clock import now
 from glovecal_service.store.database import Database
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import LayoutRecord
+from glovecal_service.store.row_hash import sound_row, sound_rows
 
 
 class Layouts:
@@ -20,11 +24,11 @@ class Layouts:
 
     def get(self, name: str) -> Layout:
         """The layout of that name, stored or built in. Raises NotFound."""
-        statement = select(tables.layouts.c.document).where(tables.layouts.c.name == name)
+        statement = select(tables.layouts).where(tables.layouts.c.name == name)
         with self._database.read() as connection:
-            document = connection.scalar(statement)
-        if document is not None:
-            return Layout.from_document(document)
+            row = connection.execute(statement).one_or_none()
+        if row is not None:
+            return Layout.from_document(sound_row(tables.layouts, row)["document"])
         if name in BUILT_IN:
             return Layout.built_in(name)
         raise NotFound(f"there is no layout {name!r}; built in are {', '.join(BUILT_IN)}")
@@ -34,11 +38,7 @@ class Layouts:
         built_in = [LayoutRecord(name, Layout.built_in(name).to_document(), True) for name in BUILT_IN]
         statement = select(tables.layouts).order_by(tables.layouts.c.name)
         with self._database.read() as connection:
-            stored = [
-                LayoutRecord(row.name, row.document, False, row.created_at)
-                for row in connection.execute(statement)
-            ]
-        return built_in + stored
+            return built_in + sound_rows(connection, tables.layouts, statement, _record)
 
     def put(self, layout: Layout) -> LayoutRecord:
         """Keep a layout; the same one again changes nothing.
@@ -69,6 +69,10 @@ class Layouts:
                 insert(tables.layouts).values(name=name, document=document, created_at=record.created_at)
             )
         return record
+
+
+def _record(values: Mapping[str, Any]) -> LayoutRecord:
+    return LayoutRecord(**values, built_in=False)
 
 
 def _in_use(connection: Connection, name: str) -> bool:

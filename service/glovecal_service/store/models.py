@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from sqlalchemy import Connection, Row, func, insert, select
+from sqlalchemy import ColumnElement, Connection, func, select
 
 from glovecal_models.calibration.artifact import read_manifest
 from glovecal_models.errors import BadInput, DamagedArtifact
@@ -17,8 +17,8 @@ from glovecal_service.store.clock import now
 from glovecal_service.store.database import Database
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import Activation, ModelRecord
-from glovecal_service.store.row_hash import check_row, row_hash
-from glovecal_service.store.subjects import require_subject
+from glovecal_service.store.row_hash import add_row, sound_row, sound_rows
+from glovecal_service.store.subjects import of_subject, require_subject
 
 SHORTEST_PREFIX = 6
 _PREFIX = re.compile(r"[0-9a-f]{6,64}\Z")
@@ -66,12 +66,9 @@ class Models:
                         f" {earlier.layout!r} already"
                     )
                 return earlier
-            values = dict(record.__dict__)
-            values["row_sha256"] = row_hash("models", values)
-            connection.execute(insert(tables.models).values(**values))
-            if takes:
-                rows = [{"model": record.id, "take": take} for take in takes]
-                connection.execute(insert(tables.model_takes), rows)
+            add_row(connection, tables.models, record.__dict__)
+            for take in takes:
+                add_row(connection, tables.model_takes, {"model": record.id, "take": take})
         return record
 
     def get(self, id: str) -> ModelRecord:
@@ -83,11 +80,10 @@ class Models:
         """Models in the order they were added."""
         statement = select(tables.models).order_by(tables.models.c.created_at, tables.models.c.id)
         if subject is not None:
-            statement = statement.where(tables.models.c.subject == subject)
-        if layout is not None:
-            statement = statement.where(tables.models.c.layout == layout)
+            statement = statement.where(of_subject(tables.models, subject))
         with self._database.read() as connection:
-            return [_record(row) for row in connection.execute(statement)]
+            wanted = {"subject": subject, "layout": layout}
+            return sound_rows(connection, tables.models, statement, _record, wanted)
 
     def lineage(self, id: str) -> list[ModelRecord]:
         """The model, its parent, the parent's parent ... Raises NotFound."""
@@ -142,10 +138,10 @@ class Models:
     def activations(self, subject: str, layout: str) -> list[Activation]:
         """What was active since when, oldest first."""
         table = tables.activations
-        statement = select(table).where((table.c.subject == subject) & (table.c.layout == layout))
+        statement = select(table).where(_concerns(subject)).order_by(table.c.id)
+        wanted = {"subject": subject, "layout": layout}
         with self._database.read() as connection:
-            rows = connection.execute(statement.order_by(table.c.id)).all()
-        return [_checked_activation(row) for row in rows]
+            return sound_rows(connection, table, statement, _activation_record, wanted)
 
 
 def _effect_names(artifact: bytes) -> dict[str, list[str]]:
@@ -159,7 +155,7 @@ def _effect_names(artifact: bytes) -> dict[str, list[str]]:
 
 def _find(connection: Connection, id: str) -> ModelRecord | None:
     row = connection.execute(select(tables.models).where(tables.models.c.id == id)).one_or_none()
-    return None if row is None else _record(row)
+    return None if row is None else _record(sound_row(tables.models, row))
 
 
 def _one(connection: Connection, id: str) -> ModelRecord:
@@ -173,21 +169,27 @@ def _one(connection: Connection, id: str) -> ModelRecord:
         raise NotFound(f"there is no model {id!r}")
     if len(rows) > 1:
         raise Conflict(f"more than one model starts with {id!r}; give more digits")
-    return _record(rows[0])
+    return _record(sound_row(tables.models, rows[0]))
 
 
-def _record(row: Row) -> ModelRecord:
-    values = dict(row._mapping)
-    check_row("models", values, f"model {values['id'][:12]}")
-    del values["row_sha256"]
+def _record(values: dict[str, Any]) -> ModelRecord:
     return ModelRecord(**values)
 
 
 def _current(connection: Connection, subject: str, layout: str) -> Activation | None:
     table = tables.activations
-    mine = (table.c.subject == subject) & (table.c.layout == layout)
-    row = connection.execute(select(table).where(mine).order_by(table.c.id.desc()).limit(1)).first()
-    return None if row is None else _checked_activation(row)
+    newest_first = select(table).where(_concerns(subject)).order_by(table.c.id.desc())
+    for row in connection.execute(newest_first):
+        found = _activation_record(sound_row(table, row))
+        if (found.subject, found.layout) == (subject, layout):
+            return found
+    return None
+
+
+def _concerns(subject: str) -> ColumnElement[bool]:
+    """Activations that are the subject's, or were before a damage: of all layouts, and of its models."""
+    own = select(tables.models.c.id).where(tables.models.c.subject == subject)
+    return of_subject(tables.activations, subject) | tables.activations.c.model.in_(own)
 
 
 def _newest(connection: Connection, subject: str) -> int | None:
@@ -200,7 +202,7 @@ def _activation(connection: Connection, id: int) -> Activation:
     row = connection.execute(select(tables.activations).where(tables.activations.c.id == id)).one_or_none()
     if row is None:
         raise NotFound(f"activation {id} is missing from the database")
-    return _checked_activation(row)
+    return _activation_record(sound_row(tables.activations, row))
 
 
 def _append(connection: Connection, model: ModelRecord, kind: str, previous: int | None) -> Activation:
@@ -212,17 +214,11 @@ def _append(connection: Connection, model: ModelRecord, kind: str, previous: int
         "previous": previous,
         "created_at": now(),
     }
-    statement = insert(tables.activations).values(**values, row_sha256=row_hash("activations", values))
-    id = connection.execute(statement.returning(tables.activations.c.id)).scalar_one()
-    return Activation(id=id, **values)
+    return Activation(id=add_row(connection, tables.activations, values), **values)
 
 
-def _checked_activation(row: Row) -> Activation:
-    values = dict(row._mapping)
-    id = values.pop("id")
-    check_row("activations", values, f"activation {id}")
-    del values["row_sha256"]
-    return Activation(id=id, **values)
+def _activation_record(values: dict[str, Any]) -> Activation:
+    return Activation(**values)
 
 
 def _take_ids(takes: Iterable[Any]) -> list[str]:

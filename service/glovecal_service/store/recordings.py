@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from sqlalchemy import Connection, Row, insert, select, update
+from sqlalchemy import Connection, select
 
 from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier
@@ -13,6 +13,7 @@ from glovecal_service.store.clock import new_id, now
 from glovecal_service.store.database import Database
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import OPEN_RECORDING_STATES, RecordingRecord, RecordingState
+from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
 from glovecal_service.store.subjects import require_subject
 from glovecal_service.store.texts import check_text
 
@@ -74,7 +75,7 @@ class Recordings:
                 "requested_at": at,
                 "updated_at": at,
             }
-            connection.execute(insert(tables.recordings).values(**values))
+            add_row(connection, tables.recordings, values)
             return _require(connection, id)
 
     def stop(self, id: str) -> RecordingRecord:
@@ -108,20 +109,21 @@ class Recordings:
         if glove is not None:
             statement = statement.where(table.c.glove == glove)
         if only_open:
-            statement = statement.where(table.c.state.in_(OPEN_RECORDING_STATES))
+            statement = statement.where(
+                table.c.state.not_in([s for s, order in _ORDER.items() if order == 3])
+            )
         with self._database.read() as connection:
-            return [_record(row) for row in connection.execute(statement)]
+            return sound_rows(connection, table, statement, _record)
 
 
 def _move(connection: Connection, id: str, state: str | None, facts: dict[str, Any]) -> RecordingRecord:
-    statement = select(tables.recordings).where(tables.recordings.c.id == id).with_for_update()
-    row = connection.execute(statement).one_or_none()
-    if row is None:
-        raise NotFound(f"there is no recording {id!r}")
-    values: dict[str, Any] = {"facts": {**row.facts, **facts}, "updated_at": now()}
-    if state is not None and _ORDER[state] > _ORDER[row.state]:
-        values["state"] = state
-    connection.execute(update(tables.recordings).where(tables.recordings.c.id == id).values(**values))
+    def change(row: dict[str, Any]) -> dict[str, Any]:
+        values: dict[str, Any] = {"facts": {**row["facts"], **facts}, "updated_at": now()}
+        if state is not None and _ORDER[state] > _ORDER[row["state"]]:
+            values["state"] = state
+        return values
+
+    change_rows(connection, tables.recordings, tables.recordings.c.id == id, change)
     return _require(connection, id)
 
 
@@ -129,15 +131,15 @@ def _open_recording(connection: Connection, glove: str) -> RecordingRecord | Non
     table = tables.recordings
     open_ones = (table.c.glove == glove) & table.c.state.in_(OPEN_RECORDING_STATES)
     row = connection.execute(select(table).where(open_ones).limit(1)).first()
-    return None if row is None else _record(row)
+    return None if row is None else _record(sound_row(table, row))
 
 
 def _require(connection: Connection, id: str) -> RecordingRecord:
     row = connection.execute(select(tables.recordings).where(tables.recordings.c.id == id)).one_or_none()
     if row is None:
         raise NotFound(f"there is no recording {id!r}")
-    return _record(row)
+    return _record(sound_row(tables.recordings, row))
 
 
-def _record(row: Row) -> RecordingRecord:
-    return RecordingRecord(**row._mapping)
+def _record(values: dict[str, Any]) -> RecordingRecord:
+    return RecordingRecord(**values)

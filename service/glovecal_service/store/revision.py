@@ -31,6 +31,6 @@ class Revision:
     def __call__(self) -> int:
         with self._database.read() as connection:
             value = connection.scalar(select(tables.revision.c.value))
-        if value is None:
+        if not isinstance(value, int):
             raise StoreDamaged("the revision of the store is missing; restore a backup of the database")
-        return int(value)
+        return value

@@ -1,32 +1,137 @@
-"""A sha256 over a row's values: databases do not notice changed row contents by themselves.
+"""Tables whose rows carry a sha256 of their values: the only way in which those tables are written and read.
 
-In trials 40 random overwrites of an SQLite file were found 7 times by its integrity check, so the rows that
-decide which model speaks for a person carry a hash of their own, checked at each read.
+Databases do not notice changed row contents by themselves: in trials 40 random overwrites of an SQLite file
+were found 7 times by its integrity check. A table is protected by having the column ``row_sha256``; then all
+its other columns are hashed but those the database itself numbers. NULL is left out of the hash, so a
+nullable column can be added later and the rows there are stay valid.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
-from datetime import datetime
-from typing import Any
+import json
+from collections.abc import Callable, Mapping
+from datetime import UTC
+from typing import Any, TypeVar
 
-from glovecal_service.store.errors import StoreDamaged
+from sqlalchemy import ColumnElement, Connection, Row, Select, Table, insert, select, update
+from sqlalchemy.types import JSON, Float
+
+from glovecal_models.errors import BadInput
+from glovecal_service.store.column_types import Json, Unreadable, UtcTime
+from glovecal_service.store.errors import DamagedRows, StoreDamaged
 from glovecal_service.store.json_text import json_text
 
+HASH = "row_sha256"
+Record = TypeVar("Record")
 
-def row_hash(table: str, values: Mapping[str, Any]) -> str:
-    """sha256 hex of the canonical JSON of ``values`` (column names sorted, ``row_sha256`` left out)."""
-    content = {name: _plain(value) for name, value in values.items() if name != "row_sha256"}
-    text = json_text([table, content], sort_keys=True)
+
+def add_row(connection: Connection, table: Table, values: Mapping[str, Any]) -> Any:
+    """Insert a row with its hash; its (first) primary key. Raises BadInput for what JSON cannot hold."""
+    values = {**values, HASH: row_hash(table, _as_read(table, values))}
+    key = connection.execute(insert(table).values(**values)).inserted_primary_key
+    return None if key is None else key[0]
+
+
+def change_rows(
+    connection: Connection,
+    table: Table,
+    which: ColumnElement[bool],
+    change: Mapping[str, Any] | Callable[[dict[str, Any]], Mapping[str, Any]],
+    *,
+    skip_locked: bool = False,
+) -> int:
+    """Set columns of the rows ``which`` chooses and hash them anew; how many there were.
+
+    ``change`` holds the new values, or gives them for the row as it is. The rows are locked first. One that
+    was damaged raises StoreDamaged: a new hash would hide it.
+    """
+    rows = connection.execute(select(table).where(which).with_for_update(skip_locked=skip_locked)).all()
+    for row in rows:
+        before = sound_row(table, row)
+        values = change(dict(before)) if callable(change) else change
+        digest = row_hash(table, _as_read(table, {**before, **values}))
+        same = [column == before[column.name] for column in table.primary_key.columns]
+        connection.execute(update(table).where(*same).values({**values, HASH: digest}))
+    return len(rows)
+
+
+def sound_rows(
+    connection: Connection,
+    table: Table,
+    chosen: Select[Any],
+    make: Callable[[dict[str, Any]], Record],
+    wanted: Mapping[str, Any] | None = None,
+) -> list[Record]:
+    """What ``make`` makes of the rows of ``chosen``, a selection of whole rows of ``table``; with ``wanted``
+    of those that have these values (None: any), which is looked at when the row is known to be sound.
+
+    Raises DamagedRows, which names each damaged row and holds the records of the others.
+    """
+    records, damaged = [], []
+    for row in connection.execute(chosen):
+        try:
+            values = sound_row(table, row)
+            if all(value is None or values[name] == value for name, value in (wanted or {}).items()):
+                records.append(make(values))
+        except StoreDamaged as error:
+            damaged.append(str(error))
+    if damaged:
+        raise DamagedRows(damaged, records)
+    return records
+
+
+def sound_row(table: Table, row: Row[Any]) -> dict[str, Any]:
+    """The row's values without its hash. Raises StoreDamaged unless they are what was written."""
+    values = dict(row._mapping)
+    for name, value in values.items():
+        if isinstance(value, Unreadable):
+            raise StoreDamaged(
+                f"{_named(table, values)} is damaged: {name} holds {value}; restore a backup of the database"
+            )
+    expected = values.pop(HASH, None)
+    if HASH in table.columns and not _matches(table, values, expected):
+        raise StoreDamaged(
+            f"{_named(table, values)} was changed after it was written; restore a backup of the database"
+        )
+    return values
+
+
+def row_hash(table: Table, values: Mapping[str, Any]) -> str:
+    """sha256 hex of the table's name and ``values`` as they are read back, as canonical JSON."""
+    content = {}
+    for column in table.columns:
+        value = values.get(column.name)
+        if value is not None and column.name != HASH and column is not table.autoincrement_column:
+            content[column.name] = value.isoformat() if isinstance(column.type, UtcTime) else value
+    text = json_text([table.name, content], sort_keys=True)
     return hashlib.sha256(text.encode("ascii")).hexdigest()
 
 
-def check_row(table: str, values: Mapping[str, Any], what: str) -> None:
-    """Raise StoreDamaged unless the row is what was written."""
-    if row_hash(table, values) != values["row_sha256"]:
-        raise StoreDamaged(f"the database row of {what} was changed after it was written; restore a backup")
+def _matches(table: Table, values: Mapping[str, Any], expected: Any) -> bool:
+    try:
+        return row_hash(table, values) == expected
+    except BadInput:  # infinity, or bytes where there was text
+        return False
 
 
-def _plain(value: Any) -> Any:
-    return value.isoformat() if isinstance(value, datetime) else value
+def _as_read(table: Table, values: Mapping[str, Any]) -> dict[str, Any]:
+    """``values`` as the database will give them back: 0 s as 0.0, a tuple as a list, times in UTC."""
+    read = {}
+    for name, value in values.items():
+        kind = table.columns[name].type
+        if value is None:
+            continue
+        if isinstance(kind, Json | JSON):
+            value = json.loads(json_text(value))
+        elif isinstance(kind, UtcTime):
+            value = value.astimezone(UTC)
+        elif isinstance(kind, Float):
+            value = float(value)
+        read[name] = value
+    return read
+
+
+def _named(table: Table, values: Mapping[str, Any]) -> str:
+    key = ", ".join(str(values[column.name])[:80] for column in table.primary_key.columns)
+    return f"row {key!a} of table {table.name}"

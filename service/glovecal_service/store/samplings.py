@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from sqlalchemy import Connection, Row, insert, select, update
+from sqlalchemy import Connection, select
 
 from glovecal_service.store import revision, tables
 from glovecal_service.store.clock import new_id, now
 from glovecal_service.store.database import Database
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import SamplingRecord
+from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
 from glovecal_service.store.subjects import require_subject
 
 
@@ -56,7 +57,7 @@ class Samplings:
                 "created_at": at,
                 "updated_at": at,
             }
-            connection.execute(insert(table).values(**values))
+            add_row(connection, table, values)
             revision.grow(connection)
             return _require(connection, id)
 
@@ -74,7 +75,7 @@ class Samplings:
         if only_open:
             statement = statement.where(table.c.open)
         with self._database.read() as connection:
-            return [_record(row) for row in connection.execute(statement)]
+            return sound_rows(connection, table, statement, _record)
 
     def save(self, seen: SamplingRecord, document: Mapping[str, Any]) -> SamplingRecord | None:
         """Replace the document that ``seen`` has; None if somebody else did so meanwhile."""
@@ -82,7 +83,7 @@ class Samplings:
         same = (table.c.id == seen.id) & (table.c.version == seen.version)
         values = {"document": dict(document), "version": seen.version + 1, "updated_at": now()}
         with self._database.write() as connection:
-            if not connection.execute(update(table).where(same).values(**values)).rowcount:
+            if not change_rows(connection, table, same, values):
                 return None
             revision.grow(connection)
             return _require(connection, seen.id)
@@ -90,16 +91,15 @@ class Samplings:
     def note(self, id: str, **values: Any) -> None:
         """Set ``live``, ``problem``, ``recordings``, ``takes`` or ``open``; only its runner does so."""
         with self._database.write() as connection:
-            table = tables.samplings
-            connection.execute(update(table).where(table.c.id == id).values(**values))
+            change_rows(connection, tables.samplings, tables.samplings.c.id == id, values)
 
 
 def _require(connection: Connection, id: str) -> SamplingRecord:
     row = connection.execute(select(tables.samplings).where(tables.samplings.c.id == id)).one_or_none()
     if row is None:
         raise NotFound(f"there is no sampling {id!r}")
-    return _record(row)
+    return _record(sound_row(tables.samplings, row))
 
 
-def _record(row: Row) -> SamplingRecord:
-    return SamplingRecord(**row._mapping)
+def _record(values: dict[str, Any]) -> SamplingRecord:
+    return SamplingRecord(**values)

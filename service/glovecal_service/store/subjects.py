@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import get_args
+from typing import Any, get_args
 
-from sqlalchemy import Connection, Row, delete, func, insert, select, update
+from sqlalchemy import ColumnElement, Connection, Table, delete, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
 from glovecal_models.errors import BadInput
@@ -18,6 +18,7 @@ from glovecal_service.store.clock import now
 from glovecal_service.store.database import Database
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import SubjectRecord
+from glovecal_service.store.row_hash import sound_row, sound_rows
 from glovecal_service.store.texts import check_text
 
 
@@ -56,8 +57,8 @@ class Subjects:
     def list(self) -> list[SubjectRecord]:
         """All subjects by name."""
         with self._database.read() as connection:
-            rows = connection.execute(select(tables.subjects).order_by(tables.subjects.c.name))
-            return [_record(row) for row in rows]
+            statement = select(tables.subjects).order_by(tables.subjects.c.name)
+            return sound_rows(connection, tables.subjects, statement, _record)
 
     def measure(self, name: str, dimensions: Mapping[str, float], hand: Handedness) -> SubjectRecord:
         """Replace what was measured of a person's hand. Raises NotFound, BadInput."""
@@ -87,11 +88,16 @@ def require_subject(connection: Connection, name: str) -> SubjectRecord:
     row = connection.execute(select(tables.subjects).where(tables.subjects.c.name == name)).one_or_none()
     if row is None:
         raise NotFound(f"there is no subject {name!r}")
-    return _record(row)
+    return _record(sound_row(tables.subjects, row))
 
 
-def _record(row: Row) -> SubjectRecord:
-    return SubjectRecord(**row._mapping)
+def of_subject(table: Table, name: str) -> ColumnElement[bool]:
+    """Rows of a person, and rows of nobody: their subject is damaged, and whoever reads them notices."""
+    return (table.c.subject == name) | table.c.subject.not_in(select(tables.subjects.c.name))
+
+
+def _record(values: Mapping[str, Any]) -> SubjectRecord:
+    return SubjectRecord(**values)
 
 
 def _dimensions(subject: str, dimensions: Mapping[str, float]) -> dict[str, float]:

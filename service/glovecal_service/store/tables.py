@@ -1,16 +1,13 @@
-"""The database's tables, as SQLAlchemy Core knows them; migrations bring a file to this shape."""
+"""The database's tables, as SQLAlchemy Core knows them; migrations bring a file to this shape.
+
+A column ``row_sha256`` protects a table: ``row_hash.py`` writes and checks it.
+"""
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
-from typing import Any
-
 from sqlalchemy import (
-    JSON,
     BigInteger,
-    Boolean,
     Column,
-    DateTime,
     Float,
     ForeignKey,
     Index,
@@ -19,9 +16,10 @@ from sqlalchemy import (
     String,
     Table,
     Text,
-    TypeDecorator,
     UniqueConstraint,
 )
+
+from glovecal_service.store.column_types import Flag, Json, UtcTime
 
 metadata = MetaData(
     naming_convention={
@@ -33,21 +31,6 @@ metadata = MetaData(
 )
 
 
-class UtcTime(TypeDecorator[datetime]):
-    """A time in UTC on both databases; SQLite alone would drop the zone."""
-
-    impl = DateTime(timezone=True)
-    cache_ok = True
-
-    def process_bind_param(self, value: datetime | None, dialect: Any) -> datetime | None:
-        return None if value is None else value.astimezone(UTC)
-
-    def process_result_value(self, value: datetime | None, dialect: Any) -> datetime | None:
-        if value is None:
-            return None
-        return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
-
-
 NAME = String(64)
 SHA256 = String(64)
 GROWING = BigInteger().with_variant(Integer(), "sqlite")
@@ -57,7 +40,7 @@ subjects = Table(
     metadata,
     Column("name", NAME, primary_key=True),
     Column("title", Text, nullable=False),
-    Column("dimensions", JSON, nullable=False),
+    Column("dimensions", Json, nullable=False),
     Column("created_at", UtcTime, nullable=False),
     Column("hand", String(8), nullable=False, server_default="right"),
 )
@@ -66,7 +49,7 @@ layouts = Table(
     "layouts",
     metadata,
     Column("name", NAME, primary_key=True),
-    Column("document", JSON, nullable=False),
+    Column("document", Json, nullable=False),
     Column("created_at", UtcTime, nullable=False),
 )
 
@@ -78,8 +61,8 @@ gloves = Table(
     Column("subject", NAME),
     Column("wearing", Text),
     Column("hand", String(16), nullable=False),
-    Column("simulated", Boolean, nullable=False),
-    Column("meta", JSON, nullable=False),
+    Column("simulated", Flag, nullable=False),
+    Column("meta", Json, nullable=False),
     Column("run_id", String(32)),
     Column("first_seen_at", UtcTime, nullable=False),
     Column("last_seen_at", UtcTime, nullable=False),
@@ -99,17 +82,18 @@ takes = Table(
     Column("artifact", SHA256, nullable=False),
     Column("frames_sha256", SHA256, nullable=False),
     Column("original_sha256", SHA256),
-    Column("sensors", JSON, nullable=False),
-    Column("rotations", JSON, nullable=False),
-    Column("context", JSON, nullable=False),
+    Column("sensors", Json, nullable=False),
+    Column("rotations", Json, nullable=False),
+    Column("context", Json, nullable=False),
     Column("frames", Integer, nullable=False),
     Column("reference_rows", Integer, nullable=False),
     Column("duration_s", Float, nullable=False),
-    Column("simulated", Boolean, nullable=False),
+    Column("simulated", Flag, nullable=False),
     Column("recording", NAME),
-    Column("accounting", JSON),
-    Column("facts", JSON, nullable=False),
+    Column("accounting", Json),
+    Column("facts", Json, nullable=False),
     Column("created_at", UtcTime, nullable=False),
+    Column("row_sha256", SHA256, nullable=False, server_default=""),
     UniqueConstraint("subject", "layout", "frames_sha256"),
 )
 
@@ -121,7 +105,7 @@ models = Table(
     Column("layout", NAME, nullable=False),
     Column("method", String(64), nullable=False),
     Column("parent", SHA256),
-    Column("facts", JSON, nullable=False),
+    Column("facts", Json, nullable=False),
     Column("created_at", UtcTime, nullable=False),
     Column("row_sha256", SHA256, nullable=False),
     Index(None, "subject", "layout"),
@@ -132,6 +116,7 @@ model_takes = Table(
     metadata,
     Column("model", SHA256, ForeignKey("models.id"), primary_key=True),
     Column("take", NAME, primary_key=True, index=True),
+    Column("row_sha256", SHA256, nullable=False, server_default=""),
 )
 
 activations = Table(
@@ -157,9 +142,10 @@ recordings = Table(
     Column("subject", NAME),
     Column("wearing", Text),
     Column("state", String(16), nullable=False, index=True),
-    Column("facts", JSON, nullable=False),
+    Column("facts", Json, nullable=False),
     Column("requested_at", UtcTime, nullable=False),
     Column("updated_at", UtcTime, nullable=False),
+    Column("row_sha256", SHA256, nullable=False, server_default=""),
 )
 
 samplings = Table(
@@ -170,15 +156,16 @@ samplings = Table(
     Column("subject", NAME, ForeignKey("subjects.name"), nullable=False),
     Column("wearing", Text, nullable=False),
     Column("layout", NAME, nullable=False),
-    Column("open", Boolean, nullable=False, index=True),
+    Column("open", Flag, nullable=False, index=True),
     Column("version", Integer, nullable=False),
-    Column("document", JSON, nullable=False),
-    Column("recordings", JSON, nullable=False),
-    Column("takes", JSON, nullable=False),
-    Column("live", JSON, nullable=False),
+    Column("document", Json, nullable=False),
+    Column("recordings", Json, nullable=False),
+    Column("takes", Json, nullable=False),
+    Column("live", Json, nullable=False),
     Column("problem", Text, nullable=False),
     Column("created_at", UtcTime, nullable=False),
     Column("updated_at", UtcTime, nullable=False),
+    Column("row_sha256", SHA256, nullable=False, server_default=""),
 )
 
 jobs = Table(
@@ -187,23 +174,24 @@ jobs = Table(
     Column("id", NAME, primary_key=True),
     Column("kind", NAME, nullable=False),
     Column("subject", NAME),
-    Column("payload", JSON, nullable=False),
+    Column("payload", Json, nullable=False),
     Column("state", String(16), nullable=False),
     Column("attempt", Integer, nullable=False),
     Column("losses", Integer, nullable=False),
     Column("owner", Text),
     Column("lease_until", Float),
-    Column("cancel_requested", Boolean, nullable=False),
+    Column("cancel_requested", Flag, nullable=False),
     Column("fraction", Float, nullable=False),
     Column("sentence", Text, nullable=False),
-    Column("detail", JSON, nullable=False),
-    Column("result", JSON),
+    Column("detail", Json, nullable=False),
+    Column("result", Json),
     Column("error", Text),
     Column("created_at", UtcTime, nullable=False),
     Column("started_at", UtcTime),
     Column("finished_at", UtcTime),
     Column("updated_at", UtcTime, nullable=False),
     Column("traceback", Text),
+    Column("row_sha256", SHA256, nullable=False, server_default=""),
     Index(None, "state", "created_at"),
 )
 
@@ -216,7 +204,7 @@ job_events = Table(
     Column("state", String(16), nullable=False),
     Column("fraction", Float, nullable=False),
     Column("sentence", Text, nullable=False),
-    Column("detail", JSON, nullable=False),
+    Column("detail", Json, nullable=False),
     Column("created_at", UtcTime, nullable=False),
     Index(None, "job", "id"),
 )

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from sqlalchemy import Connection, Row, delete, insert, select, update
+from sqlalchemy import Connection, delete, select
 from sqlalchemy.exc import IntegrityError
 
 from glovecal_models.effects.clock_scan import aligned
@@ -22,7 +22,8 @@ from glovecal_service.store.clock import new_id, now
 from glovecal_service.store.database import Database
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import TakeRecord
-from glovecal_service.store.subjects import require_subject
+from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
+from glovecal_service.store.subjects import of_subject, require_subject
 from glovecal_service.store.take_file import dump_take, frames_hash, load_take
 from glovecal_service.store.texts import check_text
 
@@ -108,11 +109,10 @@ class Takes:
         """Takes in the order they were added."""
         statement = select(tables.takes).order_by(tables.takes.c.created_at, tables.takes.c.id)
         if subject is not None:
-            statement = statement.where(tables.takes.c.subject == subject)
-        if layout is not None:
-            statement = statement.where(tables.takes.c.layout == layout)
+            statement = statement.where(of_subject(tables.takes, subject))
         with self._database.read() as connection:
-            return [_record(row) for row in connection.execute(statement)]
+            wanted = {"subject": subject, "layout": layout}
+            return sound_rows(connection, tables.takes, statement, _record, wanted)
 
     def load(self, id: str) -> Take:
         """The take's arrays, verified. Raises NotFound, DamagedArtifact."""
@@ -166,8 +166,7 @@ class Takes:
         if missing:
             raise BadInput(f"take {id} has no sensor {missing[0]}, which layout {layout.name!r} reads")
         with self._database.write() as connection:
-            same = tables.takes.c.id == id
-            connection.execute(update(tables.takes).where(same).values(layout=layout.name))
+            change_rows(connection, tables.takes, tables.takes.c.id == id, {"layout": layout.name})
             return _require(connection, id)
 
     def _replace(self, earlier: TakeRecord, take: Take, facts: dict[str, Any]) -> TakeRecord:
@@ -180,7 +179,7 @@ class Takes:
         values = {**content, "facts": {**earlier.facts, **facts, "history": history}}
         same = (tables.takes.c.id == earlier.id) & (tables.takes.c.artifact == earlier.artifact)
         with self._database.write() as connection:
-            if not connection.execute(update(tables.takes).where(same).values(**values)).rowcount:
+            if not change_rows(connection, tables.takes, same, values):
                 raise Conflict(f"take {earlier.id} was changed or removed meanwhile; look at it again")
             return _require(connection, earlier.id)
 
@@ -188,8 +187,7 @@ class Takes:
         """Forget a take (its artifact stays). Raises NotFound, Conflict if a model was trained on it."""
         with self._database.write() as connection:
             record = _require(connection, id)
-            trained = select(tables.model_takes.c.model).where(tables.model_takes.c.take == id)
-            if model := connection.scalar(trained.limit(1)):
+            if model := _trained_on(connection, record):
                 raise Conflict(f"model {model[:12]} was trained on take {id} ({record.name}), so it stays")
             connection.execute(delete(tables.takes).where(tables.takes.c.id == id))
 
@@ -209,6 +207,16 @@ class Takes:
         }
 
 
+def _trained_on(connection: Connection, record: TakeRecord) -> str | None:
+    """A model that learned from the take. All rows of the subject's models are looked at: in a damaged one
+    the name of this very take may be lost."""
+    table, models = tables.model_takes, tables.models
+    own = select(models.c.id).where(models.c.subject == record.subject)
+    possible = select(table).where((table.c.take == record.id) | table.c.model.in_(own))
+    rows = sound_rows(connection, table, possible, dict)
+    return next((row["model"] for row in rows if row["take"] == record.id), None)
+
+
 def _check_keepable(take: Take) -> None:
     check_text(take.name, "name of the take")
     check_text(take.wearing, f"wearing of take {take.name!r}", empty=True)
@@ -219,7 +227,7 @@ def _check_keepable(take: Take) -> None:
 def _insert(connection: Connection, take: Take, record: TakeRecord) -> None:
     values = {**record.__dict__, "frames_sha256": frames_hash(take)}
     try:
-        connection.execute(insert(tables.takes).values(**values))
+        add_row(connection, tables.takes, values)
     except IntegrityError as error:
         raise Conflict(
             f"subject {record.subject!r} already has a take with exactly the frames of {take.name!r}"
@@ -230,11 +238,11 @@ def _require(connection: Connection, id: str) -> TakeRecord:
     row = connection.execute(select(tables.takes).where(tables.takes.c.id == id)).one_or_none()
     if row is None:
         raise NotFound(f"there is no take {id!r}")
-    return _record(row)
+    return _record(sound_row(tables.takes, row))
 
 
-def _record(row: Row) -> TakeRecord:
-    values = {name: value for name, value in row._mapping.items() if name != "frames_sha256"}
+def _record(values: dict[str, Any]) -> TakeRecord:
+    values = {name: value for name, value in values.items() if name != "frames_sha256"}
     for name in ("sensors", "rotations", "context"):
         values[name] = tuple(values[name])
     return TakeRecord(**values)
