@@ -7,6 +7,7 @@ its own process). It is an extra, ``pip install 'glovecal-client[rest]'``, impor
 from __future__ import annotations
 
 import json
+import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 FINISHED = ("done", "failed", "cancelled")
+_WARNING = re.compile(r'^299 \S+ "(.*)"$', re.DOTALL)
 CSV, PARQUET = "text/csv", "application/vnd.apache.parquet"
 
 
@@ -62,6 +64,8 @@ class RestClient:
             raise BadName(f"{url!r} is not the address of a service; write it like http://127.0.0.1:8600")
         httpx = _import_httpx()
         self.url = url.rstrip("/")
+        self.warnings: list[str] = []
+        """What answers said in ``Warning`` headers, each once: rows of a list that are damaged."""
         self._http = httpx.Client(
             base_url=f"{self.url}/v1",
             transport=transport,
@@ -202,6 +206,10 @@ class RestClient:
             raise NoService(502, "Connection broken", sentence) from error
         if response.status_code >= 400:
             raise _refusal(response)
+        for header in response.headers.get_list("Warning"):
+            sentence = _WARNING.sub(r"\1", header).replace('\\"', '"').replace("\\\\", "\\")
+            if sentence not in self.warnings:
+                self.warnings.append(sentence)
         return response
 
 

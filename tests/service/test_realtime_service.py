@@ -202,8 +202,34 @@ def test_a_damaged_artifact_is_named_and_the_model_before_it_stays(
         assert serving.model.model_id == good
         assert bad in serving.sentence
         assert f"model {good[:12]}, active before it, is served" in serving.sentence
+        assert f"glovecal model rollback --subject carla --layout {LAYOUT.name}" in serving.sentence
     path.write_bytes(content)
     eventually(lambda: served(session, glove, bad), "the repaired model, without being told")
+
+
+def test_a_model_damaged_while_it_is_served_stays_and_the_status_says_what_to_do(
+    session: zenoh.Session, settings: Settings, store: Store
+) -> None:
+    model = store_model(store, "gerda", degrees_per_count=0.5)
+    glove = WireGlove(session, settings, "g-gerda", subject="gerda")
+    poses = Poses(session, glove)
+    glove.say_meta()
+    eventually(lambda: served(session, glove, model), "the model is served")
+    path = settings.artifacts_folder / model
+    content = path.read_bytes()
+    path.write_bytes(content[:-100])
+
+    def sentence() -> str:
+        return glove_status(session, settings, "g-gerda").get("sentence") or ""
+
+    told = eventually(sentence, "the damage is told")
+    assert f"model {model[:12]} is served as it was loaded before: artifact {model}" in told
+    assert "restore that file from a backup, or train again: glovecal train --subject gerda" in told
+    glove.send()
+    eventually(lambda: poses.live, "a pose")
+    assert poses.live[-1].model_sha256 == model
+    path.write_bytes(content)
+    eventually(lambda: not sentence(), "the repair is noticed")
 
 
 def test_an_unknown_wearer_gets_marked_poses_without_angles(

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from glovecal_models.errors import BadInput
+from glovecal_service.cli.printing import err
 from glovecal_service.cli.refusal import Refusal, sentence_of
 
 if TYPE_CHECKING:
@@ -36,15 +37,25 @@ def connect() -> Iterator[RestClient]:
             client = RestClient(url)
         except BadName as error:
             raise BadInput(f"GLOVECAL_URL: {error}") from error
-        with client:
+        with client, _warnings_told(client):
             yield client
         return
     from glovecal_service.rest.in_process import in_process_client
 
     settings = settings_of_environment()
     _require_usable(settings)
-    with in_process_client(settings) as client:
+    with in_process_client(settings) as client, _warnings_told(client):
         yield client
+
+
+@contextmanager
+def _warnings_told(client: RestClient) -> Iterator[None]:
+    """What answers warned of stands on standard error after what the verb itself prints."""
+    try:
+        yield
+    finally:
+        for sentence in client.warnings:
+            err.print(sentence, style="yellow")
 
 
 def settings_of_environment() -> Settings:

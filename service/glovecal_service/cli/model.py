@@ -44,6 +44,9 @@ def list_models(subject: OnlySubject = None, layout: OnlyLayout = None, as_json:
         "created_at": "trained",
     }
     print_table(shown, columns, empty="No models yet. Train one: glovecal train --subject NAME")
+    for row in rows:
+        if row["damage"]:
+            err.print(f"Damaged and active: {row['damage']}", style="red")
 
 
 @app.command("show")

@@ -16,7 +16,7 @@ from glovecal_service.realtime.model_choice import choose
 from glovecal_service.realtime.pose_meta import PoseMetas, Serving
 from glovecal_service.realtime.served_model import ServedModels
 from glovecal_service.realtime.worn_gloves import WornGlove, WornGloves
-from glovecal_service.store.errors import StoreError, StoreUnavailable
+from glovecal_service.store.errors import StoreDamaged, StoreError, StoreUnavailable
 from glovecal_service.store.store import Store
 
 LOOK_EVERY_S = 0.1
@@ -54,6 +54,8 @@ class ModelWatcher:
         self._unnoted: set[str] = set()
         self._to_choose: set[str] = set()
         self._troubled_at: dict[str, float] = {}
+        self._artifacts_at = 0.0
+        self._damaged: set[str] = set()
 
     def run(self, stopped: Event) -> None:
         """Until ``stopped``."""
@@ -91,14 +93,25 @@ class ModelWatcher:
             self._to_choose |= self._gloves
         late = time.monotonic() - TRY_AGAIN_AFTER_S
         self._to_choose |= {glove for glove, at in self._troubled_at.items() if at < late}
+        self._look_at_artifacts(store)
         for glove in sorted(self._to_choose):
             self._choose(store, glove)
         self._revision = revision
 
+    def _look_at_artifacts(self, store: Store) -> None:
+        """Frames do not read them, so that a damage would only be noticed at the next start."""
+        if time.monotonic() < self._artifacts_at:
+            return
+        self._artifacts_at = time.monotonic() + TRY_AGAIN_AFTER_S
+        damaged = {id for id in self._models.in_use() if not store.artifacts.is_sound(id)}
+        if damaged != self._damaged:
+            self._to_choose |= self._gloves
+        self._damaged = damaged
+
     def _note(self, store: Store, glove: str) -> None:
         try:
             store.gloves.seen(glove, self._metas.of(glove) or {})
-        except BadInput as error:
+        except (BadInput, StoreDamaged) as error:
             _log.warning("glove %s: its meta cannot be used: %s", glove, error)
         self._unnoted.discard(glove)
         self._to_choose.add(glove)

@@ -22,7 +22,14 @@ from glovecal_service.realtime.recording_file import SUFFIX, RecordingFile
 from glovecal_service.realtime.recording_result import keep_as_take
 from glovecal_service.settings import Settings
 from glovecal_service.store.clock import now
-from glovecal_service.store.errors import NotFound, StorageFull, StoreError, StoreUnavailable
+from glovecal_service.store.errors import (
+    DamagedRows,
+    NotFound,
+    StorageFull,
+    StoreDamaged,
+    StoreError,
+    StoreUnavailable,
+)
 from glovecal_service.store.recordings import LEAD_IN
 from glovecal_service.store.records import RecordingRecord
 from glovecal_service.store.store import Store
@@ -76,7 +83,7 @@ class Recorder:
             if now - self._reported_at >= REPORT_EVERY_S:
                 self._reported_at = now
                 self._report(self._opened())
-        except (StoreUnavailable, StorageFull, SQLAlchemyError, OSError) as error:
+        except (StoreError, SQLAlchemyError, OSError) as error:
             _log.warning("the store does not answer, recordings go on: %s", error)
             self._looked_at = now + REPORT_EVERY_S
 
@@ -88,7 +95,7 @@ class Recorder:
     def _follow(self, store: Store) -> None:
         revision = store.revision()
         if revision != self._revision:
-            records = store.recordings.list(only_open=True)
+            records = _sound_recordings(store, only_open=True)
             settled = [self._move(store, record) for record in records]
             self._revision = revision if all(settled) else None
 
@@ -141,7 +148,7 @@ class Recorder:
             "glove": record.glove,
             "capture": capture,
         }
-        others = store.recordings.list(record.glove)
+        others = _sound_recordings(store, record.glove)
         meta[LEAD_IN] = lead_in_wish(record, store.gloves.get(record.glove), others, now()).document()
         try:
             return RecordingFile.create(path, meta)
@@ -181,7 +188,10 @@ class Recorder:
             live.file.sync()
             problem = live.file.problem
             sentence = f"frames wait in memory: {problem}" if problem else "recording"
-            store.recordings.update(id, sentence=sentence, **live.account())
+            try:
+                store.recordings.update(id, sentence=sentence, **live.account())
+            except StoreDamaged as error:  # its frames are written all the same, the others are reported
+                _log.warning("recording %s cannot be reported: %s", id, error)
 
     def _note(self, id: str, **facts: Any) -> None:
         _log.warning("recording %s: %s", id, facts)
@@ -189,6 +199,16 @@ class Recorder:
             self._opened().recordings.update(id, **facts)
         except (StoreError, SQLAlchemyError, OSError):
             return
+
+
+def _sound_recordings(
+    store: Store, glove: str | None = None, *, only_open: bool = False
+) -> list[RecordingRecord]:
+    try:
+        return store.recordings.list(glove, only_open=only_open)
+    except DamagedRows as error:
+        _log.warning("recordings that cannot be read: %s", "; ".join(error.damaged))
+        return error.sound
 
 
 def _interruption(file: RecordingFile) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from glovecal_models.layout import Layout
 from glovecal_service.realtime.live_sampling import LiveSampling
 from glovecal_service.realtime.sampling_takes import keep_sampled_takes
 from glovecal_service.settings import Settings
-from glovecal_service.store.errors import StorageFull, StoreUnavailable
+from glovecal_service.store.errors import DamagedRows, StorageFull, StoreError, StoreUnavailable
 from glovecal_service.store.records import SamplingRecord
 from glovecal_service.store.store import Store
 
@@ -59,7 +59,7 @@ class SamplingRunner:
                 self._follow(store)
             for live in list(self._live.values()):
                 self._go_on(store, live)
-        except (StoreUnavailable, StorageFull, SQLAlchemyError, OSError) as error:
+        except (StoreError, SQLAlchemyError, OSError) as error:
             _log.warning("the store does not answer, samplings wait: %s", error)
             self._revision, self._follow_at = None, time.monotonic() + AFTER_TROUBLE_S
 
@@ -67,7 +67,7 @@ class SamplingRunner:
         revision = store.revision()
         if revision == self._revision:
             return
-        records = {record.id: record for record in store.samplings.list(only_open=True)}
+        records = {record.id: record for record in _open_samplings(store)}
         for id in [id for id in self._live if id not in records]:
             self._live.pop(id).close()
         for id, record in records.items():
@@ -105,10 +105,18 @@ class SamplingRunner:
 
     def _give_up(self, store: Store, record: SamplingRecord, problem: str) -> None:
         _log.warning("sampling %s: %s", record.id, problem)
-        store.samplings.note(record.id, problem=problem, open=False)
         live = self._live.pop(record.id, None)
         if live is not None:
             live.close()
+        store.samplings.note(record.id, problem=problem, open=False)
+
+
+def _open_samplings(store: Store) -> list[SamplingRecord]:
+    try:
+        return store.samplings.list(only_open=True)
+    except DamagedRows as error:
+        _log.warning("samplings that cannot go on: %s", "; ".join(error.damaged))
+        return error.sound
 
 
 def _touch_watch(store: Store, record: SamplingRecord, layout: Layout) -> TouchWatch | None:

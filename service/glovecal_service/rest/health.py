@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field
 from glovecal_service.rest.answers import problems
 from glovecal_service.rest.dependencies import PartsNeeded
 from glovecal_service.rest.problem import Problem
-from glovecal_service.store.errors import StoreError
+from glovecal_service.store.errors import StoreDamaged, StoreError
 from glovecal_service.store.store import Store
 
 router = APIRouter(prefix="/health", tags=["health"])
@@ -36,6 +36,9 @@ class Ready(BaseModel):
         description="The real-time process is restarted by itself; REST works without it."
     )
     realtime_seen_s_ago: float | None
+    problems: list[str] = Field(
+        description="What does not keep the service from working, such as a damaged active model: what to do."
+    )
 
 
 @router.get("/live", summary="The process answers", responses=problems())
@@ -54,6 +57,7 @@ def ready(parts: PartsNeeded, response: Response) -> Ready:
         artifacts=_check_artifacts(parts.store, parts.settings.data),
         realtime="seen" if seen is not None and seen <= SEEN_WITHIN_S else "not seen",
         realtime_seen_s_ago=seen,
+        problems=_problems(parts.store),
     )
 
 
@@ -76,6 +80,13 @@ def _check_artifacts(store: Store, data: Path) -> str:
     if free < LEAST_FREE_BYTES:
         raise Problem(507, "storage-full", f"only {free / 1e6:.0f} MB are free; free some disk space")
     return f"{free / 1e9:.1f} GB free"
+
+
+def _problems(store: Store) -> list[str]:
+    try:
+        return [damage for model in store.models.all_active() if (damage := store.models.damage(model))]
+    except StoreDamaged as error:
+        return [str(error)]
 
 
 def _seconds_since(path: Path) -> float | None:

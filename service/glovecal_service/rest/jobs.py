@@ -8,12 +8,13 @@ from collections.abc import AsyncIterator
 from datetime import datetime
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Header
+from fastapi import APIRouter, Depends, Header, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import BaseModel, Field
 
 from glovecal_service.plain import plain
 from glovecal_service.rest.answers import change_problems, problems
+from glovecal_service.rest.damaged_rows import without_damaged
 from glovecal_service.rest.dependencies import StoreNeeded
 from glovecal_service.rest.names import IdInPath, SubjectFilter
 from glovecal_service.store.records import FINISHED_JOB_STATES, JobEvent, JobRecord, JobState
@@ -50,9 +51,12 @@ class Job(BaseModel):
 
 @router.get("", response_model=list[Job], summary="Jobs, newest first", responses=problems())
 def list_jobs(
-    store: StoreNeeded, subject: SubjectFilter = None, only_unfinished: bool = False
+    store: StoreNeeded, response: Response, subject: SubjectFilter = None, only_unfinished: bool = False
 ) -> list[JobRecord]:
-    return store.jobs.list(subject=subject, only_unfinished=only_unfinished)
+    """Damaged rows are left out and named in `Warning` headers."""
+    return without_damaged(
+        response, lambda: store.jobs.list(subject=subject, only_unfinished=only_unfinished)
+    )
 
 
 @router.get("/{id}", response_model=Job, summary="One job", responses=problems())

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 from fastapi import APIRouter, Response
 from prometheus_client import CONTENT_TYPE_LATEST
 
@@ -21,7 +19,7 @@ router = APIRouter(tags=["health"])
     | {200: {"description": "Text format.", "content": {"text/plain": {"schema": {"type": "string"}}}}},
 )
 def metrics(parts: PartsNeeded) -> Response:
-    counts = Counter(job.state for job in parts.store.jobs.list(only_unfinished=True))
+    counts = parts.store.jobs.unfinished()
     for state in ("queued", "running"):
-        parts.metrics.jobs.labels(state).set(counts[state])
+        parts.metrics.jobs.labels(state).set(counts.get(state, 0))
     return Response(parts.metrics.text(), media_type=CONTENT_TYPE_LATEST)

@@ -10,13 +10,16 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field
 
 from glovecal_models.calibration.model import RotationModel
+from glovecal_models.errors import DamagedArtifact
 from glovecal_service.plain import plain
 from glovecal_service.rest.answers import change_problems, problems
+from glovecal_service.rest.damaged_rows import warn, without_damaged
 from glovecal_service.rest.dependencies import PartsNeeded, StoreNeeded
 from glovecal_service.rest.effect_view import EffectView, effect_view
 from glovecal_service.rest.kernel_view import KernelChoiceView, kernel_view
 from glovecal_service.rest.names import Identifier, LayoutFilter, ModelInPath, SubjectFilter
 from glovecal_service.rest.strict_body import StrictBody
+from glovecal_service.store.errors import StoreDamaged
 from glovecal_service.store.records import Activation, ModelRecord
 
 router = APIRouter(prefix="/models", tags=["models"])
@@ -30,6 +33,9 @@ class Model(BaseModel):
     parent: str | None
     active: bool = Field(
         description="Whether live frames of the subject with the layout are predicted by it."
+    )
+    damage: str | None = Field(
+        description="Of an active model in a list: why its artifact cannot be loaded, and what to do."
     )
     held_out_rmse_deg: float | None = Field(description="Error on takes left out of training, degrees.")
     effects: list[str] = Field(description="Names of its effects, in the order in which they were added.")
@@ -73,12 +79,23 @@ class Which(StrictBody):
 
 @router.get("", response_model=list[Model], summary="Models, oldest first", responses=problems())
 def list_models(
-    store: StoreNeeded, subject: SubjectFilter = None, layout: LayoutFilter = None
+    store: StoreNeeded, response: Response, subject: SubjectFilter = None, layout: LayoutFilter = None
 ) -> list[dict[str, Any]]:
-    records = store.models.list(subject=subject, layout=layout)
-    pairs = {(record.subject, record.layout) for record in records}
-    active = {record.id for pair in pairs if (record := store.models.active(*pair)) is not None}
-    return [_row(record, record.id in active) for record in records]
+    """Damaged rows are left out and named in `Warning` headers."""
+    records = without_damaged(response, lambda: store.models.list(subject=subject, layout=layout))
+    active = set()
+    for pair in sorted({(record.subject, record.layout) for record in records}):
+        try:
+            found = store.models.active(*pair)
+        except StoreDamaged as error:
+            warn(response, str(error))
+            continue
+        if found is not None:
+            active.add(found.id)
+    return [
+        _row(record, record.id in active, store.models.damage(record) if record.id in active else "")
+        for record in records
+    ]
 
 
 @router.post(
@@ -97,6 +114,8 @@ def roll_back(body: Which, store: StoreNeeded) -> Activation:
 def get_model(id: ModelInPath, parts: PartsNeeded) -> dict[str, Any]:
     record = parts.store.models.get(id)
     active = parts.store.models.active(record.subject, record.layout)
+    if damage := parts.store.models.damage(record):
+        raise DamagedArtifact(damage)
     model, _ = parts.predictors.get(record.id)
     return _row(record, active is not None and active.id == record.id) | {
         "rotations": [_rotation(item) for item in model.rotations],
@@ -153,9 +172,10 @@ def export_model(id: ModelInPath, store: StoreNeeded) -> Response:
     )
 
 
-def _row(record: ModelRecord, active: bool) -> dict[str, Any]:
+def _row(record: ModelRecord, active: bool, damage: str = "") -> dict[str, Any]:
     effects = list(record.facts.get("effects", ()))
     row = {**record.__dict__, "active": active, "effects": effects, "facts": plain(record.facts)}
+    row["damage"] = damage or None
     return row | {"held_out_rmse_deg": plain(record.facts.get("held_out_rmse_deg"))}
 
 

@@ -18,7 +18,7 @@ def new_job(
     store: Store, response: Response, kind: str, payload: Mapping[str, Any], subject: str
 ) -> JobRecord:
     """The job, its address in the answer's ``Location``. Raises Conflict when too many are waiting."""
-    if len(store.jobs.list(only_unfinished=True)) >= MOST_UNFINISHED_JOBS:
+    if sum(store.jobs.unfinished().values()) >= MOST_UNFINISHED_JOBS:
         raise Conflict(f"{MOST_UNFINISHED_JOBS} jobs are waiting already; cancel some or wait")
     record = store.jobs.create(kind, payload, subject=subject)
     response.headers["Location"] = f"/v1/jobs/{record.id}"

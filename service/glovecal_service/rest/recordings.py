@@ -9,6 +9,7 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, Field
 
 from glovecal_service.rest.answers import change_problems, problems
+from glovecal_service.rest.damaged_rows import without_damaged
 from glovecal_service.rest.dependencies import StoreNeeded
 from glovecal_service.rest.names import IDENTIFIER, Identifier, IdInPath, WearingName
 from glovecal_service.rest.strict_body import StrictBody
@@ -63,10 +64,12 @@ def start_recording(body: NewRecording, store: StoreNeeded, response: Response) 
 @router.get("", response_model=list[Recording], summary="Recordings, newest first", responses=problems())
 def list_recordings(
     store: StoreNeeded,
+    response: Response,
     glove: Annotated[str | None, Query(pattern=IDENTIFIER)] = None,
     only_open: bool = False,
 ) -> list[RecordingRecord]:
-    return store.recordings.list(glove, only_open=only_open)
+    """Damaged rows are left out and named in `Warning` headers."""
+    return without_damaged(response, lambda: store.recordings.list(glove, only_open=only_open))
 
 
 @router.get("/{id}", response_model=Recording, summary="One recording", responses=problems())

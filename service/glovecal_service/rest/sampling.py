@@ -17,6 +17,7 @@ from glovecal_models.sampling.engine import Sampling, begin_sampling
 from glovecal_models.sampling.state import SamplingState, Trigger
 from glovecal_models.sampling.user_events import Event, NotNow
 from glovecal_service.rest.answers import change_problems, problems
+from glovecal_service.rest.damaged_rows import without_damaged
 from glovecal_service.rest.dependencies import StoreNeeded
 from glovecal_service.rest.names import IDENTIFIER, Channel, Identifier, IdInPath, WearingName
 from glovecal_service.rest.sampling_view import SamplingView, sampling_view
@@ -111,10 +112,13 @@ def start_sampling(body: NewSampling, store: StoreNeeded, response: Response) ->
 @router.get("", response_model=list[SamplingView], summary="Samplings, newest first", responses=problems())
 def list_samplings(
     store: StoreNeeded,
+    response: Response,
     glove: Annotated[str | None, Query(pattern=IDENTIFIER)] = None,
     only_open: bool = False,
 ) -> list[SamplingView]:
-    return [sampling_view(record) for record in store.samplings.list(glove=glove, only_open=only_open)]
+    """Damaged rows are left out and named in `Warning` headers."""
+    records = without_damaged(response, lambda: store.samplings.list(glove=glove, only_open=only_open))
+    return [sampling_view(record) for record in records]
 
 
 @router.get("/{id}", response_model=SamplingView, summary="One sampling", responses=problems())

@@ -11,7 +11,7 @@ from glovecal_models.errors import BadInput
 from glovecal_models.improvement.take_warnings import take_warnings
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
-from glovecal_service.store.errors import Conflict
+from glovecal_service.store.errors import Conflict, DamagedRows
 from glovecal_service.store.records import TakeRecord
 from glovecal_service.store.store import Store
 
@@ -72,7 +72,11 @@ def import_takes(
 
 
 def _require_no_other_owner(store: Store, original_sha256: str, subject: str) -> None:
-    for record in store.takes.list():
+    try:
+        every = store.takes.list()
+    except DamagedRows as error:  # a damaged row of anyone must not end all imports
+        every = error.sound
+    for record in every:
         if record.original_sha256 == original_sha256 and record.subject != subject:
             raise Conflict(
                 f"this file was imported for subject {record.subject!r} already (take {record.id}, "

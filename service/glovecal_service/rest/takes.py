@@ -20,6 +20,7 @@ from glovecal_models.takes.take import Take as TakeArrays
 from glovecal_models.takes.take_check import check_take
 from glovecal_service.plain import plain
 from glovecal_service.rest.answers import change_problems, problems
+from glovecal_service.rest.damaged_rows import without_damaged
 from glovecal_service.rest.dependencies import Parts, PartsNeeded, StoreNeeded
 from glovecal_service.rest.names import (
     IDENTIFIER,
@@ -170,9 +171,10 @@ async def add_takes(
 
 @router.get("", response_model=list[Take], summary="Takes, oldest first", responses=problems())
 def list_takes(
-    store: StoreNeeded, subject: SubjectFilter = None, layout: LayoutFilter = None
+    store: StoreNeeded, response: Response, subject: SubjectFilter = None, layout: LayoutFilter = None
 ) -> list[TakeRecord]:
-    return store.takes.list(subject=subject, layout=layout)
+    """Damaged rows are left out and named in `Warning` headers."""
+    return without_damaged(response, lambda: store.takes.list(subject=subject, layout=layout))
 
 
 @router.get("/{id}", response_model=Take, summary="One take", responses=problems())

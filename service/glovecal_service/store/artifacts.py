@@ -32,7 +32,9 @@ class Artifacts:
         """The bytes of that name, verified. Raises NotFound, DamagedArtifact."""
         content = self._blobs.read(check_sha256(sha256))
         if content is None:
-            raise NotFound(f"artifact {sha256} is missing from {self._blobs.place}")
+            raise NotFound(
+                f"artifact {sha256} is missing from {self._blobs.place}; restore that file from a backup"
+            )
         found = hashlib.sha256(content).hexdigest()
         if found != sha256:
             raise DamagedArtifact(
@@ -40,6 +42,14 @@ class Artifacts:
                 f" sha256 {found}; restore that file from a backup"
             )
         return content
+
+    def is_sound(self, sha256: str) -> bool:
+        """Whether there is a file of that name that holds what was put there."""
+        try:
+            self.get(sha256)
+        except (NotFound, DamagedArtifact):
+            return False
+        return True
 
     def exists(self, sha256: str) -> bool:
         """Whether there is a file of that name, damaged or not."""

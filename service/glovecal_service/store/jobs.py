@@ -14,7 +14,7 @@ from datetime import datetime
 from functools import partial
 from typing import Any
 
-from sqlalchemy import Connection, insert, select
+from sqlalchemy import Connection, func, insert, select
 
 from glovecal_models.names import check_identifier
 from glovecal_service.store import tables
@@ -196,6 +196,13 @@ class Jobs:
             statement = statement.where(table.c.state.not_in(FINISHED_JOB_STATES))
         with self._database.read() as connection:
             return sound_rows(connection, table, statement, _record)
+
+    def unfinished(self) -> dict[str, int]:
+        """How many jobs are in each state that is not final."""
+        state = tables.jobs.c.state
+        statement = select(state, func.count()).where(state.not_in(FINISHED_JOB_STATES)).group_by(state)
+        with self._database.read() as connection:
+            return {row[0]: row[1] for row in connection.execute(statement)}
 
     def _end(self, id: str, attempt: int, state: str, sentence: str, **values: Any) -> JobRecord:
         at: datetime = now()

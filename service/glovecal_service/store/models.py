@@ -135,6 +135,27 @@ class Models:
             current = _current(connection, subject, layout)
             return None if current is None else _one(connection, current.model)
 
+    def all_active(self) -> list[ModelRecord]:
+        """The active model of each subject and layout. Raises StoreDamaged."""
+        table = tables.activations
+        statement = select(table.c.subject, table.c.layout).distinct()
+        with self._database.read() as connection:
+            pairs = connection.execute(statement.order_by(table.c.subject, table.c.layout)).all()
+            current = [_current(connection, subject, layout) for subject, layout in pairs]
+            return [_one(connection, item.model) for item in current if item is not None]
+
+    def damage(self, model: ModelRecord) -> str:
+        """Why the model's artifact cannot be loaded, and what to do; "" while it is what was stored."""
+        try:
+            self._artifacts.get(model.id)
+        except (DamagedArtifact, NotFound) as error:
+            with self._database.read() as connection:
+                current = _current(connection, model.subject, model.layout)
+            before = current is not None and current.model == model.id and current.previous is not None
+            remedies = other_remedies(model.subject, model.layout, can_roll_back=before)
+            return f"model {model.id[:12]} cannot be loaded: {error}{remedies}"
+        return ""
+
     def activations(self, subject: str, layout: str) -> list[Activation]:
         """What was active since when, oldest first."""
         table = tables.activations
@@ -142,6 +163,14 @@ class Models:
         wanted = {"subject": subject, "layout": layout}
         with self._database.read() as connection:
             return sound_rows(connection, table, statement, _activation_record, wanted)
+
+
+def other_remedies(subject: str, layout: str, *, can_roll_back: bool) -> str:
+    """What helps against a damaged model where there is no backup, as the end of a sentence."""
+    back = (
+        f", or return to the model before it: glovecal model rollback --subject {subject} --layout {layout}"
+    )
+    return f"{back if can_roll_back else ''}, or train again: glovecal train --subject {subject}"
 
 
 def _effect_names(artifact: bytes) -> dict[str, list[str]]:

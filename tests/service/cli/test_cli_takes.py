@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import sqlite3
 import stat
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -223,6 +225,25 @@ def test_a_file_written_has_the_rights_of_any_other(anna, tmp_path):
     other.touch()
     assert anna("take", "export", "cross", tmp_path / "x.csv").code == 0
     assert stat.S_IMODE((tmp_path / "x.csv").stat().st_mode) == stat.S_IMODE(other.stat().st_mode)
+
+
+def test_a_damaged_row_is_named_after_the_sound_ones(run: Run, tmp_path: Path) -> None:
+    files = []
+    for number in range(2):
+        readings = np.arange(30.0 + number)[:, None]
+        take = Take(f"t{number}", "w", ("A",), np.arange(30 + number) / 60, readings, ("A",),
+                    np.arange(30 + number) / 60, readings)  # fmt: skip
+        files += write_takes([take], tmp_path / f"t{number}.csv")
+    run("subject", "add", "anna")
+    assert run("take", "import", *files, "-s", "anna").code == 0
+    with closing(sqlite3.connect(tmp_path / "data" / "glovecal.sqlite3")) as connection:
+        connection.execute("UPDATE takes SET frames = 31 WHERE name = 't0'")
+        connection.commit()
+    listed = run("take", "list")
+    assert listed.code == 0
+    assert "t1" in listed.out
+    assert "t0" not in listed.out
+    assert "of table takes was changed after it was written; restore a backup" in listed.said
 
 
 def test_units_that_look_wrong_are_told_once_for_all_files_by_every_import(run: Run, tmp_path: Path) -> None:

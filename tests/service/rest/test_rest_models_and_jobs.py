@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import sqlite3
 import threading
 from collections.abc import Callable
+from contextlib import closing
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from typing import Any
@@ -142,6 +144,51 @@ def test_a_damaged_artifact_is_named_and_the_last_good_model_stays(
     path.unlink()
     with pytest.raises(Refused, match="missing"):
         client.post(f"/models/{bad}/activate")
+
+
+def test_a_damaged_active_model_is_told_with_what_to_do(client: RestClient, settings: Settings) -> None:
+    first, model = trained(client), trained(client, takes=[client.get("/takes")[0]["id"]])
+    layout = client.get("/takes")[0]["layout"]
+    path = settings.artifacts_folder / model
+    content = path.read_bytes()
+    assert client.get(f"/models/{model}")["damage"] is None
+    assert client.get("/health/ready")["problems"] == []
+    for change in (content[:-1] + bytes([content[-1] ^ 1]), content[:100], None):
+        path.unlink() if change is None else path.write_bytes(change)
+        [problem] = client.get("/health/ready")["problems"]
+        assert problem.startswith(f"model {model[:12]} cannot be loaded: artifact {model}")
+        assert problem.endswith(
+            "restore that file from a backup, or return to the model before it: glovecal model rollback"
+            f" --subject anna --layout {layout}, or train again: glovecal train --subject anna"
+        )
+        assert [row["damage"] for row in client.get("/models")] == [None, problem]
+        with pytest.raises(Refused) as refused:
+            client.get(f"/models/{model}")
+        assert (refused.value.status, refused.value.detail) == (500, problem)
+    client.post("/models/rollback", {"subject": "anna", "layout": layout})
+    assert client.get("/health/ready")["problems"] == []
+    assert [row["id"] for row in client.get("/models") if row["active"]] == [first]
+
+
+def test_lists_go_on_without_damaged_rows_and_name_them(client: RestClient, settings: Settings) -> None:
+    trained(client)
+    whole = {path: client.get(path) for path in ("/takes", "/jobs", "/models")}
+    with closing(sqlite3.connect(settings.data / "glovecal.sqlite3")) as connection:
+        for change in ("takes SET facts = '{'", "jobs SET fraction = 0.25", "models SET method = 'spgp'"):
+            table = change.split()[0]
+            connection.execute(f"UPDATE {change} WHERE id = (SELECT min(id) FROM {table})")
+        connection.commit()
+    for path, rows in whole.items():
+        assert client.warnings == []
+        left = min(row["id"] for row in rows)
+        assert client.get(path) == [row for row in rows if row["id"] != left]
+        [sentence] = client.warnings
+        assert sentence.startswith(f"row '{left}' of table {path[1:]}")
+        assert sentence.endswith("restore a backup of the database")
+        with pytest.raises(Refused, match=f"row '{left}' of table {path[1:]}") as refused:
+            client.get(f"{path}/{left}")
+        assert refused.value.problem["type"] == "urn:glovecal:problem:damaged"
+        client.warnings.clear()
 
 
 def test_what_cannot_be_trained_is_refused_before_a_job(client: RestClient, write_table: Write) -> None:
