@@ -29,3 +29,8 @@ def check_channel_name(name: str, what: str) -> str:
             f"{what}: {name!r} is not a channel name (a letter, then letters, digits, _; at most 64)"
         )
     return name
+
+
+def subject_name(name: str) -> str:
+    """A subject's name as it is stored, which is in lower case: ``Anna`` is ``anna``. Raises BadName."""
+    return check_identifier(name.lower() if name.isascii() else name, "subject")

@@ -118,14 +118,14 @@ class RestClient:
         subject: str,
         layout: str | None = None,
         reference: Path | None = None,
-        **options: str,
+        **options: str | bool,
     ) -> dict[str, Any]:
         """Import a take table, streamed from disk, with its reference table if that is a second file.
 
-        ``options`` are ``name``, ``wearing``, ``equal_times``. The answer holds ``takes``, ``imported``,
-        ``existing`` (ids), ``layout`` and ``warnings``.
+        ``options`` are ``name``, ``wearing``, ``equal_times`` and ``create_subject``. The answer holds
+        ``takes``, ``imported``, ``existing`` (ids), ``layout``, ``subject_created`` and ``warnings``.
         """
-        query: dict[str, str] = {"subject": subject, "filename": file.name, **options}
+        query: dict[str, str | bool] = {"subject": subject, "filename": file.name, **options}
         if layout is not None:
             query["layout"] = layout
         if reference is not None:
@@ -178,7 +178,7 @@ class RestClient:
         return document
 
     def _send_file(
-        self, method: str, path: str, file: Path, query: Mapping[str, str] | None = None
+        self, method: str, path: str, file: Path, query: Mapping[str, str | bool] | None = None
     ) -> dict[str, Any]:
         kind = PARQUET if file.suffix.lower() == ".parquet" else CSV
         with file.open("rb") as stream:

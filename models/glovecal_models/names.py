@@ -26,3 +26,8 @@ def check_identifier(name: str, what: str) -> str:
             f"{what}: {name!r} is not allowed; use a-z, 0-9, _ and -, at most 64, not starting with _ or -"
         )
     return name
+
+
+def subject_name(name: str) -> str:
+    """A subject's name as it is stored, which is in lower case: ``Anna`` is ``anna``. Raises BadInput."""
+    return check_identifier(name.lower() if name.isascii() else name, "subject")

@@ -13,6 +13,7 @@ import glovecal_client.names
 import glovecal_models.names
 from glovecal_client import BadName, GloveKeys, all_gloves, all_services, parse_glove_key, service_alive_key
 from glovecal_client.keys import PLANES
+from glovecal_models.errors import BadInput
 
 identifiers = st.from_regex(r"[a-z0-9][a-z0-9_-]{0,63}\Z", fullmatch=True)
 
@@ -20,6 +21,11 @@ identifiers = st.from_regex(r"[a-z0-9][a-z0-9_-]{0,63}\Z", fullmatch=True)
 def test_client_and_models_have_the_same_rule_for_names() -> None:
     assert glovecal_client.names.IDENTIFIER.pattern == glovecal_models.names.IDENTIFIER.pattern
     assert glovecal_client.names.CHANNEL.pattern == glovecal_models.names.CHANNEL.pattern
+    for names in (glovecal_client.names, glovecal_models.names):
+        assert names.subject_name("Anna-2") == "anna-2"
+        for name in ("Änna", "\u212aai", "_A", ""):  # the Kelvin sign has an ASCII lower case
+            with pytest.raises((BadName, BadInput), match="use a-z"):
+                names.subject_name(name)
 
 
 @given(identifiers, identifiers.filter(lambda name: name != "service"))

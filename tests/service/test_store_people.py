@@ -128,7 +128,7 @@ def test_a_glove_is_worn_by_whoever_was_named_last(store):
     assert (again.subject, again.wearing) == ("ben", "second"), "the same run: the user's word is later"
     silent = store.gloves.seen("left", {**META, "run_id": "0b", "subject": None, "wearing": "third"})
     assert (silent.subject, silent.wearing) == ("ben", "second")
-    later = store.gloves.seen("left", {**META, "run_id": "0c"})
+    later = store.gloves.seen("left", {**META, "run_id": "0c", "subject": "Anna"})
     assert (later.subject, later.wearing) == ("anna", "first"), "a new run names its subject: that is later"
     assert store.gloves.assign("left", None).subject is None
     assert store.gloves.list() == [store.gloves.get("left")]

@@ -15,7 +15,7 @@ from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings, Captu
 from glovecal_client.capture.device import build_device, device_names
 from glovecal_client.errors import BadOption, ClientError
 from glovecal_client.keys import GloveKeys
-from glovecal_client.names import check_identifier
+from glovecal_client.names import check_identifier, subject_name
 from glovecal_client.session import DEFAULT_ENDPOINT
 
 
@@ -34,15 +34,18 @@ def run_capture(
 ) -> CaptureSummary:
     """Capture until ``stop`` is set or the device has no more to give.
 
-    ``device`` is ``NAME`` or ``NAME:ARGUMENT``; ``report`` gets sentences as things happen. Raises BadName,
-    UnknownDevice, BadOption, DeviceError (a device that cannot work at all) and CaptureRefused (another
-    publisher, no place to record).
+    ``device`` is ``NAME`` or ``NAME:ARGUMENT``; ``report`` gets sentences as things happen. Subjects are
+    written in lower case. Raises BadName, UnknownDevice, BadOption, DeviceError (a device that cannot work at
+    all) and CaptureRefused (another publisher, no place to record).
     """
-    for name, what in ((subject, "subject"), (wearing, "wearing")):
-        if name is not None:
-            check_identifier(name, what)
+    report = report or (lambda sentence: None)
+    if subject is not None and (stored := subject_name(subject)) != subject:
+        report(f"Subject {subject} is stored as {stored}.")
+        subject = stored
+    if wearing is not None:
+        check_identifier(wearing, "wearing")
     settings = CaptureSettings(GloveKeys(site, glove), subject, wearing, tuple(endpoints), Path(data))
-    daemon = CaptureDaemon(build_device(device, options), settings, report or (lambda sentence: None))
+    daemon = CaptureDaemon(build_device(device, options), settings, report)
     return daemon.run(stop or threading.Event())
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from glovecal_service.cli.options import DEFAULT_ZENOH, Site, Zenoh, identifier
+from glovecal_service.cli.options import DEFAULT_ZENOH, Site, Zenoh, identifier, subject_named
 from glovecal_service.cli.printing import err, out
 
 GloveOption = Annotated[
@@ -25,7 +25,7 @@ def capture(
         ),
     ],
     glove: GloveOption,
-    subject: Annotated[str | None, typer.Option(help="Who wears it.", callback=identifier("subject"))] = None,
+    subject: Annotated[str | None, typer.Option(help="Who wears it.", callback=subject_named)] = None,
     wearing: Annotated[
         str | None, typer.Option(help="Name of this donning.", callback=identifier("wearing"))
     ] = None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from glovecal_client.errors import ServiceError
 from glovecal_service.cli.import_warnings import ImportWarnings
+from glovecal_service.cli.printing import err
 from glovecal_service.cli.refusal import Refusal, exit_code_of, sentence_of
 from glovecal_service.cli.two_tables import frames_among, reference_beside
 
@@ -44,10 +46,12 @@ class FileSubject:
         hashes = [_sha256(file) for file in files]
         rows = [] if subject is not None else service.get("/takes")
         owners: list[str] = [row["subject"] for row in rows if row["original_sha256"] in hashes]
-        subject = subject or next(iter(owners), PREFIX + hashes[0][:8])
-        if subject not in {row["name"] for row in service.get("/subjects")}:
-            service.post("/subjects", {"name": subject, "title": f"Takes of {files[0].name}"})
-        return cls(service, subject, layout, spread)
+        name = subject or next(iter(owners), PREFIX + hashes[0][:8])
+        if name not in {row["name"] for row in service.get("/subjects")}:
+            service.post("/subjects", {"name": name, "title": f"Takes of {files[0].name}"})
+            if subject is not None:
+                err.print(added_subject(service, subject), style="yellow")
+        return cls(service, name, layout, spread)
 
     def take_ids(self, files: Sequence[Path]) -> list[str]:
         """Ids of the takes in ``files``, imported unless they were. Raises Refusal that names the file."""
@@ -90,3 +94,11 @@ def _sha256(file: Path) -> str:
         while chunk := stream.read(READ_BYTES):
             digest.update(chunk)
     return digest.hexdigest()
+
+
+def added_subject(service: RestClient, subject: str) -> str:
+    """What to say of a subject that a file's import added, so that a mistyped name is seen and undone."""
+    others = [row["name"] for row in service.get("/subjects") if row["name"] != subject]
+    near = difflib.get_close_matches(subject, others, n=3)
+    similar = f" Similar: {', '.join(near)}." if near else ""
+    return f"Added subject {subject}.{similar} To undo: glovecal subject remove {subject} --takes"

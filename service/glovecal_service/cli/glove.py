@@ -9,7 +9,7 @@ import typer
 
 from glovecal_service.cli.connection import connect
 from glovecal_service.cli.layout_file import add_layout_file
-from glovecal_service.cli.options import AsJson, Glove, identifier
+from glovecal_service.cli.options import AsJson, Glove, identifier, subject_named
 from glovecal_service.cli.printing import moment, out, print_json, print_table
 
 app = typer.Typer(help="Layouts, and the gloves that were seen.", no_args_is_help=True)
@@ -76,9 +76,7 @@ def add(
 @app.command("wear")
 def wear(
     glove: Glove,
-    subject: Annotated[
-        str | None, typer.Argument(help="Who wears it now.", callback=identifier("subject"))
-    ] = None,
+    subject: Annotated[str | None, typer.Argument(help="Who wears it now.", callback=subject_named)] = None,
     wearing: Annotated[
         str | None, typer.Option(help="Name of this donning; readings shift between them.")
     ] = None,

@@ -12,7 +12,7 @@ from typer.core import TyperCommand
 from glovecal_service.cli.connection import connect
 from glovecal_service.cli.file_subject import FileSubject
 from glovecal_service.cli.layout_file import layout_named
-from glovecal_service.cli.options import AsJson, identifier
+from glovecal_service.cli.options import AsJson, subject_named
 from glovecal_service.cli.printing import err, out, print_json, print_table
 from glovecal_service.cli.refusal import Refusal
 from glovecal_service.cli.report_file import Report, fetch_job_report, write_report
@@ -68,7 +68,7 @@ def improve(
             "--subject",
             "-s",
             help="Whose takes they are. Default: whoever has the files already, else a new improve-...",
-            callback=identifier("subject"),
+            callback=subject_named,
         ),
     ] = None,
     layout: Annotated[

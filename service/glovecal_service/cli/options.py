@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 
 from glovecal_models.errors import BadInput
-from glovecal_models.names import check_identifier
+from glovecal_models.names import check_identifier, subject_name
+from glovecal_service.cli.printing import err
 
 MODEL_ID = re.compile(r"[0-9a-f]{6,64}\Z")
 JOB_ID = re.compile(r"[0-9a-f]{12}\Z")
@@ -28,6 +29,19 @@ def identifier(what: str) -> Callable[[str | None], str | None]:
         return value
 
     return check
+
+
+def subject_named(value: str | None) -> str | None:
+    """A typer callback: a subject's name in lower case, as it is stored; says so if typed otherwise."""
+    if value is None:
+        return None
+    try:
+        stored = subject_name(value)
+    except BadInput as error:
+        raise typer.BadParameter(str(error)) from error
+    if stored != value:
+        err.print(f"Subject {value} is stored as {stored}.")
+    return stored
 
 
 def _model_ids(value: str | list[str]) -> str | list[str]:
@@ -57,10 +71,10 @@ def _job_id(value: str) -> str:
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON on standard output and nothing else.")]
 Subject = Annotated[
-    str, typer.Option("--subject", "-s", help="The subject's short name.", callback=identifier("subject"))
+    str, typer.Option("--subject", "-s", help="The subject's short name.", callback=subject_named)
 ]
 OnlySubject = Annotated[
-    str | None, typer.Option("--subject", "-s", help="Only this one's.", callback=identifier("subject"))
+    str | None, typer.Option("--subject", "-s", help="Only this one's.", callback=subject_named)
 ]
 OnlyLayout = Annotated[
     str | None, typer.Option("--layout", "-l", help="Only of this layout.", callback=identifier("layout"))

@@ -9,7 +9,7 @@ import typer
 
 from glovecal_client.errors import ServiceError
 from glovecal_service.cli.connection import connect
-from glovecal_service.cli.options import AsJson, Glove, identifier
+from glovecal_service.cli.options import AsJson, Glove, subject_named
 from glovecal_service.cli.printing import err, out, print_json
 from glovecal_service.cli.refusal import NobodyThere
 from glovecal_service.cli.waiting import wait_seconds
@@ -27,7 +27,7 @@ def record(
     seconds: Annotated[float, typer.Option(min=0.1, help="How long.")] = 10.0,
     subject: Annotated[
         str | None,
-        typer.Option("--subject", "-s", help="Default: who wears it.", callback=identifier("subject")),
+        typer.Option("--subject", "-s", help="Default: who wears it.", callback=subject_named),
     ] = None,
     wearing: Annotated[str | None, typer.Option(help="Default: the glove's wearing.")] = None,
     lead_in: Annotated[

@@ -12,7 +12,7 @@ from glovecal_models.names import check_identifier
 from glovecal_models.sampling.catalogue import PROTOCOLS
 from glovecal_models.sampling.state import TRIGGERS
 from glovecal_service.cli.connection import connect
-from glovecal_service.cli.options import AsJson, identifier
+from glovecal_service.cli.options import AsJson, identifier, subject_named
 from glovecal_service.cli.printing import moment, out, print_json, print_table
 from glovecal_service.cli.refusal import Refusal
 from glovecal_service.cli.sample_next import next_steps
@@ -29,7 +29,9 @@ app = typer.Typer(help="Guided sampling: takes with known angles.", invoke_witho
 def sample(
     context: typer.Context,
     glove: Annotated[str, typer.Option(help="The glove's name.")] = "",
-    subject: Annotated[str, typer.Option("--subject", "-s", help="Who wears it.")] = "",
+    subject: Annotated[
+        str | None, typer.Option("--subject", "-s", help="Who wears it.", callback=subject_named)
+    ] = None,
     wearing: Annotated[str | None, typer.Option(help="Default: the glove's wearing.")] = None,
     protocol: Annotated[str, typer.Option(help=f"One of {', '.join(PROTOCOLS)}.")] = "new_subject",
     trigger: Annotated[
@@ -51,7 +53,7 @@ def sample(
     for what, value in (("glove", glove), ("subject", subject)):
         if not value:
             raise typer.BadParameter(f"give --{what}")
-        check_identifier(value, what)
+    check_identifier(glove, "glove")
     wanted: dict[str, Any] = {"glove": glove, "subject": subject, "protocol": protocol, "trigger": trigger}
     wanted["widget_deg"] = widget_angles(widget or [])
     wanted["pose_deg"] = pose_angles(poses)

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from glovecal_service.cli.connection import connect
 from glovecal_service.cli.measured_hand import DimensionsFile, Hand, HandLength, measured_dimensions
-from glovecal_service.cli.options import AsJson, identifier
+from glovecal_service.cli.options import AsJson, subject_named
 from glovecal_service.cli.printing import moment, out, print_facts, print_json, print_table, text
+from glovecal_service.cli.refusal import Refusal
+
+if TYPE_CHECKING:
+    from glovecal_client.rest import RestClient
 
 app = typer.Typer(help="The people who wear gloves.", no_args_is_help=True)
 
-Name = Annotated[str, typer.Argument(help="Short name: a-z, 0-9, _ and -.", callback=identifier("subject"))]
+Name = Annotated[str, typer.Argument(help="Short name: a-z, 0-9, _ and -.", callback=subject_named)]
 
 
 @app.command("add")
@@ -109,8 +113,27 @@ def show(name: Name, as_json: AsJson = False) -> None:
 
 
 @app.command("remove")
-def remove(name: Name) -> None:
-    """Remove a subject that owns no takes and no models."""
+def remove(
+    name: Name,
+    takes: Annotated[
+        bool, typer.Option("--takes", help="Remove the subject's takes too; never those of a model.")
+    ] = False,
+) -> None:
+    """Remove a subject that owns no takes and no models. Imported files stay in the data folder."""
     with connect() as service:
+        if takes:
+            _remove_takes(service, name)
         service.delete(f"/subjects/{name}")
     out.print(f"Removed subject {name}.")
+
+
+def _remove_takes(service: RestClient, subject: str) -> None:
+    """All or none: takes that a model was trained on stay, so a subject with models keeps all."""
+    models = service.get("/models", {"subject": subject})
+    if models:
+        raise Refusal(
+            f"subject {subject} has {len(models)} models, which keep the takes they were trained on"
+        )
+    for row in service.get("/takes", {"subject": subject}):
+        service.delete(f"/takes/{row['id']}")
+        out.print(f"Removed take {row['name']} ({row['id']}).")

@@ -9,6 +9,7 @@ import typer
 
 from glovecal_client.errors import ServiceError
 from glovecal_service.cli.connection import connect
+from glovecal_service.cli.file_subject import added_subject
 from glovecal_service.cli.import_warnings import ImportWarnings
 from glovecal_service.cli.layout_file import layout_named
 from glovecal_service.cli.options import AsJson, Subject
@@ -48,7 +49,8 @@ def import_takes(
 ) -> None:
     """Import take tables. X.reference.csv beside X.frames.csv is found by itself.
 
-    A file that cannot be imported is told and the others are imported; the exit code is 1 then.
+    A subject that is not there yet is added. A file that cannot be imported is told and the others are
+    imported; the exit code is 1 then.
     """
     if reference and len(files) > 1:
         raise typer.BadParameter("--reference goes with one frames file")
@@ -56,7 +58,6 @@ def import_takes(
     options = {"name": name, "wearing": wearing, "equal_times": "spread" if spread_equal_times else None}
     rows, refused, warnings = [], 0, ImportWarnings()
     with connect() as service:
-        service.get(f"/subjects/{subject}")
         chosen = layout_named(service, layout)
         for file in frames:
             try:
@@ -86,7 +87,11 @@ def _import(
     warnings: ImportWarnings,
 ) -> list[dict[str, Any]]:
     given = {key: value for key, value in options.items() if value is not None}
-    answer = service.upload_takes(file, reference=reference, subject=subject, layout=layout, **given)
+    answer = service.upload_takes(
+        file, reference=reference, subject=subject, layout=layout, create_subject=True, **given
+    )
+    if answer["subject_created"]:
+        err.print(added_subject(service, subject), style="yellow")
     if not answer["imported"]:
         err.print(f"{file}: its takes were here already", style="yellow")
     warnings.add(file, answer["warnings"])

@@ -15,7 +15,15 @@ from glovecal_models.errors import BadLayout
 from glovecal_models.layout import Layout
 from glovecal_service.rest.answers import change_problems, problems
 from glovecal_service.rest.dependencies import StoreNeeded
-from glovecal_service.rest.names import ONE_LINE, Channel, Identifier, NameInPath, Title, WearingName
+from glovecal_service.rest.names import (
+    ONE_LINE,
+    Channel,
+    Identifier,
+    NameInPath,
+    SubjectName,
+    Title,
+    WearingName,
+)
 from glovecal_service.rest.problem import Problem
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.errors import NotFound
@@ -76,7 +84,7 @@ class Gloves(BaseModel):
 
 
 class Wearer(StrictBody):
-    subject: Identifier | None = Field(description="None: nobody.")
+    subject: SubjectName | None = Field(description="None: nobody.")
     wearing: WearingName | None = None
 
 

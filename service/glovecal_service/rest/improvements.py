@@ -12,7 +12,7 @@ from glovecal_service.rest.answers import change_problems
 from glovecal_service.rest.dependencies import StoreNeeded
 from glovecal_service.rest.jobs import Job
 from glovecal_service.rest.model_takes import TakesNamed, takes_named
-from glovecal_service.rest.names import Identifier
+from glovecal_service.rest.names import Identifier, SubjectName
 from glovecal_service.rest.new_job import new_job
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.records import JobRecord
@@ -21,7 +21,7 @@ router = APIRouter(prefix="/improve", tags=["models"])
 
 
 class ImprovementWanted(StrictBody):
-    subject: Identifier
+    subject: SubjectName
     layout: Identifier
     takes: TakesNamed = Field(description="Ids or names of the takes to learn from.")
     holdout: TakesNamed | None = Field(

@@ -17,7 +17,7 @@ from glovecal_service.rest.damaged_rows import warn, without_damaged
 from glovecal_service.rest.dependencies import PartsNeeded, StoreNeeded
 from glovecal_service.rest.effect_view import EffectView, effect_view
 from glovecal_service.rest.kernel_view import KernelChoiceView, kernel_view
-from glovecal_service.rest.names import Identifier, LayoutFilter, ModelInPath, SubjectFilter
+from glovecal_service.rest.names import Identifier, LayoutFilter, ModelInPath, SubjectFilter, SubjectName
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.errors import StoreDamaged
 from glovecal_service.store.records import Activation, ModelRecord
@@ -73,7 +73,7 @@ class ActivationView(BaseModel):
 
 
 class Which(StrictBody):
-    subject: Identifier
+    subject: SubjectName
     layout: Identifier
 
 

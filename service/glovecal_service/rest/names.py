@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import Path, Query
-from pydantic import Field, FiniteFloat, StringConstraints
+from pydantic import AfterValidator, Field, FiniteFloat, StringConstraints
 
 ID = r"^[0-9a-f]{12}$"
 IDENTIFIER = r"^[a-z0-9][a-z0-9_-]{0,63}$"
+SUBJECT = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
 CHANNEL = r"^[A-Za-z][A-Za-z0-9_]{0,63}$"
 ONE_LINE = r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]*$"
 SHA256 = r"^[0-9a-f]{64}$"
@@ -16,6 +17,7 @@ SHA256_PREFIX = r"^[0-9a-f]{6,64}$"
 
 MEANING = {
     IDENTIFIER: "use a-z, 0-9, _ and -, at most 64, not starting with _ or -",
+    SUBJECT: "use a-z, 0-9, _ and -, at most 64, not starting with _ or -",
     CHANNEL: "use a letter, then letters, digits and _, at most 64",
     SHA256: "give 64 digits of 0-9 and a-f",
     SHA256_PREFIX: "give 6 to 64 digits of 0-9 and a-f",
@@ -25,7 +27,9 @@ MEANING = {
 """What would be right, for each pattern."""
 
 Identifier = Annotated[str, StringConstraints(pattern=IDENTIFIER)]
-"""Subjects, gloves, layouts, wearings, recordings: as in ``glovecal_models.names``."""
+"""Gloves, layouts, wearings, recordings: as in ``glovecal_models.names``."""
+SubjectName = Annotated[str, StringConstraints(pattern=SUBJECT), AfterValidator(str.lower)]
+"""A subject's name, stored in lower case: ``Anna`` is ``anna``."""
 Channel = Annotated[str, StringConstraints(pattern=CHANNEL)]
 TakeReference = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=ONE_LINE)]
 """A take's id, or its name."""
@@ -41,7 +45,12 @@ ModelInPath = Annotated[
     str, Path(pattern=SHA256_PREFIX, description="A model's id, or at least its first 6 digits.")
 ]
 IdInPath = Annotated[str, Path(pattern=ID, description="As given when it was made.")]
-SubjectFilter = Annotated[str | None, Query(pattern=IDENTIFIER, description="Only this subject's.")]
+SubjectInPath = Annotated[
+    str,
+    Path(pattern=SUBJECT, description="a-z, 0-9, _ and -, at most 64; capitals are read as lower case."),
+    AfterValidator(str.lower),
+]
+SubjectFilter = Annotated[SubjectName | None, Query(description="Only this subject's.")]
 LayoutFilter = Annotated[str | None, Query(pattern=IDENTIFIER, description="Only of this layout.")]
 Id = Annotated[str, StringConstraints(pattern=ID)]
 """Of takes, recordings and jobs."""

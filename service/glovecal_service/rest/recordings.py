@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field
 from glovecal_service.rest.answers import change_problems, problems
 from glovecal_service.rest.damaged_rows import without_damaged
 from glovecal_service.rest.dependencies import StoreNeeded
-from glovecal_service.rest.names import IDENTIFIER, Identifier, IdInPath, WearingName
+from glovecal_service.rest.names import IDENTIFIER, Identifier, IdInPath, SubjectName, WearingName
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.recordings import LEAD_IN_S, LONGEST_LEAD_IN_S
 from glovecal_service.store.records import RecordingRecord, RecordingState
@@ -22,7 +22,7 @@ router = APIRouter(prefix="/recordings", tags=["recordings"])
 class NewRecording(StrictBody):
     glove: Identifier
     name: WearingName = Field(description="What the take will be called.")
-    subject: Identifier | None = Field(None, description="None: who wears the glove now.")
+    subject: SubjectName | None = Field(None, description="None: who wears the glove now.")
     wearing: WearingName | None = None
     lead_s: float = Field(
         LEAD_IN_S,

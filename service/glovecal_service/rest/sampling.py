@@ -19,7 +19,7 @@ from glovecal_models.sampling.user_events import Event, NotNow
 from glovecal_service.rest.answers import change_problems, problems
 from glovecal_service.rest.damaged_rows import without_damaged
 from glovecal_service.rest.dependencies import StoreNeeded
-from glovecal_service.rest.names import IDENTIFIER, Channel, Identifier, IdInPath, WearingName
+from glovecal_service.rest.names import IDENTIFIER, Channel, Identifier, IdInPath, SubjectName, WearingName
 from glovecal_service.rest.sampling_view import SamplingView, sampling_view
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.errors import Conflict
@@ -39,7 +39,7 @@ PoseAngles = Annotated[dict[Channel, FiniteFloat], Field(max_length=100)]
 
 class NewSampling(StrictBody):
     glove: Identifier
-    subject: Identifier
+    subject: SubjectName
     wearing: WearingName | None = Field(None, description="None: the glove's wearing.")
     protocol: ProtocolName = "new_subject"
     trigger: Trigger = Field("key", description="What begins a step: a key or pedal, a timer, a still hand.")
@@ -62,7 +62,7 @@ class Change(StrictBody):
 
 
 class Reuse(StrictBody):
-    subject: Identifier = Field(description="For whom the takes are to be used too.")
+    subject: SubjectName = Field(description="For whom the takes are to be used too.")
 
 
 class Reused(BaseModel):

@@ -13,7 +13,7 @@ from glovecal_models.hand.skeleton import Handedness
 from glovecal_models.hand.skeleton_document import skeleton_document
 from glovecal_service.rest.answers import change_problems, problems
 from glovecal_service.rest.dependencies import StoreNeeded
-from glovecal_service.rest.names import Channel, Identifier, Millimetres, NameInPath, Title
+from glovecal_service.rest.names import Channel, Millimetres, SubjectInPath, SubjectName, Title
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.records import SubjectRecord
 
@@ -31,7 +31,7 @@ Dimensions = Annotated[
 
 
 class NewSubject(StrictBody):
-    name: Identifier
+    name: SubjectName
     title: Title = ""
     dimensions: Dimensions = Field(default_factory=dict)
     hand: Handedness = "right"
@@ -115,7 +115,7 @@ def list_subjects(store: StoreNeeded) -> list[SubjectRecord]:
 
 
 @router.get("/{name}", response_model=Subject, summary="One subject", responses=problems())
-def get_subject(name: NameInPath, store: StoreNeeded) -> SubjectRecord:
+def get_subject(name: SubjectInPath, store: StoreNeeded) -> SubjectRecord:
     return store.subjects.get(name)
 
 
@@ -125,7 +125,7 @@ def get_subject(name: NameInPath, store: StoreNeeded) -> SubjectRecord:
     summary="Say how large a subject's hand is",
     responses=change_problems(),
 )
-def measure_hand(name: NameInPath, body: MeasuredHand, store: StoreNeeded) -> SubjectRecord:
+def measure_hand(name: SubjectInPath, body: MeasuredHand, store: StoreNeeded) -> SubjectRecord:
     """Replaces all that was measured before. Models stay as they are; errors in mm follow."""
     return store.subjects.measure(name, body.dimensions, body.hand)
 
@@ -136,7 +136,7 @@ def measure_hand(name: NameInPath, body: MeasuredHand, store: StoreNeeded) -> Su
     summary="The subject's hand, for viewers",
     responses=problems(),
 )
-def get_skeleton(name: NameInPath, store: StoreNeeded, hand: Handedness | None = None) -> dict[str, Any]:
+def get_skeleton(name: SubjectInPath, store: StoreNeeded, hand: Handedness | None = None) -> dict[str, Any]:
     """Joints, axes, offsets and limits; of the other hand with `hand`."""
     return skeleton_document(store.subjects.get(name).skeleton(hand))
 
@@ -148,6 +148,6 @@ def get_skeleton(name: NameInPath, store: StoreNeeded, hand: Handedness | None =
     summary="Remove a subject",
     responses=change_problems(409),
 )
-def remove_subject(name: NameInPath, store: StoreNeeded) -> None:
+def remove_subject(name: SubjectInPath, store: StoreNeeded) -> None:
     """409 while the subject owns takes or models."""
     store.subjects.remove(name)

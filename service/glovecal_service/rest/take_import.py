@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 
 from glovecal_models.calibration.samples import require_layout
@@ -29,6 +30,8 @@ class Import:
     existing: set[str]
     """Ids of those that this very file had brought before: sending a file twice is harmless."""
     warnings: list[str]
+    subject_created: bool
+    """Whether the subject was not there before."""
 
     @property
     def imported(self) -> list[str]:
@@ -36,14 +39,23 @@ class Import:
 
 
 def import_takes(
-    store: Store, read: Callable[[], list[Take]], *, original_sha256: str, subject: str, layout: str | None
+    store: Store,
+    read: Callable[[], list[Take]],
+    *,
+    original_sha256: str,
+    subject: str,
+    layout: str | None,
+    create_subject: bool = False,
 ) -> Import:
     """Keep all takes that ``read`` finds. Without ``layout`` the file's columns make one.
 
-    A file that another subject has already is refused: one recording is of one hand. Raises BadInput
-    (BadTakeTable, LayoutMismatch), NotFound, Conflict, StorageFull; then nothing was imported.
+    A file that another subject has already is refused: one recording is of one hand. With ``create_subject``
+    a subject that is not there is added with the takes. Raises BadInput (BadTakeTable, LayoutMismatch),
+    NotFound, Conflict, StorageFull; then nothing was imported, and no subject added.
     """
-    store.subjects.get(subject)
+    is_new = create_subject and subject not in {record.name for record in store.subjects.list()}
+    if not is_new:
+        store.subjects.get(subject)
     known = None if layout is None else store.layouts.get(layout)
     _require_no_other_owner(store, original_sha256, subject)
     takes = read()
@@ -59,15 +71,21 @@ def import_takes(
     }
     existing = {take.name: _same(take, stored[take.name]) for take in takes if take.name in stored}
     new = [take for take in takes if take.name not in stored]
-    added = store.takes.add_all(
-        new, subject=subject, layout=chosen.name, source="import", original_sha256=original_sha256
-    )
+    with ExitStack() as undo:
+        if is_new:
+            store.subjects.create(subject)
+            undo.callback(store.subjects.remove, subject)
+        added = store.takes.add_all(
+            new, subject=subject, layout=chosen.name, source="import", original_sha256=original_sha256
+        )
+        undo.pop_all()
     by_name = existing | {record.name: record for record in added}
     return Import(
         chosen.name,
         [by_name[take.name] for take in takes],
         {record.id for record in existing.values()},
         take_warnings(takes),
+        is_new,
     )
 
 
@@ -79,8 +97,8 @@ def _require_no_other_owner(store: Store, original_sha256: str, subject: str) ->
     for record in every:
         if record.original_sha256 == original_sha256 and record.subject != subject:
             raise Conflict(
-                f"this file was imported for subject {record.subject!r} already (take {record.id}, "
-                f"{record.name!r}); a recording is of one hand"
+                f"this file already belongs to {record.subject} (take {record.name}, {record.id}); use "
+                f"subject {record.subject}, or remove its takes there first"
             )
 
 

@@ -29,6 +29,7 @@ from glovecal_service.rest.names import (
     IdInPath,
     LayoutFilter,
     SubjectFilter,
+    SubjectName,
     WearingName,
 )
 from glovecal_service.rest.problem import Problem
@@ -108,12 +109,14 @@ class ImportedTakes(BaseModel):
     layout: str
     original_sha256: str
     warnings: list[str] = Field(description="What `check` says of the takes; like sentences once.")
+    subject_created: bool = Field(description="Whether the subject was not there before.")
 
 
 class ImportOptions(BaseModel):
     """Query parameters of an import."""
 
-    subject: str = Field(pattern=IDENTIFIER)
+    subject: SubjectName
+    create_subject: bool = Field(False, description="Add the subject if it is not there; else 404.")
     layout: str | None = Field(None, pattern=IDENTIFIER, description="None: made of the file's columns.")
     format: TableFormat | None = Field(None, description="None: by the file's first bytes and name.")
     name: WearingName | None = Field(None, description="Name of the take; before the names of several.")
@@ -165,6 +168,7 @@ async def add_takes(
         "existing": sorted(result.existing),
         "layout": result.layout,
         "original_sha256": upload.sha256,
+        "subject_created": result.subject_created,
         "warnings": result.warnings,
     }
 
@@ -290,6 +294,7 @@ def _import(
             original_sha256=original_sha256,
             subject=options.subject,
             layout=options.layout,
+            create_subject=options.create_subject,
         )
 
 

@@ -12,7 +12,7 @@ from glovecal_models.errors import LayoutMismatch, NotTrainable
 from glovecal_service.rest.answers import change_problems
 from glovecal_service.rest.dependencies import StoreNeeded
 from glovecal_service.rest.jobs import Job
-from glovecal_service.rest.names import Id, Identifier, ModelReference
+from glovecal_service.rest.names import Id, Identifier, ModelReference, SubjectName
 from glovecal_service.rest.new_job import new_job
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.errors import Conflict
@@ -25,12 +25,12 @@ MOST_TAKES = 1000
 
 
 class Training(StrictBody):
-    subject: Identifier
-    layout: Identifier
+    subject: SubjectName
+    layout: Identifier | None = Field(None, description="None: that of the takes, if it is one.")
     method: Method = Field("lmc_gpr", description="`auto` chooses a kernel for each rotation.")
     takes: Annotated[list[Id], Field(min_length=1, max_length=MOST_TAKES)] | None = Field(
         None,
-        description="None: all takes of the subject and layout that have a "
+        description="None: all takes of the subject (and layout) that have a "
         "reference, or in which fingertips were kept together.",
     )
     activate: bool = Field(True, description="Predict live with the model once it is trained.")
@@ -62,9 +62,11 @@ class Training(StrictBody):
 def train(body: Training, store: StoreNeeded, response: Response) -> JobRecord:
     """Answers at once with the job; what cannot be trained is refused here, before anything is fitted."""
     store.subjects.get(body.subject)
-    store.layouts.get(body.layout)
+    if body.layout is not None:
+        store.layouts.get(body.layout)
     takes = _chosen_takes(store, body)
-    payload: dict[str, Any] = body.model_dump() | {"takes": [take.id for take in takes]}
+    chosen = {"layout": takes[0].layout, "takes": [take.id for take in takes]}
+    payload: dict[str, Any] = body.model_dump() | chosen
     if body.parent is not None:
         payload["parent"] = store.models.get(body.parent).id
     return new_job(store, response, "train", payload, body.subject)
@@ -80,13 +82,17 @@ def _chosen_takes(store: Store, body: Training) -> list[TakeRecord]:
             raise Conflict(
                 f"take {take.id} ({take.name!r}) is of subject {take.subject!r}, not {body.subject!r}"
             )
-        if take.layout != body.layout:
+        if body.layout not in (None, take.layout):
             raise LayoutMismatch(
                 f"take {take.id} ({take.name!r}) has layout {take.layout!r}, not {body.layout!r}"
             )
     if not any(take.teaches for take in takes):
+        of_layout = f" with layout {body.layout!r}" if body.layout is not None else ""
         raise NotTrainable(
-            f"no take of subject {body.subject!r} with layout {body.layout!r} has reference angles; "
+            f"no take of subject {body.subject!r}{of_layout} has reference angles; "
             "import some with r.ROTATION columns, or attach a reference to a recording"
         )
+    layouts = sorted({take.layout for take in takes})
+    if len(layouts) > 1:
+        raise LayoutMismatch(f"the takes have layouts {', '.join(layouts)}; choose one of them as layout")
     return takes

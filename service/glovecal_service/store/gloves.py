@@ -9,7 +9,7 @@ from typing import Any
 from sqlalchemy import Connection, Row, insert, select, update
 
 from glovecal_models.errors import BadInput
-from glovecal_models.names import check_identifier
+from glovecal_models.names import check_identifier, subject_name
 from glovecal_service.store import revision, tables
 from glovecal_service.store.clock import now
 from glovecal_service.store.database import Database
@@ -86,9 +86,10 @@ class Gloves:
 def _said(glove: str, meta: Mapping[str, Any]) -> dict[str, Any]:
     layout, subject, wearing = meta.get("layout"), meta.get("subject"), meta.get("wearing")
     run_id = meta.get("run_id")
-    for what, value in (("layout", layout), ("subject", subject)):
-        if value is not None:
-            check_identifier(_text(value, what, glove), f"{what} of glove {glove!r}")
+    if layout is not None:
+        check_identifier(_text(layout, "layout", glove), f"layout of glove {glove!r}")
+    if subject is not None:
+        subject = subject_name(_text(subject, "subject", glove))
     if wearing is not None:
         check_text(wearing, f"wearing of glove {glove!r}")
     return {

@@ -54,13 +54,14 @@ def _end(process: subprocess.Popen[str], number: int = signal.SIGINT) -> tuple[s
 def streaming(live: dict[str, str], *options: str) -> Iterator[None]:
     """``glovecal capture`` of the simulated glove until the block ends; it must end cleanly."""
     arguments = [word for option in ("seed=1", *options) for word in ("--option", option)]
-    arguments += ["--subject", "anna", "--wearing", "monday"]
+    arguments += ["--subject", "Anna", "--wearing", "monday"]
     process = start(live, "capture", "--device", "simulated", "--glove", GLOVE, *arguments)
     try:
         yield
     finally:
         said, complaints = _end(process)
     assert process.returncode == 0, complaints
+    assert "Subject Anna is stored as anna." in complaints
     assert said.startswith("run ")
     assert "Traceback" not in complaints
 

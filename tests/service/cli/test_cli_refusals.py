@@ -14,10 +14,10 @@ from glovecal_client.session import DEFAULT_ENDPOINT
 from glovecal_models.calibration.training_settings import METHODS
 from glovecal_service.cli import options, train
 from glovecal_service.cli.command import app
-from glovecal_service.rest.names import IDENTIFIER
+from glovecal_service.rest.names import IDENTIFIER, SUBJECT
 from glovecal_service.rest.training import Training
 
-HOSTILE = ["", "..", "../x", "a/b", "%2e%2e", "A", "a b", "-", "x" * 65, "a\x00b", "a\nb", "ä", "a\udc80"]
+HOSTILE = ["", "..", "../x", "a/b", "%2e%2e", "A/", "a b", "-", "x" * 65, "a\x00b", "a\nb", "ä", "a\udc80"]
 VERBS = [
     (), ("subject",), ("glove",), ("take",), ("model",), ("job",), ("demo",), ("serve",), ("capture",),
     ("find-port",), ("watch",), ("record",), ("train",), ("compare",), ("take", "import"), ("job", "wait"),
@@ -127,6 +127,7 @@ def test_the_command_and_rest_agree():
         assert defaults[name].default == bounds[name]["default"]
     assert options.DEFAULT_ZENOH == DEFAULT_ENDPOINT
     assert IDENTIFIER == "^[a-z0-9][a-z0-9_-]{0,63}$"
+    assert IDENTIFIER.replace("a-z", "A-Za-z") == SUBJECT
 
 
 def test_nobody_at_the_address():

@@ -35,6 +35,47 @@ def test_a_subject_comes_and_goes(run):
     assert run("subject", "list", "--json").json == []
 
 
+def test_a_subject_in_capitals_is_the_one_in_lower_case(run, tables):
+    added = run("subject", "add", "Anna")
+    assert (added.out, added.said) == ("Added subject anna.\n", "Subject Anna is stored as anna.")
+    imported = run("take", "import", tables / "other.parquet", "-s", "ANNA", "--json")
+    assert imported.json[0]["subject"] == "anna"
+    assert imported.said == "Subject ANNA is stored as anna."
+    assert len(run("take", "list", "--subject", "Anna", "--json").json) == 1
+    assert run("glove", "wear", "right", "Anna").out == "right is worn by anna.\n"
+    assert run("subject", "show", "ANNA", "--json").json["name"] == "anna"
+
+
+def test_an_import_adds_the_subject_and_a_mistyped_one_can_be_undone(run, tables):
+    first = run("take", "import", tables / "other.parquet", "-s", "anna")
+    assert first.code == 0
+    assert first.said == "Added subject anna. To undo: glovecal subject remove anna --takes"
+    wrong = run("take", "import", tables / "train.csv", "-s", "ana")
+    assert wrong.said == "Added subject ana. Similar: anna. To undo: glovecal subject remove ana --takes"
+    right = run("take", "import", tables / "train.csv", "-s", "anna")
+    assert right.code == 1
+    assert "this file already belongs to ana" in right.said
+    assert "use subject ana, or remove its takes there first" in right.said
+    assert run("subject", "remove", "ana").code == 1
+    removed = run("subject", "remove", "ana", "--takes").out.splitlines()
+    assert [line.split()[:3] for line in removed[:2]] == [
+        ["Removed", "take", "poses"],
+        ["Removed", "take", "cross"],
+    ]
+    assert removed[2:] == ["Removed subject ana."]
+    again = run("take", "import", tables / "train.csv", "-s", "anna")
+    assert (again.code, again.err) == (0, "")
+    assert len(run("take", "list", "-s", "anna", "--json").json) == 3
+
+
+def test_an_import_that_fails_adds_no_subject(run, tmp_path):
+    (tmp_path / "bad.csv").write_text("time_s,s.I_MCP\n0,x\n")
+    answer = run("take", "import", tmp_path / "bad.csv", "-s", "anna")
+    assert answer.code == 1
+    assert "Added" not in answer.err
+    assert run("subject", "list", "--json").json == []
+
+
 def test_a_frames_file_finds_its_reference(anna):
     rows = {row["name"]: row for row in anna("take", "list", "--json").json}
     assert list(rows) == ["poses", "cross", "second"]

@@ -41,6 +41,24 @@ def client(client: RestClient, write_table: Write) -> RestClient:
     return client
 
 
+def test_the_layout_is_that_of_the_takes(client: RestClient, write_table: Write) -> None:
+    takes = client.get("/takes")
+    job = client.post("/models/train", {"subject": "Anna", "method": "linear", "folds": 0})
+    model = client.get(f"/models/{client.wait_for_job(job['id'], patience_s=300)['result']['model']}")
+    assert (model["subject"], model["layout"]) == ("anna", takes[0]["layout"])
+    client.post("/subjects", {"name": "ben"})
+    with pytest.raises(Refused, match="no take of subject 'ben' has reference angles"):
+        client.post("/models/train", {"subject": "ben"})
+    fingers = {"sensors": ["I_MCP", "I_PIP"], "rotations": {"I_MCP": ["I_MCP"], "I_PIP": ["I_PIP"]}}
+    client.put("/gloves/two-fingers", fingers)
+    client.put(f"/takes/{takes[0]['id']}/layout", {"layout": "two-fingers"})
+    with pytest.raises(
+        Refused, match=f"have layouts {takes[1]['layout']}, two-fingers; choose one"
+    ) as refused:
+        client.post("/models/train", {"subject": "anna"})
+    assert refused.value.status == 422
+
+
 def test_train_activate_roll_back(client: RestClient) -> None:
     takes = [take["id"] for take in client.get("/takes")]
     layout = client.get("/takes")[0]["layout"]

@@ -67,11 +67,22 @@ def test_the_same_file_again_changes_nothing(client: RestClient, write_table: Wr
     assert len(client.get("/takes")) == 2
 
 
+def test_a_subject_is_added_where_that_is_asked_for(client: RestClient, write_table: Write) -> None:
+    file = write_table("of-ben.csv", seed=3)
+    with pytest.raises(Refused, match="there is no subject 'ben'"):
+        client.upload_takes(file, subject="Ben")
+    first = client.upload_takes(file, subject="Ben", create_subject=True)
+    again = client.upload_takes(file, subject="ben", create_subject=True)
+    assert (first["subject_created"], again["subject_created"]) == (True, False)
+    assert {take["subject"] for take in first["takes"]} == {"ben"}
+    assert [take["id"] for take in client.get("/takes", {"subject": "BEN"})] == first["imported"]
+
+
 def test_a_recording_is_of_one_hand(client: RestClient, write_table: Write) -> None:
     client.post("/subjects", {"name": "ben"})
     file = write_table()
     take = client.upload_takes(file, subject="anna")["imported"][0]
-    with pytest.raises(Refused, match=take) as refused:
+    with pytest.raises(Refused, match=f"already belongs to anna .*{take}.* use subject anna") as refused:
         client.upload_takes(file, subject="ben")
     assert refused.value.status == 409
     assert client.get("/takes", {"subject": "ben"}) == []
