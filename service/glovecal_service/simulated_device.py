@@ -17,7 +17,7 @@ from typing import TextIO, TypeVar
 
 import numpy as np
 
-from glovecal_client.capture.device import Reading
+from glovecal_client.capture.device import Reading, check_options
 from glovecal_client.errors import BadOption, DeviceFinished, DeviceLost
 from glovecal_models.simulation.performance import Performance, duration_s
 from glovecal_models.simulation.protocol import MOTIONS, Segment, free_segment, segments
@@ -33,6 +33,17 @@ LATE_S = 1.0
 """A frame this late is left out, as it would be by a glove whose computer was asleep."""
 _NS = 1_000_000_000
 _Number = TypeVar("_Number", int, float)
+OPTION_HELP = {
+    "seed": "N (0; another is another glove)",
+    "layout": f"{'|'.join(LAYOUTS)} (cyberglove18)",
+    "motion": f"{'|'.join((*MOTIONS, ASKED))} (free)",
+    "service": f"URL, where motion=asked asks ({DEFAULT_SERVICE})",
+    "wearing": "N (0; another is another donning)",
+    "rate_hz": f"HZ, 1 to {FASTEST_HZ:g} (120)",
+    "reference": "FILE, reference angles are written there",
+    "reference_noise_deg": f"DEGREES ({REFERENCE_NOISE_DEG:g})",
+    "duration": "SECONDS (free and asked motion: for ever)",
+}
 
 
 @dataclass(frozen=True)
@@ -53,22 +64,8 @@ class SimulationOptions:
 
     @classmethod
     def parse(cls, options: Mapping[str, str]) -> SimulationOptions:
-        """From ``seed=N``, ``layout=``, ``motion=``, ``service=URL``, ``wearing=N``, ``rate_hz=``,
-        ``reference=FILE``, ``reference_noise_deg=``, ``duration=SECONDS``. Raises BadOption."""
-        known = (
-            "seed",
-            "layout",
-            "motion",
-            "service",
-            "wearing",
-            "rate_hz",
-            "reference",
-            "reference_noise_deg",
-            "duration",
-        )
-        unknown = sorted(set(options) - set(known))
-        if unknown:
-            raise BadOption(f"simulated: no option {unknown[0]!r}; there are {', '.join(known)}")
+        """From the texts that ``OPTION_HELP`` describes. Raises BadOption."""
+        check_options("simulated", options, OPTION_HELP)
         duration = options.get("duration")
         reference = options.get("reference")
         return cls(
@@ -94,6 +91,7 @@ class SimulatedDevice:
     """
 
     simulated = True
+    option_help = OPTION_HELP
     context: tuple[str, ...] = ()
     hand = "right"
 

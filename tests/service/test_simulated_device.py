@@ -134,7 +134,7 @@ def test_a_motion_ends_when_it_was_done_and_repeats_to_fill_a_duration():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"speed": "2"}, "no option 'speed'"),
+        ({"speed": "2"}, "no option 'speed'; there are seed=N"),
         ({"motion": "dance"}, "must be one of free, key_poses"),
         ({"layout": "lucidglove"}, "must be one of cyberglove18, cyberglove22"),
         ({"seed": "1.5"}, "must be a whole number"),

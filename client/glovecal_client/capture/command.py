@@ -6,13 +6,14 @@ import argparse
 import os
 import signal
 import sys
+import textwrap
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings, CaptureSummary
-from glovecal_client.capture.device import build_device, device_names
+from glovecal_client.capture.device import build_device, device_names, device_options
 from glovecal_client.errors import BadOption, ClientError
 from glovecal_client.keys import GloveKeys
 from glovecal_client.names import check_identifier, subject_name
@@ -90,7 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 endpoints=asked.connect or [os.environ.get("GLOVECAL_ZENOH", DEFAULT_ENDPOINT)],
                 data=asked.data,
                 stop=stop,
-                report=_tell,
+                report=tell,
             )
     except ClientError as error:
         print(f"glovecal-capture: {error}", file=sys.stderr)
@@ -99,17 +100,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _tell(sentence: str) -> None:
+def tell(sentence: str) -> None:
     """To standard error, if there still is one: a closed terminal must not end a recording."""
     with suppress(OSError, ValueError):
         print(sentence, file=sys.stderr, flush=True)
 
 
+class _Parser(argparse.ArgumentParser):
+    def format_help(self) -> str:
+        """The devices are loaded when their options are asked for, not at every start."""
+        self.epilog = "\n\n".join(textwrap.fill(sentence, 79) for sentence in device_options())
+        return super().format_help()
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="glovecal-capture", description="Record and publish a data glove.")
+    parser = _Parser(
+        prog="glovecal-capture",
+        description="Record and publish a data glove.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     installed = ", ".join(device_names())
     parser.add_argument("--device", required=True, help=f"NAME or NAME:ARGUMENT; installed: {installed}")
-    parser.add_argument("--option", action="append", default=[], metavar="KEY=VALUE", help="for the device")
+    parser.add_argument(
+        "--option", action="append", default=[], metavar="KEY=VALUE", help="for the device, see below"
+    )
     parser.add_argument("--glove", required=True, help="name of this glove on the wire, such as right-hand")
     parser.add_argument("--site", default=os.environ.get("GLOVECAL_SITE", "lab"))
     parser.add_argument("--subject", help="who wears it")

@@ -19,7 +19,7 @@ from glovecal_client.capture.cyberglove_box import Unanswered
 from glovecal_client.capture.cyberglove_clock import BoxClock
 from glovecal_client.capture.cyberglove_connection import BAUD_RATES, connect
 from glovecal_client.capture.cyberglove_identity import Identity, identify
-from glovecal_client.capture.cyberglove_options import CyberGloveOptions
+from glovecal_client.capture.cyberglove_options import OPTION_HELP, CyberGloveOptions
 from glovecal_client.capture.cyberglove_order import SENSORS, layout_index
 from glovecal_client.capture.cyberglove_rate import DEFAULT_RATE_HZ
 from glovecal_client.capture.cyberglove_record import Record, RecordReader
@@ -52,6 +52,7 @@ class CyberGlove:
     name = "cyberglove"
     context: tuple[str, ...] = ()
     counts = (1.0, 255.0)
+    option_help = OPTION_HELP
 
     def __init__(self, port: str | None = None, options: CyberGloveOptions | None = None) -> None:
         self.port = port

@@ -9,10 +9,16 @@ from typing import TypeVar
 from glovecal_client.capture.cyberglove_connection import BAUD_RATES
 from glovecal_client.capture.cyberglove_order import SENSORS
 from glovecal_client.capture.cyberglove_rate import FASTEST_HZ, SLOWEST_HZ
+from glovecal_client.capture.device import check_options
 from glovecal_client.errors import BadOption
 
-_NAMES = ("baud", "rate", "layout", "timestamp")
 _Value = TypeVar("_Value")
+OPTION_HELP = {
+    "baud": f"auto|{'|'.join(map(str, BAUD_RATES))} (auto)",
+    "rate": f"HZ, {SLOWEST_HZ:g} to {FASTEST_HZ:g} (100, or what the baud rate carries)",
+    "layout": f"auto|{'|'.join(SENSORS)} (auto)",
+    "timestamp": "on|off (off)",
+}
 
 
 @dataclass(frozen=True)
@@ -30,9 +36,7 @@ class CyberGloveOptions:
 
         Raises BadOption.
         """
-        unknown = set(options) - set(_NAMES)
-        if unknown:
-            raise BadOption(f"cyberglove has no option {min(unknown)!r}; it has {', '.join(_NAMES)}")
+        check_options("cyberglove", options, OPTION_HELP)
         return cls(
             baud=_choice(options, "baud", {"auto": None, **{str(rate): rate for rate in BAUD_RATES}}),
             rate_hz=_rate(options["rate"]) if "rate" in options else None,

@@ -11,7 +11,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from glovecal_client.errors import BadName, DeviceError, UnknownDevice
+from glovecal_client.errors import BadName, BadOption, DeviceError, UnknownDevice
 from glovecal_client.names import check_channel_name
 from glovecal_client.wire.frame import MAX_CONTEXT, MAX_SENSORS
 
@@ -41,9 +41,10 @@ class Reading:
 class Device(Protocol):
     """A source of readings. It says what it produces before it is opened.
 
-    Four more attributes are looked at if the device has them: ``counts``, the pair of smallest and largest
+    Five more attributes are looked at if the device has them: ``counts``, the pair of smallest and largest
     raw value its hardware can send; ``hand``, one of ``left``, ``right``, ``unknown``; ``counters`` with
-    ``bad_frames``, the records thrown away since they came damaged; ``notice``, a sentence for the user.
+    ``bad_frames``, the records thrown away since they came damaged; ``notice``, a sentence for the user;
+    ``option_help`` of the class, what each option may be, by the option's name.
     """
 
     @property
@@ -116,6 +117,31 @@ def check_description(device: Device) -> None:
 def device_names() -> list[str]:
     """Names of all installed devices."""
     return sorted({point.name for point in metadata.entry_points(group=DEVICE_GROUP)})
+
+
+def check_options(device: str, given: Mapping[str, str], option_help: Mapping[str, str]) -> None:
+    """Raise BadOption, with the options there are, for one that the device does not have."""
+    unknown = sorted(set(given) - set(option_help))
+    if unknown:
+        raise BadOption(f"{device}: no option {unknown[0]!r}; there are {_listed(option_help)}")
+
+
+def device_options() -> list[str]:
+    """One sentence for each installed device: its options and what they may be."""
+    sentences = []
+    for name in device_names():
+        try:
+            option_help = getattr(_device_class(name), "option_help", None)
+        except DeviceError as error:
+            sentences.append(str(error))
+            continue
+        if option_help:
+            sentences.append(f"Options of {name}: {_listed(option_help)}")
+    return sentences
+
+
+def _listed(option_help: Mapping[str, str]) -> str:
+    return "; ".join(f"{name}={values}" for name, values in option_help.items())
 
 
 def build_device(text: str, options: Mapping[str, str] | None = None) -> Device:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import ClassVar
 
-from glovecal_client.capture.device import Reading
+from glovecal_client.capture.device import Reading, check_options
 from glovecal_client.capture.replayed_frames import ReplayedFrame, nominal_rate_hz, open_recording
 from glovecal_client.errors import BadOption, DeviceFinished
 from glovecal_client.names import check_identifier
-
-_OPTIONS = ("speed", "loop", "layout")
 
 
 class ReplayDevice:
@@ -19,6 +18,12 @@ class ReplayDevice:
 
     A reading that is missing in the recording comes as NaN, for the daemon to refuse and count.
     """
+
+    option_help: ClassVar = {
+        "speed": "TIMES (1 is as recorded)",
+        "loop": "yes|no (no)",
+        "layout": "NAME (as in the recording)",
+    }
 
     def __init__(
         self, path: Path | str, *, speed: float = 1.0, loop: bool = False, layout: str | None = None
@@ -45,9 +50,7 @@ class ReplayDevice:
         """``replay:FILE`` with options ``speed=2``, ``loop=yes``, ``layout=NAME``. Raises BadOption."""
         if not argument:
             raise BadOption("device replay needs a file: replay:FILE")
-        unknown = sorted(set(options) - set(_OPTIONS))
-        if unknown:
-            raise BadOption(f"replay: no option {unknown[0]!r}; there are {', '.join(_OPTIONS)}")
+        check_options("replay", options, cls.option_help)
         loop = options.get("loop", "no")
         if loop not in ("yes", "no"):
             raise BadOption(f"replay: loop={loop!r} must be yes or no")

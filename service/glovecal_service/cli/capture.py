@@ -4,17 +4,28 @@ from __future__ import annotations
 
 import threading
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from glovecal_service.cli.options import DEFAULT_ZENOH, Site, Zenoh, identifier, subject_named
-from glovecal_service.cli.printing import err, out
+from glovecal_service.cli.printing import out
 
 GloveOption = Annotated[
     str,
     typer.Option("--glove", help="Its name on the wire, such as right-hand.", callback=identifier("glove")),
 ]
+
+
+class WithDeviceOptions(TyperCommand):
+    """Its help ends with the options of every installed device."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        from glovecal_client.capture.device import device_options
+
+        self.epilog = "\n\n".join(device_options())
+        super().format_help(ctx, formatter)
 
 
 def capture(
@@ -29,7 +40,9 @@ def capture(
     wearing: Annotated[
         str | None, typer.Option(help="Name of this donning.", callback=identifier("wearing"))
     ] = None,
-    option: Annotated[list[str] | None, typer.Option(help="KEY=VALUE for the device; repeat.")] = None,
+    option: Annotated[
+        list[str] | None, typer.Option(help="KEY=VALUE for the device, see below; repeat.")
+    ] = None,
     connect: Zenoh = DEFAULT_ZENOH,
     site: Site = "lab",
     data: Annotated[Path, typer.Option(envvar="GLOVECAL_DATA", help="Where the local log goes.")] = Path(
@@ -37,7 +50,7 @@ def capture(
     ),
 ) -> None:
     """Record a glove to the local log and publish it. Ctrl-C stops it."""
-    from glovecal_client.capture.command import parse_options, run_capture, stopped_by_signals
+    from glovecal_client.capture.command import parse_options, run_capture, stopped_by_signals, tell
 
     stop = threading.Event()
     with stopped_by_signals(stop):
@@ -51,6 +64,6 @@ def capture(
             endpoints=[connect],
             data=data,
             stop=stop,
-            report=lambda sentence: err.print(sentence),
+            report=tell,  # not the console: it ends the program where nobody reads
         )
     out.print(str(summary))

@@ -50,7 +50,7 @@ app = typer.Typer(
 )
 app.command("demo")(demo.demo)
 app.command("serve")(serve.serve)
-app.command("capture")(capture.capture)
+app.command("capture", cls=capture.WithDeviceOptions)(capture.capture)
 app.command("find-port")(find_port.find_port)
 app.command("watch")(watch.watch)
 app.command("record")(record.record)

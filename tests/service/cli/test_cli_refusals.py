@@ -10,12 +10,16 @@ import pytest
 from cli_running import glovecal
 from typer.testing import CliRunner
 
+from glovecal_client.capture.command import main as capture_alone
+from glovecal_client.capture.cyberglove import CyberGlove
+from glovecal_client.capture.replay import ReplayDevice
 from glovecal_client.session import DEFAULT_ENDPOINT
 from glovecal_models.calibration.training_settings import METHODS
 from glovecal_service.cli import options, train
 from glovecal_service.cli.command import app
 from glovecal_service.rest.names import IDENTIFIER, SUBJECT
 from glovecal_service.rest.training import Training
+from glovecal_service.simulated_device import SimulatedDevice
 
 HOSTILE = ["", "..", "../x", "a/b", "%2e%2e", "A/", "a b", "-", "x" * 65, "a\x00b", "a\nb", "ä", "a\udc80"]
 VERBS = [
@@ -32,6 +36,16 @@ def test_every_verb_explains_itself(verb):
     assert answer.exit_code == 0
     assert "Usage" in answer.output
     assert max(map(len, answer.output.splitlines())) <= 80
+
+
+def test_capture_explains_the_options_of_each_device(capsys):
+    told = CliRunner().invoke(app, ["capture", "--help"], env={"COLUMNS": "80"}).output
+    with pytest.raises(SystemExit):
+        capture_alone(["--help"])
+    for text in (" ".join(told.split()), " ".join(capsys.readouterr().out.split())):
+        for device in (ReplayDevice, SimulatedDevice, CyberGlove):
+            for name, values in device.option_help.items():
+                assert f"{name}={values}" in text
 
 
 def test_the_version_is_told(run):
