@@ -49,6 +49,8 @@ def test_golden_pose_is_read_and_written_to_the_byte() -> None:
     assert (pose.extrapolating, pose.too_uncertain, pose.simulated) == (True, True, True)
     assert (pose.uncalibrated, pose.stale, pose.state_reset) == (False, False, False)
     assert not pose.settling
+    assert pose.words == ("extrapolating", "too uncertain", "simulated")
+    assert Pose(0, 0, 0, 0, flags=35 | 1 << 15).words == ("uncalibrated", "stale", "simulated")
     arrays = {name: np.array(VALUES[name]) for name in ARRAYS}
     assert encode_pose(Pose(**(VALUES | arrays))) == MESSAGE
 

@@ -78,6 +78,11 @@ class Pose:
     """Microseconds from the service's receipt of the frame to publication."""
 
     @property
+    def words(self) -> tuple[str, ...]:
+        """The flags in words, such as ``("uncalibrated", "simulated")``; unknown bits have none."""
+        return tuple((flag.name or "").lower().replace("_", " ") for flag in PoseFlag if self.flags & flag)
+
+    @property
     def uncalibrated(self) -> bool:
         return bool(self.flags & PoseFlag.UNCALIBRATED)
 

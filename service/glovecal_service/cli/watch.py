@@ -131,15 +131,5 @@ def _rotations(names: tuple[str, ...], pose: Pose) -> Table:
 
 
 def _state(poses: PoseSubscriber, pose: Pose) -> str:
-    from glovecal_client.wire.pose import PoseFlag
-
-    words = {
-        PoseFlag.UNCALIBRATED: "uncalibrated",
-        PoseFlag.EXTRAPOLATING: "extrapolating",
-        PoseFlag.TOO_UNCERTAIN: "too uncertain",
-        PoseFlag.SETTLING: "settling",
-        PoseFlag.FAULTY_SENSOR: "faulty sensor",
-        PoseFlag.SIMULATED: "simulated glove",
-    }
-    said = [word for flag, word in words.items() if pose.flags & flag]
+    said = [word for word in pose.words if word not in ("stale", "state reset")]
     return ", ".join((["stale"] if poses.stale else []) + said) or "ok"

@@ -7,6 +7,7 @@ import os
 import re
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,6 +19,7 @@ from cli_running import glovecal, start
 from realtime_support import eventually, free_endpoint
 
 GLOVE = "right-hand"
+README = Path(__file__).parents[3] / "README.md"
 
 
 @pytest.fixture(scope="module")
@@ -109,13 +111,14 @@ def test_a_recorded_take_becomes_a_model_that_predicts_live(live, recorded):
 
         eventually(is_calibrated, "poses of the new model")
         assert len(poses[-1]["degrees"]) == len(poses[-1]["sd_deg"]) == 22
-        assert "simulated glove" in poses[-1]["state"]
+        assert "simulated" in poses[-1]["state"]
         sequence = [pose["sequence"] for pose in poses]
         assert sequence == sorted(set(sequence))
         drawn = run("watch", GLOVE, "--seconds", 0.3)
         assert drawn.out.startswith(f"{GLOVE}: ")
         assert f"model {model['id'][:12]}" in drawn.out
         assert "I_MCP" in drawn.out
+        _run_the_subscriber_of_the_readme(live)
         _watch_until_interrupted(live)
         _record_with_lead_in(live)
         assert "worn by nobody" in run("glove", "wear", GLOVE, "--nobody").out
@@ -123,6 +126,20 @@ def test_a_recorded_take_becomes_a_model_that_predicts_live(live, recorded):
     silent = run("watch", "left-hand", "--seconds", 0.3, "--json")
     assert (silent.code, silent.out) == (1, "")
     assert "no pose of glove left-hand came" in silent.said
+
+
+def _run_the_subscriber_of_the_readme(live: dict[str, str]) -> None:
+    """As it stands there, but for the address and the glove's name."""
+    (code,) = re.findall("```python\n(.*?)```", README.read_text(), re.DOTALL)
+    code = code.replace("tcp/127.0.0.1:7447", live["GLOVECAL_ZENOH"]).replace('"right"', f'"{GLOVE}"')
+    process = subprocess.Popen([sys.executable, "-u", "-c", code], stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+    finally:
+        process.kill()
+        process.communicate()
+    assert re.match(r"\d+ \(.*'simulated'.*\) \{'T_TMC': -?\d", line), line
 
 
 def _record_with_lead_in(live: dict[str, str]) -> None:
