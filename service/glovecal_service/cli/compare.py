@@ -56,12 +56,12 @@ def compare(
         body = {"takes": [row["id"] for row in takes]}
         results = {name: service.post(f"/models/{name}/compare", body) for name in documents}
         page = fetch_report(service, list(documents), takes) if report is not None else b""
+    if report is not None:
+        write_report(report, page, as_json=as_json)
     if as_json:
         print_json(results)
     else:
         _print(documents, takes, results, poses=poses)
-    if report is not None:
-        write_report(report, page, as_json=as_json)
 
 
 def _print(

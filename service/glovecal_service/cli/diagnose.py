@@ -65,6 +65,8 @@ def diagnose(
         job = service.post(f"/models/{model}/diagnose", body)["id"]
         found = wait_for_job(service, job, quiet=as_json)["result"]
         page = fetch_job_report(service, job) if report is not None else b""
+    if report is not None:
+        write_report(report, page, as_json=as_json)
     if as_json:
         print_json(found)
     else:
@@ -72,8 +74,6 @@ def diagnose(
         out.print(f"Model {model[:12]} ({document['method']}) of {document['subject']}, {len(takes)} takes:")
         print_diagnosis(found)
         out.print(f"\nNext: {next_command(document['id'], found)}")
-    if report is not None:
-        write_report(report, page, as_json=as_json)
 
 
 def print_diagnosis(found: Mapping[str, Any]) -> None:

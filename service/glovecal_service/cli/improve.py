@@ -104,12 +104,12 @@ def improve(
         job = service.post("/improve", {**chosen, **options, "activate": activate})["id"]
         result = wait_for_job(service, job, quiet=as_json)["result"]
         page = fetch_job_report(service, job) if report is not None else b""
+    if report is not None:
+        write_report(report, page, as_json=as_json)
     if as_json:
         print_json(result)
     else:
         _print(chosen["subject"], method, result, active=activate)
-    if report is not None:
-        write_report(report, page, as_json=as_json)
 
 
 def _chosen(

@@ -31,5 +31,8 @@ def fetch_job_report(service: RestClient, job: str) -> bytes:
 
 
 def write_report(file: Path, page: bytes, *, as_json: bool) -> None:
-    """Say so where it does not get into the JSON."""
+    """Before anything is printed, since whoever reads that may stop reading (``| head``).
+
+    Says so where it does not get into the JSON.
+    """
     write_whole({file: page}, tell=err if as_json else out)

@@ -79,14 +79,14 @@ def examine(
         found = service.post("/takes/examination", body | ({"layout_name": keep} if keep else {}))
         page = service.page("/takes/examination/report", body) if report is not None else ""
         kept = _kept(service, found, keep, rotation) if keep is not None else None
+    if report is not None:
+        write_report(report, page.encode(), as_json=as_json)
     if as_json:
         print_json(found)
     else:
         _print(found)
     if kept is not None:
         (err if as_json else out).print(kept)
-    if report is not None:
-        write_report(report, page.encode(), as_json=as_json)
 
 
 def _body(

@@ -57,12 +57,12 @@ def where(
         body = {"takes": [row["id"] for row in takes]}
         found = service.post(f"/models/{model}/where", body)
         page = fetch_report(service, [model], takes) if report is not None else b""
+    if report is not None:
+        write_report(report, page, as_json=as_json)
     if as_json:
         print_json(found)
     else:
         _print(model, document, takes, found, floors=floors)
-    if report is not None:
-        write_report(report, page, as_json=as_json)
 
 
 def _print(

@@ -28,7 +28,10 @@ def require_place(*files: Path, overwrite: bool) -> None:
 
 
 def write_whole(contents: Mapping[Path, bytes], *, tell: Console = out) -> None:
-    """Write files beside their places and move them there, so that a full disk leaves no half of one."""
+    """Write files beside their places and move them there, so that a full disk leaves no half of one.
+
+    It is said when all are there.
+    """
     for file, content in contents.items():
         unfinished = file.with_name(f".{file.name}.{os.getpid()}.part")
         try:
@@ -36,4 +39,5 @@ def write_whole(contents: Mapping[Path, bytes], *, tell: Console = out) -> None:
             unfinished.replace(file)
         finally:
             unfinished.unlink(missing_ok=True)
+    for file in contents:
         tell.print(f"Wrote {file}.")
