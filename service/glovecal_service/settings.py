@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from glovecal_models.names import check_identifier
@@ -30,14 +30,36 @@ class Settings(BaseSettings):
     port: Annotated[int, Field(ge=0, le=65535)] = 8600
     workers: Annotated[int, Field(ge=1, le=256)] = 2
     """Training processes, one thread each."""
+    workers_idle_s: Annotated[float, Field(gt=0, le=86400)] = 60.0
+    """Training processes that nobody has needed for so long are ended; the next job starts them anew."""
+    scheduler_ca: Path | None = None
+    scheduler_certificate: Path | None = None
+    scheduler_key: Path | None = None
+    """PEM files with which ``scheduler`` and this service prove to each other who they are."""
     scheduler: str | None = None
-    """Address of a Dask scheduler whose workers share ``data``; None: workers of our own, started lazily."""
+    """Address ``tls://HOST:PORT`` of a Dask scheduler whose workers share ``data``; None: workers of our own,
+    started when they are needed."""
     upload_limit_mb: Annotated[int, Field(ge=1)] = 256
 
     @field_validator("site")
     @classmethod
     def _site_fits_into_a_key(cls, site: str) -> str:
         return check_identifier(site, "GLOVECAL_SITE")
+
+    @field_validator("scheduler")
+    @classmethod
+    def _scheduler_is_protected(cls, scheduler: str | None, info: ValidationInfo) -> str | None:
+        """Whoever reaches a scheduler without TLS runs code on all its workers, and through them here."""
+        if scheduler is None:
+            return None
+        if not scheduler.startswith("tls://"):
+            raise ValueError("a scheduler is reached over TLS only: tls://HOST:PORT")
+        for name in ("scheduler_ca", "scheduler_certificate", "scheduler_key"):
+            file = info.data.get(name)
+            if file is None or not file.is_file():
+                problem = "is not set" if file is None else f"is {str(file)!r}, which is no file"
+                raise ValueError(f"it needs a PEM file in GLOVECAL_{name.upper()}, but that {problem}")
+        return scheduler
 
     @property
     def database_url(self) -> str:

@@ -1,7 +1,8 @@
-"""A process that is killed by tests: it runs the jobs of a store."""
+"""A process of its own that runs the jobs of a store: tests kill it, or break its children."""
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from pathlib import Path
@@ -21,5 +22,9 @@ def run_jobs(settings: Settings) -> None:
 
 
 if __name__ == "__main__":
-    data, database = sys.argv[1:3]
+    data, database, *of_children = sys.argv[1:]
+    if of_children:
+        import distributed  # noqa: F401  # whole here, and replaced by what lies in that folder for children
+
+        os.environ["PYTHONPATH"] = of_children[0]
     run_jobs(Settings(data=Path(data), database=database or None, artifacts=None, scheduler=None, workers=1))

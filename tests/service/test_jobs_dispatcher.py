@@ -2,12 +2,14 @@
 
 import os
 import signal
-import urllib.error
-import urllib.request
+import subprocess
+import sys
+from pathlib import Path
 
+import jobs_process
 import pytest
 from jobs_counting import CountingJob, noted
-from jobs_waiting import result_of, wait_for, wait_for_job
+from jobs_waiting import error_of, result_of, wait_for, wait_for_job
 
 from glovecal_service.jobs import workers
 from glovecal_service.jobs.dispatcher import Dispatcher
@@ -44,17 +46,6 @@ def test_progress_is_told_task_by_task_and_kept(dispatched, ledger):
     assert {f"sum to {number} done" for number in (3, 4, 5)} <= {event.sentence for event in events}
     assert [event.state for event in (events[0], events[1], events[-1])] == ["queued", "running", "done"]
     assert store.jobs.events(job.id, after=events[-2].id) == events[-1:]
-
-
-def test_the_scheduler_listens_on_this_computer_only_and_shows_nothing(dispatched, ledger):
-    store, dispatcher = dispatched
-    wait_for_job(store, create(store, ledger, [1]).id)
-    assert dispatcher.workers.address.startswith("tcp://127.0.0.1:")
-    http = dispatcher.workers._cluster.scheduler.http_server
-    for port in {sock.getsockname() for sock in http._sockets.values()}:
-        assert port[0] == "127.0.0.1"
-        with pytest.raises(urllib.error.HTTPError, match="404"):
-            urllib.request.urlopen(f"http://127.0.0.1:{port[1]}/info/main/workers.html", timeout=60)
 
 
 def test_what_was_computed_once_is_not_computed_again(dispatched, ledger):
@@ -112,6 +103,22 @@ def test_a_refusal_is_passed_on_and_a_mistake_is_called_one(dispatched, ledger):
     unknown = wait_for_job(store, store.jobs.create("knit", {}).id)
     kinds = "add_effect, count, diagnose, improve, remove_effect, train"
     assert unknown.error == f"no job of kind 'knit'; there are {kinds}"
+
+
+def test_a_process_that_cannot_start_is_told_in_its_own_words(
+    sqlite_store, sqlite_settings, ledger, tmp_path
+):
+    """Whatever breaks it: here a package that only children import."""
+    broken = tmp_path / "broken"
+    broken.mkdir()
+    (broken / "dask.py").write_text("raise ValueError('the installation is damaged')\n")
+    job = create(sqlite_store, ledger, [1])
+    program = Path(jobs_process.__file__)
+    command = [sys.executable, str(program), str(sqlite_settings.data), "", str(broken)]
+    assert subprocess.run(command, capture_output=True, timeout=120).returncode == 0
+    assert error_of(sqlite_store, job.id).endswith(
+        "Nanny failed to start: ValueError: the installation is damaged"
+    )
 
 
 def test_stopping_leaves_the_job_for_the_next_start(sqlite_store, sqlite_settings, ledger):

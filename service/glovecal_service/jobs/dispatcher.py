@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 import traceback
 from collections.abc import Mapping
 
@@ -34,6 +35,8 @@ class Dispatcher:
         self._folder = settings.fits_folder
         self._owners = settings.data / "owners"
         self._kinds = kinds
+        self._workers_idle_s = settings.workers_idle_s
+        self._busy_at = time.monotonic()
         self._owner: Owner | None = None
         self._runs: dict[threading.Thread, JobRun] = {}
         self._wake = threading.Event()
@@ -77,6 +80,7 @@ class Dispatcher:
             self._wake.clear()
             self._runs = {thread: run for thread, run in self._runs.items() if thread.is_alive()}
             try:
+                self._end_idle_workers()
                 while len(self._runs) < JOBS_AT_ONCE and not self._stopping.is_set():
                     if (job := self._store.jobs.claim(self._name())) is None:
                         break
@@ -87,6 +91,14 @@ class Dispatcher:
             except Exception:
                 log.error("no job can be claimed now", trace=traceback.format_exc())
                 self._stopping.wait(1.0)
+
+    def _end_idle_workers(self) -> None:
+        """Processes and ports that no job needs are closed; only this thread begins jobs."""
+        now = time.monotonic()
+        if self._runs:
+            self._busy_at = now
+        elif self.workers.started and now - self._busy_at > self._workers_idle_s:
+            self.workers.close()
 
     def _begin(self, job: JobRecord) -> None:
         kind = self._kinds.get(job.kind)

@@ -1,4 +1,5 @@
-"""What a worker process does before its first task: step back behind the live stream, pin BLAS."""
+"""What a worker process does before its first task: step back behind the live stream, pin BLAS, close
+a port."""
 
 from __future__ import annotations
 
@@ -16,3 +17,4 @@ def dask_setup(worker: Worker) -> None:
     if hasattr(os, "nice"):
         os.nice(NICENESS - os.nice(0))
     pin_blas_to_one_thread()
+    worker.http_server.stop()  # it has nothing to show

@@ -4,6 +4,10 @@ Dask distributed was chosen over procrastinate (needs PostgreSQL) and Ray (620 M
 in 2 s with SQLite alone, retries a task whose worker died, and a scheduler elsewhere is one setting. It is
 trusted with nothing but running: the database remembers jobs, the fits folder remembers results. It is
 imported at the first task too: importing it takes a second that short commands do not have.
+
+Dask's processes run what they are sent, so they speak TLS and both sides have to show a certificate. That of
+our own processes is made at their start and signs itself; its key is in their memory alone, so that no other
+user of this computer can have it.
 """
 
 from __future__ import annotations
@@ -11,6 +15,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import subprocess
 import sys
 import tempfile
 import threading
@@ -26,7 +31,7 @@ from glovecal_service.jobs.task_run import TaskOutcome, run_task
 from glovecal_service.settings import Settings
 
 if TYPE_CHECKING:
-    from distributed import Client, Future, LocalCluster
+    from distributed import Client, Future, LocalCluster, Security
 
 START_TIMEOUT_S = 60
 LOOK_S = 0.01
@@ -144,27 +149,40 @@ class Workers:
                 if sys.platform == "linux" and len(os.fsencode(tempfile.gettempdir())) <= _LONGEST_FOLDER:
                     _import_once()
                 try:
-                    address = self._settings.scheduler or self._local_cluster()
-                    self._client = Client(address, timeout=START_TIMEOUT_S, set_as_default=False)
+                    security = _security(self._settings)
+                    address = self._settings.scheduler or self._local_cluster(security)
+                    self._client = Client(
+                        address, security=security, timeout=START_TIMEOUT_S, set_as_default=False
+                    )
+                except (OSError, TimeoutError, RuntimeError) as error:
+                    self._close()
+                    raise WorkersLost(f"no training process can be started: {_reason(error)}") from error
                 except BaseException:
                     self._close()
                     raise
             return self._client
 
-    def _local_cluster(self) -> LocalCluster:
+    def _local_cluster(self, security: Security) -> LocalCluster:
         from distributed import LocalCluster
 
+        folder = self._settings.fits_folder.resolve() / "workers"
+        folder.mkdir(parents=True, exist_ok=True)
         self._cluster = LocalCluster(
             n_workers=self._settings.workers,
             threads_per_worker=1,
             processes=True,
             host="127.0.0.1",
+            security=security,
             dashboard_address="127.0.0.1:0",
             scheduler_kwargs={"dashboard": False},
-            local_directory=str(self._settings.fits_folder.resolve() / "workers"),
+            local_directory=str(folder),
             silence_logs=logging.CRITICAL,
             preload=["glovecal_service.jobs.worker_setup"],
         )
+        scheduler, loop = self._cluster.scheduler, self._cluster.loop
+        assert scheduler is not None
+        assert loop is not None
+        loop.add_callback(scheduler.http_server.stop)  # it has nothing to show
         return self._cluster
 
     def _close(self) -> None:
@@ -175,6 +193,36 @@ class Workers:
             with suppress(TimeoutError, OSError):  # it is thrown away in any case
                 if part is not None:
                     part.close(timeout=timeout_s)
+
+
+def _security(settings: Settings) -> Security:
+    """Who may speak to the scheduler and the workers."""
+    from distributed import Security
+
+    if settings.scheduler is None:
+        return Security.temporary()
+    certificate, key = str(settings.scheduler_certificate), str(settings.scheduler_key)
+    return Security(
+        require_encryption=True,
+        tls_ca_file=str(settings.scheduler_ca),
+        tls_client_cert=certificate,
+        tls_client_key=key,
+    )
+
+
+def _reason(error: Exception) -> str:
+    """Why no process starts, in the words of the process where Dask only says "Nanny failed to start".
+
+    One that dies before it can speak to Dask writes why to standard error: what it imports is imported once
+    more to hear that.
+    """
+    if not isinstance(error, RuntimeError):
+        return str(error) or type(error).__name__
+    cause = "" if error.__cause__ is None else str(error.__cause__)
+    command = [sys.executable, "-P", "-c", "import " + ", ".join(_IMPORTED_ONCE)]
+    child = subprocess.run(command, capture_output=True, text=True, check=False)
+    said = child.stderr.strip().splitlines()[-1:] if child.returncode else [cause]
+    return ": ".join(part for part in (str(error).rstrip("."), *said) if part)
 
 
 LOOP_IS_CLOSED = "IOLoop is closed"

@@ -1,0 +1,115 @@
+"""The ports of the training processes: nobody without the key of this start runs anything through them."""
+
+from __future__ import annotations
+
+import os
+
+import psutil
+import pytest
+from distributed import LocalCluster, Security
+from jobs_counting import CountingJob
+from jobs_waiting import result_of, wait_for
+from port_attack import NOBODY, attack
+
+from glovecal_models.errors import BadInput
+from glovecal_service.cli.connection import settings_of_environment
+from glovecal_service.jobs.dispatcher import Dispatcher
+from glovecal_service.settings import Settings
+
+
+def listening() -> set[int]:
+    """TCP ports of this process and its children."""
+    me = psutil.Process()
+    connections = [item for process in (me, *me.children(recursive=True)) for item in _connections(process)]
+    return {item.laddr.port for item in connections if item.status == psutil.CONN_LISTEN}
+
+
+def _connections(process):
+    try:
+        return process.net_connections("tcp")
+    except psutil.NoSuchProcess:
+        return []
+
+
+def create(store, ledger, numbers):
+    return store.jobs.create("count", {"numbers": numbers, "seconds": 0.0, "ledger": str(ledger)}).id
+
+
+@pytest.fixture
+def another_user(not_here):
+    if os.getuid() != 0:
+        not_here("becoming another user needs root")
+    return NOBODY
+
+
+def test_another_user_runs_nothing(sqlite_store, sqlite_settings, tmp_path, another_user):
+    before = listening()
+    with Dispatcher(sqlite_store, sqlite_settings, {"count": CountingJob()}) as dispatcher:
+        assert result_of(sqlite_store, create(sqlite_store, tmp_path / "ledger", [1, 2]))["sums"] == [1, 3]
+        ports = listening() - before
+        open_to_all = LocalCluster(
+            n_workers=0, processes=False, protocol="tcp://", host="127.0.0.1", dashboard_address="127.0.0.1:0"
+        )
+        try:
+            port = int(open_to_all.scheduler_address.rpartition(":")[2])
+            run = attack([*ports, port])
+        finally:
+            open_to_all.close()
+        assert run == {f"{port}-raw-tcp-{os.getuid()}"}, "only where nothing protects, and there it works"
+        assert str(dispatcher.workers.address).startswith("tls://127.0.0.1:")
+        assert len(ports) == 5, "of one scheduler, two workers and their nannies, and no web server"
+        assert result_of(sqlite_store, create(sqlite_store, tmp_path / "ledger", [3]))["sums"] == [6]
+
+
+def test_the_ports_close_when_nobody_needs_them(sqlite_store, sqlite_settings, tmp_path):
+    before = listening()
+    settings = sqlite_settings.model_copy(update={"workers_idle_s": 0.5})
+    with Dispatcher(sqlite_store, settings, {"count": CountingJob()}) as dispatcher:
+        for number in (3, 4):
+            result_of(sqlite_store, create(sqlite_store, tmp_path / "ledger", [number]))
+            wait_for(lambda: not dispatcher.workers.started)
+            wait_for(lambda: listening() <= before)
+
+
+@pytest.fixture
+def certificates(tmp_path):
+    """PEM files as an operator would keep them, and what Dask makes of them."""
+    made = Security.temporary()
+    texts = {"ca": made.tls_ca_file, "certificate": made.tls_client_cert, "key": made.tls_client_key}
+    for name, text in texts.items():
+        (tmp_path / f"{name}.pem").write_text(text)
+    return {f"scheduler_{name}": tmp_path / f"{name}.pem" for name in texts}, made
+
+
+def test_a_scheduler_elsewhere_is_reached_with_the_configured_certificate(
+    sqlite_store, sqlite_settings, tmp_path, certificates
+):
+    files, security = certificates
+    elsewhere = LocalCluster(n_workers=1, processes=False, security=security, dashboard_address="127.0.0.1:0")
+    try:
+        given = {**sqlite_settings.model_dump(), **files, "scheduler": elsewhere.scheduler_address}
+        with Dispatcher(sqlite_store, Settings(**given), {"count": CountingJob()}) as dispatcher:
+            assert result_of(sqlite_store, create(sqlite_store, tmp_path / "ledger", [4]))["sums"] == [10]
+            assert dispatcher.workers.address == elsewhere.scheduler_address
+    finally:
+        elsewhere.close()
+
+
+@pytest.mark.parametrize(
+    ("address", "left_out", "sentence"),
+    [
+        ("tcp://10.0.0.7:8786", "", r"GLOVECAL_SCHEDULER is 'tcp://10.0.0.7:8786': .* over TLS only: tls://"),
+        ("tls://10.0.0.7:8786", "scheduler_key", "a PEM file in GLOVECAL_SCHEDULER_KEY, but that is not set"),
+        ("tls://10.0.0.7:8786", "file", "in GLOVECAL_SCHEDULER_CA, but that is '.*ca.pem', which is no file"),
+    ],
+)
+def test_a_scheduler_without_a_proof_is_refused(monkeypatch, certificates, address, left_out, sentence):
+    files, _ = certificates
+    for name, file in files.items():
+        if name != left_out:
+            monkeypatch.setenv(f"GLOVECAL_{name.upper()}", str(file))
+    if left_out == "file":
+        files["scheduler_ca"].unlink()
+    monkeypatch.setenv("GLOVECAL_SCHEDULER", address)
+    with pytest.raises(BadInput, match=sentence):
+        settings_of_environment()
