@@ -25,21 +25,25 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"{' or '.join(PARTS)}; default: all")
     parser.add_argument("--quick", action="store_true", help="fewer frames, shorter runs")
+    parser.add_argument("--gloves", help="of streaming: only so many gloves with effects, such as 16,32,64")
+    parser.add_argument("--seconds", help="of streaming with --gloves: length of a run")
     parser.add_argument("--folder", type=Path, default=Path(".bench"), help="for figures and picture")
     options = parser.parse_args()
     unknown = sorted(set(options.parts) - set(PARTS))
     if unknown:
         parser.error(f"there is no part {unknown[0]!r}; there are {', '.join(PARTS)}")
     options.folder.mkdir(parents=True, exist_ok=True)
-    return max(_run(part, options.folder, options.quick) for part in options.parts or PARTS)
+    return max(_run(part, options) for part in options.parts or PARTS)
 
 
-def _run(part: str, folder: Path, quick: bool) -> int:
+def _run(part: str, options: argparse.Namespace) -> int:
     print(f"\n== {part} ==", flush=True)
-    command = [sys.executable, str(HERE / PARTS[part]), "--json", str(folder / f"{part}.json")]
+    command = [sys.executable, str(HERE / PARTS[part]), "--json", str(options.folder / f"{part}.json")]
     if part == "gaussian-process":
-        command += ["--picture", str(folder / f"{part}.png")]
-    command += ["--quick"] if quick else []
+        command += ["--picture", str(options.folder / f"{part}.png")]
+    if part == "streaming":
+        command += [f"--{name}={value}" for name in ("gloves", "seconds") if (value := vars(options)[name])]
+    command += ["--quick"] if options.quick else []
     return subprocess.run(command, env={**os.environ, **ONE_THREAD}).returncode
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import timeit
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -25,7 +25,7 @@ def cost_of_effects(base: CalibrationModel) -> dict[str, Any]:
     """Milliseconds a frame without and with hysteresis and creep on all rotations of ``base``."""
     names = base.rotation_names
     lanes, sensors = len(names), len(base.layout.sensors)
-    effects = (_everywhere("hysteresis", names, [4.0]), _everywhere("creep", names, [2.0, 10.0]))
+    effects = (everywhere("hysteresis", names, [4.0]), everywhere("creep", names, [0.6, 2.4, 10.0]))
     model = ServedModel.prepare("1" * 64, replace(base, effects=effects))
     of_glove, worn = LaneEffects(model), WornGlove()
     readings = np.random.default_rng(1).uniform(60, 190, (FRAMES, sensors)).astype(np.float32)
@@ -59,7 +59,8 @@ def cost_of_effects(base: CalibrationModel) -> dict[str, Any]:
     }
 
 
-def _everywhere(name: str, rotations: tuple[str, ...], shape: list[float]) -> AddedEffect:
+def everywhere(name: str, rotations: tuple[str, ...], shape: Sequence[float]) -> AddedEffect:
+    """An effect of the catalogue on all ``rotations`` with the same nonlinear parameters; small weights."""
     lanes, effect = len(rotations), stored_effect(name, {})
     weights = np.full((lanes, len(effect.weight_names({}))), 0.1)
     return AddedEffect(name, rotations, {}, np.tile(shape, (lanes, 1)), weights, np.zeros(lanes))

@@ -1,41 +1,37 @@
 """Frames in, poses out, through the running service and real zenoh: latency, age, and where every frame went.
 
-    python tests/bench/streaming_bench.py [--quick] [--json FILE]
+    python tests/bench/streaming_bench.py [--gloves 16,32,64] [--seconds S] [--quick] [--json FILE]
 
-Three processes: the real-time process of the product, a publisher of all gloves' frames, a subscriber of
-their poses. Latency is from just before a frame's ``put`` to the pose callback (two hops and a prediction,
-one machine, so one clock); age is what the pose states. Every glove has a calibration model of its own, 22
-rotations with 100 nodes each; the overload case serves models so large that the machine manages half of
-what is sent. Before that, without any network: what two effects with a memory add to a frame.
+Two processes: the real-time process of the product, and one that stands for all gloves and all readers of
+poses (``streaming_load.py``). Latency is from just before a frame's ``put`` to the pose callback (two hops
+and a prediction, one machine, so one clock); age is what the pose states. Models have 22 rotations with 100
+nodes each, and are those of 8 people; with ``--gloves`` they hold two effects with a memory too. The overload
+case serves models so large that the machine manages half of what is sent. Whether memory grows after the
+first minute: ``--gloves 64 --seconds 600``.
 """
 
 from __future__ import annotations
 
 import argparse
-import gc
 import json
 import multiprocessing
+import operator
 import os
-import secrets
-import signal
+import socket
 import tempfile
-import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import zenoh
-from effects_cost import cost_of_effects, sentence
+from effects_cost import cost_of_effects, everywhere, sentence
+from streaming_load import Load, ProcessCost, drive
 
-from glovecal_client.keys import GloveKeys, all_gloves, all_services
+from glovecal_client.keys import all_services
 from glovecal_client.queries import ask_json
 from glovecal_client.session import open_client
-from glovecal_client.wire.frame import Frame, encode_frame
-from glovecal_client.wire.pose import decode_pose
 from glovecal_models.calibration.artifact import dump
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.covariance.squared_exponential_ard import SquaredExponentialArd
@@ -50,6 +46,12 @@ ROTATIONS = 22
 SPAWN = multiprocessing.get_context("spawn")
 
 
+PEOPLE = 8
+FIRST_MINUTE_S = 60.0
+EFFECTS = {"hysteresis": (4.0,), "lag": (0.05,)}
+"""Both with a memory, on every rotation, with these nonlinear parameters."""
+
+
 @dataclass(frozen=True)
 class Case:
     """One run of the bench."""
@@ -59,43 +61,62 @@ class Case:
     rate_hz: float
     seconds: float
     nodes: int = 100
+    effects: bool = False
     targets: tuple[tuple[str, str, float], ...] = ()
-    """(figure, "<=" or "==", value)."""
+    """(figure, "<=", ">=" or "==", value)."""
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--gloves", type=_numbers, help="only so many gloves with effects, such as 16,32,64")
+    parser.add_argument("--seconds", type=float, help="length of a run with --gloves; default 20")
     parser.add_argument("--quick", action="store_true", help="shorter runs")
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     arguments = parser.parse_args()
     pin_blas_to_one_thread()
     effects = cost_of_effects(random_model("nobody", 100, seed=0))
     print(sentence(effects), flush=True)
-    results = run_all(quick=arguments.quick)
-    print_table(results)
+    results: list[dict[str, Any]] = []
+    for result in run_all(arguments.gloves, arguments.seconds, quick=arguments.quick):
+        print_result(result)
+        results.append(result)
+    print(f"\nload of the machine during the last minute: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     if arguments.json:
         arguments.json.write_text(json.dumps([effects, *results], indent=1))
 
 
-def run_all(*, quick: bool) -> list[dict[str, Any]]:
-    """All cases in turn; figures with their targets."""
+def _numbers(text: str) -> list[int]:
+    return [int(part) for part in text.split(",")]
+
+
+def run_all(gloves: list[int] | None, seconds: float | None, *, quick: bool) -> Iterator[dict[str, Any]]:
+    """The cases in turn; figures with their targets."""
     long, short = (10.0, 5.0) if quick else (60.0, 20.0)
-    two = Case(
-        "2 gloves at 120 Hz", 2, 120.0, long,
-        targets=(("latency_p50_ms", "<=", 1.0), ("lost", "==", 0), ("unaccounted", "==", 0)),
-    )  # fmt: skip
-    sixteen = Case(
-        "16 gloves at 120 Hz", 16, 120.0, short,
-        targets=(("age_p99_ms", "<=", 25.0), ("unaccounted", "==", 0)),
-    )  # fmt: skip
-    results = [run(two), run(sixteen)]
-    capacity = run(Case("large models, as many frames as it can", 8, 250.0, 5.0, nodes=400))
-    per_second = capacity["predicted"] / capacity["seconds"]
-    overload = Case(
-        f"twice what it can ({2 * per_second:.0f} frames/s)", 8, 2 * per_second / 8, short, nodes=400,
-        targets=(("age_max_ms", "<=", 50.0), ("unaccounted", "==", 0)),
-    )  # fmt: skip
-    return [*results, capacity, run(overload)]
+    if not gloves:
+        two = Case(
+            "2 gloves at 120 Hz", 2, 120.0, long,
+            targets=(("latency_p50_ms", "<=", 1.0), ("lost", "==", 0), ("unaccounted", "==", 0)),
+        )  # fmt: skip
+        yield run(two)
+    for count in gloves or [16, 32, 64]:
+        yield run(_gloves_case(count, seconds or short))
+    if not gloves:
+        capacity = run(Case("large models, as many frames as it can", 8, 250.0, 5.0, nodes=400))
+        yield capacity
+        per_second = capacity["predicted"] / capacity["seconds"]
+        overload = Case(
+            f"twice what it can ({2 * per_second:.0f} frames/s)", 8, 2 * per_second / 8, short, nodes=400,
+            targets=(("age_max_ms", "<=", 50.0), ("unaccounted", "==", 0)),
+        )  # fmt: skip
+        yield run(overload)
+
+
+def _gloves_case(count: int, seconds: float) -> Case:
+    targets = [("age_p99_ms", "<=", 25.0), ("predicted_share", ">=", 0.99), ("unaccounted", "==", 0)]
+    if seconds > FIRST_MINUTE_S:
+        targets.append(("memory_growth_mib", "<=", 5.0))
+    name = f"{count} gloves at 120 Hz, {PEOPLE} models with {' and '.join(EFFECTS)}"
+    return Case(name, count, 120.0, seconds, effects=True, targets=tuple(targets))
 
 
 def run(case: Case) -> dict[str, Any]:
@@ -103,16 +124,18 @@ def run(case: Case) -> dict[str, Any]:
     with tempfile.TemporaryDirectory(prefix="glovecal-bench-") as folder, ExitStack() as running:
         settings = Settings(data=Path(folder), zenoh=f"tcp/127.0.0.1:{_free_port()}")
         _store_models(settings, case)
-        running.enter_context(_service(settings))
-        watcher = running.enter_context(_helper(_watch, settings))
-        watcher.recv()
-        publisher = running.enter_context(_helper(_publish, settings, case))
-        sent = publisher.recv()
+        service = running.enter_context(_service(settings))
+        load = Load(settings.zenoh, settings.site, case.gloves, PEOPLE, case.rate_hz, case.seconds)
+        driver = running.enter_context(_helper(drive, load))
+        driver.recv()
+        with ProcessCost(service) as cost:
+            driver.send("start")
+            sent = driver.recv()
         status = _service_status(settings)
-        watcher.send("enough")
-        latency_ms, age_ms = watcher.recv()
-        publisher.send("enough")
-    return _figures(case, sent, status, latency_ms, age_ms)
+        driver.send("enough")
+        latency_ms, age_ms = driver.recv()
+    figures = _figures(case, sent, status, latency_ms, age_ms) | _cost_figures(case, cost, status)
+    return figures | {"targets": _targets(case, figures)}
 
 
 def _figures(
@@ -121,23 +144,33 @@ def _figures(
     gloves = status["gloves"].values()
     counts = {name: sum(glove[name] for glove in gloves) for name in ("received", "predicted", "skipped")}
     refused = sum(sum(glove["refused"].values()) for glove in gloves)
-    figures = {
+    never_came, never_arrived = sent - counts["received"], counts["predicted"] - len(latency_ms)
+    return {
         "case": case.name,
         "seconds": case.seconds,
         "sent": sent,
         **counts,
         "refused": refused,
         "poses": len(latency_ms),
-        "lost": sent - len(latency_ms) - counts["skipped"] - refused,
+        "lost": never_came + never_arrived,
+        "lost_before": never_came,
+        "lost_after": never_arrived,
         "unaccounted": counts["received"] - counts["predicted"] - counts["skipped"] - refused,
+        "predicted_share": counts["predicted"] / sent,
         **_percentiles("latency", latency_ms),
         **_percentiles("age", age_ms),
     }
-    figures["targets"] = [
-        {"figure": name, "is": relation, "value": value, "met": bool(_holds(figures[name], relation, value))}
-        for name, relation, value in case.targets
-    ]
-    return figures
+
+
+def _cost_figures(case: Case, cost: ProcessCost, status: dict[str, Any]) -> dict[str, Any]:
+    predicted = sum(glove["predicted"] for glove in status["gloves"].values())
+    return {
+        "cpu_cores": sum(cost.cpu_s.values()) / case.seconds,
+        "cpu_us_per_frame": 1e6 * sum(cost.cpu_s.values()) / max(predicted, 1),
+        "cpu_s_by_thread": {name: round(spent, 2) for name, spent in sorted(cost.cpu_s.items())},
+        "memory_mib": [round(mib, 1) for _, mib in cost.memory],
+        "memory_growth_mib": cost.growth_mib(FIRST_MINUTE_S),
+    }
 
 
 def _percentiles(name: str, values: np.ndarray) -> dict[str, float]:
@@ -147,33 +180,56 @@ def _percentiles(name: str, values: np.ndarray) -> dict[str, float]:
     return {f"{name}_p50_ms": p50, f"{name}_p99_ms": p99, f"{name}_max_ms": largest}
 
 
-def _holds(figure: float, relation: str, value: float) -> bool:
-    return figure <= value if relation == "<=" else figure == value
+def _targets(case: Case, figures: dict[str, Any]) -> list[dict[str, Any]]:
+    return [
+        {
+            "figure": name,
+            "is": relation,
+            "value": value,
+            "met": bool(_COMPARED[relation](figures[name], value)),
+        }
+        for name, relation, value in case.targets
+    ]
 
 
-def print_table(results: list[dict[str, Any]]) -> None:
-    """Counts, milliseconds, and each target beside what was reached."""
-    columns = ("sent", "received", "predicted", "skipped", "poses", "lost", "unaccounted")
+_COMPARED: dict[str, Callable[[float, float], bool]] = {
+    "<=": operator.le,
+    ">=": operator.ge,
+    "==": operator.eq,
+}
+
+
+def print_result(result: dict[str, Any]) -> None:
+    """Counts, milliseconds, cost, and each target beside what was reached."""
+    counts = ("sent", "received", "predicted", "skipped", "refused", "poses", "lost_before", "lost_after")
     times = ("latency_p50_ms", "latency_p99_ms", "age_p50_ms", "age_p99_ms", "age_max_ms")
-    for result in results:
-        print(f"\n{result['case']}, {result['seconds']:.0f} s")
-        print("  " + ", ".join(f"{name} {result[name]}" for name in columns))
-        print("  " + ", ".join(f"{name.removesuffix('_ms')} {result[name]:.2f} ms" for name in times))
-        for target in result["targets"]:
-            reached = result[target["figure"]]
-            print(
-                f"  {'met   ' if target['met'] else 'MISSED'} {target['figure']} {target['is']} "
-                f"{target['value']:g}: {reached:.2f}"
-            )
-    print(f"\nload of the machine during the last minute: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+    memory = result["memory_mib"] or [float("nan")]
+    print(f"\n{result['case']}, {result['seconds']:.0f} s")
+    print("  " + ", ".join(f"{name} {result[name]}" for name in (*counts, "unaccounted")))
+    print("  " + ", ".join(f"{name.removesuffix('_ms')} {result[name]:.2f} ms" for name in times))
+    print(
+        f"  real-time process: {result['cpu_cores']:.2f} of a core, {result['cpu_us_per_frame']:.0f} us a "
+        f"predicted frame, CPU seconds by thread {result['cpu_s_by_thread']}"
+    )
+    print(f"  memory: {memory[0]:.0f} MiB after 1 s, {max(memory):.0f} at most, {memory[-1]:.0f} at the end")
+    for target in result["targets"]:
+        print(
+            f"  {'met   ' if target['met'] else 'MISSED'} {target['figure']} {target['is']} "
+            f"{target['value']:g}: {result[target['figure']]:.2f}",
+            flush=True,
+        )
 
 
 def _store_models(settings: Settings, case: Case) -> None:
     with Store.open(settings) as store:
-        for number in range(case.gloves):
+        for number in range(min(case.gloves, PEOPLE)):
             subject = f"person{number}"
             store.subjects.create(subject)
             model = random_model(subject, case.nodes, seed=number)
+            if case.effects:
+                names = model.rotation_names
+                effects = tuple(everywhere(name, names, shape) for name, shape in EFFECTS.items())
+                model = replace(model, effects=effects)
             record = store.models.add(
                 dump(model), subject=subject, layout=model.layout.name, method="spgp", parent=None, facts={}
             )
@@ -219,14 +275,15 @@ def _random_rotation(
 
 
 @contextmanager
-def _service(settings: Settings) -> Iterator[None]:
+def _service(settings: Settings) -> Iterator[int]:
+    """The id of the real-time process."""
     ready = SPAWN.Event()
     process = SPAWN.Process(target=run_part, args=(real_time, settings, ready, os.getpid()))
     process.start()
     try:
-        if not ready.wait(60):
+        if not ready.wait(60) or process.pid is None:
             raise RuntimeError("the real-time process did not start")
-        yield
+        yield process.pid
     finally:
         process.terminate()
         process.join(15)
@@ -246,86 +303,6 @@ def _helper(work: Callable[..., None], *arguments: Any) -> Iterator[Any]:
             process.join()
 
 
-def _publish(pipe: Any, settings: Settings, case: Case) -> None:
-    """All gloves' capture: meta first, then frames at even spacing, and how many were sent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    layout = Layout.built_in("cyberglove18")
-    readings = np.random.default_rng(1).uniform(60, 190, (64, len(layout.sensors))).astype("<f4")
-    with open_client([settings.zenoh]) as session:
-        gloves = [GloveKeys(settings.site, f"glove{number}") for number in range(case.gloves)]
-        runs = [secrets.randbits(64) for _ in gloves]
-        publishers = [
-            session.declare_publisher(keys.raw, priority=zenoh.Priority.INTERACTIVE_HIGH, express=True)
-            for keys in gloves
-        ]
-        for number, keys in enumerate(gloves):
-            meta = _meta(layout, f"person{number}", runs[number])
-            session.put(keys.meta, json.dumps({**meta, "glove": keys.glove}))
-        _wait_until_calibrated(session, gloves)
-        gc.disable()
-        period, start = 1 / case.rate_hz, time.monotonic() + 0.1
-        total = int(case.rate_hz * case.seconds)
-        for sequence in range(total):
-            for number, publisher in enumerate(publishers):
-                wait = start + (sequence + number / len(publishers)) * period - time.monotonic()
-                if wait > 0:
-                    time.sleep(wait)
-                values = readings[sequence % len(readings)]
-                now = time.monotonic_ns()
-                publisher.put(encode_frame(Frame(sequence, runs[number], now, time.time_ns(), values)))
-        time.sleep(0.4)
-        pipe.send(total * len(publishers))
-        pipe.recv()
-
-
-def _meta(layout: Layout, subject: str, run_id: int) -> dict[str, Any]:
-    return {
-        "layout": layout.name,
-        "sensors": list(layout.sensors),
-        "context": [],
-        "subject": subject,
-        "wearing": "bench",
-        "simulated": False,
-        "run_id": f"{run_id:016x}",
-    }
-
-
-def _wait_until_calibrated(session: zenoh.Session, gloves: list[GloveKeys]) -> None:
-    deadline = time.monotonic() + 60
-    for keys in gloves:
-        while True:
-            try:
-                if ask_json(session, keys.pose_meta, timeout_s=1.0)["state"] == "calibrated":
-                    break
-            except Exception:
-                if time.monotonic() > deadline:
-                    raise
-            time.sleep(0.1)
-
-
-def _watch(pipe: Any, settings: Settings) -> None:
-    """All poses: latency and age in milliseconds of those that are not repeated as stale."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    latency: list[int] = []
-    age: list[int] = []
-
-    def hear(sample: zenoh.Sample) -> None:
-        now = time.monotonic_ns()
-        pose = decode_pose(sample.payload.to_bytes())
-        if not pose.stale:
-            latency.append(now - pose.monotonic_ns)
-            age.append(pose.age_us)
-
-    with open_client([settings.zenoh]) as session:
-        handler = zenoh.handlers.Callback(hear, indirect=False)
-        subscriber = session.declare_subscriber(all_gloves(settings.site, "pose"), handler)
-        gc.disable()
-        pipe.send("ready")
-        pipe.recv()
-        subscriber.undeclare()
-        pipe.send((np.array(latency) / 1e6, np.array(age) / 1e3))
-
-
 def _service_status(settings: Settings) -> dict[str, Any]:
     with open_client([settings.zenoh]) as session:
         key = all_services(settings.site).removesuffix("alive") + "status"
@@ -333,13 +310,10 @@ def _service_status(settings: Settings) -> dict[str, Any]:
 
 
 def _free_port() -> int:
-    import socket
-
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
 
 
 if __name__ == "__main__":
-    assert threading.current_thread() is threading.main_thread()
     main()

@@ -1,0 +1,196 @@
+"""What loads the real-time process in the streaming bench, and what is measured of it from outside.
+
+``drive`` is one process that stands for all gloves and for all animation tools, written to cost little:
+frames are patched into ready-made messages and put in batches each millisecond, poses are only looked into.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import secrets
+import signal
+import struct
+import time
+import zlib
+from array import array
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Event, Thread
+from typing import Any
+
+import numpy as np
+import zenoh
+
+from glovecal_client.errors import NoAnswer
+from glovecal_client.keys import GloveKeys, all_gloves
+from glovecal_client.queries import ask_json
+from glovecal_client.session import open_client
+from glovecal_client.wire.frame import Frame, encode_frame
+from glovecal_client.wire.pose import PoseFlag
+from glovecal_models.layout import Layout
+
+TICK_S = 0.001
+_SEQUENCE_AND_TIMES = struct.Struct("<Qqq")
+_AT = 8
+_CHECKSUM = struct.Struct("<I")
+_POSE_FLAGS_AT, _POSE_TIME, _POSE_AGE = 5, struct.Struct("<q"), struct.Struct("<I")
+_POSE_TIME_AT, _POSE_AGE_AT = 16, 48
+_STALE = int(PoseFlag.STALE)
+
+
+@dataclass(frozen=True)
+class Load:
+    """Gloves that stream at one rate; glove number i is worn by person number i modulo ``people``."""
+
+    endpoint: str
+    site: str
+    gloves: int
+    people: int
+    rate_hz: float
+    seconds: float
+
+
+def drive(pipe: Any, load: Load) -> None:
+    """Connect, wait for models, say "ready", stream when told to, then send what was sent and what came."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with open_client([load.endpoint]) as session:
+        gloves = [GloveKeys(load.site, f"glove{number}") for number in range(load.gloves)]
+        messages = [_Messages(number) for number in range(load.gloves)]
+        watch = _Watch()
+        subscriber = session.declare_subscriber(
+            all_gloves(load.site, "pose"), zenoh.handlers.Callback(watch.hear)
+        )
+        for keys, of_glove in zip(gloves, messages, strict=True):
+            session.put(keys.meta, json.dumps({**of_glove.meta(load.people), "glove": keys.glove}))
+        _wait_until_calibrated(session, gloves)
+        publishers = [
+            session.declare_publisher(keys.raw, priority=zenoh.Priority.INTERACTIVE_HIGH) for keys in gloves
+        ]
+        gc.disable()
+        pipe.send("ready")
+        pipe.recv()
+        pipe.send(_stream(load, publishers, messages))
+        pipe.recv()
+        subscriber.undeclare()
+        pipe.send((np.array(watch.latency_ns) / 1e6, np.array(watch.age_us) / 1e3))
+
+
+def _stream(load: Load, publishers: list[zenoh.Publisher], messages: list[_Messages]) -> int:
+    """Frames at even spacing over all gloves, put as they fall due; how many were sent."""
+    per_second, count = load.rate_hz * len(publishers), len(publishers)
+    total, sent = int(per_second * load.seconds), 0
+    start = time.monotonic()
+    while sent < total:
+        due = min(int((time.monotonic() - start) * per_second), total)
+        for number in range(sent, due):
+            sequence, glove = divmod(number, count)
+            publishers[glove].put(messages[glove].message(sequence))
+        sent = due
+        time.sleep(TICK_S)
+    time.sleep(0.5)
+    return sent
+
+
+class _Messages:
+    """Frames of one glove without a call of the encoder for each: another number, time and checksum."""
+
+    def __init__(self, number: int) -> None:
+        self._number = number
+        self._layout = Layout.built_in("cyberglove18")
+        self._run_id = secrets.randbits(64)
+        readings = np.random.default_rng(number).uniform(60, 190, (16, len(self._layout.sensors)))
+        self._ready = [
+            bytearray(encode_frame(Frame(0, self._run_id, 0, 0, row))[:-4]) for row in readings.astype("<f4")
+        ]
+
+    def message(self, sequence: int) -> bytes:
+        body = self._ready[sequence % len(self._ready)]
+        _SEQUENCE_AND_TIMES.pack_into(body, _AT, sequence, time.monotonic_ns(), time.time_ns())
+        return bytes(body) + _CHECKSUM.pack(zlib.crc32(body))
+
+    def meta(self, people: int) -> dict[str, Any]:
+        return {
+            "layout": self._layout.name,
+            "sensors": list(self._layout.sensors),
+            "context": [],
+            "subject": f"person{self._number % people}",
+            "wearing": "bench",
+            "simulated": False,
+            "run_id": f"{self._run_id:016x}",
+        }
+
+
+class _Watch:
+    """Latency and age of all poses that are not repeated as stale."""
+
+    def __init__(self) -> None:
+        self.latency_ns, self.age_us = array("q"), array("L")
+
+    def hear(self, sample: zenoh.Sample) -> None:
+        now, pose = time.monotonic_ns(), sample.payload.to_bytes()
+        if not pose[_POSE_FLAGS_AT] & _STALE:
+            self.latency_ns.append(now - _POSE_TIME.unpack_from(pose, _POSE_TIME_AT)[0])
+            self.age_us.append(_POSE_AGE.unpack_from(pose, _POSE_AGE_AT)[0])
+
+
+def _wait_until_calibrated(session: zenoh.Session, gloves: list[GloveKeys]) -> None:
+    deadline = time.monotonic() + 120
+    for keys in gloves:
+        while not _is_calibrated(session, keys):
+            if time.monotonic() > deadline:
+                raise RuntimeError(f"glove {keys.glove} was given no model in 120 s")
+            time.sleep(0.1)
+
+
+def _is_calibrated(session: zenoh.Session, keys: GloveKeys) -> bool:
+    try:
+        return ask_json(session, keys.pose_meta, timeout_s=1.0)["state"] == "calibrated"
+    except NoAnswer:
+        return False
+
+
+class ProcessCost:
+    """CPU time and resident memory of another process while it is entered, from /proc (Linux)."""
+
+    def __init__(self, process: int) -> None:
+        self._folder = Path(f"/proc/{process}")
+        self.memory: list[tuple[float, float]] = []
+        """(seconds since the start, MiB), once a second."""
+        self.cpu_s: dict[str, float] = {}
+        """By the names of its threads; zenoh's begin with ``rx``, ``tx``, ``net``, ``app`` or ``acc``."""
+
+    def __enter__(self) -> ProcessCost:
+        self._before, self._started = self._cpu_now(), time.monotonic()
+        self._ended = Event()
+        self._thread = Thread(target=self._follow_memory, daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        self._thread.join()
+        after = self._cpu_now()
+        for task, (name, seconds) in after.items():
+            spent = seconds - self._before.get(task, (name, 0.0))[1]
+            self.cpu_s[name] = self.cpu_s.get(name, 0.0) + spent
+
+    def growth_mib(self, after_s: float) -> float:
+        """By how much memory grew at most beyond what it was ``after_s`` seconds after the start."""
+        later = [mib for at, mib in self.memory if at >= after_s]
+        return max(later) - later[0] if later else float("nan")
+
+    def _follow_memory(self) -> None:
+        while not self._ended.wait(1.0):
+            pages = int((self._folder / "statm").read_text().split()[1])
+            self.memory.append((time.monotonic() - self._started, pages * os.sysconf("SC_PAGE_SIZE") / 2**20))
+
+    def _cpu_now(self) -> dict[str, tuple[str, float]]:
+        tasks = {}
+        for task in (self._folder / "task").iterdir():
+            name, _, rest = (task / "stat").read_text().partition("(")[2].rpartition(")")
+            user, system = rest.split()[11:13]
+            seconds = (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+            tasks[task.name] = (name.rstrip("0123456789").rstrip("-"), seconds)
+        return tasks
