@@ -6,6 +6,7 @@ triangle is made and read.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,8 +36,8 @@ class TrainingProcess:
     """mean(x) = plane + exp(-|x - x_i|^2 / 2) @ weights, shape (m,)."""
     mean: np.ndarray
     """Mean without the plane, shape (m,)."""
-    variance: np.ndarray
-    """Shape (m,)."""
+    variance: Callable[[], np.ndarray]
+    """Shape (m,); takes twice as long as all the rest. Can be asked for once."""
 
 
 class ExactProfiledLikelihood:
@@ -82,9 +83,13 @@ class ExactProfiledLikelihood:
         best, _, factor, inside = evaluated
         solved = trtrs(factor, inside.columns @ best.residual, lower=1, trans=1)[0]
         mean = (samples.columns @ best.residual - inside.rho * solved) / root
-        inverse = potri(factor, lower=1, overwrite_c=1)[0].diagonal()
-        left = inside.rho * (1.0 - inside.rho * inverse) / root**2
-        return TrainingProcess(best, root * solved, mean, best.scale * np.maximum(left, 0.0))
+
+        def variance() -> np.ndarray:
+            inverse = potri(factor, lower=1, overwrite_c=1)[0].diagonal()
+            left = inside.rho * (1.0 - inside.rho * inverse) / root**2
+            return best.scale * np.maximum(left, 0.0)
+
+        return TrainingProcess(best, root * solved, mean, variance)
 
     def _factor(self, kernel: np.ndarray, rho: float) -> np.ndarray | None:
         root = self._samples.root_count

@@ -7,8 +7,8 @@ K^-1 already, while log|K + X B X'| can only grow. So the trained model is a pla
 what ``fit_lmc_gpr`` searches, with plane and scale in closed form, and D + 1 parameters left.
 
 Steps: merge equal inputs; several starts on few nodes (``multi_start``); refine the best to 1e-4 nats, by
-exact evaluations where nodes do not suffice; bracket the exact NLML (``certificate``); keep as many nodes as
-the served mean and standard deviation need (``served_nodes``).
+exact evaluations where nodes do not suffice (``lmc_search``); bracket the exact NLML (``certificate``); keep
+as many nodes as the served mean and standard deviation need (``served_nodes``).
 """
 
 from __future__ import annotations
@@ -23,27 +23,15 @@ from glovecal_models.covariance.squared_exponential_ard import SquaredExponentia
 from glovecal_models.errors import Cancelled
 from glovecal_models.regression.certificate import Certificate, NystromFit, certify
 from glovecal_models.regression.exact_profiled_likelihood import ExactProfiledLikelihood
+from glovecal_models.regression.lmc_search import MOST_EXACT, LmcSearch
 from glovecal_models.regression.merged_samples import MergedSamples
-from glovecal_models.regression.multi_start import (
-    FEW,
-    MOST_NODES,
-    SAME_OPTIMUM,
-    SCREENED,
-    Candidate,
-    descend,
-    screen,
-    search_exactly,
-    some_samples,
-)
+from glovecal_models.regression.multi_start import FEW, Candidate
 from glovecal_models.regression.pivoted_cholesky import PivotedCholesky, pivoted_cholesky
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.regression.profiled_likelihood import Profile, profile
 from glovecal_models.regression.served_nodes import NodeChooser, Reference, ServedNodes
-from glovecal_models.regression.standardise import Standardised, standardise
-from glovecal_models.regression.training_check import check_samples
+from glovecal_models.regression.standardise import Standardised
 
-MOST_EXACT = 4000
-"""Distinct inputs up to which an N x N matrix is formed; 128 MB each at this size."""
 LARGEST_FACTOR = 8e6
 """Entries of a low-rank factor: 64 MB."""
 TIGHT = 0.05
@@ -87,71 +75,33 @@ def fit_lmc_gpr(
     very many samples and short lengthscales), ``missing_input_suspected``.
     Raises NotTrainable on unusable samples, Cancelled when ``cancelled`` answers True.
     """
-    inputs, target = check_samples(inputs, target)
-    standard = standardise(inputs, target)
-    samples = MergedSamples.of(standard.x, standard.y, sample_weight)
-    generator = np.random.default_rng(seed)
     say = report or (lambda sentence, fraction: None)
     say("searching from several starts", 0.0)
-    found, account = screen(samples, standard.x, standard.y, generator, cancelled, sample_weight)
+    search = LmcSearch.begin(inputs, target, sample_weight=sample_weight, seed=seed, cancelled=cancelled)
+    return finish_search(search, cancelled=cancelled, report=report)
+
+
+def finish_search(
+    search: LmcSearch,
+    *,
+    cancelled: Callable[[], bool] | None = None,
+    report: Callable[[str, float], None] | None = None,
+) -> ProcessRegressor:
+    """What ``fit_lmc_gpr`` returns, from a search that has begun. Raises Cancelled."""
+    say = report or (lambda sentence, fraction: None)
+    samples, standard = search.samples, search.standard
     _stop_if(cancelled)
     say("refining the best optimum", 0.4)
-    refined = _refine_best(samples, standard, found, generator, cancelled)
+    refined = search.optimum(cancelled)
     _stop_if(cancelled)
     say("bounding the likelihood and choosing nodes", 0.8)
     trained = _examine(samples, refined)
     scale_deg = standard.target_scale
     served = _served(samples, trained, scale_deg)
     evidence = _evidence(samples, trained, refined, served, scale_deg)
-    evidence |= {"samples": len(target), "sample_weight": sample_weight, "starts": account}
+    evidence |= {"samples": len(standard.y), "sample_weight": search.sample_weight, "starts": search.account}
     say("trained", 1.0)
     return _regressor(samples, standard, trained, served, evidence)
-
-
-def _refine_best(
-    samples: MergedSamples,
-    standard: Standardised,
-    found: list[Candidate],
-    generator: np.random.Generator,
-    cancelled: Callable[[], bool] | None,
-) -> Candidate:
-    """Refine the most promising optimum; others too while that is cheap, which exact searches are not."""
-    best = _refine(samples, standard, found[0], generator, cancelled)
-    for candidate in found[1:3] if len(samples.inputs) <= MOST_EXACT or best.low_rank else ():
-        _stop_if(cancelled)
-        if np.abs(candidate.parameters - best.parameters).max() < SAME_OPTIMUM:
-            continue
-        nodes = min(MOST_NODES, len(samples.inputs))
-        rival = descend(samples, candidate.parameters, fine=True, most_nodes=nodes, cancelled=cancelled)
-        if rival is not None and rival.nlml < best.nlml - 1e-3:
-            best = rival
-    return best
-
-
-def _refine(
-    samples: MergedSamples,
-    standard: Standardised,
-    rough: Candidate,
-    generator: np.random.Generator,
-    cancelled: Callable[[], bool] | None,
-) -> Candidate:
-    """The optimum to 1e-4 nats on nodes, to 1e-3 by exact evaluations, or from some of very many samples.
-
-    Exact searches start from the optimum of a subset, where an evaluation costs a fifteenth.
-    """
-    distinct, weight = len(samples.inputs), samples.total / len(standard.y)
-    if distinct <= FEW:
-        return search_exactly(samples, rough.parameters, tolerance=1e-6, cancelled=cancelled) or rough
-    nodes = min(MOST_NODES, distinct // 2)
-    refined = descend(samples, rough.parameters, fine=True, most_nodes=nodes, cancelled=cancelled)
-    if refined is not None:
-        return refined
-    if distinct > MOST_EXACT:
-        samples = some_samples(standard.x, standard.y, 2000, generator, weight)
-    if len(samples.inputs) > 2 * SCREENED:
-        subset = some_samples(standard.x, standard.y, SCREENED, generator, weight)
-        rough = search_exactly(subset, rough.parameters, tolerance=0.05, cancelled=cancelled) or rough
-    return search_exactly(samples, rough.parameters, tolerance=1e-3, cancelled=cancelled) or rough
 
 
 def _examine(samples: MergedSamples, refined: Candidate) -> _Trained:
@@ -173,7 +123,7 @@ def _examine(samples: MergedSamples, refined: Candidate) -> _Trained:
     process = ExactProfiledLikelihood(samples).training_process(parameters)
     if process is None:
         raise ArithmeticError(f"covariance is not positive definite at {parameters.tolist()}")
-    reference = Reference(process.mean, process.variance, process.weights)
+    reference = Reference(process.mean, process.variance(), process.weights)
     nlml = process.profile.nlml
     known = Certificate(nlml, nlml, "exact evaluation")
     return _Trained(parameters, process.profile, known, factor, reference)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, Any
 
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, Task, TextColumn, TimeElapsedColumn
+from rich.text import Text
 
 from glovecal_client.errors import ServiceError
 from glovecal_service.cli.printing import err
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
 
 STEP_S = 0.1
-BAR_WIDTH, TEXT_WIDTH = 12, 52
+BAR_WIDTH, TEXT_WIDTH = 12, 44
 """Text, bar, percentage and time fit into 80 columns."""
 
 
@@ -28,7 +29,12 @@ def wait_for_job(
 
         def show(document: dict[str, Any]) -> None:
             sentence = document["sentence"] or "waiting for a worker"
-            progress.update(bar, completed=document["fraction"], description=_short(sentence))
+            progress.update(
+                bar,
+                completed=document["fraction"],
+                description=_short(sentence),
+                left=document["detail"].get("seconds_left"),
+            )
 
         try:
             return service.wait_for_job(job, progress=show)
@@ -67,4 +73,14 @@ def _bar(quiet: bool) -> Progress:
         TextColumn("{task.percentage:>3.0f} %"),
     )
     shown = err.is_terminal and not quiet
-    return Progress(*columns, TimeElapsedColumn(), console=err, transient=True, disable=not shown)
+    return Progress(*columns, _TimeColumn(), console=err, transient=True, disable=not shown)
+
+
+class _TimeColumn(TimeElapsedColumn):
+    """How long it will still take, where the job tells; else how long it has taken."""
+
+    def render(self, task: Task) -> Text:
+        left = task.fields.get("left")
+        if left is None:
+            return super().render(task)
+        return Text(f"about {max(1, round(left))} s left", style="progress.remaining")

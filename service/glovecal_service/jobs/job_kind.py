@@ -41,6 +41,8 @@ class Task:
     says to the third how far it is."""
     payload: Any
     """Its first argument: plain dataclasses, numbers, texts and arrays."""
+    effort: float | None = None
+    """How long it takes beside the job's other tasks. None: nobody knows, and no time left is told."""
 
 
 @dataclass(frozen=True)

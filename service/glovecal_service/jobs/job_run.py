@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ from glovecal_service.jobs.finished_tasks import FinishedTasks
 from glovecal_service.jobs.job_kind import JobKind, JobPlan, Task, TaskResult
 from glovecal_service.jobs.progress_file import ProgressFile, TaskProgress
 from glovecal_service.jobs.task_run import TaskOutcome, run_task
+from glovecal_service.jobs.time_left import TimeLeft
 from glovecal_service.jobs.workers import Workers, WorkersLost, finished, outcome
 from glovecal_service.store import Store
 from glovecal_service.store.errors import Conflict, StoreUnavailable
@@ -44,10 +45,12 @@ class JobRun:
         self._workers = workers
         self._finished = FinishedTasks(folder)
         self._cancel_file = folder / f"cancel-{job.id}-{job.attempt}"
-        self._progress_file = folder / f"progress-{job.id}-{job.attempt}.json"
+        self._folder = folder
         self._telling = threading.Lock()
-        self._heard: TaskProgress | None = None
-        self._tasks_done = self._tasks = 0
+        self._tasks: Sequence[Task] = ()
+        self._done: set[int] = set()
+        self._heard: dict[int, TaskProgress] = {}
+        self._time_left: TimeLeft | None = None
         self._ended = threading.Event()
         self._stopped = threading.Event()
         self._released = False
@@ -71,7 +74,8 @@ class JobRun:
             self._ended.set()
             watch.join()
             self._cancel_file.unlink(missing_ok=True)
-            self._progress_file.unlink(missing_ok=True)
+            for number in range(len(self._tasks)):
+                self._progress_file(number).unlink(missing_ok=True)
 
     def _end(self) -> Callable[[], object]:
         """Do the work; the write that ends it."""
@@ -111,10 +115,11 @@ class JobRun:
         """Results that an earlier attempt or an earlier job left."""
         found = {number: self._finished.get(task.key) for number, task in enumerate(plan.tasks)}
         results = {number: result for number, result in found.items() if result is not None}
-        self._tasks_done, self._tasks = len(results), len(plan.tasks)
+        with self._telling:
+            self._tasks, self._done = plan.tasks, set(results)
         already = f", {len(results)} of them known already" if results else ""
         self._progress(
-            len(results) / max(1, len(plan.tasks)),
+            self._fraction(),
             f"{len(plan.tasks)} fits to do{already}",
             {"tasks": len(plan.tasks), "known": len(results)},
         )
@@ -124,10 +129,14 @@ class JobRun:
         for number, task in enumerate(plan.tasks):
             self._raise_if_stopped()
             if number not in results:
-                self._take(plan, number, self._run_here(task), results)
+                self._take(plan, number, self._run_here(number, task), results)
 
-    def _run_here(self, task: Task) -> TaskOutcome:
-        return run_task(task, self._finished.folder, self._cancel_file, self._progress_file)
+    def _run_here(self, number: int, task: Task) -> TaskOutcome:
+        self._begin_to_count()
+        return run_task(task, self._finished.folder, self._cancel_file, self._progress_file(number))
+
+    def _progress_file(self, number: int) -> Path:
+        return self._folder / f"progress-{self._job.id}-{self._job.attempt}-{number}.json"
 
     def _fit_in_workers(self, plan: JobPlan, results: dict[int, TaskResult]) -> None:
         for restart in range(WORKER_RESTARTS + 1):
@@ -145,16 +154,17 @@ class JobRun:
         waiting = [number for number in range(len(plan.tasks)) if number not in results]
         running: dict[Future, int] = {}
         if waiting and not self._workers.started:
-            self._progress(len(results) / len(plan.tasks), "starting the training processes", {})
+            self._progress(self._fraction(), "starting the training processes", {})
         try:
             while waiting or running:
                 self._raise_if_stopped()
                 while waiting and len(running) < 2 * self._workers.count:
                     number = waiting.pop(0)
                     task = plan.tasks[number]
-                    files = self._finished.folder, self._cancel_file, self._progress_file
+                    files = self._finished.folder, self._cancel_file, self._progress_file(number)
                     future = self._workers.submit(task, *files)
                     running[future] = number
+                    self._begin_to_count()
                 self._workers.check()
                 for future in finished(list(running), WATCH_S):
                     number = running.pop(future)
@@ -183,23 +193,42 @@ class JobRun:
             raise WorkersLost(f"the result of {plan.tasks[number].label} is not in {self._finished.folder}")
         results[number] = result
         step = plan.step(number, results)
-        self._tasks_done = len(results)
-        self._progress(len(results) / len(plan.tasks), step.sentence, step.detail)
+        with self._telling:
+            self._done.add(number)
+            self._heard.pop(number, None)
+        self._progress(self._fraction(), step.sentence, step.detail)
+
+    def _fraction(self) -> float:
+        """Of all tasks' efforts, what is done and what running tasks have said of themselves."""
+        effort = [1.0 if task.effort is None else task.effort for task in self._tasks]
+        running = sum(effort[number] * said.share for number, said in self._heard.items())
+        return (sum(effort[number] for number in self._done) + running) / max(sum(effort), 1e-9)
+
+    def _begin_to_count(self) -> None:
+        """Once the first task runs, and only where all efforts are known."""
+        if self._time_left is None and all(task.effort is not None for task in self._tasks):
+            self._time_left = TimeLeft(self._fraction())
 
     def _progress(self, fraction: float, sentence: str, detail: dict) -> None:
-        jobs, id, attempt = self._store.jobs, self._job.id, self._job.attempt
         with self._telling:
-            self._written(lambda: jobs.progress(id, attempt, fraction, sentence, detail))
+            self._written(lambda: self._tell(fraction, sentence, detail))
+
+    def _tell(self, fraction: float, sentence: str, detail: dict) -> None:
+        left = None if self._time_left is None else self._time_left.seconds(fraction)
+        if left is not None:
+            detail = detail | {"seconds_left": round(left, 1)}
+        self._store.jobs.progress(self._job.id, self._job.attempt, fraction, sentence, detail)
 
     def _tell_on(self) -> None:
         """Pass on what a running task said last, once; its file is gone before its own end is told."""
         with self._telling:
-            said = ProgressFile(self._progress_file).read()
-            if said is None or said == self._heard or self._stopped.is_set():
-                return
-            self._heard = said
-            fraction = (self._tasks_done + said.share) / max(1, self._tasks)
-            self._store.jobs.progress(self._job.id, self._job.attempt, fraction, said.sentence)
+            sentence = None
+            for number in set(range(len(self._tasks))) - self._done:
+                said = ProgressFile(self._progress_file(number)).read()
+                if said is not None and said != self._heard.get(number):
+                    self._heard[number], sentence = said, said.sentence
+            if sentence is not None and not self._stopped.is_set():
+                self._tell(self._fraction(), sentence, {})
 
     def _written(self, write: Callable[[], object]) -> None:
         """Repeat a write while the database is away; the lease outlives a short restart."""

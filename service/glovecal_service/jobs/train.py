@@ -17,7 +17,6 @@ from glovecal_models.calibration.training_plan import TrainingPlan, plan_trainin
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput, NotTrainable
 from glovecal_models.regression.kept_choice import choice_of
-from glovecal_models.regression.kernel_candidates import CHOOSING
 from glovecal_models.regression.kernel_scores import kernel_sentences
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult
@@ -58,7 +57,7 @@ class TrainJob:
             return _keep(store, model, layout_name, facts, activate=bool(payload.get("activate", False)))
 
         return JobPlan(
-            tasks=[Task(task.key, _label(task), fit, task) for task in plan.tasks],
+            tasks=[Task(task.key, _label(task), fit, task, _effort(task)) for task in plan.tasks],
             step=_stepper(plan),
             finish=finish,
             in_this_process=settings.method in ("raw", "linear"),
@@ -69,9 +68,9 @@ def fit(task: FitTask, cancelled: Callable[[], bool], report: Report) -> TaskRes
     """One fit, run in a worker. Raises Cancelled, NotTrainable."""
 
     def say(sentence: str, share: float) -> None:
-        report(f"{_label(task)}: {sentence}", 0.0)  # fits run side by side: what counts is how many are done
+        report(f"{_label(task)}: {sentence}", share)
 
-    result = run_fit(task, cancelled=cancelled, report=say if task.settings.method in CHOOSING else None)
+    result = run_fit(task, cancelled=cancelled, report=say)
     facts = {
         "rotation": result.rotation,
         "fold": result.fold,
@@ -80,6 +79,11 @@ def fit(task: FitTask, cancelled: Callable[[], bool], report: Report) -> TaskRes
         "held_out_count": result.held_out_count,
     }
     return TaskResult(result.arrays, facts)
+
+
+def _effort(task: FitTask) -> float:
+    """Measured: a process of one sensor takes hundredths of a second, of four or more seconds."""
+    return 4.0 ** min(len(task.sensors), 4)
 
 
 def _fit_result(result: TaskResult) -> FitResult:
