@@ -236,3 +236,14 @@ def test_received_skipped_and_lost_add_up(steps: list[tuple[int, bool]], data: s
     assert (counts.received, counts.skipped, counts.lost) == (len(steps) + 1, skipped, lost)
     assert counts.received + counts.skipped + counts.lost == sequence + 1
     assert counts.repeated == len(steps)
+
+
+def test_poses_go_on_when_the_numbers_of_the_glove_begin_again() -> None:
+    """A glove restarted without a new run id, and one whose numbers jumped: nothing of that is lost."""
+    order = PoseOrder()
+    assert all(order.accept(pose(number)) for number in range(100, 110))
+    assert [order.accept(pose(number)) for number in (3, 109, 3, 4, 4)] == [False] * 5
+    assert not order.accept(pose(5))
+    assert all(order.accept(pose(number)) for number in (6, 7, 8, 10**12, 10**12 + 1))
+    counts = order.counts()
+    assert (counts.received, counts.repeated, counts.lost) == (15, 6, 0)

@@ -123,6 +123,27 @@ def test_what_capture_can_no_longer_give_is_reported_missing(settings: Settings,
     assert "capture's log did not give more: " in record.facts["lead_in"]["sentence"]
 
 
+def test_numbers_that_no_glove_can_have_reached_are_not_sent(settings: Settings, store: Store) -> None:
+    """One wild number is refused; a publisher that goes on elsewhere loses no frame, and leaves no gap."""
+    with open_router([settings.zenoh]), open_client([settings.zenoh]) as session, recording_thread(settings):
+        glove = WireGlove(session, settings, GLOVE, subject="anna")
+        store.gloves.seen(GLOVE, {"layout": LAYOUT.name, "sensors": list(LAYOUT.sensors), "subject": "anna"})
+        asked = store.recordings.request(GLOVE, name="wild")
+        eventually(lambda: store.recordings.get(asked.id).state == "recording", "recording began")
+        numbers = [*range(100, 120), 999_999_999, *range(120, 140), *range(5_000_000, 5_000_080)]
+        for sequence in [*numbers, *range(90), 2**64 - 1]:
+            glove.send(sequence=sequence)
+            time.sleep(0.01)
+        eventually(frames(store, asked.id, 210), "all frames but two")
+        stopped_at = time.monotonic()
+        store.recordings.stop(asked.id)
+        record = finished(store, asked.id)
+    assert time.monotonic() - stopped_at < 30
+    check_exact(store, record)
+    assert (record.facts["sent"], record.facts["recorded"], record.facts["refused"]) == (210, 210, 2)
+    assert (record.facts["first_sequence"], record.facts["missing"]) == (100, [])
+
+
 def test_a_killed_recorder_goes_on_and_fetches_what_it_missed(settings: Settings, store: Store) -> None:
     with open_router([settings.zenoh]), capturing(settings, settings.data):
         with part_of_service(recorder, settings) as process:

@@ -5,73 +5,104 @@ from __future__ import annotations
 from glovecal_client.errors import WireError
 from glovecal_client.wire.frame import Frame, decode_frame
 from glovecal_service.realtime.refusal import Refusal, Refused
+from glovecal_service.realtime.sequence_order import SequenceOrder
 
 TAKEOVER_AFTER_NS = 500_000_000
 """A publisher keeps its glove until it was silent this long; then another run may take it over."""
 
 _VERSION_AT = 4
 _KNOWN_VERSION = 1
+_REFUSED_RUNS = 8
 
 
 class FrameGate:
     """Lets the frames of one glove pass or raises Refused; ``run_id`` and ``sequence`` tell where it stands.
 
-    Sequence numbers must grow within a run. A clock that stepped back costs the frame at the step, not
-    all that follow. Another run may begin after the present one was silent for half a second.
+    Sequence numbers must grow within a run, as ``SequenceOrder`` says. A clock that stepped back costs the
+    frame at the step, not all that follow. Another run may begin after the present one was silent for half
+    a second.
     """
 
     def __init__(self) -> None:
         self.run_id: int | None = None
-        self.sequence = -1
         self.runs = 0
         """How many runs began so far; grows when another publisher takes over."""
+        self.missing = 0
+        """Frames that were sent, as the numbers of those that passed tell, and never arrived."""
+        self.passed_at_ns = 0
+        """When the newest frame arrived that was whole and in order."""
+        self._order = SequenceOrder()
         self._monotonic_ns = 0
-        self._passed_at_ns = 0
+        self._unread = 0
+        """Messages since then of which nobody knows the number."""
+        self._overflowed = 0
+        """The same, but newer than messages that still wait."""
+        self._refused_of_run: dict[int, int] = {}
+
+    @property
+    def sequence(self) -> int:
+        """The number of the newest frame in order, -1 before the first."""
+        return self._order.last
+
+    @property
+    def jumps(self) -> int:
+        """How often a publisher went on with other numbers in the same run."""
+        return self._order.jumps
+
+    def note_unread(self, count: int) -> None:
+        """So many messages came before the next one for ``pass_frame`` and are thrown away without a look."""
+        self._unread += count
+
+    def note_overflow(self, count: int) -> None:
+        """So many messages were thrown away, newer than some that will be given to ``pass_frame`` yet."""
+        self._overflowed += count
 
     def pass_frame(self, message: bytes, received_ns: int) -> Frame:
         """The frame in ``message``, received at ``received_ns`` of this process' monotonic clock."""
-        frame = _decode(message)
-        silent = received_ns - self._passed_at_ns > TAKEOVER_AFTER_NS
+        try:
+            frame = decode_frame(message)
+        except WireError as error:
+            self._unread += 1
+            raise Refused(_reason(message, error), str(error)) from error
         if frame.run_id != self.run_id:
-            self._check_takeover(frame, silent)
+            self._begin_run(frame, received_ns)
         else:
-            self._check_order(frame)
-        if frame.run_id != self.run_id:
-            self.runs += 1
-        self.run_id, self.sequence = frame.run_id, frame.sequence
-        self._monotonic_ns, self._passed_at_ns = frame.monotonic_ns, received_ns
-        return frame
-
-    def _check_takeover(self, frame: Frame, silent: bool) -> None:
-        if self.run_id is not None and not silent:
-            raise Refused(
-                Refusal.SECOND_PUBLISHER,
-                f"run {frame.run_id:016x} publishes while run {self.run_id:016x} has the glove; stop one",
-            )
-
-    def _check_order(self, frame: Frame) -> None:
-        if frame.sequence == self.sequence:
-            raise Refused(Refusal.DUPLICATE, f"sequence number {frame.sequence} came twice")
-        if frame.sequence < self.sequence:
-            raise Refused(
-                Refusal.SEQUENCE_BACKWARDS,
-                f"sequence number {frame.sequence} came after {self.sequence}",
-            )
-        if frame.monotonic_ns <= self._monotonic_ns:
-            before, self._monotonic_ns, self.sequence = (
-                self._monotonic_ns, frame.monotonic_ns, frame.sequence
-            )  # fmt: skip
+            self._follow(frame.sequence, received_ns)
+        self._unread = 0
+        before, self._monotonic_ns = self._monotonic_ns, frame.monotonic_ns
+        if frame.monotonic_ns <= before:
             raise Refused(
                 Refusal.TIME_BACKWARDS,
                 f"frame {frame.sequence} went back in time by {(before - frame.monotonic_ns) / 1e9:.6f} s",
             )
+        self.passed_at_ns = received_ns
+        return frame
 
+    def _follow(self, sequence: int, received_ns: int) -> None:
+        unread, lost = self._unread, sequence - self._order.last - 1
+        overflowed = min(self._overflowed, max(0, lost - unread)) if self._overflowed else 0
+        self.missing += self._order.follow(sequence, received_ns, unread=unread + overflowed)
+        self._overflowed -= overflowed
 
-def _decode(message: bytes) -> Frame:
-    try:
-        return decode_frame(message)
-    except WireError as error:
-        raise Refused(_reason(message, error), str(error)) from error
+    def _begin_run(self, frame: Frame, received_ns: int) -> None:
+        if self.run_id is not None and received_ns - self.passed_at_ns <= TAKEOVER_AFTER_NS:
+            self._note_refused_run(frame.run_id)
+            raise Refused(
+                Refusal.SECOND_PUBLISHER,
+                f"run {frame.run_id:016x} publishes while run {self.run_id:016x} has the glove; stop one",
+            )
+        unread = self._unread + self._refused_of_run.pop(frame.run_id, 0)
+        whole = self.run_id is not None
+        self.missing += self._order.begin(frame.sequence, received_ns, unread=unread, whole=whole)
+        self.run_id = frame.run_id
+        self.runs += 1
+        self._monotonic_ns = frame.monotonic_ns - 1  # clocks of two runs cannot be compared
+
+    def _note_refused_run(self, run_id: int) -> None:
+        """Count a frame that a run lost because another had the glove; of a few runs only."""
+        if run_id not in self._refused_of_run and len(self._refused_of_run) >= _REFUSED_RUNS:
+            self._refused_of_run.clear()
+        self._refused_of_run[run_id] = self._refused_of_run.get(run_id, 0) + 1
 
 
 def _reason(message: bytes, error: WireError) -> Refusal:

@@ -58,12 +58,14 @@ class GloveLane:
         self.last_received_ns = received_ns
         if len(self._waiting) >= WAITING_LIMIT:
             self._waiting.popleft()
+            self.gate.note_unread(1)
             self.skip(1)
         self._waiting.append(Waiting(message, received_ns))
 
     def add_skipped(self, count: int) -> None:
         """Count messages that were received but thrown away before they got here."""
         self.received += count
+        self.gate.note_overflow(count)
         self.skip(count)
 
     def skip(self, count: int) -> None:
@@ -78,6 +80,7 @@ class GloveLane:
             self._waiting.popleft()
             late += 1
         if late:
+            self.gate.note_unread(late)
             self.skip(late)
         taken = list(self._waiting)
         self._waiting.clear()
@@ -115,6 +118,7 @@ class GloveLane:
             "last_refusal": self.refusals.last_sentence,
             "run_id": None if run_id is None else f"{run_id:016x}",
             "runs": self.gate.runs,
+            "jumps": self.gate.jumps,
             "sequence": self.gate.sequence,
             "model": self.model_id,
             "effects": None if effects is None else effects.status(),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from typing import Any
 
 import zenoh
@@ -11,15 +12,19 @@ from glovecal_client.errors import NoAnswer, WireError
 from glovecal_client.gap_repair import fetch_frames
 from glovecal_client.keys import GloveKeys
 from glovecal_client.queries import ask_json
-from glovecal_client.wire.frame import encode_frame
+from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_service.realtime.arrivals import Arrivals
 from glovecal_service.realtime.frame_gate import TAKEOVER_AFTER_NS
 from glovecal_service.realtime.lead_in import LeadIn
 from glovecal_service.realtime.lead_in_wish import LeadInWish
 from glovecal_service.realtime.recording_file import RecordingFile, RunBooks, decoded
+from glovecal_service.realtime.refusal import Refusal, Refused
+from glovecal_service.realtime.sequence_order import SequenceOrder
 from glovecal_service.store.recordings import LEAD_IN
 
 WAITING_LIMIT = 65536
+HELD_LIMIT = 1024
+"""Frames with numbers that do not fit yet."""
 REPAIR_AFTER_S = 0.5
 """A gap this old is asked for; a shorter one may still be on its way."""
 ANSWER_WITHIN_S = 2.0
@@ -40,12 +45,15 @@ class LiveRecording:
         self.file = file
         self.keys = keys
         self.refused = 0
-        """Messages of a second publisher, and damaged ones."""
+        """Messages of a second publisher, damaged ones, and numbers that no glove can have reached."""
         self._session = session
         self._wish = wish
         self._lead_in: LeadIn | None = None
         self._run_id: int | None = None
         self._heard_ns = 0
+        self._order = SequenceOrder()
+        self._held: deque[tuple[Frame, bytes, bool]] = deque(maxlen=HELD_LIMIT)
+        """Frames with their messages, and whether they were counted as refused."""
         self._repair_at = 0.0
         self._arrivals = Arrivals(session, keys.raw, limit=WAITING_LIMIT)
 
@@ -85,8 +93,40 @@ class LiveRecording:
         if frame.run_id != self._run_id and self._run_id is not None and not silent:
             self.refused += 1
             return
+        begins = frame.run_id != self._run_id
         self._run_id, self._heard_ns = frame.run_id, received_ns
-        self.file.add(frame, message)
+        if begins:
+            self._order.begin(frame.sequence, received_ns)
+            self.file.add(frame, message, jumped=self.file.has_jumped(frame))
+        else:
+            self._record_in_order(frame, message, received_ns)
+
+    def _record_in_order(self, frame: Frame, message: bytes, received_ns: int) -> None:
+        """Record a frame that fits; hold one that does not until it is clear whether its publisher jumped."""
+        jumps = self._order.jumps
+        try:
+            self._order.follow(frame.sequence, received_ns)
+        except Refused as refused:
+            if self.file.lacks(frame):
+                self.file.add(frame, message)
+            elif refused.reason is not Refusal.DUPLICATE:
+                is_new = not self.file.has(frame)
+                self.refused += is_new
+                self._held.append((frame, message, is_new))
+            return
+        if self._order.jumps != jumps:
+            self._record_jump(frame, message)
+        else:
+            self.file.add(frame, message)
+        self._held.clear()
+
+    def _record_jump(self, frame: Frame, message: bytes) -> None:
+        """Record the frames that confirmed each other; the last of them is ``frame``."""
+        first = self._order.jumped_to
+        held = [item for item in self._held if first <= item[0].sequence < frame.sequence]
+        self.refused -= sum(is_new for _, _, is_new in held)
+        for at, (each, bytes_of_it, _) in enumerate([*held, (frame, message, True)]):
+            self.file.add(each, bytes_of_it, jumped=at == 0 and not self.file.lacks(each))
 
     def repair_now_and_then(self) -> None:
         """Twice a second at most, ask capture's log for what is missing."""

@@ -11,6 +11,7 @@ from typing import Any
 from glovecal_client.errors import WireError
 from glovecal_client.frame_log import FrameLog
 from glovecal_client.log_records import Recording
+from glovecal_client.plausible_loss import PlausibleLoss
 from glovecal_client.wire.frame import Frame, decode_frame
 from glovecal_service.realtime.sequence_ranges import SequenceRanges
 
@@ -25,28 +26,57 @@ class RunBooks:
 
     run_id: int
     first: int
-    """Where the recording begins in this run; 0 for a run that began while it was going on."""
+    """Where the recording begins in this run; 0 for a run that began while it was going on, if it can be."""
     recorded: SequenceRanges = field(default_factory=SequenceRanges)
     repaired: int = 0
     """Of the recorded frames, those fetched from the capture log."""
     last: int = -1
     """The last frame that belongs to the recording, as far as is known."""
+    earlier: list[RunBooks] = field(default_factory=list)
+    """What came before each jump of the publisher's numbers; the numbers jumped over were never sent."""
 
     def missing(self) -> list[tuple[int, int]]:
-        return self.recorded.missing(self.first, self.last)
+        before = [gap for books in self.earlier for gap in books.missing()]
+        return [*before, *self.recorded.missing(self.first, self.last)]
 
     @property
     def sent(self) -> int:
-        return max(0, self.last - self.first + 1)
+        return sum(books.sent for books in self.earlier) + max(0, self.last - self.first + 1)
+
+    @property
+    def recorded_frames(self) -> int:
+        return sum(len(books.recorded) for books in (*self.earlier, self))
+
+    def lacks(self, sequence: int) -> bool:
+        """Whether the frame is missing."""
+        return any(
+            books.first <= sequence <= books.last and sequence not in books.recorded
+            for books in (*self.earlier, self)
+        )
+
+    def jump_to(self, sequence: int) -> None:
+        """From ``sequence`` on the numbers are counted anew."""
+        self.earlier.append(RunBooks(self.run_id, self.first, self.recorded, last=self.last))
+        self.first, self.last, self.recorded = sequence, sequence - 1, SequenceRanges()
+
+    def enter(self, sequence: int) -> bool:
+        """Note a frame as recorded; False if it was."""
+        for books in self.earlier:
+            if books.lacks(sequence):
+                return books.recorded.add(sequence)
+        if not self.recorded.add(sequence):
+            return False
+        self.last = max(self.last, sequence)
+        return True
 
     def document(self) -> dict[str, Any]:
         """``sent`` equals ``recorded`` plus the frames in ``missing``."""
         return {
             "run_id": f"{self.run_id:016x}",
-            "first_sequence": self.first,
+            "first_sequence": (*self.earlier, self)[0].first,
             "last_sequence": self.last,
             "sent": self.sent,
-            "recorded": len(self.recorded),
+            "recorded": self.recorded_frames,
             "repaired": self.repaired,
             "missing": [list(gap) for gap in self.missing()],
         }
@@ -80,8 +110,19 @@ class RecordingFile:
         """
         file = cls(FrameLog.resume(path))
         for frame in Recording.open(path).frames():
-            file._enter(frame)
+            file._enter(frame, jumped=not frame.repaired and file.has_jumped(frame))
         return file
+
+    def has_jumped(self, frame: Frame) -> bool:
+        """Whether the numbers jumped to ``frame``, as far as the frames in the file and their times tell."""
+        books = self.runs.get(frame.run_id)
+        if books is None:
+            lost = frame.sequence if self.runs else 0
+        elif books.lacks(frame.sequence):
+            return False
+        else:
+            lost = frame.sequence - books.last - 1
+        return lost < 0 or not PlausibleLoss(self.last_wall_ns).allows(lost, frame.wall_ns)
 
     @property
     def path(self) -> Path:
@@ -96,9 +137,12 @@ class RecordingFile:
         """Why frames do not reach the disk, None if they do."""
         return self._log.problem
 
-    def add(self, frame: Frame, message: bytes) -> bool:
-        """Write a frame, or False if it is in already. While the disk is full frames wait in memory."""
-        if not self._enter(frame):
+    def add(self, frame: Frame, message: bytes, *, jumped: bool = False) -> bool:
+        """Write a frame, or False if it is in already. While the disk is full frames wait in memory.
+
+        ``jumped``: its publisher gave it another number than the next; the numbers between were never sent.
+        """
+        if not self._enter(frame, jumped=jumped):
             return False
         self._log.append(message)
         return True
@@ -118,18 +162,29 @@ class RecordingFile:
         """The books of a run; one that was not met before belongs to the recording from its start."""
         return self.runs.setdefault(run_id, RunBooks(run_id, 0))
 
-    def _enter(self, frame: Frame) -> bool:
+    def lacks(self, frame: Frame) -> bool:
+        """Whether the frame is one of those that are missing."""
+        books = self.runs.get(frame.run_id)
+        return books is not None and books.lacks(frame.sequence)
+
+    def has(self, frame: Frame) -> bool:
+        """Whether a frame of this number is recorded."""
+        books = self.runs.get(frame.run_id)
+        return books is not None and any(frame.sequence in part.recorded for part in (*books.earlier, books))
+
+    def _enter(self, frame: Frame, *, jumped: bool = False) -> bool:
         books = self.runs.get(frame.run_id)
         if books is None:
-            first = 0 if self.runs else frame.sequence
+            first = 0 if self.runs and not jumped else frame.sequence
             books = self.runs[frame.run_id] = RunBooks(frame.run_id, first)
+        elif jumped:
+            books.jump_to(frame.sequence)
         if self.first_frame is None:
             self.first_frame = self.oldest_frame = frame
-        if frame.sequence < books.first:
+        if frame.sequence < books.first and not books.lacks(frame.sequence):
             return frame.repaired and self._enter_lead_in(frame)
-        if not books.recorded.add(frame.sequence):
+        if not books.enter(frame.sequence):
             return False
-        books.last = max(books.last, frame.sequence)
         books.repaired += frame.repaired
         self.last_wall_ns = max(self.last_wall_ns, frame.wall_ns)
         return True
@@ -152,8 +207,10 @@ class RecordingFile:
 
     def _count_again(self) -> None:
         self.lead_in, self.oldest_frame = SequenceRanges(), self.first_frame
-        for books in self.runs.values():
-            books.recorded, books.repaired = SequenceRanges(), 0
+        for run in self.runs.values():
+            run.repaired = 0
+            for books in (*run.earlier, run):
+                books.recorded = SequenceRanges()
         for frame in Recording.open(self.path).frames():
             self._enter(frame)
 

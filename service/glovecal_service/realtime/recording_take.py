@@ -28,7 +28,7 @@ class RecordedTake:
 def read_take(path: Path, *, name: str, wearing: str, first_sequence: int = 0) -> RecordedTake:
     """The frames of all runs in order; ``time_s`` is the capture computer's monotonic clock in seconds.
 
-    What has a smaller sequence number than ``first_sequence`` in the first run is the lead-in.
+    Fetched frames of the first run with numbers below ``first_sequence`` are the lead-in.
     Frames whose time does not increase, or with another number of sensors, are left out and counted.
     Raises BadInput if nothing usable remains, DamagedLog, OSError.
     """
@@ -44,7 +44,10 @@ def read_take(path: Path, *, name: str, wearing: str, first_sequence: int = 0) -
     time_s = _time_s(usable)
     kept = _increasing(time_s)
     taken = [frame for frame, keep in zip(usable, kept, strict=True) if keep]
-    lead = sum(frame.run_id == taken[0].run_id and frame.sequence < first_sequence for frame in taken)
+    lead = sum(
+        frame.repaired and frame.run_id == taken[0].run_id and frame.sequence < first_sequence
+        for frame in taken
+    )
     if lead == len(taken):
         raise BadInput(f"recording {path.name}: none of the frames asked for has {len(sensors)} sensors")
     begins_s = float(time_s[kept][lead])
@@ -64,9 +67,31 @@ def read_take(path: Path, *, name: str, wearing: str, first_sequence: int = 0) -
 
 
 def _in_order(frames: Sequence[Frame]) -> list[Frame]:
-    """By run, in the order the runs were met, and by sequence number: repaired frames were written late."""
+    """By run, in the order the runs were met, and by sequence number: repaired frames were written late.
+
+    Where a publisher's numbers went on from a lower one, by time.
+    """
     order = {run_id: place for place, run_id in enumerate(dict.fromkeys(frame.run_id for frame in frames))}
-    return sorted(frames, key=lambda frame: (order[frame.run_id], frame.sequence))
+    restarted = _restarted(frames)
+
+    def place(frame: Frame) -> tuple[int, int]:
+        return order[frame.run_id], frame.monotonic_ns if frame.run_id in restarted else frame.sequence
+
+    return sorted(frames, key=place)
+
+
+def _restarted(frames: Sequence[Frame]) -> set[int]:
+    """Runs with frames that were recorded as they came, and are later than ones with higher numbers."""
+    newest: dict[int, Frame] = {}
+    found = set()
+    for frame in frames:
+        if frame.repaired:
+            continue
+        before = newest.get(frame.run_id, frame)
+        if frame.sequence < before.sequence and frame.monotonic_ns > before.monotonic_ns:
+            found.add(frame.run_id)
+        newest[frame.run_id] = frame
+    return found
 
 
 def _time_s(frames: Sequence[Frame]) -> np.ndarray:

@@ -19,6 +19,7 @@ class Refusal(Enum):
     NOT_FINITE = "not_finite"
     DUPLICATE = "duplicate"
     SEQUENCE_BACKWARDS = "sequence_backwards"
+    SEQUENCE_JUMP = "sequence_jump"
     TIME_BACKWARDS = "time_backwards"
     SECOND_PUBLISHER = "second_publisher"
     SENSOR_COUNT = "sensor_count"
