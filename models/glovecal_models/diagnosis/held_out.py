@@ -118,7 +118,7 @@ def held_out(
     ridge[:, diagonal, diagonal] = np.maximum(
         ALIKE_ROWS * variance / prior_sd**2, LEAST_RIDGE * total[:, diagonal, diagonal]
     )
-    beta = np.linalg.solve(total - joint + ridge, (total_right - right)[..., None])[..., 0]
+    beta = _solved(total - joint + ridge, total_right - right)
     training = (products.square.sum() - products.square)[:, None] + _quadratic(
         total - joint, total_right - right, beta
     )
@@ -128,7 +128,7 @@ def held_out(
         rows.target - rows.base @ b[:size] - extra[:, g, :] @ b[size:]
         for rows, extra, g, b in zip(products.units, columns, best, chosen, strict=True)
     )
-    whole = np.linalg.solve(total + ridge, total_right[..., None])[..., 0]
+    whole = _solved(total + ridge, total_right)
     fit = products.square.sum() + _quadratic(total, total_right, whole)
     shape = int(np.argmin(fit))
     return HeldOut(
@@ -141,6 +141,13 @@ def held_out(
         residual=products.residual,
         residual_added=residual,
     )
+
+
+def _solved(gram: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """With columns of any size: each is brought to a square of one first."""
+    size = np.sqrt(np.diagonal(gram, axis1=-2, axis2=-1))
+    scaled = gram / (size[..., :, None] * size[..., None, :])
+    return np.linalg.solve(scaled, (right / size)[..., None])[..., 0] / size
 
 
 def _quadratic(gram: np.ndarray, right: np.ndarray, beta: np.ndarray) -> np.ndarray:

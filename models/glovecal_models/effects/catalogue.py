@@ -52,6 +52,7 @@ def declared_effect(declaration: str | Mapping[str, Any]) -> ExpressionEffect:
         declared = ExpressionEffect.from_document(declaration)
     if declared.name in catalogue():
         raise BadInput(f"there is an effect {declared.name!r} already; give yours another name")
+    declared.check_sizes()
     return declared
 
 

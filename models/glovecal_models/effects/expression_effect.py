@@ -14,6 +14,14 @@ from glovecal_models.effects.history_effect import LONGEST_GAP_S, elapsed_s, unb
 from glovecal_models.effects.joint_units import in_joint_units, settle_joint_units
 from glovecal_models.errors import BadInput
 
+LARGEST = 1e9
+"""Of a column: squares of more lose the digits of everything fitted beside it."""
+TOO_LARGE = (
+    f"at most {LARGEST:g} can be fitted. The factor of each column is learned: write it without one,"
+    " such as own instead of own*1e300"
+)
+SAME = 1e-9
+"""Share of a column's size within which it does not change."""
 MOST_VALUES = {1: 8, 2: 6}
 """Values tried for each parameter, by the number of parameters."""
 
@@ -58,15 +66,45 @@ class ExpressionEffect(Effect):
         """From plain JSON data; ``settings["declaration"]`` of a stored model is one. Raises BadInput."""
         return cls(Declaration.from_document(document))
 
+    def check_sizes(self) -> None:
+        """What shows before any take: raises BadInput for a factor beyond ``LARGEST``, and for a column in
+        which nothing is recorded."""
+        for column in self.declaration.columns:
+            if not column.names:
+                raise BadInput(
+                    f"effect {self.name!r}: {column.text!r} is the same in every frame; write an expression"
+                    " of own, of sensors or of context columns"
+                )
+            for node in column.walk():
+                if node.kind == "number" and not node.value <= LARGEST:
+                    raise BadInput(f"effect {self.name!r}: {node.text} in {column.text!r}: {TOO_LARGE}")
+
     def missing(self, takes: Sequence[Signals]) -> str | None:
         for name in self._signals:
             if not any(name in take.others for take in takes):
                 known = sorted({other for take in takes for other in take.others})
                 return f"no signal {name} was recorded (there are {', '.join(known) or 'none'})"
-        return super().missing(takes)
+        why = super().missing(takes)
+        return self._constant(takes) if why is None else why
+
+    def _constant(self, takes: Sequence[Signals]) -> str | None:
+        """The first column that never changes, whatever its parameters: the calibration has a constant."""
+        settings, moves = self.settle(takes), np.zeros(len(self.declaration.columns), dtype=bool)
+        low = high = np.zeros(len(moves))
+        for shape in self.grid(takes, settings):
+            values = [self._evaluated(take, settings, shape)[0] for take in takes if len(take)]
+            low = np.min([part.min(axis=(0, 1)) for part in values], axis=0)
+            high = np.max([part.max(axis=(0, 1)) for part in values], axis=0)
+            moves |= high - low > SAME * np.maximum(np.abs(low), np.abs(high))
+        still = np.flatnonzero(~moves)
+        if not len(still):
+            return None
+        text = self.declaration.columns[still[0]].text
+        return f"its column {text!r} is always {low[still[0]]:g}; write one that changes with the hand"
 
     def settle(self, takes: Sequence[Signals]) -> Settings:
-        """Raises BadInput for a name that is not recorded, and for frames in which a column has no value."""
+        """Raises BadInput for a name that is not recorded, and for frames in which a column has no value or
+        is larger than ``LARGEST``."""
         others = {name for take in takes for name in take.others}
         self.declaration.check_signals(others, {name for take in takes for name in take.context})
         ranges = {name: (low, high) for name, low, high in self.declaration.ranges}
@@ -87,8 +125,12 @@ class ExpressionEffect(Effect):
             "context": context,
             **settle_joint_units(takes),
         }
-        self._refuse_undefined(takes, settings)
-        return settings
+        return settings | {"scale": self._scale(takes, settings)}
+
+    def prior_sd(self, settings: Settings) -> np.ndarray:
+        """A degree for a column of its usual size, whatever the unit it is written in."""
+        scale = np.array(settings.get("scale", [1.0] * len(self.declaration.columns)))
+        return 1.0 / np.where(scale > 0, scale, 1.0)
 
     def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
         axes = [
@@ -163,17 +205,30 @@ class ExpressionEffect(Effect):
                 first = Undefined(part.start + undefined.frame, undefined.sentence)
         return np.concatenate(blocks), first
 
-    def _refuse_undefined(self, takes: Sequence[Signals], settings: Settings) -> None:
+    def _scale(self, takes: Sequence[Signals], settings: Settings) -> list[float]:
+        """The usual size (RMS) of each column over all shapes. Raises BadInput for what cannot be fitted."""
+        squares, count = np.zeros(len(self.declaration.columns)), 0
         for shape in self.grid(takes, settings):
             for take in takes:
-                undefined = self._evaluated(take, settings, shape)[1]
+                values, undefined = self._evaluated(take, settings, shape)
                 if undefined is not None:
-                    at = take.time_s[undefined.frame] - take.time_s[0]
-                    named = f" of take {take.take}" if take.take else ""
                     raise BadInput(
-                        f"effect {self.name!r}: {undefined.sentence} at frame {undefined.frame}{named} "
-                        f"({at:.3f} s from its start); guard it, for example with max(x, 0.001)"
+                        f"effect {self.name!r}: {undefined.sentence} at {_place(take, undefined.frame)};"
+                        " guard it, for example with max(x, 0.001)"
                     )
+                self._refuse_large(take, values)
+                squares += np.sum(values**2, axis=(0, 1))
+                count += values.shape[0] * values.shape[1]
+        return np.sqrt(squares / max(count, 1)).tolist()
+
+    def _refuse_large(self, take: Signals, values: np.ndarray) -> None:
+        for node, column in zip(self.declaration.columns, np.moveaxis(np.abs(values), 2, 0), strict=True):
+            if column.max(initial=0.0) > LARGEST:
+                frame = int(column.max(axis=1).argmax())
+                raise BadInput(
+                    f"effect {self.name!r}: {node.text!r} reaches {column[frame].max():.3g} at"
+                    f" {_place(take, frame)}; {TOO_LARGE}"
+                )
 
 
 class ExpressionStream(Stream):
@@ -203,6 +258,11 @@ class ExpressionStream(Stream):
         )
         self.undefined = None if undefined is None else undefined.sentence
         return np.where(np.isfinite(values).all(axis=2, keepdims=True), values, 0.0)
+
+
+def _place(take: Signals, frame: int) -> str:
+    named = f" of take {take.take}" if take.take else ""
+    return f"frame {frame}{named} ({take.time_s[frame] - take.time_s[0]:.3f} s from its start)"
 
 
 def _values(low: float, high: float, start: float, most: int) -> np.ndarray:

@@ -114,8 +114,8 @@ def document_of(found: Diagnosis | Improvement) -> str:
     return json.dumps(found.to_document(), allow_nan=False)
 
 
-@given(any_takes(900))
-@settings(SHAPES, max_examples=60)
+@given(any_takes(400))
+@settings(SHAPES, max_examples=25)
 def test_a_diagnosis_ends_in_a_document(found: AnyTakes):
     with suppress(BadInput):
         diagnosis = diagnose(found.takes(), LAYOUT)
@@ -124,8 +124,8 @@ def test_a_diagnosis_ends_in_a_document(found: AnyTakes):
             assert 0 <= each.at_least_deg <= each.size_deg
 
 
-@given(any_takes(300))
-@settings(SHAPES, max_examples=8)
+@given(any_takes(150))
+@settings(SHAPES, max_examples=6)
 def test_an_improvement_ends_in_a_document(found: AnyTakes):
     with suppress(BadInput):
         improvement = improve(found.takes(), LAYOUT, "anna", TrainingSettings(method="linear", samples=60))
