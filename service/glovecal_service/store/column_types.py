@@ -22,6 +22,14 @@ class Unreadable:
         return ascii(self.stored)[:80]
 
 
+@dataclass(frozen=True)
+class JsonText:
+    """A JSON document and the text it was stored as, which is cheaper to hash than the document."""
+
+    document: Any
+    text: str
+
+
 class _Checked(TypeDecorator[Any]):
     """Gives ``Unreadable`` instead of raising while a result is fetched."""
 
@@ -43,10 +51,22 @@ class _Checked(TypeDecorator[Any]):
 
 
 class Json(_Checked):
-    """A JSON document."""
+    """A JSON document; where the driver hands out its text (SQLite) a ``JsonText``, None for null."""
 
     impl = JSON
     cache_ok = True
+
+    def result_processor(self, dialect: Dialect, coltype: Any) -> _ResultProcessorType[Any] | None:
+        read = super().result_processor(dialect, coltype)
+        if dialect.name != "sqlite" or read is None:
+            return read
+
+        def process(value: Any) -> Any:
+            document = read(value)
+            keeps_text = isinstance(value, str) and not isinstance(document, Unreadable | None)
+            return JsonText(document, value) if keeps_text else document
+
+        return process
 
 
 class UtcTime(_Checked):

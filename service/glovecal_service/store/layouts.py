@@ -58,8 +58,10 @@ class Layouts:
         record = LayoutRecord(name, document, False, now())
         with self._database.write() as connection:
             earlier = connection.execute(select(tables.layouts).where(tables.layouts.c.name == name)).first()
-            if earlier is not None and earlier.document == document:
-                return LayoutRecord(name, document, False, earlier.created_at)
+            if earlier is not None:
+                record_before = _record(sound_row(tables.layouts, earlier))
+                if record_before.document == document:
+                    return record_before
             if _in_use(connection, name):
                 raise Conflict(
                     f"takes or models use layout {name!r} as it is; give the changed one another name"

@@ -9,16 +9,15 @@ nullable column can be added later and the rows there are stay valid.
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Callable, Mapping
 from datetime import UTC
 from typing import Any, TypeVar
 
 from sqlalchemy import ColumnElement, Connection, Row, Select, Table, insert, select, update
-from sqlalchemy.types import JSON, Float
+from sqlalchemy.types import Float
 
 from glovecal_models.errors import BadInput
-from glovecal_service.store.column_types import Json, Unreadable, UtcTime
+from glovecal_service.store.column_types import Json, JsonText, Unreadable, UtcTime
 from glovecal_service.store.errors import DamagedRows, StoreDamaged
 from glovecal_service.store.json_text import json_text
 
@@ -28,7 +27,7 @@ Record = TypeVar("Record")
 
 def add_row(connection: Connection, table: Table, values: Mapping[str, Any]) -> Any:
     """Insert a row with its hash; its (first) primary key. Raises BadInput for what JSON cannot hold."""
-    values = {**values, HASH: row_hash(table, _as_read(table, values))}
+    values = {**values, HASH: row_hash(table, values)}
     key = connection.execute(insert(table).values(**values)).inserted_primary_key
     return None if key is None else key[0]
 
@@ -50,7 +49,7 @@ def change_rows(
     for row in rows:
         before = sound_row(table, row)
         values = change(dict(before)) if callable(change) else change
-        digest = row_hash(table, _as_read(table, {**before, **values}))
+        digest = row_hash(table, {**before, **values})
         same = [column == before[column.name] for column in table.primary_key.columns]
         connection.execute(update(table).where(*same).values({**values, HASH: digest}))
     return len(rows)
@@ -94,18 +93,27 @@ def sound_row(table: Table, row: Row[Any]) -> dict[str, Any]:
         raise StoreDamaged(
             f"{_named(table, values)} was changed after it was written; restore a backup of the database"
         )
-    return values
+    return {name: value.document if isinstance(value, JsonText) else value for name, value in values.items()}
 
 
 def row_hash(table: Table, values: Mapping[str, Any]) -> str:
-    """sha256 hex of the table's name and ``values`` as they are read back, as canonical JSON."""
+    """sha256 hex of the table's name and ``values`` as canonical JSON; NULL is left out."""
     content = {}
     for column in table.columns:
         value = values.get(column.name)
         if value is not None and column.name != HASH and column is not table.autoincrement_column:
-            content[column.name] = value.isoformat() if isinstance(column.type, UtcTime) else value
+            content[column.name] = _plain(column.type, value)
     text = json_text([table.name, content], sort_keys=True)
     return hashlib.sha256(text.encode("ascii")).hexdigest()
+
+
+def _plain(kind: Any, value: Any) -> Any:
+    """The same for a value that is written and as it is read back: 0 s as 0.0, documents as their text."""
+    if isinstance(kind, Json):
+        return value.text if isinstance(value, JsonText) else json_text(value)
+    if isinstance(kind, UtcTime):
+        return value.astimezone(UTC).isoformat()
+    return float(value) if isinstance(kind, Float) and isinstance(value, int) else value
 
 
 def _matches(table: Table, values: Mapping[str, Any], expected: Any) -> bool:
@@ -113,23 +121,6 @@ def _matches(table: Table, values: Mapping[str, Any], expected: Any) -> bool:
         return row_hash(table, values) == expected
     except BadInput:  # infinity, or bytes where there was text
         return False
-
-
-def _as_read(table: Table, values: Mapping[str, Any]) -> dict[str, Any]:
-    """``values`` as the database will give them back: 0 s as 0.0, a tuple as a list, times in UTC."""
-    read = {}
-    for name, value in values.items():
-        kind = table.columns[name].type
-        if value is None:
-            continue
-        if isinstance(kind, Json | JSON):
-            value = json.loads(json_text(value))
-        elif isinstance(kind, UtcTime):
-            value = value.astimezone(UTC)
-        elif isinstance(kind, Float):
-            value = float(value)
-        read[name] = value
-    return read
 
 
 def _named(table: Table, values: Mapping[str, Any]) -> str:

@@ -149,6 +149,21 @@ def test_activate_and_roll_back(walked):
     assert by_method(run)["linear"]["active"]
 
 
+def test_a_damaged_active_model_is_told_by_list_and_show(walked):
+    run, *_ = walked
+    [active] = [row["id"] for row in run("model", "list", "--json").json if row["active"]]
+    file = Path(run.args[0]["GLOVECAL_DATA"]) / "artifacts" / active
+    content = file.read_bytes()
+    file.write_bytes(content[:-1])
+    try:
+        listed, shown = run("model", "list"), run("model", "show", active[:12])
+    finally:
+        file.write_bytes(content)
+    assert f"Damaged and active: model {active[:12]} cannot be loaded" in listed.said
+    assert shown.code == 1
+    assert "or train again: glovecal train --subject anna" in shown.said
+
+
 def test_what_models_stand_on_stays(walked):
     run, _, _ = walked
     assert "was trained on take" in run("take", "remove", "cross").said

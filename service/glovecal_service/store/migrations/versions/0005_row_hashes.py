@@ -29,26 +29,42 @@ def upgrade() -> None:
 
 def _hash_rows(connection: sa.Connection, name: str) -> None:
     table = sa.Table(name, sa.MetaData(), autoload_with=connection)
+    documents = {column.name for column in table.columns if isinstance(column.type, sa.JSON)}
+    columns = [
+        sa.cast(item, sa.Text).label(item.name) if item.name in documents else item for item in table.columns
+    ]
     keys = list(table.primary_key.columns)
     for key in connection.execute(sa.select(*keys)).all():
         same = [column == value for column, value in zip(keys, key, strict=True)]
         try:
-            values = dict(connection.execute(sa.select(table).where(*same)).one()._mapping)
+            row = connection.execute(sa.select(*columns).where(*same)).one()._mapping
+            values = {column: _plain(value) for column, value in row.items()}
             before = values.pop("row_sha256")
             values.pop(NUMBERED_BY_THE_DATABASE.get(name, ""), None)
-            if name in HASHED_BEFORE and _sha256(name, values) != before:
+            parsed = {
+                column: json.loads(str(values[column])) for column in documents & _present(values).keys()
+            }
+            if name in HASHED_BEFORE and _sha256(name, values | parsed) != before:
                 continue
-            present = {column: value for column, value in values.items() if value is not None}
-            digest = _sha256(name, present)
+            if connection.dialect.name != "sqlite":  # there the text is made anew from what the driver parsed
+                values |= {column: _json(document) for column, document in parsed.items()}
+            nothing = {column: None for column, document in parsed.items() if document is None}
+            digest = _sha256(name, _present(values | nothing))
         except (ValueError, TypeError, RecursionError, NoResultFound):
             continue
         connection.execute(sa.update(table).where(*same).values(row_sha256=digest))
 
 
+def _present(values: dict) -> dict:
+    return {column: value for column, value in values.items() if value is not None}
+
+
 def _sha256(name: str, values: dict) -> str:
-    plain = {column: _plain(value) for column, value in values.items()}
-    text = json.dumps([name, plain], allow_nan=False, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode("ascii")).hexdigest()
+    return hashlib.sha256(_json([name, values], sort_keys=True).encode("ascii")).hexdigest()
+
+
+def _json(value: object, *, sort_keys: bool = False) -> str:
+    return json.dumps(value, allow_nan=False, sort_keys=sort_keys, separators=(",", ":"))
 
 
 def _plain(value: object) -> object:
