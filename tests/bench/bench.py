@@ -11,6 +11,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 HERE = Path(__file__).resolve().parent
 PARTS = {
@@ -25,25 +26,28 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"{' or '.join(PARTS)}; default: all")
     parser.add_argument("--quick", action="store_true", help="fewer frames, shorter runs")
+    parser.add_argument("--smoke", action="store_true", help="tiny runs, in a temporary folder unless named")
     parser.add_argument("--gloves", help="of streaming: only so many gloves with effects, such as 16,32,64")
     parser.add_argument("--seconds", help="of streaming with --gloves: length of a run")
-    parser.add_argument("--folder", type=Path, default=Path(".bench"), help="for figures and picture")
+    parser.add_argument("--folder", type=Path, help="for figures and picture; default .bench")
     options = parser.parse_args()
     unknown = sorted(set(options.parts) - set(PARTS))
     if unknown:
         parser.error(f"there is no part {unknown[0]!r}; there are {', '.join(PARTS)}")
-    options.folder.mkdir(parents=True, exist_ok=True)
-    return max(_run(part, options) for part in options.parts or PARTS)
+    with TemporaryDirectory(prefix="glovecal-bench-") as temporary:
+        folder = options.folder or Path(temporary if options.smoke else ".bench")
+        folder.mkdir(parents=True, exist_ok=True)
+        return max(_run(part, folder, options) for part in options.parts or PARTS)
 
 
-def _run(part: str, options: argparse.Namespace) -> int:
+def _run(part: str, folder: Path, options: argparse.Namespace) -> int:
     print(f"\n== {part} ==", flush=True)
-    command = [sys.executable, str(HERE / PARTS[part]), "--json", str(options.folder / f"{part}.json")]
+    command = [sys.executable, str(HERE / PARTS[part]), "--json", str(folder / f"{part}.json")]
+    command += [f"--{name}" for name in ("quick", "smoke") if getattr(options, name)]
     if part == "gaussian-process":
-        command += ["--picture", str(options.folder / f"{part}.png")]
+        command += ["--picture", str(folder / f"{part}.png")]
     if part == "streaming":
         command += [f"--{name}={value}" for name in ("gloves", "seconds") if (value := vars(options)[name])]
-    command += ["--quick"] if options.quick else []
     return subprocess.run(command, env={**os.environ, **ONE_THREAD}).returncode
 
 

@@ -53,10 +53,11 @@ def main(arguments: Iterable[str] | None = None) -> int:
     parser.add_argument("--quick", action="store_true", help="800 frames instead of 2000, under 90 s")
     parser.add_argument("--json", type=Path, help="write all figures here")
     parser.add_argument("--picture", type=Path, default=Path("gaussian-process-bench.png"))
+    parser.add_argument("--smoke", action="store_true", help="150 frames, beside scikit-learn alone: seconds")
     options = parser.parse_args(None if arguments is None else list(arguments))
     pin_blas_to_one_thread()
-    frames = 800 if options.quick else 2000
-    peers = _installed()
+    frames = 150 if options.smoke else 800 if options.quick else 2000
+    peers = _installed(("scikit-learn",) if options.smoke else tuple(PEERS))
     result: dict[str, Any] = {"frames": frames, "peers": {n: _version(m) for n, m in peers.items()}}
     result["one_joint"] = _one_joint(frames, peers, options.quick)
     result["sparse"] = _sparse(frames, peers)
@@ -68,10 +69,14 @@ def main(arguments: Iterable[str] | None = None) -> int:
     return 0
 
 
-def _installed() -> dict[str, ModuleType | None]:
+def _installed(wanted: tuple[str, ...]) -> dict[str, ModuleType | None]:
+    """By peer; None for what is not ``wanted`` or not there."""
     sys.path.append(str(GPYTORCH))  # last: what the lock file names goes first
     found: dict[str, ModuleType | None] = {}
     for name, module in PEERS.items():
+        if name not in wanted:
+            found[name] = None
+            continue
         try:
             found[name] = importlib.import_module(module)
         except (ImportError, OSError) as error:
@@ -82,7 +87,7 @@ def _installed() -> dict[str, ModuleType | None]:
 
 
 def _version(module: ModuleType | None) -> str:
-    return "not installed" if module is None else str(module.VERSION)
+    return "not used" if module is None else str(module.VERSION)
 
 
 def _one_joint(frames: int, peers: dict[str, ModuleType | None], quick: bool) -> list[dict[str, Any]]:

@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from kept_results import KeptResults, programs_hash
 from paper_job import PaperJob, PaperResult
@@ -20,10 +21,14 @@ from paper_parts import PARTS
 from paper_workers import work_off
 
 WORKERS = 2
+SMOKE_PART = "table-1"
 
 
 def main(arguments: Sequence[str]) -> int:
     options = _parser().parse_args(arguments)
+    if options.smoke:
+        with TemporaryDirectory(prefix="glovecal-paper-") as folder:
+            return main(["--part", SMOKE_PART, "--quick", "--workers", "1", "--folder", folder])
     unknown = [name for name in options.part or () if name not in PARTS]
     if unknown:
         _parser().error(f"there is no part {unknown[0]!r}; there are {', '.join(PARTS)}")
@@ -73,6 +78,8 @@ def _parser() -> argparse.ArgumentParser:
     named = f"one part, may be repeated: {', '.join(PARTS)}; default: all"
     parser.add_argument("--part", action="append", metavar="NAME", help=named)
     parser.add_argument("--quick", action="store_true", help="few samples: to see that it works")
+    smoke = f"{SMOKE_PART} with few samples, in a temporary folder: seconds"
+    parser.add_argument("--smoke", action="store_true", help=smoke)
     parser.add_argument("--again", action="store_true", help="compute anew what is known")
     parser.add_argument("--seed", type=int, default=1, help="of the simulated person and glove (default 1)")
     parser.add_argument("--workers", type=int, default=WORKERS, help="processes (default 2)")

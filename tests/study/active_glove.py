@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -33,28 +34,32 @@ FULL_S = 252.0
 SHARES = (0.4, 0.5, 0.6, 0.7, 0.8)
 """Of the fixed protocol's capture time, at which models are compared; its end is one more."""
 FREE_S = 40.0
-WAYS = ("fixed", "fixed, any order", "any step", "active")
+GROWING_WAYS = ("any step", "active")
+"""Whose protocols choose step by step, and may be stopped at any time."""
+WAYS = ("fixed", "fixed, any order", *GROWING_WAYS)
 
 
 @dataclass(frozen=True)
 class ActiveGlove:
     seed: int
+    most_s: float = math.inf
+    """Capture time after which growing protocols ask for nothing more."""
 
 
-def glove_answer(glove: ActiveGlove) -> dict[str, Any]:
+def glove_answer(glove: ActiveGlove, ways: Sequence[str] = WAYS) -> dict[str, Any]:
     """Points of every way: capture seconds, samples, errors in degrees."""
     worn = SimulatedGlove(glove.seed)
     tests = [
         simulate_take(worn, segment, seed=900 + glove.seed, rate_hz=60)
         for segment in (evaluation_segment(900 + glove.seed), free_segment(900 + glove.seed, FREE_S))
     ]
-    return {way: list(_points(way, worn, glove.seed, tests)) for way in WAYS}
+    return {way: list(_points(way, worn, glove, tests)) for way in ways}
 
 
 def _points(
-    way: str, worn: SimulatedGlove, seed: int, tests: list[SimulatedTake]
+    way: str, worn: SimulatedGlove, glove: ActiveGlove, tests: list[SimulatedTake]
 ) -> Iterator[dict[str, Any]]:
-    session, ends = sampled(way, worn, seed)
+    session, ends = sampled(way, worn, glove.seed, glove.most_s)
     whole = session.state.capture_s
     cuts = [share * FULL_S for share in SHARES if share * FULL_S < whole] if way != "fixed" else []
     for cut_s in [*cuts, whole]:
@@ -64,7 +69,9 @@ def _points(
         yield {"capture_s": cut_s, "is_end": cut_s == whole, **_errors(worn, taught, tests, session, loosen)}
 
 
-def sampled(way: str, worn: SimulatedGlove, seed: int) -> tuple[AskedSession, list[float]]:
+def sampled(
+    way: str, worn: SimulatedGlove, seed: int, most_s: float = math.inf
+) -> tuple[AskedSession, list[float]]:
     """The session, and the capture time at which each attempt ended."""
     ends: list[float] = []
 
@@ -73,6 +80,7 @@ def sampled(way: str, worn: SimulatedGlove, seed: int) -> tuple[AskedSession, li
         return reading
 
     protocol, choose = _protocol(way, worn.layout, np.random.default_rng([seed, 77]))
+    choose = choose and _until(choose, most_s)
     session = asked_session(protocol, worn, seed=seed, choose=choose, disturb=watch)
     return session, ends + [session.state.capture_s] * (len(session.state.attempts) - len(ends))
 
@@ -99,6 +107,11 @@ def _at_random(steps: list, random: np.random.Generator) -> Callable[[SamplingSt
         return NextSteps((), True, "") if over else NextSteps((waiting.pop(),), False, "")
 
     return choose
+
+
+def _until(choose: Choose, most_s: float) -> Choose:
+    """Nothing more after ``most_s`` of capture."""
+    return lambda state: NextSteps((), True, "") if state.capture_s > most_s else choose(state)
 
 
 def _taught(session: AskedSession, state: SamplingState) -> list[TaughtTake]:

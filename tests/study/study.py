@@ -11,6 +11,7 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from confusion_picture import draw_confusion
 from error_fall_picture import draw_error_fall
@@ -27,10 +28,14 @@ SET_ASIDE = (
     "nobody may look at set-aside results while tuning"
 )
 PICTURES = (".png", ".svg")
+SMOKE = ("names", "--effects", "lag", "--gloves", "1", "--workers", "1")
 
 
 def main(arguments: Sequence[str]) -> int:
     options = _parser().parse_args(arguments)
+    if options.smoke:
+        with TemporaryDirectory(prefix="glovecal-study-") as folder:
+            return main([*SMOKE, "--folder", folder])
     unknown = [name for name in options.parts if name not in PARTS]
     if unknown:
         _parser().error(f"there is no part {unknown[0]!r}; there are {', '.join(PARTS)}")
@@ -128,6 +133,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--pairs", type=int, default=24, help="gloves with two effects per size (default 24)")
     parser.add_argument("--effects", default="", help="only these, separated by commas")
     parser.add_argument("--set-aside", action="store_true", help=SET_ASIDE)
+    smoke = "one glove with one effect, in a temporary folder: seconds"
+    parser.add_argument("--smoke", action="store_true", help=smoke)
     parser.add_argument("--workers", type=int, default=WORKERS, help="processes (default 2)")
     parser.add_argument("--folder", type=Path, default=Path(".study"), help="for answers, figures, pictures")
     return parser

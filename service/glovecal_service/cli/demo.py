@@ -48,10 +48,16 @@ def demo(
             help="Only write the second glove's takes into this folder, as CSV files for the other verbs.",
         ),
     ] = None,
+    smoke: Annotated[
+        bool, typer.Option("--smoke", help="Seconds of the first act only: does everything run here?")
+    ] = False,
 ) -> None:
     """Calibrate a simulated CyberGlove live, then find the effect hidden in another; under 90 seconds."""
     from glovecal_service.demo.hidden_session import check_effect, hidden_session
 
+    if smoke:
+        _smoke(FIRST_ACT_SEED if seed is None else seed)
+        return
     try:
         check_effect(effect)
     except BadInput as error:
@@ -98,6 +104,22 @@ def _run(seed: int, effect: str, drawn: int, *, as_json: bool, keep: bool) -> No
                 sys.stdout.flush()
             if keep:
                 keep_running(place, seed, lambda sentence: err.print(sentence))
+
+
+def _smoke(seed: int) -> None:
+    from glovecal_service.demo.processes import demo_place, running_service
+    from glovecal_service.demo.table import contract
+    from glovecal_service.demo.walk import SMOKE, walk
+
+    with tempfile.TemporaryDirectory(prefix="glovecal-demo-") as folder:
+        place = demo_place(Path(folder))
+        with running_service(place) as service:
+            found = contract(walk(service, place, seed, lambda sentence: err.print(sentence), SMOKE))
+    error, frames = found["rmse_deg"], found["frames"]
+    out.print(
+        f"Smoke test of the demo: error {error['raw']:.1f} degrees raw, {error['linear']:.1f} linear; "
+        f"{frames['sent']} frames sent live, {frames['received']} poses received."
+    )
 
 
 def _second_act(service: RestClient, place: DemoPlace, hidden: HiddenSession, found: Findings) -> None:

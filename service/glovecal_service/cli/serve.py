@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Annotated
 
-def serve() -> None:
+import typer
+
+
+def serve(
+    smoke: Annotated[
+        bool,
+        typer.Option("--smoke", help="On free ports in a temporary folder, until ready; then stop."),
+    ] = False,
+) -> None:
     """Run the service: zenoh router, real-time prediction, recorder and REST. Ctrl-C stops it.
 
     Settings are environment variables: GLOVECAL_DATA, GLOVECAL_HOST, GLOVECAL_PORT, GLOVECAL_ZENOH,
@@ -16,4 +25,21 @@ def serve() -> None:
     from glovecal_service.cli.connection import settings_of_environment
     from glovecal_service.serve import serve as run
 
+    if smoke:
+        _smoke()
+        return
     sys.exit(run(settings_of_environment()))
+
+
+def _smoke() -> None:
+    import tempfile
+    from pathlib import Path
+
+    from glovecal_service.cli.printing import out
+    from glovecal_service.demo.processes import demo_place, running_service
+
+    with tempfile.TemporaryDirectory(prefix="glovecal-serve-") as folder:
+        place = demo_place(Path(folder))
+        with running_service(place) as service:
+            gloves = len(service.get("/gloves")["seen"])
+        out.print(f"Smoke test of serve: ready on {place.url} and {place.zenoh}, {gloves} gloves; stopped.")

@@ -6,7 +6,7 @@ from typing import Any
 
 from rich.table import Table
 
-from glovecal_service.demo.walk import METHODS, Walk
+from glovecal_service.demo.walk import Walk
 
 HEADINGS = {"raw": "raw", "linear": "linear", "lmc_gpr": "LMC-GPR", "spgp": "SPGP 100"}
 
@@ -15,22 +15,22 @@ def error_table(found: Walk) -> Table:
     """Mean and standard deviation of the absolute error over all rotations, per pose and over all."""
     table = Table(title="Error in degrees, second wearing (not used for training)", box=None, pad_edge=False)
     table.add_column("pose")
-    for method in METHODS:
+    for method in found.models:
         table.add_column(HEADINGS[method], justify="right")
     by_pose = {
-        method: {item["pose"]: item for item in found.comparisons[method]["poses"]} for method in METHODS
+        method: {item["pose"]: item for item in found.comparisons[method]["poses"]} for method in found.models
     }
-    for pose in by_pose[METHODS[0]]:
-        cells = (by_pose[method][pose] for method in METHODS)
+    for pose in by_pose[next(iter(found.models))]:
+        cells = (by_pose[method][pose] for method in found.models)
         table.add_row(pose, *(f"{cell['mean_deg']:.1f} ± {cell['sd_deg']:.1f}" for cell in cells))
     rmse = rmse_deg(found)
-    table.add_row("all frames, RMSE", *(f"{rmse[method]:.2f}" for method in METHODS), style="bold")
+    table.add_row("all frames, RMSE", *(f"{rmse[method]:.2f}" for method in found.models), style="bold")
     return table
 
 
 def rmse_deg(found: Walk) -> dict[str, float]:
     """Root mean square error of each method over all rotations and frames of the second wearing."""
-    return {method: found.comparisons[method]["over_all"]["rmse_deg"] for method in METHODS}
+    return {method: found.comparisons[method]["over_all"]["rmse_deg"] for method in found.models}
 
 
 def sentences(found: Walk) -> list[str]:

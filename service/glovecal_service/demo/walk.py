@@ -16,16 +16,28 @@ from glovecal_service.demo.processes import DemoPlace, running_capture
 
 SUBJECT, GLOVE, SITE, LAYOUT = "demo-subject", "demo-right", "lab", "cyberglove18"
 FREE_MOTION_S = 5.0
-SAMPLING = ("key_poses", "cross_couple", "thumb", "wrist", "free")
-BEFORE, MEANWHILE = ("raw", "linear", "lmc_gpr"), "spgp"
-"""What is trained before the second wearing, and during it: prediction does not wait for training."""
-METHODS = (*BEFORE, MEANWHILE)
-SERVED = "lmc_gpr"
 QUICK_TRAINING = {"samples": 1000, "folds": 0, "iterations": 100}
 """Half the samples and rounds of a usual training, and no error estimate: the second wearing will show the
 error."""
 CAPTURE_PATIENCE_S = 120.0
 Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class WalkPlan:
+    """What is recorded and trained."""
+
+    sampling: tuple[str, ...] = ("key_poses", "cross_couple", "thumb", "wrist", "free")
+    test: str = "evaluation"
+    """The motion of the second wearing."""
+    before: tuple[str, ...] = ("raw", "linear", "lmc_gpr")
+    """What is trained before the second wearing; the last is served."""
+    meanwhile: str | None = "spgp"
+    """What is trained during it: prediction does not wait for training."""
+
+
+SMOKE = WalkPlan(sampling=("free",), test="free", before=("raw", "linear"), meanwhile=None)
+"""Both motions of a few seconds, and nothing that needs training processes."""
 
 
 @dataclass
@@ -41,26 +53,29 @@ class Walk:
     sent: int = 0
 
 
-def walk(service: RestClient, place: DemoPlace, seed: int, say: Say) -> Walk:
+def walk(service: RestClient, place: DemoPlace, seed: int, say: Say, plan: WalkPlan | None = None) -> Walk:
     """The whole walk on a running service."""
-    found = Walk()
+    plan = plan or WalkPlan()
+    found, served = Walk(), plan.before[-1]
     service.post("/subjects", {"name": SUBJECT, "title": "Simulated subject"})
     say(f"Subject {SUBJECT} puts on a simulated CyberGlove (18 sensors, seed {seed}).")
-    takes = [_record(service, place, motion, "first", seed, say, found) for motion in SAMPLING]
+    takes = [_record(service, place, motion, "first", seed, say, found) for motion in plan.sampling]
     found.sampled_frames = sum(take["frames"] for take in takes)
     found.sampled_s = sum(take["duration_s"] for take in takes)
     ids = [take["id"] for take in takes]
-    for method in BEFORE:
+    for method in plan.before:
         _finish_training(service, _start_training(service, method, ids), found, say)
-    service.post(f"/models/{found.models[SERVED]}/activate")
-    say(f"Model {found.models[SERVED][:12]} ({SERVED}) is active; {MEANWHILE} trains on in the background.")
-    meanwhile = _start_training(service, MEANWHILE, ids)
+    service.post(f"/models/{found.models[served]}/activate")
+    trains_on = f"; {plan.meanwhile} trains on in the background" if plan.meanwhile else ""
+    say(f"Model {found.models[served][:12]} ({served}) is active{trains_on}.")
+    meanwhile = _start_training(service, plan.meanwhile, ids) if plan.meanwhile else None
     say("The glove is taken off and put on again.")
     with metered_poses(place.zenoh, SITE, GLOVE) as meter:
         found.meter = meter
-        test = _record(service, place, "evaluation", "second", seed, say, found)
+        test = _record(service, place, plan.test, "second", seed, say, found)
     found.recording = test["accounting"]
-    _finish_training(service, meanwhile, found, say)
+    if meanwhile is not None:
+        _finish_training(service, meanwhile, found, say)
     for method, model in found.models.items():
         found.comparisons[method] = service.post(f"/models/{model}/compare", {"takes": [test["id"]]})
     return found
@@ -79,7 +94,7 @@ def _record(
     }
     if motion == "free":
         options["duration"] = str(FREE_MOTION_S)  # it has no end of its own
-    if motion == "evaluation":
+    if wearing == "second":
         options["reference_noise_deg"] = "0"  # the simulated hand's truth itself
     # each motion is a run of its own, and nothing in this glove remembers: no lead-in
     wanted = {

@@ -1,0 +1,142 @@
+"""Every verb of ``do.py`` with ``--smoke``: its work in small, with what is installed and no network.
+
+Two verbs at a time: most of them wait for a process to start.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+NO_NETWORK = {"UV_OFFLINE": "1", "PIP_NO_INDEX": "1", "HTTPS_PROXY": "http://127.0.0.1:9"}
+VERBS = (
+    "demo",
+    "serve",
+    "glovecal",
+    "test",
+    "check",
+    "bench gaussian-process inverse-kinematics",
+    "paper",
+    "study",
+    "study active",
+)
+
+
+@dataclass(frozen=True)
+class Said:
+    """How a verb ended, and all it said."""
+
+    code: int
+    text: str
+
+    def number(self, pattern: str) -> float:
+        """The figure in the first group of ``pattern``; the verb has to have ended well."""
+        assert self.code == 0, self.text
+        found = re.search(pattern, self.text)
+        assert found, self.text
+        return float(found[1])
+
+
+@pytest.fixture(scope="module")
+def smoke() -> Iterator[dict[str, Future[Said]]]:
+    """All verbs, begun at once; nothing may be installed on the way."""
+    if not (ROOT / ".venv").is_dir() or not (ROOT / ".tools" / "uv").is_dir():
+        pytest.skip("needs the environment that do.py makes")
+    before = _installed()
+    with ThreadPoolExecutor(2) as pool:
+        yield {verb: pool.submit(_run, verb) for verb in VERBS}
+    assert _installed() == before
+
+
+def _run(verb: str) -> Said:
+    mine = {name: value for name, value in os.environ.items() if not name.startswith("GLOVECAL_")}
+    command = [sys.executable, str(ROOT / "do.py"), *verb.split(), "--smoke"]
+    done = subprocess.run(
+        command,
+        env=mine | NO_NETWORK,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=500,
+    )
+    return Said(done.returncode, done.stdout)
+
+
+def _installed() -> set[str]:
+    return {entry.name for folder in (ROOT / ".tools", *_packages()) for entry in folder.iterdir()}
+
+
+def _packages() -> list[Path]:
+    return sorted((ROOT / ".venv").glob("lib/python*/site-packages"))
+
+
+def test_demo_calibrates_and_serves_a_glove(smoke) -> None:
+    said = smoke["demo"].result()
+    assert said.number(r"([\d.]+) linear") < 0.7 * said.number(r"error ([\d.]+) degrees raw")
+    sent = said.number(r"(\d+) frames sent live")
+    assert 0.9 * sent <= said.number(r"(\d+) poses received") <= sent
+    assert sent > 100
+
+
+def test_serve_gets_ready_on_free_ports_and_stops(smoke) -> None:
+    said = smoke["serve"].result()
+    assert said.number(r"ready on http://127\.0\.0\.1:(\d+)") != said.number(r"tcp/127\.0\.0\.1:(\d+)")
+    assert "stopped" in said.text
+
+
+def test_the_command_line_lists_its_effects(smoke) -> None:
+    said = smoke["glovecal"].result()
+    assert said.code == 0, said.text
+    assert "hysteresis" in said.text
+
+
+def test_tests_run_and_pass(smoke) -> None:
+    assert smoke["test"].result().number(r"(\d+) passed") > 10
+
+
+def test_check_formats_lints_and_types(smoke) -> None:
+    said = smoke["check"].result()
+    assert said.number(r"(\d+) errors?, ") == 0
+    assert "already formatted" in said.text
+    assert "All checks passed" in said.text
+
+
+def test_bench_prints_its_tables(smoke) -> None:
+    said = smoke["bench gaussian-process inverse-kinematics"].result()
+    assert said.number(r"Glovecal, all rotations: ([\d.]+) s on one core") > 0
+    assert said.number(r"thumb and index: Glovecal (\d+)") > 100
+
+
+def test_paper_writes_a_page(smoke) -> None:
+    said = smoke["paper"].result()
+    assert said.code == 0, said.text
+    assert "table-1: took" in said.text
+    assert "paper-quick.html" in said.text
+
+
+def test_study_names_the_effect_of_one_glove(smoke) -> None:
+    assert smoke["study"].result().number(r"right effect first[^|]*, lag \| ([\d.]+) %") == 100
+
+
+def test_study_of_active_sampling_compares_two_ways(smoke) -> None:
+    said = smoke["study active"].result()
+    errors = [said.number(rf"\| {way} \| \d+ \| \d+ \| ([\d.]+) ") for way in ("any step", "active")]
+    assert all(0 < error < 90 for error in errors)
+
+
+def test_smoke_refuses_where_nothing_is_installed(tmp_path: Path) -> None:
+    copy = tmp_path / "do.py"
+    copy.write_text((ROOT / "do.py").read_text())
+    done = subprocess.run([sys.executable, str(copy), "serve", "--smoke"], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "--smoke installs nothing" in done.stderr
+    assert not (tmp_path / ".tools").exists()
