@@ -133,7 +133,7 @@ def _banner(settings: Settings) -> str:
     shown = f"[{settings.host}]" if ":" in settings.host else settings.host
     return (
         "Glovecal is running. Ctrl-C stops it.\n"
-        f"  REST    http://{shown}:{settings.port}/v1  (description: /v1/openapi.json)\n"
+        f"  REST    http://{shown}:{settings.port}/v1  (in a browser: / and /docs)\n"
         f"  zenoh   {settings.zenoh}, keys glovecal/{settings.site}/<glove>/...\n"
         f"  data    {settings.data.resolve()}"
     )

@@ -22,6 +22,7 @@ def whole_page(title: str, parts: Sequence[str]) -> str:
     """The page with ``parts`` (HTML) in its body."""
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>Glovecal: {escape(title)}</title>'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<style>{STYLE}</style></head><body>{''.join(parts)}"
         f"<p>Glovecal {escape(version('glovecal-service'))}.</p></body></html>"
     )

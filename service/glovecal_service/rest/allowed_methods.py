@@ -9,15 +9,15 @@ from starlette.routing import Route, compile_path
 
 
 class AllowedMethods:
-    """Called with a path, gives the methods of all routes under ``prefix`` that match it, sorted.
+    """Called with a path, gives the methods of all routes that match it, sorted; each router has its prefix.
 
     The routes with the fewest parameters are the ones its path means: ``models/train`` is no model's id.
     """
 
-    def __init__(self, prefix: str, routers: Iterable[APIRouter]) -> None:
+    def __init__(self, routers: Iterable[tuple[str, APIRouter]]) -> None:
         self._routes = [
             (compile_path(prefix + route.path)[0], frozenset(route.methods or ()))
-            for router in routers
+            for prefix, router in routers
             for route in router.routes
             if isinstance(route, Route)
         ]

@@ -17,6 +17,7 @@ from glovecal_service.rest import (
     diagnosis,
     effects,
     examinations,
+    front,
     gloves,
     health,
     holds,
@@ -96,9 +97,10 @@ def create_app(
         openapi_url=f"{PREFIX}/openapi.json",
         redirect_slashes=False,
     )
-    for noun in ROUTERS:
-        app.include_router(noun.router, prefix=PREFIX)
-    app.state.allowed_methods = AllowedMethods(PREFIX, [noun.router for noun in ROUTERS])
+    routers = [("", front.router), *((PREFIX, noun.router) for noun in ROUTERS)]
+    for prefix, router in routers:
+        app.include_router(router, prefix=prefix)
+    app.state.allowed_methods = AllowedMethods(routers)
     install_error_handlers(app)
     install_openapi(app, gloves.LayoutBody)
     _guard(app, settings, metrics, body_patience_s)

@@ -107,4 +107,4 @@ def _route(scope: Scope) -> str:
     path = getattr(scope.get("route"), "path", None)
     if path is None:
         return "unmatched"
-    return path if path.startswith(PREFIX) else PREFIX + path
+    return path if path.startswith(PREFIX) or not scope["path"].startswith(PREFIX) else PREFIX + path

@@ -117,7 +117,7 @@ def test_api8_answers_tell_nothing_of_the_inside(serve: Callable[..., str], tmp_
     assert "server" not in answer.headers
     assert answer.headers["x-content-type-options"] == "nosniff"
     assert str(tmp_path) not in answer.text
-    assert httpx.get(f"{url}/docs", trust_env=False).status_code == 404
+    assert httpx.get(f"{url}/redoc", trust_env=False).status_code == 404
 
 
 def test_api8_a_failure_inside_is_logged_not_shown(
