@@ -34,7 +34,7 @@ def uv() -> list[str]:
     if not (TOOLS / "uv").is_dir():
         print("installing uv into .tools ...", file=sys.stderr)
         pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-        subprocess.run([*pip, "--target", str(TOOLS), "uv"], check=True)
+        subprocess.run([*pip, "--target", str(TOOLS), "uv"], cwd=ROOT, check=True)
     return [str(TOOLS / "bin" / "uv")]
 
 
@@ -110,7 +110,9 @@ def install_gpytorch() -> None:
     if folder.is_dir():
         return
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    if subprocess.run([*pip, "--target", str(folder), "torch==2.13.0", "gpytorch==1.15.2"]).returncode:
+    if subprocess.run(
+        [*pip, "--target", str(folder), "torch==2.13.0", "gpytorch==1.15.2"], cwd=ROOT
+    ).returncode:
         print("GPyTorch could not be installed: the bench goes on without it", file=sys.stderr)
 
 

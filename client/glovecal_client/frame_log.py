@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from glovecal_client.log_records import cut_damaged_tail, good_end, header_bytes, record_bytes
+from glovecal_client.private_files import open_private
 
 MAX_WAITING = 7200
 """Records kept in memory while the disk is full: one minute at 120 Hz."""
@@ -44,7 +45,7 @@ class FrameLog:
         """A new log. Raises FileExistsError, OSError (no folder, disk full), ValueError (meta is no JSON)."""
         path = Path(path)
         head = header_bytes(meta)
-        file = FileIO(path, "xb")
+        file = FileIO(path, "xb", opener=open_private)
         try:
             if file.write(head) != len(head):
                 raise OSError(f"{path}: no room for the header")

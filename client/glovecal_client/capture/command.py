@@ -17,6 +17,7 @@ from glovecal_client.capture.device import build_device, device_names, device_op
 from glovecal_client.errors import BadOption, ClientError
 from glovecal_client.keys import GloveKeys
 from glovecal_client.names import check_identifier, subject_name
+from glovecal_client.private_files import keep_private
 from glovecal_client.session import DEFAULT_ENDPOINT
 
 
@@ -79,6 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """The script's entry point; 0 when stopped cleanly, 1 with a sentence when it could not capture."""
     asked = _parser().parse_args(arguments)
     stop = threading.Event()
+    keep_private()
     try:
         with stopped_by_signals(stop):
             summary = run_capture(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -12,6 +13,7 @@ from glovecal_client.errors import CaptureRefused, DamagedLog
 from glovecal_client.frame_log import FrameLog
 from glovecal_client.keys import GloveKeys
 from glovecal_client.log_records import cut_damaged_tail
+from glovecal_client.private_files import make_private
 
 SUFFIX = ".glvlog"
 
@@ -24,6 +26,8 @@ class LogFolder:
         self.path = data / "capture" / keys.site / keys.glove
         try:
             self.path.mkdir(parents=True, exist_ok=True)
+            with suppress(PermissionError):  # a file system without permissions takes recordings all the same
+                make_private(data / "capture")
             self._lock = (self.path / "lock").open("ab")
         except OSError as error:
             raise CaptureRefused(

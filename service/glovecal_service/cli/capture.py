@@ -9,8 +9,9 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
+from glovecal_client.private_files import keep_private
 from glovecal_service.cli.options import DEFAULT_ZENOH, Site, Zenoh, identifier, subject_named
-from glovecal_service.cli.printing import out
+from glovecal_service.cli.printing import err, out
 
 GloveOption = Annotated[
     str,
@@ -52,6 +53,7 @@ def capture(
     """Record a glove to the local log and publish it. Ctrl-C stops it."""
     from glovecal_client.capture.command import parse_options, run_capture, stopped_by_signals, tell
 
+    keep_private()
     stop = threading.Event()
     with stopped_by_signals(stop):
         summary = run_capture(

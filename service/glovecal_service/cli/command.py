@@ -6,6 +6,7 @@ Exit codes: 0 done, 1 refused (the sentence says why), 2 wrong use of the comman
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -89,6 +90,7 @@ def options(
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Entry point of the ``glovecal`` script, on the process's arguments by default; ends in SystemExit."""
+    _leave_start_folder()
     signal.signal(signal.SIGTERM, _stop)
     try:
         app(arguments, prog_name="glovecal")
@@ -98,6 +100,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except EXPECTED as error:
         err.print(sentence_of(error), style="red")
         sys.exit(exit_code_of(error))
+
+
+def _leave_start_folder() -> None:
+    """No process of ours imports what lies in the folder it happens to be started in.
+
+    Python looks there first, unless told otherwise, in processes that it starts for ``multiprocessing``.
+    """
+    os.environ["PYTHONSAFEPATH"] = "1"
+    if not sys.flags.safe_path and sys.path[0] in ("", os.getcwd()):  # begun as python -m
+        del sys.path[0]
 
 
 def _stop(number: int, _frame: object) -> NoReturn:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from glovecal_client.private_files import PRIVATE_FOLDER, keep_private
 from glovecal_models.errors import BadInput
 from glovecal_service.cli.printing import err
 from glovecal_service.cli.refusal import Refusal, sentence_of
@@ -42,6 +43,7 @@ def connect() -> Iterator[RestClient]:
         return
     from glovecal_service.rest.in_process import in_process_client
 
+    keep_private()
     settings = settings_of_environment()
     _require_usable(settings)
     with in_process_client(settings) as client, _warnings_told(client):
@@ -76,7 +78,7 @@ def settings_of_environment() -> Settings:
 def _require_usable(settings: Settings) -> None:
     """The folder is made here, where its name and its variable are known."""
     try:
-        settings.data.mkdir(parents=True, exist_ok=True)
+        settings.data.mkdir(mode=PRIVATE_FOLDER, parents=True, exist_ok=True)
         if not os.access(settings.data, os.W_OK | os.X_OK):
             raise PermissionError(13, os.strerror(13), str(settings.data))
     except OSError as error:

@@ -22,9 +22,11 @@ def serve(
     """
     import sys
 
+    from glovecal_client.private_files import keep_private
     from glovecal_service.cli.connection import settings_of_environment
     from glovecal_service.serve import serve as run
 
+    keep_private()
     if smoke:
         _smoke()
         return

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from glovecal_client.private_files import make_ordinary
 from glovecal_service.cli.printing import out
 from glovecal_service.cli.refusal import Refusal
 
@@ -36,6 +37,7 @@ def write_whole(contents: Mapping[Path, bytes], *, tell: Console = out) -> None:
         unfinished = file.with_name(f".{file.name}.{os.getpid()}.part")
         try:
             unfinished.write_bytes(content)
+            make_ordinary(unfinished)
             unfinished.replace(file)
         finally:
             unfinished.unlink(missing_ok=True)

@@ -114,7 +114,7 @@ def _wait_until_ready(service: RestClient, process: subprocess.Popen[bytes], log
 
 
 def _glovecal() -> list[str]:
-    return [sys.executable, "-m", "glovecal_service.cli.command"]
+    return [sys.executable, "-P", "-m", "glovecal_service.cli.command"]
 
 
 def _free_port() -> int:

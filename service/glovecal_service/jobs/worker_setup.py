@@ -7,6 +7,7 @@ import os
 
 from distributed import Worker
 
+from glovecal_client.private_files import keep_private
 from glovecal_models.threads import pin_blas_to_one_thread
 
 NICENESS = 10
@@ -17,4 +18,5 @@ def dask_setup(worker: Worker) -> None:
     if hasattr(os, "nice"):
         os.nice(NICENESS - os.nice(0))
     pin_blas_to_one_thread()
+    keep_private()
     worker.http_server.stop()  # it has nothing to show

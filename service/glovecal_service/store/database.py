@@ -35,6 +35,7 @@ _DAMAGED = ("malformed", "not a database", "unsupported file format", "no such t
 """SQLite's words; the schema was looked at when the store was opened, so a table that is gone is damage."""
 _DAMAGED_STATES = ("XX001", "XX002")
 """PostgreSQL's data_corrupted and index_corrupted."""
+_SQLITE_ENDS = ("", "-wal", "-shm", "-journal")
 
 
 class Database:
@@ -51,6 +52,12 @@ class Database:
         """The SQLite file, None for a server or a database in memory."""
         name = self.engine.url.database
         return Path(name) if self.is_sqlite and name and name != ":memory:" else None
+
+    @property
+    def files(self) -> list[Path]:
+        """The SQLite file and those that SQLite keeps beside it, whether or not they are there now."""
+        file = self.file
+        return [] if file is None else [file.with_name(file.name + end) for end in _SQLITE_ENDS]
 
     @contextmanager
     def read(self) -> Iterator[Connection]:

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from types import TracebackType
 
+from glovecal_client.private_files import PRIVATE_FOLDER, make_private
 from glovecal_service.settings import Settings
 from glovecal_service.store.artifacts import Artifacts
 from glovecal_service.store.blobs import FolderBlobs, ObjectBlobs, full_disk_named
@@ -14,6 +15,7 @@ from glovecal_service.store.gloves import Gloves
 from glovecal_service.store.jobs import Jobs
 from glovecal_service.store.layouts import Layouts
 from glovecal_service.store.models import Models
+from glovecal_service.store.private_data import close_to_others
 from glovecal_service.store.recordings import Recordings
 from glovecal_service.store.revision import Revision
 from glovecal_service.store.samplings import Samplings
@@ -52,13 +54,16 @@ class Store:
                 settings.recordings_folder,
                 settings.fits_folder,
             ):
-                folder.mkdir(parents=True, exist_ok=True)
+                folder.mkdir(mode=PRIVATE_FOLDER, parents=True, exist_ok=True)
+        database = Database(settings.database_url)
+        close_to_others(settings.data.resolve(), database.files)
         blobs = (
             ObjectBlobs(settings.artifacts) if settings.artifacts else FolderBlobs(settings.artifacts_folder)
         )
-        database = Database(settings.database_url)
         try:
             upgrade(database)
+            for file in database.files:
+                make_private(file)
         except BaseException:
             database.close()
             raise

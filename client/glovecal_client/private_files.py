@@ -1,0 +1,67 @@
+"""Files for their owner only: what a glove records tells about a person.
+
+On Windows, whose files have no such permissions, nothing here has an effect.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from contextlib import suppress
+from pathlib import Path
+
+OTHERS = stat.S_IRWXG | stat.S_IRWXO
+PRIVATE_FOLDER = 0o700
+
+_mask_at_start: int | None = None
+
+
+def keep_private() -> None:
+    """Files and folders that this process and its children make from now on are 600 and 700."""
+    global _mask_at_start
+    mask = os.umask(OTHERS)
+    if _mask_at_start is None:
+        _mask_at_start = mask
+
+
+def make_ordinary(file: Path) -> None:
+    """Give a file that the user asked for by name, such as a report, what the umask at the start gives."""
+    if _mask_at_start is not None:
+        file.chmod(0o666 & ~_mask_at_start)
+
+
+def open_private(path: str, flags: int) -> int:
+    """``opener`` for ``open`` and ``FileIO``: a new file is 600, whatever the umask."""
+    return os.open(path, flags, 0o600)
+
+
+def make_private(place: Path) -> int:
+    """Take the rights of other users off a file, or a folder and all in it; how many had some.
+
+    Links are neither followed nor changed. What lies in a folder that is closed already is out of others'
+    reach and not looked at. The folder itself comes last, so that a repair that was killed is done again.
+    Raises PermissionError for what another user owns.
+    """
+    if not _is_open(place):
+        return 0
+    count = 0
+    for folder, _, files in os.walk(place, topdown=False):
+        for path in (*(Path(folder, file) for file in files), Path(folder)):
+            count += _close(path)
+    return count + _close(place)
+
+
+def _is_open(path: Path) -> bool:
+    try:
+        mode = path.lstat().st_mode
+    except FileNotFoundError:
+        return False
+    return os.name == "posix" and bool(mode & OTHERS) and not stat.S_ISLNK(mode)
+
+
+def _close(path: Path) -> bool:
+    with suppress(FileNotFoundError):  # another process's temporary file
+        if _is_open(path):
+            path.chmod(stat.S_IMODE(path.lstat().st_mode) & ~OTHERS)
+            return True
+    return False
