@@ -21,6 +21,8 @@ MAX_PUT_BYTES = 65536
 """The router drops larger puts at its door; our largest message, a pose, has under 10 kB."""
 
 _ATTEMPT_MS = 1000
+_RETRY = {"period_init_ms": 100, "period_max_ms": 400, "period_increase_factor": 2}
+"""After a router that restarts; zenoh's own, 1 s doubling to 4 s, may miss it by 4 s."""
 _BATCHES_WAITING, _QUEUES = 16, ("interactive_high", "data")
 """zenoh's most. An express message takes a batch of its own, and with zenoh's two a computer that is busy
 for 25 ms loses frames; 16 carry over 130 ms at 120 Hz. Old frames are left out by the service, not here."""
@@ -28,7 +30,8 @@ for 25 ms loses frames; 16 carry over 130 ms at 120 Hz. Old frames are left out 
 
 def client_config(endpoints: Sequence[str] = (DEFAULT_ENDPOINT,)) -> zenoh.Config:
     """A client of the router at ``endpoints``; nothing is bound, no scouting, no shared memory."""
-    return _config("client", {"connect/endpoints": list(endpoints), "connect/timeout_ms": _ATTEMPT_MS})
+    settings = {"endpoints": list(endpoints), "timeout_ms": _ATTEMPT_MS, "retry": _RETRY}
+    return _config("client", {f"connect/{name}": value for name, value in settings.items()})
 
 
 def router_config(

@@ -1,8 +1,11 @@
 """``glovecal serve``: starts the service's processes, restarts one that dies, stops all of them cleanly.
 
 Three processes, none of which needs another to be alive: real time (zenoh router and prediction), recorder
-(its disk and database must never make a pose wait) and web (REST). Each is a fresh interpreter: a forked
-zenoh session delivers nothing.
+(its disk and database must never make a pose wait) and web (REST).
+
+On Linux they are forked from this process, which has imported what real time needs: a fresh interpreter takes
+a second for that, on a busy computer five, in which there are no poses. This process opens no zenoh session,
+as a forked one delivers nothing. Elsewhere the system's libraries do not survive a fork, and each is fresh.
 """
 
 from __future__ import annotations
@@ -17,18 +20,21 @@ import time
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, field
-from multiprocessing.context import SpawnProcess
+from multiprocessing.process import BaseProcess
 from threading import Event, Thread
 from typing import Any
 
+from glovecal_client.private_files import keep_private
 from glovecal_models.errors import GlovecalError
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
 
-FIRST_DELAY_S = 0.25
+FIRST_DELAY_S = 0.1
 LONGEST_DELAY_S = 10.0
 HEALTHY_AFTER_S = 30.0
-"""A process that lived this long is restarted without delay when it dies."""
+"""A process that lived this long begins with the first delay again."""
+QUICK_CRASHES = 20
+"""So many crashes in a row are answered with the first delay, by a process that gets as far as serving."""
 STOP_WITHIN_S = 10.0
 
 READY_WITHIN_S = 60.0
@@ -36,8 +42,21 @@ READY_WITHIN_S = 60.0
 Work = Callable[[Settings, Event, Callable[[], None]], None]
 """Runs until the event is set; calls the last argument when it is there for its users."""
 
-_SPAWN = multiprocessing.get_context("spawn")
+_CONTEXT = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
 _log = logging.getLogger("glovecal.serve")
+
+
+class Ready:
+    """Whether a process is there for its users. An Event has a lock, which a killed process may keep."""
+
+    def __init__(self) -> None:
+        self._flag = _CONTEXT.RawValue("b", 0)
+
+    def set(self) -> None:
+        self._flag.value = 1
+
+    def is_set(self) -> bool:
+        return bool(self._flag.value)
 
 
 @dataclass
@@ -46,27 +65,36 @@ class Part:
 
     name: str
     work: Work
-    ready: Any = field(default_factory=lambda: _SPAWN.Event())
-    """Set by the process when it is there for its users."""
-    process: SpawnProcess | None = None
+    listens: tuple[str, str, int] | None = None
+    """What is served where: ``("REST", host, port)``."""
+    ready: Ready = field(default_factory=Ready)
+    """Set by the process, anew after each start."""
+    process: BaseProcess | None = None
     started_at: float = 0.0
     start_at: float = 0.0
-    delay_s: float = FIRST_DELAY_S
-    starts: int = 0
-    exits: list[int | None] = field(default_factory=list)
+    crashes: int = 0
+    """Ends in a row of a process that was ready, or that somebody else ended."""
+    failed_starts: int = 0
+    """Ends in a row of a process that gave up before it was ready."""
 
 
 def serve(settings: Settings) -> int:
     """Run until SIGTERM or Ctrl-C; the exit code. Problems that no restart can cure are one sentence."""
     _log_to_stderr()
-    problem = _why_not(settings)
+    parts = [
+        Part("real time", real_time, ("zenoh", *_zenoh_address(settings))),
+        Part("recorder", recorder),
+        Part("web", web, ("REST", settings.host, settings.port)),
+    ]
+    problem = _why_not(settings, parts)
     if problem:
         print(f"glovecal serve: {problem}", file=sys.stderr)
         return 1
     stopped = Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stopped.set())
-    parts = [Part("real time", real_time), Part("recorder", recorder), Part("web", web)]
+    import glovecal_service.realtime.process  # noqa: F401  # for the processes, also those after a crash
+
     try:
         for part in parts:
             _start(part, settings)
@@ -90,11 +118,10 @@ def _supervise(parts: list[Part], settings: Settings, stopped: Event) -> None:
                 _log.warning("not ready yet: %s", ", ".join(waiting))
 
 
-def _why_not(settings: Settings) -> str:
+def _why_not(settings: Settings, parts: list[Part]) -> str:
     """Why the service cannot start here, "" if it can. Also brings the store up to date, once for all."""
-    for what, host, port in (("REST", settings.host, settings.port), ("zenoh", *_zenoh_address(settings))):
-        problem = _port_problem(what, host, port)
-        if problem:
+    for part in parts:
+        if problem := _port_problem(part):
             return problem
     try:
         Store.open(settings).close()
@@ -112,7 +139,8 @@ def _zenoh_address(settings: Settings) -> tuple[str, int]:
     return host.strip("[]"), int(port)
 
 
-def _port_problem(what: str, host: str, port: int) -> str:
+def _port_problem(part: Part) -> str:
+    what, host, port = part.listens or ("", "", 0)
     if not port:
         return ""
     try:
@@ -140,12 +168,12 @@ def _banner(settings: Settings) -> str:
 
 
 def _start(part: Part, settings: Settings) -> None:
-    part.process = _SPAWN.Process(
+    part.ready = Ready()
+    part.process = _CONTEXT.Process(
         target=run_part, args=(part.work, settings, part.ready, os.getpid()), name=f"glovecal {part.name}"
     )
     part.process.start()
     part.started_at = time.monotonic()
-    part.starts += 1
 
 
 def _keep_alive(part: Part, settings: Settings) -> None:
@@ -157,13 +185,25 @@ def _keep_alive(part: Part, settings: Settings) -> None:
     if part.process.is_alive():
         return
     code = part.process.exitcode
-    part.exits.append(code)
     part.process = None
-    if now - part.started_at >= HEALTHY_AFTER_S:
-        part.delay_s = FIRST_DELAY_S
-    part.start_at = now + part.delay_s
-    _log.warning("%s ended (exit code %s); starting it again in %.2g s", part.name, code, part.delay_s)
-    part.delay_s = min(2 * part.delay_s, LONGEST_DELAY_S)
+    delay_s = _delay_s(part, code, now - part.started_at)
+    part.start_at = now + delay_s
+    why = _port_problem(part) if part.failed_starts else ""
+    ending = f"exit code {code}: {why}" if why else f"exit code {code}"
+    _log.warning("%s ended (%s); starting it again in %.2g s", part.name, ending, delay_s)
+
+
+def _delay_s(part: Part, code: int | None, lived_s: float) -> float:
+    """What crashes is back at once, for a pose is waited for; what cannot even start is given time."""
+    if lived_s >= HEALTHY_AFTER_S:
+        part.crashes = part.failed_starts = 0
+    if part.ready.is_set() or (code is not None and code < 0):
+        part.failed_starts = 0
+        part.crashes += 1
+    else:
+        part.failed_starts += 1
+    doublings = max(part.failed_starts, part.crashes - QUICK_CRASHES, 0)
+    return min(FIRST_DELAY_S * 2.0**doublings, LONGEST_DELAY_S)
 
 
 def _stop(parts: list[Part]) -> None:
@@ -184,6 +224,7 @@ def _stop(parts: list[Part]) -> None:
 def run_part(work: Work, settings: Settings, ready: Any, parent: int) -> None:
     """What a child does first: stop on signals, and when the parent is gone."""
     _log_to_stderr()
+    keep_private()
     stopped = Event()
     signal.signal(signal.SIGTERM, lambda *_: stopped.set())
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import httpx
 import pytest
-from realtime_support import eventually, free_endpoint
+from realtime_support import WireGlove, eventually, free_endpoint
 
 from glovecal_client.errors import NoAnswer
 from glovecal_client.keys import all_services
+from glovecal_client.pose_subscriber import PoseSubscriber
 from glovecal_client.queries import ask_json
 from glovecal_client.session import open_client
+from glovecal_service.settings import Settings
 
 SERVE = "import sys; from glovecal_service.cli.command import main; sys.argv = ['glovecal', 'serve']; main()"
 
@@ -73,8 +77,8 @@ def is_ready(port: int) -> bool:
         return False
 
 
-def web_process(process: subprocess.Popen[str], port: int) -> int:
-    """The child that holds the REST port."""
+def listener(process: subprocess.Popen[str], port: int) -> int:
+    """The child that listens on ``port``, 0 if there is none."""
     wanted = f"{port:04X}"
     inodes = {
         line.split()[9]
@@ -98,7 +102,7 @@ def test_each_part_survives_the_death_of_the_others(serving: tuple[subprocess.Po
     assert endpoint in banner[2]
     assert is_ready(port)
     first = answers(endpoint)
-    web = web_process(process, port)
+    web = listener(process, port)
     assert len({first, web, 0}) == 3
 
     os.kill(web, signal.SIGKILL)
@@ -113,6 +117,59 @@ def test_each_part_survives_the_death_of_the_others(serving: tuple[subprocess.Po
     process.send_signal(signal.SIGTERM)
     assert process.wait(120) == 0
     eventually(lambda: not any(Path(f"/proc/{child}").exists() for child in all_children), "nothing is left")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+def test_poses_are_back_within_3_s_of_each_of_ten_crashes(
+    serving: tuple[subprocess.Popen[str], str, int],
+) -> None:
+    process, endpoint, _ = serving
+    assert process.stdout is not None
+    process.stdout.readline()
+    router_port = int(endpoint.rpartition(":")[2])
+    gone_s = []
+    with open_client([endpoint]) as session, PoseSubscriber(session, "lab", "right") as poses:
+        glove = WireGlove(session, Settings(), "right")
+
+        def pose_comes() -> bool:
+            glove.send()
+            return poses.wait(0.02) is not None
+
+        eventually(pose_comes, "the first pose")
+        for _ in range(10):
+            victim = eventually(lambda: listener(process, router_port), "real time listens")
+            os.kill(victim, signal.SIGKILL)
+            killed_at = time.monotonic()
+            eventually(lambda victim=victim: listener(process, router_port) != victim, "it is dead")
+            while poses.wait(0.0) is not None:
+                pass
+            eventually(pose_comes, "poses are back")
+            gone_s.append(round(time.monotonic() - killed_at, 2))
+    assert max(gone_s) <= 3.0, gone_s
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+def test_what_cannot_start_is_tried_more_and_more_rarely_and_says_why(
+    serving: tuple[subprocess.Popen[str], str, int],
+) -> None:
+    process, endpoint, _ = serving
+    assert process.stdout is not None
+    assert process.stderr is not None
+    process.stdout.readline()
+    router_port = int(endpoint.rpartition(":")[2])
+    victim = listener(process, router_port)
+    process.send_signal(signal.SIGSTOP)  # it looks away while somebody else takes the port
+    os.kill(victim, signal.SIGKILL)
+    eventually(lambda: listener(process, router_port) != victim, "it is dead")
+    with socket.create_server(("127.0.0.1", router_port)):
+        process.send_signal(signal.SIGCONT)
+        ends: list[tuple[str, str]] = []
+        while len(ends) < 4:
+            pattern = r"real time ended \((.*)\); starting it again in (\S+) s"
+            ends += re.findall(pattern, process.stderr.readline())
+    assert f"zenoh cannot listen on 127.0.0.1:{router_port} (Address already in use)" in ends[-1][0]
+    assert [wait for _, wait in ends] == ["0.1", "0.2", "0.4", "0.8"]
+    eventually(lambda: answers(endpoint), "it starts once the port is free")
 
 
 @pytest.mark.parametrize("taken", ["REST", "zenoh"])
