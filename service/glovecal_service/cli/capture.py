@@ -11,7 +11,7 @@ from typer.core import TyperCommand
 
 from glovecal_client.private_files import keep_private
 from glovecal_service.cli.options import DEFAULT_ZENOH, Site, Zenoh, identifier, subject_named
-from glovecal_service.cli.printing import err, out
+from glovecal_service.cli.printing import out
 
 GloveOption = Annotated[
     str,
