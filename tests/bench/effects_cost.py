@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from glovecal_client.keys import GloveKeys
 from glovecal_client.wire.frame import Frame
 from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.effects.catalogue import stored_effect
-from glovecal_service.realtime.lane_effects import LaneEffects
+from glovecal_service.realtime.corrected_frames import corrected
+from glovecal_service.realtime.glove_lane import GloveLane
 from glovecal_service.realtime.served_model import ServedModel
-from glovecal_service.realtime.worn_gloves import WornGlove
+from glovecal_service.realtime.worn_gloves import WornGloves
 
 FRAMES = 2000
 MOST_ADDED_MS = 0.2
@@ -27,19 +29,18 @@ def cost_of_effects(base: CalibrationModel) -> dict[str, Any]:
     lanes, sensors = len(names), len(base.layout.sensors)
     effects = (everywhere("hysteresis", names, [4.0]), everywhere("creep", names, [0.6, 2.4, 10.0]))
     model = ServedModel.prepare("1" * 64, replace(base, effects=effects))
-    of_glove, worn = LaneEffects(model), WornGlove()
+    lane, worn = GloveLane(GloveKeys("bench", "glove")), WornGloves()
     readings = np.random.default_rng(1).uniform(60, 190, (FRAMES, sensors)).astype(np.float32)
+    frames = [Frame(number, 1, number * 8_333_333, 0, row) for number, row in enumerate(readings)]
 
     def without() -> None:
         for row in readings:
-            model.predict([row])
+            model.predictor.predict(row[None])
 
     def with_effects() -> None:
-        for number, row in enumerate(readings):
-            angles = model.predict([row])
-            frame = Frame(number, 1, number * 8_333_333, 0, row)
-            correction = of_glove.correct(frame, worn, angles.mean[0]).degrees
-            model.predictor.corrected(angles, correction[None])
+        for frame in frames:
+            row = frame.readings[None].astype(np.float64)
+            corrected(model, [(lane, frame, 0)], row, model.predictor.predict(row), worn)
 
     before, after = _milliseconds(without), _milliseconds(with_effects)
     return {

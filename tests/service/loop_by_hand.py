@@ -13,8 +13,10 @@ from glovecal_client.keys import GloveKeys
 from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_client.wire.pose import Pose, decode_pose
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.predictor import GlovePredictor
+from glovecal_models.calibration.predictor import GloveAngles, GlovePredictor
 from glovecal_service.realtime.arrivals import Arrival, Arrivals
+from glovecal_service.realtime.corrected_frames import corrected
+from glovecal_service.realtime.glove_lane import GloveLane
 from glovecal_service.realtime.pose_loop import PoseLoop
 from glovecal_service.realtime.served_model import ServedModel, ServedModels
 from glovecal_service.realtime.worn_gloves import WornGlove, WornGloves
@@ -26,14 +28,11 @@ class ByHand:
     def __init__(self) -> None:
         self.queue: SimpleQueue[Arrival] = SimpleQueue()
 
-    def wait(self, timeout_s: float) -> Arrival | None:
+    def wait(self) -> Arrival | None:
         return None if self.queue.empty() else self.queue.get()
 
     def drain(self) -> list[Arrival]:
         return [self.queue.get() for _ in range(self.queue.qsize())]
-
-    def take_refused(self) -> dict[str, int]:
-        return {}
 
 
 class LoopByHand:
@@ -72,8 +71,8 @@ class LoopByHand:
             key = GloveKeys("lab", glove).raw
             self.arrivals.queue.put(Arrival(key, encode_frame(frame), time.monotonic_ns()))
             if number % together == 0:
-                self.loop.step(0.0)
-        self.loop.step(0.0)
+                self.loop.step()
+        self.loop.step()
 
     def stream(self, frames: Iterable[Frame], *, together: int = 4) -> None:
         """Frames of glove ``g1``."""
@@ -81,6 +80,31 @@ class LoopByHand:
 
     def status(self, glove: str) -> dict[str, Any]:
         return next(lane.status() for lane in self.loop.lanes if lane.glove == glove)
+
+
+def served_in_turns(
+    model: CalibrationModel, turns: Iterable[list[tuple[str, Frame]]]
+) -> dict[str, GloveAngles]:
+    """Angles by glove, before they are rounded for the wire, of turns that may hold many gloves' frames."""
+    served, worn = ServedModel.prepare("1" * 64, model), WornGloves()
+    lanes: dict[str, GloveLane] = {}
+    found: dict[str, list[GloveAngles]] = {}
+    for turn in turns:
+        readings = np.array([frame.readings for _, frame in turn], dtype=np.float64)
+        opened = [
+            (lanes.setdefault(glove, GloveLane(GloveKeys("lab", glove))), frame, 0) for glove, frame in turn
+        ]
+        angles, _ = corrected(served, opened, readings, served.predictor.predict(readings), worn)
+        for row, (glove, _) in enumerate(turn):
+            one = GloveAngles(*(getattr(angles, name)[row : row + 1] for name in _ANGLES))
+            found.setdefault(glove, []).append(one)
+    return {
+        glove: GloveAngles(*(np.concatenate([getattr(one, name) for one in each]) for name in _ANGLES))
+        for glove, each in found.items()
+    }
+
+
+_ANGLES = ("mean", "sd", "flags")
 
 
 def moving_frames(count: int, *, seed: int = 0, run_id: int = 1, start_s: float = 1000.0) -> list[Frame]:

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from effect_models import HYSTERESIS, LAG, MODEL, UNITS, added, model_with
-from loop_by_hand import LoopByHand, as_take, assert_published, degrees, moving_frames
+from loop_by_hand import (
+    LoopByHand,
+    as_take,
+    assert_published,
+    degrees,
+    moving_frames,
+    served_in_turns,
+)
 from realtime_support import LAYOUT
 
 from glovecal_client.wire.frame import encode_frame
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_service.realtime.frame_gate import TAKEOVER_AFTER_NS
-from glovecal_service.realtime.lane_effects import LaneEffects
 from glovecal_service.realtime.recording_file import RecordingFile
 from glovecal_service.realtime.recording_take import read_take
-from glovecal_service.realtime.served_model import ServedModel
-from glovecal_service.realtime.worn_gloves import WornGlove
 
 SETTLING_S = 2.5
 
@@ -40,13 +45,39 @@ def test_a_stream_gives_what_the_recorded_take_gives() -> None:
 
 
 def test_before_it_is_rounded_for_the_wire_it_agrees_to_1e_9() -> None:
-    frames, served = moving_frames(300), ServedModel.prepare("1" * 64, MODEL)
-    effects, found = LaneEffects(served), []
-    for frame in frames:
-        base = served.predict([frame.readings])
-        correction = effects.correct(frame, WornGlove(), base.mean[0]).degrees
-        found.append(served.predictor.corrected(base, correction[None]).mean[0])
-    np.testing.assert_allclose(found, as_take(MODEL, frames), rtol=0, atol=1e-9)
+    frames = moving_frames(300)
+    found = served_in_turns(MODEL, ([("g1", frame)] for frame in frames))["g1"]
+    np.testing.assert_allclose(found.mean, as_take(MODEL, frames), rtol=0, atol=1e-9)
+
+
+def test_gloves_in_one_turn_get_what_each_would_get_alone() -> None:
+    """One to twelve frames a turn of five gloves, several of one glove among them, one with a gap of 2 s."""
+    frames = {f"g{number}": moving_frames(120, seed=number, run_id=number) for number in range(5)}
+    frames["g3"][60:] = [
+        replace(frame, monotonic_ns=frame.monotonic_ns + 2 * 10**9) for frame in frames["g3"][60:]
+    ]
+    random = np.random.default_rng(3)
+    waiting = [glove for glove, of_glove in frames.items() for _ in of_glove]
+    random.shuffle(waiting)
+    next_of = {glove: iter(of_glove) for glove, of_glove in frames.items()}
+    order = [(glove, next(next_of[glove])) for glove in waiting]
+    edges = np.cumsum(random.integers(1, 13, len(order)))
+    turns = [turn for turn in (order[a:b] for a, b in itertools.pairwise([0, *edges])) if turn]
+    found = served_in_turns(MODEL, turns)
+    for glove, of_glove in frames.items():
+        np.testing.assert_allclose(found[glove].mean, as_take(MODEL, of_glove), rtol=0, atol=1e-9)
+
+
+def test_gloves_with_different_models_get_what_the_takes_give() -> None:
+    models = {"g1": MODEL, "g2": model_with(LAG, HYSTERESIS), "g3": MODEL, "g4": model_with()}
+    by_hand, frames = LoopByHand(), {}
+    for number, (glove, model) in enumerate(models.items()):
+        by_hand.serve(glove, model, number=number + 1)
+        frames[glove] = moving_frames(150, seed=number, run_id=number + 1)
+    by_hand.models.put("g3", by_hand.models.of("g1"))
+    by_hand.send([(glove, frames[glove][at]) for at in range(150) for glove in models], together=17)
+    for glove, model in models.items():
+        assert_published(by_hand.poses[glove], as_take(model, frames[glove]))
 
 
 def test_two_gloves_on_one_model_have_states_of_their_own() -> None:

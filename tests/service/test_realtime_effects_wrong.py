@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,8 +13,12 @@ from loop_by_hand import LoopByHand, as_take, assert_published, degrees, moving_
 from glovecal_client.wire.pose import RotationFlag
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.effects.expression_effect import ExpressionEffect
+from glovecal_models.effects.hysteresis import Hysteresis
 from glovecal_models.errors import BadInput
 from glovecal_service.realtime.served_model import ServedModel
+
+UPSIDE_DOWN_DEG = 75.0
+"""No joint is there in ``moving_frames``."""
 
 
 @pytest.mark.parametrize("columns", ["1e300 * exp(t * 100)", "400 + 0 * own"])
@@ -33,21 +38,26 @@ def test_an_absurd_correction_leaves_the_base_flagged_and_counted(columns: str) 
 
 
 def test_an_effect_that_raises_does_not_stop_the_poses(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither those of its glove, nor those of another glove of the model in the same turn."""
     by_hand = LoopByHand.serving(MODEL)
-    served = by_hand.models.of("g1")
-    assert served is not None
-    stream = served.predictor.stream()
+    by_hand.models.put("g2", by_hand.models.of("g1"))
+    step = Hysteresis.step
 
-    def broken(*_: object) -> np.ndarray:
-        raise RuntimeError("somebody else's code")
+    def broken(effect: Hysteresis, state: np.ndarray, elapsed_s: float, own: np.ndarray, *rest: Any) -> Any:
+        if (own > UPSIDE_DOWN_DEG).any():
+            raise RuntimeError("somebody else's code")
+        return step(effect, state, elapsed_s, own, *rest)
 
-    monkeypatch.setattr(stream, "of_frame", broken)
-    monkeypatch.setattr(served.predictor, "stream", lambda: stream)
-    frames = moving_frames(5)
-    by_hand.stream(frames)
-    base = GlovePredictor(MODEL).predict(np.array([frame.readings for frame in frames])).mean
+    monkeypatch.setattr(Hysteresis, "step", broken)
+    frames, sound = moving_frames(5), moving_frames(5, run_id=2)
+    high = [replace(frame, readings=np.full(3, 254.0, np.float32)) for frame in frames]
+    both = zip(high, sound, strict=True)
+    by_hand.send([item for one, two in both for item in (("g1", one), ("g2", two))])
+    base = GlovePredictor(MODEL).predict(np.array([frame.readings for frame in high])).mean
     assert_published(by_hand.poses["g1"], base)
     assert all(pose.too_uncertain for pose in by_hand.poses["g1"])
+    assert_published(by_hand.poses["g2"], as_take(MODEL, sound))
+    assert not any(pose.too_uncertain for pose in by_hand.poses["g2"])
     monkeypatch.undo()
     more = [replace(frame, sequence=frame.sequence + 5) for frame in moving_frames(30, start_s=1000.2)]
     by_hand.stream(more)

@@ -7,16 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from effect_models import CREEP, HYSTERESIS, added, model_with
-from loop_by_hand import LoopByHand, moving_frames
+from loop_by_hand import LoopByHand, moving_frames, served_in_turns
 from realtime_support import LAYOUT
 
 from glovecal_client.wire.frame import Frame
 from glovecal_client.wire.pose import PoseFlag, RotationFlag
 from glovecal_models.calibration.predictor import FAULTY_SENSOR, GloveAngles, GlovePredictor
 from glovecal_models.effects.fault_watch import FaultLimits
-from glovecal_service.realtime.lane_effects import LaneEffects
-from glovecal_service.realtime.served_model import ServedModel
-from glovecal_service.realtime.worn_gloves import WornGlove
 
 LIMITS = FaultLimits(
     sensors=LAYOUT.sensors,
@@ -52,18 +49,15 @@ def as_take(frames: list[Frame]) -> GloveAngles:
 
 
 def test_the_stream_is_the_take_to_1e_9() -> None:
-    frames, served = failing_frames(), ServedModel.prepare("1" * 64, MODEL)
-    effects, found = LaneEffects(served), []
-    for frame in frames:
-        base = served.predict([frame.readings])
-        said = effects.correct(frame, WornGlove(), base.mean[0])
-        assert said.doubt is not None
-        doubt = said.doubt._replace(variance=said.doubt.variance[None], is_faulty=said.doubt.is_faulty[None])
-        found.append(served.predictor.corrected(base, said.degrees[None], None, doubt))
-    expected = as_take(frames)
-    for name in ("mean", "sd", "flags"):
-        together = np.concatenate([getattr(one, name) for one in found])
-        np.testing.assert_allclose(together, getattr(expected, name), rtol=0, atol=1e-9)
+    """Beside a glove of the same model that is sound."""
+    frames, sound = failing_frames(), moving_frames(300, run_id=2)
+    turns = ([("g1", one), ("g2", two)] for one, two in zip(frames, sound, strict=True))
+    found = served_in_turns(MODEL, turns)
+    for glove, of_glove in (("g1", frames), ("g2", sound)):
+        expected = as_take(of_glove)
+        for name in ("mean", "sd", "flags"):
+            served = getattr(found[glove], name)
+            np.testing.assert_allclose(served, getattr(expected, name), rtol=0, atol=1e-9)
 
 
 def test_the_last_good_angle_is_kept_flagged_and_counted() -> None:

@@ -120,8 +120,8 @@ def _check_values(readings: np.ndarray, context: np.ndarray) -> None:
     if context.ndim != 1 or len(context) > MAX_CONTEXT:
         raise WireError(f"frame: context of shape {context.shape}; allowed are 0 to {MAX_CONTEXT} values")
     finite = np.isfinite(readings)
-    if not finite.all():
+    if not np.logical_and.reduce(finite):
         column = int(np.argmin(finite))
         raise WireError(f"frame: sensor {column} reads {readings[column]}; readings must be finite numbers")
-    if np.isinf(context).any():
+    if len(context) and np.isinf(context).any():
         raise WireError("frame: a context value is infinite; write NaN for not measured")

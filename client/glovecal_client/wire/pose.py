@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntFlag
 
@@ -123,15 +124,43 @@ def encode_pose(pose: Pose) -> bytes:
     degrees = np.asarray(pose.degrees, dtype="<f4")
     deviations = np.asarray(pose.deviations, dtype="<f4")
     rotation_flags = np.asarray(pose.rotation_flags, dtype=np.uint8)
+    (rotations,) = encode_rotations(degrees[None], deviations[None], rotation_flags[None])
+    return encode_around(
+        rotations, pose.sequence, pose.run_id, pose.monotonic_ns, pose.wall_ns,
+        model_bytes(pose.model_sha256), pose.flags, pose.skipped, pose.age_us,
+    )  # fmt: skip
+
+
+def encode_rotations(
+    degrees: np.ndarray, deviations: np.ndarray, rotation_flags: np.ndarray
+) -> Sequence[bytes]:
+    """What stands in N messages from degrees to rotations' flags, from arrays (N, R), float32 and uint8.
+
+    Raises WireError as ``encode_pose`` does.
+    """
     _check_values(degrees, deviations, rotation_flags)
+    parts = [np.ascontiguousarray(part).view(np.uint8) for part in (degrees, deviations, rotation_flags)]
+    joined, length = np.concatenate(parts, axis=1).tobytes(), 9 * degrees.shape[1]
+    return [joined[at * length : (at + 1) * length] for at in range(len(degrees))]
+
+
+def encode_around(
+    rotations: bytes, sequence: int, run_id: int, monotonic_ns: int, wall_ns: int,
+    model: bytes, flags: int, skipped: int, age_us: int,
+) -> bytes:  # fmt: skip
+    """A message around ``rotations``, one of those that ``encode_rotations`` gave.
+
+    ``model`` is what ``model_bytes`` gave, the others are named as in ``Pose``. Raises WireError where a
+    number does not fit its field.
+    """
     try:
         head = _HEAD.pack(
-            _MAGIC, _VERSION, pose.flags, len(degrees), pose.sequence, pose.monotonic_ns, pose.wall_ns,
-            pose.run_id, pose.skipped, pose.age_us, 0, _model_bytes(pose.model_sha256),
+            _MAGIC, _VERSION, flags, len(rotations) // 9, sequence, monotonic_ns, wall_ns, run_id,
+            skipped, age_us, 0, model,
         )  # fmt: skip
     except struct.error as error:
-        raise WireError(f"pose {pose.sequence}: a number does not fit its field: {error}") from error
-    return sealed(head + degrees.tobytes() + deviations.tobytes() + rotation_flags.tobytes())
+        raise WireError(f"pose {sequence}: a number does not fit its field: {error}") from error
+    return sealed(head + rotations)
 
 
 def decode_pose(message: bytes) -> Pose:
@@ -153,14 +182,15 @@ def decode_pose(message: bytes) -> Pose:
     degrees = np.frombuffer(message, "<f4", count, _HEAD.size)
     deviations = np.frombuffer(message, "<f4", count, _HEAD.size + 4 * count)
     rotation_flags = np.frombuffer(message, np.uint8, count, _HEAD.size + 8 * count)
-    _check_values(degrees, deviations, rotation_flags)
+    _check_values(degrees[None], deviations[None], rotation_flags[None])
     return Pose(
         sequence, run_id, monotonic_ns, wall_ns, degrees, deviations, rotation_flags,
         None if model == _NO_MODEL else model.hex(), flags, skipped, age_us,
     )  # fmt: skip
 
 
-def _model_bytes(sha256: str | None) -> bytes:
+def model_bytes(sha256: str | None) -> bytes:
+    """The 32 bytes that name a model in a message. Raises WireError for what is no sha256."""
     if sha256 is None:
         return _NO_MODEL
     try:
@@ -173,11 +203,14 @@ def _model_bytes(sha256: str | None) -> bytes:
 
 
 def _check_values(degrees: np.ndarray, deviations: np.ndarray, rotation_flags: np.ndarray) -> None:
-    if degrees.ndim != 1 or len(degrees) > MAX_ROTATIONS:
-        raise WireError(f"pose: degrees of shape {degrees.shape}; allowed are 0 to {MAX_ROTATIONS} rotations")
+    """All (N, R)."""
+    if degrees.ndim != 2 or degrees.shape[1] > MAX_ROTATIONS:
+        shape = degrees.shape[1:]
+        raise WireError(f"pose: degrees of shape {shape}; allowed are 0 to {MAX_ROTATIONS} rotations")
     if deviations.shape != degrees.shape or rotation_flags.shape != degrees.shape:
         raise WireError(
-            f"pose: {len(degrees)} rotations, deviations {deviations.shape}, flags {rotation_flags.shape}"
+            f"pose: {degrees.shape[1]} rotations, deviations {deviations.shape[1:]}, "
+            f"flags {rotation_flags.shape[1:]}"
         )
     if not (np.isfinite(degrees).all() and np.isfinite(deviations).all()):
         raise WireError("pose: a rotation or its deviation is NaN or infinite; send no rotations instead")

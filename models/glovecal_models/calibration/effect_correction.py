@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from functools import cache, partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,7 +12,7 @@ from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.doubt import Doubt
 from glovecal_models.calibration.fault_hold import FaultHold
 from glovecal_models.calibration.widening import Widening
-from glovecal_models.effects.effect import Effect, Signals, Uncertainty
+from glovecal_models.effects.effect import Effect, GloveFrames, Signals, Stream, Uncertainty
 from glovecal_models.errors import BadInput
 
 LARGEST_CORRECTION_DEG = 360.0
@@ -35,8 +37,21 @@ class SignalScale:
         return dict(zip(self.sensors, ((readings - self.centre) / self.scale).T, strict=True))
 
 
+class Corrections(NamedTuple):
+    """What effects say about one frame of each of G gloves."""
+
+    degrees: np.ndarray
+    """(G, R), to be added to the base's prediction; NaN where an effect raised an error."""
+    undefined: np.ndarray | None
+    """(G, R) True where an effect had no value and was left out; None: nowhere."""
+    doubt: Doubt | None
+    """Of all G frames; None: the claims stay as they are."""
+    problems: Mapping[int, str]
+    """Errors by the number of the glove; its states are no longer those of its frames."""
+
+
 class EffectCorrection:
-    """All effects of one model together."""
+    """All effects of one model together, for a take or for the frames of one glove."""
 
     def __init__(
         self,
@@ -50,29 +65,23 @@ class EffectCorrection:
 
         Raises BadInput for an effect that this machine does not have, or has in another version.
         """
-        self._lanes = [
-            (item, np.array([list(rotations).index(name) for name in item.rotations]))
-            for item in effects
-            if item.weights.any()
-        ]
-        self._scale = scale
+        self._lanes = [(item, _columns_of(item, rotations)) for item in effects if item.weights.any()]
+        self._count, self._scale = len(rotations), scale
         self._effects = [_fitting(item) for item, _ in self._lanes]
         self._streams = [
             effect.stream(item.settings, item.shape)
             for effect, (item, _) in zip(self._effects, self._lanes, strict=True)
         ]
-        self._uncertain: tuple[str, list[tuple[np.ndarray, Uncertainty]]] | None = None
+        self._uncertain: tuple[str, list[tuple[np.ndarray | slice, Uncertainty]]] | None = None
         """Of the wearing asked about last."""
         measured = np.zeros(len(rotations)) if noise is None else noise
         self._widening = Widening(effects, rotations, scale.sensors, measured)
         self._hold = _fault_hold(effects, rotations, scale.sensors)
         self._started_s: float | None = None
         self.doubt: Doubt | None = None
-        """Of the last frame, or of the last take's frames; None: the claim stays as it is."""
+        """Of the last take's frames; None: the claim stays as it is."""
         self.faulty_sensors: tuple[str, ...] = ()
         """Those that fail in the last frame."""
-        self.undefined: np.ndarray | None = None
-        """(R,) True for rotations that some effect could not correct in the last frame; None: no such."""
         self.context = tuple(dict.fromkeys(name for effect in self._effects for name in effect.context))
         """Context columns that the effects read."""
         self.settling_s = max(
@@ -101,11 +110,10 @@ class EffectCorrection:
     @property
     def rows(self) -> np.ndarray:
         """Indices of the rotations that are corrected."""
-        return (
-            np.unique(np.concatenate([lanes for _, lanes in self._lanes]))
-            if self._lanes
-            else np.empty(0, int)
-        )
+        corrected = np.zeros(self._count, dtype=bool)
+        for _, lanes in self._lanes:
+            corrected[lanes] = True
+        return np.flatnonzero(corrected)
 
     @property
     def needing_time(self) -> tuple[str, ...]:
@@ -148,37 +156,46 @@ class EffectCorrection:
             self.doubt = Doubt.more(self.doubt, unknown)
         return total
 
-    def of_frame(
-        self,
-        time_s: float,
+    @staticmethod
+    def of_frames(
+        gloves: Sequence[EffectCorrection],
+        time_s: np.ndarray,
         base: np.ndarray,
         readings: np.ndarray,
-        context: Mapping[str, float],
-        wearing: str,
-    ) -> np.ndarray:
-        """(R,) degrees to add to ``base`` (R,), the next frame of a stream; the same as in a take."""
-        first, self.undefined, self.doubt, self.faulty_sensors = base, None, None, ()
-        if self._doubts:
-            if self._started_s is None:
-                self._started_s = time_s
-            base, readings = self._doubted_frame(time_s, base, readings)
+        context: Sequence[Mapping[str, float]],
+        wearing: Sequence[str],
+    ) -> Corrections:
+        """The next frame of each of G gloves that share a model; what each would get in a take of its own.
+
+        ``time_s`` is (G,), ``base`` (G, R), ``readings`` (G, S). Raises nothing.
+        """
+        of_all, first, doubt = gloves[0], base, None
+        if of_all._doubts:
+            base, readings, doubt = _doubted_frames(gloves, time_s, base, readings)
         total = base - first
-        if not self._lanes:
-            return total
-        others = self._scale.others(readings[None, :])
-        time = np.array([time_s])
-        now = {name: np.array([value]) for name, value in context.items()}
-        for (item, lanes), stream in zip(self._lanes, self._streams, strict=True):
-            frame = Signals(time, base[None, lanes], others, now, wearing, zero_deg=item.zero_deg)
-            total[lanes] += np.einsum("lc,lc->l", stream.columns(frame)[0], item.weights)
-            if stream.undefined is not None:
-                if self.undefined is None:
-                    self.undefined = np.zeros(len(base), dtype=bool)
-                self.undefined[lanes] = True
-        unknown = self._unknown_variance(base[None], wearing)
-        if unknown is not None:
-            self.doubt = Doubt.more(self.doubt, unknown[0])
-        return total
+        if not of_all._lanes:
+            return Corrections(total, None, doubt, {})
+        others = cache(partial(of_all._scale.others, readings))
+        problems: dict[int, str] = {}
+        undefined: np.ndarray | None = None
+        for number, (item, lanes) in enumerate(of_all._lanes):
+            frames = GloveFrames(time_s, base[:, lanes], others, context, wearing, item.zero_deg)
+            streams = [glove._streams[number] for glove in gloves]
+            columns = _columns(streams, frames, item.weights.shape, problems)
+            total[:, lanes] += np.add.reduce(columns * item.weights, axis=2)
+            without = [row for row, stream in enumerate(streams) if stream.undefined is not None]
+            if without:
+                undefined = np.zeros(base.shape, dtype=bool) if undefined is None else undefined
+                for row in without:
+                    undefined[row, lanes] = True
+        for row in problems:
+            total[row, of_all.rows] = np.nan
+        for row, glove in enumerate(gloves):
+            unknown = glove._unknown_variance(base[row : row + 1], wearing[row])
+            if unknown is not None:
+                doubt = doubt or Doubt(np.zeros_like(base), np.zeros(base.shape, dtype=bool))
+                doubt.variance[row] += unknown[0]
+        return Corrections(total, undefined, doubt, problems)
 
     def _unknown_variance(self, base: np.ndarray, wearing: str) -> np.ndarray | None:
         """(N, R), degrees squared: what is not known of the corrections of ``base`` (N, R); None: nothing."""
@@ -191,7 +208,7 @@ class EffectCorrection:
             total[:, lanes] += variance(base[:, lanes])
         return total
 
-    def _uncertain_in(self, wearing: str) -> list[tuple[np.ndarray, Uncertainty]]:
+    def _uncertain_in(self, wearing: str) -> list[tuple[np.ndarray | slice, Uncertainty]]:
         found = [
             (lanes, effect.uncertainty(item.settings, item.weights, wearing))
             for effect, (item, lanes) in zip(self._effects, self._lanes, strict=True)
@@ -212,20 +229,6 @@ class EffectCorrection:
         self.doubt = Doubt(variance, np.stack([item.is_faulty for item in held]))
         return np.stack([item.base for item in held]), np.stack([item.readings for item in held])
 
-    def _doubted_frame(
-        self, time_s: float, base: np.ndarray, readings: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """The next frame without what failing sensors say; sets ``doubt``."""
-        since = np.array([time_s - (self._started_s or 0.0)])
-        variance = self._widening.added_variance(since, readings[None, :])[0]
-        if self._hold is None:
-            self.doubt = Doubt(variance, np.zeros(len(base), dtype=bool))
-            return base, readings
-        held = self._hold.frame(time_s, base, readings)
-        self.doubt = Doubt(variance + held.variance, held.is_faulty)
-        self.faulty_sensors = held.sensors
-        return held.base, held.readings
-
     def reset(self) -> None:
         """A new wearing, or frames were lost: effects with a memory start anew."""
         for stream in self._streams:
@@ -233,6 +236,55 @@ class EffectCorrection:
         self._started_s = None
         if self._hold is not None:
             self._hold.reset()
+
+
+def _columns_of(item: AddedEffect, rotations: Sequence[str]) -> np.ndarray | slice:
+    """Of the base's prediction; a slice, which costs less, for an effect on all of them."""
+    if tuple(rotations) == item.rotations:
+        return slice(None)
+    return np.array([list(rotations).index(name) for name in item.rotations])
+
+
+def _columns(
+    streams: Sequence[Stream], frames: GloveFrames, weights: tuple[int, ...], problems: dict[int, str]
+) -> np.ndarray:
+    """(G, L, C) of one effect; zero for gloves where it raises, with the error in ``problems``."""
+    try:
+        return type(streams[0]).together(streams, frames)
+    except Exception:  # an effect may be somebody else's code: one glove's error is not another's
+        columns = np.zeros((len(streams), *weights))
+    for row, (stream, frame) in enumerate(zip(streams, frames, strict=True)):
+        try:
+            columns[row] = stream.columns(frame)[0]
+        except Exception as error:
+            problems[row] = str(error) or type(error).__name__
+    return columns
+
+
+def _doubted_frames(
+    gloves: Sequence[EffectCorrection], time_s: np.ndarray, base: np.ndarray, readings: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, Doubt]:
+    """The next frames without what failing sensors say, and the doubt."""
+    starts = []
+    for glove, time in zip(gloves, time_s.tolist(), strict=True):
+        if glove._started_s is None:
+            glove._started_s = time
+        starts.append(glove._started_s)
+    doubt = Doubt(
+        gloves[0]._widening.added_variance(time_s - np.array(starts), readings),
+        np.zeros(base.shape, dtype=bool),
+    )
+    if gloves[0]._hold is None:
+        return base, readings, doubt
+    base, readings = base.copy(), readings.copy()
+    for row, glove in enumerate(gloves):
+        if glove._hold is not None:
+            held = glove._hold.frame(float(time_s[row]), base[row], readings[row])
+            base[row], readings[row] = held.base, held.readings
+            doubt.variance[row] += held.variance
+            doubt.is_faulty[row] = held.is_faulty
+            glove.faulty_sensors = held.sensors
+    return base, readings, doubt
 
 
 def _fault_hold(

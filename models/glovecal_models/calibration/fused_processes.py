@@ -8,6 +8,7 @@ node weights are large and would magnify the rounding.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from threading import local
 
 import numpy as np
 
@@ -15,6 +16,10 @@ from glovecal_models.covariance.squared_exponential_ard import SquaredExponentia
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.regression.regressor import Regressor
 
+DROPPED_VARIANCE = 1e-9
+"""Degrees squared: what is left out of the variance, at most, for fewer columns of its root."""
+LARGEST_REDUCED = 256
+"""Larger variance roots stay whole: to reduce one takes the cube of its columns."""
 GROUP_SIZES = (16, 64, 128, 256, 512)
 """Processes are grouped by the number of their nodes: padding costs more than another group's calls."""
 SMALL_GROUP = 4
@@ -27,7 +32,7 @@ def is_fusible(regressor: Regressor) -> bool:
 
 
 def grouped_by_nodes(processes: Sequence[tuple[int, ProcessRegressor]]) -> list[list[int]]:
-    """Split (key, process) pairs into lists of keys with similar numbers of nodes."""
+    """Split (key, process) pairs into lists of keys with similar numbers of nodes, most inputs first."""
     groups: list[list[int]] = [[] for _ in (*GROUP_SIZES, None)]
     for key, process in processes:
         groups[int(np.searchsorted(GROUP_SIZES, _variance_nodes(process)))].append(key)
@@ -38,104 +43,164 @@ def grouped_by_nodes(processes: Sequence[tuple[int, ProcessRegressor]]) -> list[
         if waiting and (len(waiting) >= SMALL_GROUP or size > GROUP_SIZES[2]):
             merged.append(waiting)
             waiting = []
-    return merged + ([waiting] if waiting else [])
+    inputs = {key: process.nodes.shape[1] for key, process in processes}
+    groups = merged + ([waiting] if waiting else [])
+    return [sorted(group, key=lambda key: -inputs[key]) for group in groups]
+
+
+def _parts(processes: Sequence[ProcessRegressor], nodes_used: int) -> list[tuple[slice, np.ndarray]]:
+    """For runs of inputs that the same R' processes have: rows of all inputs, and nodes (K, R', 1, M) along
+    these K inputs, relevances taken in."""
+    numbers = [process.nodes.shape[1] for process in processes]
+    parts: list[tuple[slice, np.ndarray]] = []
+    at, row = 0, 0
+    while at < numbers[0]:
+        count = sum(n > at for n in numbers)
+        # as many inputs at once as the work array has room for
+        end = min(numbers[count - 1], at + max(1, len(processes) // count))
+        nodes = np.zeros((end - at, count, 1, nodes_used))
+        for index, process in enumerate(processes[:count]):
+            along = process.nodes[:, at:end] * _root_relevance(process)[at:end]
+            nodes[:, index, 0, : len(along)] = along.T
+        rows = slice(row, row + (end - at) * count)
+        parts.append((rows, nodes))
+        at, row = end, rows.stop
+    return parts
 
 
 class FusedProcesses:
-    """Mean and variance of R processes whose inputs are linear in the glove's S sensors.
-
-    Keeps work arrays between calls: not safe to share between threads.
-    """
+    """Mean and variance of R processes whose inputs are linear in the glove's S sensors."""
 
     def __init__(self, processes: Sequence[ProcessRegressor], selections: Sequence[np.ndarray]) -> None:
-        """``selections[i]`` (S, D_i): inputs of process i = readings @ selection."""
-        self.count = len(processes)
-        self._dimensions = max(len(process.input_shift) for process in processes)
+        """``selections[i]`` (S, D_i): inputs of process i = readings @ selection. Most inputs come first."""
+        self._count = len(processes)
         self._nodes_used = max(len(process.nodes) for process in processes)
         self._variance_nodes = max(_variance_nodes(process) for process in processes)
-        rank = max(process.variance_root.shape[1] for process in processes)
-        r, d, m = self.count, self._dimensions, self._nodes_used
-        sensors = selections[0].shape[0]
-        self._select = np.zeros((d, r, sensors))
-        self._shift, self._scale = np.zeros((d, r, 1)), np.ones((d, r, 1))
-        self._root_relevance = np.zeros((d, r, 1))
-        self._slope, self._intercept = np.zeros((d, r, 1)), np.zeros((r, 1))
-        self._nodes = np.zeros((d, r, 1, m))
-        self._log_signal = np.empty((r, 1, 1))
-        self._weights = np.zeros((r, m, 1))
-        self._root = np.zeros((r, self._variance_nodes, rank))
-        for index, (process, selection) in enumerate(zip(processes, selections, strict=True)):
-            self._put(index, process, selection)
+        numbers = [process.nodes.shape[1] for process in processes]
+        # all first inputs, then the second ones of those processes that have one ...: nothing is padded
+        each = [(index, at) for at in range(numbers[0]) for index, n in enumerate(numbers) if n > at]
+        self._parts = _parts(processes, self._nodes_used)
+        self._select = np.stack([selections[index][:, at] for index, at in each])
+        self._shift = np.array([[processes[index].input_shift[at]] for index, at in each])
+        self._scale = np.array([[processes[index].input_scale[at]] for index, at in each])
+        self._root_relevance = np.array([[_root_relevance(processes[index])[at]] for index, at in each])
+        self._slope = np.zeros((self._count, len(each)))
+        for column, (index, at) in enumerate(each):
+            self._slope[index, column] = processes[index].slope[at]
+        self._intercept = np.array([[process.intercept] for process in processes])
+        self._log_signal = np.array([[[process.theta[0]]] for process in processes])
         self._signal = np.exp(self._log_signal[:, :, 0])
-        self._mean_apart = self._variance_nodes < m
-        if self._mean_apart:
-            # hundreds of nodes: a frame costs what reading the root costs; 7 digits do for a variance
-            self._root = self._root.astype(np.float32)
-        else:
-            self._root = np.ascontiguousarray(np.concatenate([self._root, self._weights], axis=2))
-        self._select = self._select.reshape(d * r, sensors)
-        self._work: dict[int, tuple[np.ndarray, ...]] = {}
+        self._weights = np.zeros((self._count, self._nodes_used, 1))
+        for index, process in enumerate(processes):
+            self._weights[index, : len(process.weights), 0] = process.weights
+        self._mean_apart = self._variance_nodes < self._nodes_used
+        self._roots = self._stacked([_reduced_root(process) for process in processes])
+        self._widest = max(root.shape[2] for _, root in self._roots)
 
-    def _put(self, index: int, process: ProcessRegressor, selection: np.ndarray) -> None:
-        d, m = process.nodes.shape[1], len(process.nodes)
-        root_relevance = np.sqrt(0.5) * np.exp(0.5 * process.theta[1:])
-        self._select[:d, index] = selection.T
-        self._shift[:d, index, 0], self._scale[:d, index, 0] = process.input_shift, process.input_scale
-        self._root_relevance[:d, index, 0] = root_relevance
-        self._slope[:d, index, 0], self._intercept[index, 0] = process.slope, process.intercept
-        self._nodes[:d, index, 0, :m] = (process.nodes * root_relevance).T
-        self._log_signal[index] = process.theta[0]
-        self._weights[index, :m, 0] = process.weights
-        v, r = min(len(process.variance_root), self._variance_nodes), process.variance_root.shape[1]
-        self._root[index, :v, :r] = process.variance_root[:v]
+    def _stacked(self, roots: Sequence[np.ndarray]) -> list[tuple[slice, np.ndarray]]:
+        """Variance roots of neighbouring processes with similar numbers of columns, the weights beside."""
+        stacked, start = [], 0
+        while start < len(roots):
+            widths = [root.shape[1] for root in roots[start:]]
+            end = next((n for n, width in enumerate(widths) if not _similar(width, widths[:n])), len(widths))
+            stack = np.zeros((end, self._variance_nodes, max(widths[:end])))
+            for index, root in enumerate(roots[start : start + end]):
+                nodes = min(len(root), self._variance_nodes)
+                stack[index, :nodes, : root.shape[1]] = root[:nodes]
+            rows = slice(start, start + end)
+            # hundreds of nodes: a frame costs what reading the root costs; 7 digits do for a variance
+            stacked.append(
+                (rows, stack.astype(np.float32))
+                if self._mean_apart
+                else (rows, np.ascontiguousarray(np.concatenate([stack, self._weights[rows]], axis=2)))
+            )
+            start += end
+        return stacked
 
     @property
     def floats_per_frame(self) -> int:
         """Size of the work arrays one frame needs."""
-        return (self._dimensions + 1) * self.count * self._nodes_used
+        return self._count * (2 * self._nodes_used + self._widest)
 
     def predict(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and variance, each (R, F), from readings transposed (S, F). Overwritten by the next call."""
+        """Mean and variance, each (R, F), from readings transposed (S, F)."""
         frames = columns.shape[1]
-        work = self._work.get(frames) or self._buffers(frames)
-        inputs, away, kernel, explained, mean, variance = work
-        np.matmul(self._select, columns, out=inputs.reshape(-1, frames))
-        np.subtract(inputs, self._shift, out=inputs)
-        np.divide(inputs, self._scale, out=inputs)
-        np.einsum("drf,drz->rf", inputs, self._slope, out=mean)
+        inputs = self._select @ columns
+        inputs -= self._shift
+        inputs /= self._scale
+        mean = self._slope @ inputs
         mean += self._intercept
-        np.multiply(inputs, self._root_relevance, out=inputs)
-        np.subtract(self._nodes, inputs[..., None], out=away)
-        np.multiply(away, away, out=away)
-        np.add.reduce(away, axis=0, out=kernel)
-        np.subtract(self._log_signal, kernel, out=kernel)
+        inputs *= self._root_relevance
+        shape = (self._count, frames, self._nodes_used)
+        size = self._count * frames * self._nodes_used
+        work = _work(self.floats_per_frame * frames)
+        kernel, away = work[:size].reshape(shape), work[size : 2 * size].reshape(shape)
+        kernel[...] = self._log_signal
+        for rows, nodes in self._parts:
+            inputs_each, count = len(nodes), nodes.shape[1]
+            part = away[: inputs_each * count].reshape(inputs_each, count, frames, -1)
+            np.subtract(nodes, inputs[rows].reshape(inputs_each, count, frames, 1), out=part)
+            np.multiply(part, part, out=part)
+            less = kernel[:count]
+            np.subtract(less, part[0] if inputs_each == 1 else np.add.reduce(part, axis=0), out=less)
         np.exp(kernel, out=kernel)
-        to_nodes = kernel[:, :, : self._variance_nodes].astype(self._root.dtype, copy=False)
-        np.matmul(to_nodes, self._root, out=explained)
+        return self._from_kernel(kernel, mean, work[2 * size :])
+
+    def _from_kernel(
+        self, kernel: np.ndarray, mean: np.ndarray, work: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        variance, frames = np.empty_like(mean), kernel.shape[1]
+        for rows, root in self._roots:
+            to_nodes = kernel[rows, :, : self._variance_nodes].astype(root.dtype, copy=False)
+            shape = (len(root), frames, root.shape[2])
+            explained = work.view(root.dtype)[: len(root) * frames * root.shape[2]].reshape(shape)
+            np.matmul(to_nodes, root, out=explained)
+            if not self._mean_apart:
+                mean[rows] += explained[:, :, -1]
+                explained = explained[:, :, :-1]
+            np.einsum("rfk,rfk->rf", explained, explained, out=variance[rows], dtype=float)
         if self._mean_apart:
             mean += np.matmul(kernel, self._weights)[:, :, 0]
-            part = explained
-        else:
-            mean += explained[:, :, -1]
-            part = explained[:, :, :-1]
-        np.einsum("rfk,rfk->rf", part, part, out=variance, dtype=float)
         np.subtract(self._signal, variance, out=variance)
         np.maximum(variance, 0.0, out=variance)
         return mean, variance
 
-    def _buffers(self, frames: int) -> tuple[np.ndarray, ...]:
-        r, d, m = self.count, self._dimensions, self._nodes_used
-        made = (
-            np.empty((d, r, frames)),
-            np.empty((d, r, frames, m)),
-            np.empty((r, frames, m)),
-            np.empty((r, frames, self._root.shape[2]), self._root.dtype),
-            np.empty((r, frames)),
-            np.empty((r, frames)),
-        )
-        if frames <= 16:
-            self._work[frames] = made
-        return made
+
+_THREAD = local()
+
+
+def _work(floats: int) -> np.ndarray:
+    """This thread's work array, for all models: it stays in the processor's cache, and memory does not grow
+    with the numbers of models and of frames that ever came together."""
+    work: np.ndarray | None = getattr(_THREAD, "work", None)
+    if work is None or len(work) < floats:
+        work = _THREAD.work = np.empty(floats)
+    return work[:floats]
+
+
+def _root_relevance(process: ProcessRegressor) -> np.ndarray:
+    """(D,): distances between inputs times it, squared and summed, are the exponent."""
+    return np.sqrt(0.5) * np.exp(0.5 * process.theta[1:])
+
+
+def _similar(width: int, before: Sequence[int]) -> bool:
+    """Whether padding to one width costs less than another call."""
+    return not before or 2 * width >= max(before) >= width / 2
+
+
+def _reduced_root(process: ProcessRegressor) -> np.ndarray:
+    """The variance root (M, r) with as few columns as nodes that lie close together allow.
+
+    For every x the vector k(x, nodes) is K^1/2 z with |z|^2 <= signal variance s (the prior variance left
+    given the nodes is not negative). So in the columns' principal axes, those of root' K root, the column of
+    eigenvalue e explains at most s e, and all that are dropped together explain at most s times the largest.
+    """
+    root = process.variance_root
+    if not 0 < root.shape[1] <= LARGEST_REDUCED:
+        return root
+    covariance = process.covariance(process.theta, process.nodes, process.nodes)
+    values, axes = np.linalg.eigh(root.T @ covariance @ root)
+    return root @ axes[:, values * np.exp(process.theta[0]) > DROPPED_VARIANCE]
 
 
 def _variance_nodes(process: ProcessRegressor) -> int:

@@ -20,8 +20,10 @@ RANGE_MARGIN = 0.05
 """An input this share of its training range outside that range is extrapolating."""
 LEAST_VARIANCE = 1e-4
 """Degrees squared: no reference repeats itself better."""
-FLOATS_AT_ONCE = 2_000_000
-"""Long recordings are predicted in blocks with work arrays of about this size."""
+FLOATS_AT_ONCE = 200_000
+"""Frames are predicted in blocks with work arrays of about this size: they stay in the processor's cache."""
+FRAMES_AT_ONCE = (16, 256)
+"""At least, so that a large model is not read from memory for each frame, and at most."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,6 @@ class GlovePredictor:
     """Predicts one frame or many with a calibration model.
 
     ``predict`` is the regressors alone; ``predict_take`` and ``with_effects`` add the model's effects.
-    Keeps work arrays between calls, so each thread needs a predictor of its own.
     """
 
     def __init__(self, model: CalibrationModel) -> None:
@@ -61,7 +62,7 @@ class GlovePredictor:
         self._largest_variance = np.array(limits)
         self._range = _Range([(index, items[index]) for index in measured], model)
         frame = sum(group.floats_per_frame for _, group in self._groups)
-        self._block = int(np.clip(FLOATS_AT_ONCE // max(frame, 1), 1, 256))
+        self._block = int(np.clip(FLOATS_AT_ONCE // max(frame, 1), *FRAMES_AT_ONCE))
 
     def predict(self, readings: np.ndarray) -> GloveAngles:
         """Angles from ``readings`` (N, S), raw counts in the layout's sensor order.

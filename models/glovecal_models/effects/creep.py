@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 from glovecal_models.effects.effect import Parameter, Settings, Signals
-from glovecal_models.effects.history_effect import HistoryEffect
+from glovecal_models.effects.history_effect import ArrayStateEffect
 from glovecal_models.effects.joint_units import on_lanes, settle_joint_units
 from glovecal_models.effects.relaxation import relax, relax_once
 
@@ -27,7 +27,7 @@ LONGEST_SHARE = 0.7
 """Of a take's length: a slower relaxation cannot be told from a constant."""
 
 
-class Creep(HistoryEffect):
+class Creep(ArrayStateEffect):
     name = "creep"
     explanation = "After a movement the reading goes on drifting for seconds although the joint is held."
     source = "standard linear solid, relaxations of 1 to 40 s: Springer 10.1007/978-3-030-25261-8_34"
@@ -56,9 +56,14 @@ class Creep(HistoryEffect):
         return np.concatenate([rested, rested, rested, away, away, away], axis=1)
 
     def step(
-        self, state: np.ndarray, elapsed_s: float, own: np.ndarray, settings: Settings, shape: np.ndarray
+        self,
+        state: np.ndarray,
+        elapsed_s: float | np.ndarray,
+        own: np.ndarray,
+        settings: Settings,
+        shape: np.ndarray,
     ) -> np.ndarray:
-        towards = own[:, None] * FOLLOWING
+        towards = own[..., None] * FOLLOWING
         relax_once(state, elapsed_s, towards, np.tile(shape, 2))
         return state - towards
 

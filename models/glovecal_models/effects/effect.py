@@ -15,7 +15,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, overload
 
 import numpy as np
 
@@ -61,6 +61,48 @@ class Signals:
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+
+class GloveFrames(Sequence[Signals]):
+    """The next frame of each of G gloves that share a model; item i is that of glove i, as signals."""
+
+    def __init__(
+        self,
+        time_s: np.ndarray,
+        own: np.ndarray,
+        others: Callable[[], Mapping[str, np.ndarray]],
+        context: Sequence[Mapping[str, float]],
+        wearing: Sequence[str],
+        zero_deg: np.ndarray | None,
+    ) -> None:
+        """``time_s`` (G,) on each glove's own clock, ``own`` (G, L); ``others`` gives signals (G,) by name
+        and is asked when they are needed; what follows is as in ``Signals``, glove by glove."""
+        self.time_s, self.own, self._others = time_s, own, others
+        self._context, self._wearing, self._zero_deg = context, wearing, zero_deg
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @overload
+    def __getitem__(self, at: int) -> Signals: ...
+    @overload
+    def __getitem__(self, at: slice) -> list[Signals]: ...
+    def __getitem__(self, at: int | slice) -> Signals | list[Signals]:
+        if isinstance(at, slice):
+            return [self[index] for index in range(len(self))[at]]
+        others = {name: values[at : at + 1] for name, values in self._others().items()}
+        context = {name: np.array([value]) for name, value in self._context[at].items()}
+        own, time_s = self.own[at : at + 1], self.time_s[at : at + 1]
+        return Signals(time_s, own, others, context, self._wearing[at], zero_deg=self._zero_deg)
+
+    def as_one(self) -> Signals | None:
+        """All gloves as the frames of one take, for what has no memory; None if not in one wearing and with
+        the same context columns."""
+        wearing, names = self._wearing[0], self._context[0].keys()
+        if any(other != wearing for other in self._wearing) or any(c.keys() != names for c in self._context):
+            return None
+        context = {name: np.array([of_glove[name] for of_glove in self._context]) for name in names}
+        return Signals(self.time_s, self.own, self._others(), context, wearing, zero_deg=self._zero_deg)
 
 
 class Effect(ABC):
@@ -162,6 +204,14 @@ class Stream(ABC):
     def reset(self) -> None:
         """Forget: a new wearing, or frames were missing."""
 
+    @classmethod
+    def together(cls, streams: Sequence[Any], frames: GloveFrames) -> np.ndarray:
+        """(G, L, C): ``columns`` of each of G gloves' streams, of this class and of one model.
+
+        To be overridden where one call for all is quicker; what raises must then leave every state as it was.
+        """
+        return np.concatenate([stream.columns(frame) for stream, frame in zip(streams, frames, strict=True)])
+
 
 class InstantEffect(Effect):
     """An effect without memory: each frame's columns depend on that frame alone."""
@@ -179,3 +229,10 @@ class _InstantStream(Stream):
 
     def reset(self) -> None:
         """There is nothing to forget."""
+
+    @classmethod
+    def together(cls, streams: Sequence[Any], frames: GloveFrames) -> np.ndarray:
+        first, signals = streams[0], frames.as_one()
+        if signals is None:
+            return super().together(streams, frames)
+        return first._effect.columns(signals, first._settings, first._shape)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import itertools
 from abc import abstractmethod
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.effect import Effect, Settings, Signals, Stream
+from glovecal_models.effects.effect import Effect, GloveFrames, Settings, Signals, Stream
 
 LONGEST_GAP_S = 1.0
 """After a longer pause the state is forgotten: the hand may have done anything meanwhile."""
@@ -55,6 +56,24 @@ class HistoryEffect(Effect):
         return np.stack([self.step(state, elapsed, joint, settings, shape) for elapsed, joint in each])
 
 
+class ArrayStateEffect(HistoryEffect):
+    """Its state is one array (L, ...), so that several gloves of a model are stepped together."""
+
+    @abstractmethod
+    def start(self, own: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray: ...
+
+    @abstractmethod
+    def step(
+        self,
+        state: np.ndarray,
+        elapsed_s: float | np.ndarray,
+        own: np.ndarray,
+        settings: Settings,
+        shape: np.ndarray,
+    ) -> np.ndarray:
+        """As for one glove; also for G gloves: state (G, L, ...), elapsed_s (G, 1, 1), own (G, L)."""
+
+
 def elapsed_s(time_s: np.ndarray) -> np.ndarray:
     """(N,) seconds since the frame before; 0 for the first one and after a gap."""
     elapsed = np.diff(time_s, prepend=time_s[:1])
@@ -85,3 +104,22 @@ class _HistoryStream(Stream):
 
     def reset(self) -> None:
         self._state = None
+
+    @classmethod
+    def together(cls, streams: Sequence[Any], frames: GloveFrames) -> np.ndarray:
+        first = streams[0]
+        effect, settings, shape = first._effect, first._settings, first._shape
+        if not isinstance(effect, ArrayStateEffect):
+            return super().together(streams, frames)
+        states, elapsed, times = [], [], frames.time_s.tolist()
+        for stream, time, own in zip(streams, times, frames.own, strict=True):
+            state, passed = stream._state, time - stream._last_s
+            if state is None or not 0.0 <= passed <= LONGEST_GAP_S:
+                state, passed = effect.start(own, settings, shape), 0.0
+            states.append(state)
+            elapsed.append(passed)
+        stacked = np.array(states)
+        columns = effect.step(stacked, np.array(elapsed)[:, None, None], frames.own, settings, shape)
+        for stream, time, state in zip(streams, times, stacked, strict=True):
+            stream._state, stream._last_s = state, time
+        return columns

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from glovecal_models.effects.effect import Parameter, Settings, Signals
-from glovecal_models.effects.history_effect import HistoryEffect
+from glovecal_models.effects.history_effect import ArrayStateEffect
 
 WIDTHS = (0.2, 0.5, 1.0)
 """Of the widest play."""
@@ -21,7 +21,7 @@ WIDEST_SHARES = (0.12, 0.25, 0.5)
 """Half-width of the widest play, in standard deviations of the motion. Wider ones imitate creep."""
 
 
-class Hysteresis(HistoryEffect):
+class Hysteresis(ArrayStateEffect):
     name = "hysteresis"
     explanation = (
         "The sensor sticks: at the same angle it reads differently on the way up and on the way down."
@@ -40,10 +40,15 @@ class Hysteresis(HistoryEffect):
         return np.repeat(own[:, None], len(WIDTHS), axis=1)
 
     def step(
-        self, state: np.ndarray, elapsed_s: float, own: np.ndarray, settings: Settings, shape: np.ndarray
+        self,
+        state: np.ndarray,
+        elapsed_s: float | np.ndarray,
+        own: np.ndarray,
+        settings: Settings,
+        shape: np.ndarray,
     ) -> np.ndarray:
         width = shape * WIDTHS
-        joint = own[:, None]
+        joint = own[..., None]
         np.minimum(joint + width, state, out=state)
         np.maximum(joint - width, state, out=state)
         return state - joint

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from glovecal_models.effects.effect import Parameter, Settings, Signals
-from glovecal_models.effects.history_effect import HistoryEffect
+from glovecal_models.effects.history_effect import ArrayStateEffect
 from glovecal_models.effects.relaxation import relax, relax_once
 
 MULTIPLES = np.array([0.5, 1.0, 2.0, 4.0, 8.0])
@@ -24,7 +24,7 @@ FAST_SHARE = 1.0
 """Per second: a joint is moved fast when its speed reaches so many of its own standard deviations."""
 
 
-class Lag(HistoryEffect):
+class Lag(ArrayStateEffect):
     name = "lag"
     explanation = "The sensor follows the joint late: fast movements come out smaller and delayed."
     source = "first-order low pass, 5 to 150 ms (facts: rate-dependent flex sensors)"
@@ -41,10 +41,15 @@ class Lag(HistoryEffect):
         return np.repeat(own[:, None], len(MULTIPLES), axis=1)
 
     def step(
-        self, state: np.ndarray, elapsed_s: float, own: np.ndarray, settings: Settings, shape: np.ndarray
+        self,
+        state: np.ndarray,
+        elapsed_s: float | np.ndarray,
+        own: np.ndarray,
+        settings: Settings,
+        shape: np.ndarray,
     ) -> np.ndarray:
-        relax_once(state, elapsed_s, own[:, None], shape * MULTIPLES)
-        return own[:, None] - state
+        relax_once(state, elapsed_s, own[..., None], shape * MULTIPLES)
+        return own[..., None] - state
 
     def run(
         self, state: np.ndarray, elapsed_s: np.ndarray, own: np.ndarray, settings: Settings, shape: np.ndarray

@@ -1,21 +1,23 @@
 """Messages from zenoh's receive thread to one of ours, without ever making zenoh wait.
 
-A callback that blocks, or a FIFO channel that fills, stalls everything else on its link; a ring channel
-drops without counting. So the callback is direct and does three things only: copy the bytes out, note the
-time, put both into a queue.
+A callback that blocks, or a FIFO channel that fills, stalls everything else on its link; a callback of ours
+that does not block still has to get Python's lock for each message, from the very thread that predicts. So
+messages wait in a ring channel, outside of Python, until ``wait`` or ``drain`` takes them. Where a reader
+stands still for so long that the ring overflows, the oldest go: they are missing in the sequence numbers.
 """
 
 from __future__ import annotations
 
+import secrets
 import time
-from queue import Empty, SimpleQueue
-from threading import Lock
+from threading import Event, Thread
 from typing import NamedTuple
 
 import zenoh
 
 ARRIVALS_LIMIT = 8192
-"""Messages waiting at most; at 16 gloves and 120 Hz that is four seconds of a reader that stands still."""
+"""Messages waiting at most; at 64 gloves and 120 Hz that is one second of a reader that stands still."""
+LONGEST_WAIT_S = 0.1
 
 
 class Arrival(NamedTuple):
@@ -24,48 +26,71 @@ class Arrival(NamedTuple):
     key: str
     payload: bytes
     received_ns: int
-    """``time.monotonic_ns()`` of this process when zenoh handed the message over."""
+    """``time.monotonic_ns()`` of this process when zenoh received the message."""
 
 
 class Arrivals:
-    """A subscription whose messages wait here until ``wait`` or ``drain`` takes them."""
+    """A subscription whose messages wait until ``wait`` or ``drain`` takes them; for one reading thread."""
 
     def __init__(self, session: zenoh.Session, key_expression: str, *, limit: int = ARRIVALS_LIMIT) -> None:
-        self._queue: SimpleQueue[Arrival] = SimpleQueue()
+        self._session = session
         self._limit = limit
-        self._lock = Lock()
-        self._refused: dict[str, int] = {}
-        self._subscriber = session.declare_subscriber(
-            key_expression, zenoh.handlers.Callback(self._receive, indirect=False)
-        )
+        self._clock_id = str(session.zid())
+        self._looked_ns = time.monotonic_ns()
+        self._closed = Event()
+        self._alarm: Thread | None = None
+        # no glove can have this name
+        self._alarm_key = key_expression.replace("*", f"ALARM-{secrets.token_hex(8)}", 1)
+        self._subscriber = session.declare_subscriber(key_expression, zenoh.handlers.RingChannel(limit))
 
-    def _receive(self, sample: zenoh.Sample) -> None:
-        if self._queue.qsize() < self._limit:
-            self._queue.put(Arrival(str(sample.key_expr), sample.payload.to_bytes(), time.monotonic_ns()))
-            return
-        with self._lock:
-            key = str(sample.key_expr)
-            self._refused[key] = self._refused.get(key, 0) + 1
-
-    def wait(self, timeout_s: float) -> Arrival | None:
-        """The next message, or None when none came in time."""
-        try:
-            return self._queue.get(timeout=timeout_s)
-        except Empty:
-            return None
+    def wait(self) -> Arrival | None:
+        """The next message, or None when none came within a tenth of a second."""
+        if self._alarm is None:
+            self._alarm = Thread(target=self._sound_alarms, name="alarm", daemon=True)
+            self._alarm.start()
+        sample = self._subscriber.recv()
+        self._looked_ns = time.monotonic_ns()
+        key = str(sample.key_expr)
+        return None if key == self._alarm_key else Arrival(key, sample.payload.to_bytes(), self._looked_ns)
 
     def drain(self) -> list[Arrival]:
-        """All messages that are waiting, oldest first; does not wait. For one reading thread only."""
-        return [self._queue.get_nowait() for _ in range(self._queue.qsize())]
+        """All messages that are waiting, oldest first; does not wait."""
+        samples: list[zenoh.Sample] = []
+        receive = self._subscriber.try_recv
+        while len(samples) < self._limit and (sample := receive()) is not None:
+            samples.append(sample)
+        looked_ns, now_ns = self._looked_ns, time.monotonic_ns()
+        self._looked_ns = now_ns
+        if not samples:
+            return []
+        wall_less_monotonic_ns = time.time_ns() - now_ns
+        taken: list[Arrival] = []
+        for sample in samples:
+            key = str(sample.key_expr)
+            if key != self._alarm_key:
+                received_ns = (
+                    self._stamped_ns(sample, now_ns + wall_less_monotonic_ns) - wall_less_monotonic_ns
+                )
+                # whatever a stamp says, it came after the look before and is here now
+                received_ns = min(max(received_ns, looked_ns), now_ns)
+                taken.append(Arrival(key, sample.payload.to_bytes(), received_ns))
+        return taken
 
-    def take_refused(self) -> dict[str, int]:
-        """Messages thrown away since the last call because the reader stood still, by key."""
-        if not self._refused:
-            return {}
-        with self._lock:
-            refused, self._refused = self._refused, {}
-        return refused
+    def _stamped_ns(self, sample: zenoh.Sample, now_ns: int) -> int:
+        """When the router received the message, in wall time; ``now_ns`` where it is not of this process."""
+        stamp = sample.timestamp
+        if stamp is None or str(stamp.get_id()) != self._clock_id:
+            return now_ns
+        return int(stamp.get_time().timestamp() * 1e9)
+
+    def _sound_alarms(self) -> None:
+        """zenoh's channels cannot be waited for with a limit of time; this ends the wait."""
+        while not self._closed.wait(LONGEST_WAIT_S):
+            self._session.put(self._alarm_key, b"", allowed_destination=zenoh.Locality.SESSION_LOCAL)
 
     def close(self) -> None:
-        """Stop receiving; what waits can still be drained."""
+        """Stop receiving. Not while another thread waits: its ``wait`` would raise zenoh.ZError."""
+        self._closed.set()
+        if self._alarm is not None:
+            self._alarm.join()
         self._subscriber.undeclare()

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 from glovecal_client.keys import GloveKeys
 from glovecal_client.wire.frame import Frame
-from glovecal_client.wire.pose import Pose
 from glovecal_service.realtime.frame_gate import FrameGate
 from glovecal_service.realtime.lane_effects import LaneEffects
 from glovecal_service.realtime.refusal import RefusalCount, Refused
@@ -41,7 +40,7 @@ class GloveLane:
         self._skipped_unseen = 0
         """Skipped since the last frame that passed: perhaps the first frames of a run still unknown."""
         self.last_received_ns = 0
-        self.last_pose: Pose | None = None
+        self.last_pose: bytes | None = None
         self.last_pose_received_ns = 0
         self.stale_published_ns = 0
         self.model_id: str | None = None
@@ -61,12 +60,6 @@ class GloveLane:
             self.gate.note_unread(1)
             self.skip(1)
         self._waiting.append(Waiting(message, received_ns))
-
-    def add_skipped(self, count: int) -> None:
-        """Count messages that were received but thrown away before they got here."""
-        self.received += count
-        self.gate.note_overflow(count)
-        self.skip(count)
 
     def skip(self, count: int) -> None:
         self.skipped += count
@@ -99,6 +92,12 @@ class GloveLane:
             self.skipped_in_run = min(self._skipped_unseen, frame.sequence)
         self._skipped_unseen = 0
         return frame
+
+    def note_pose(self, message: bytes, received_ns: int, model_id: str | None) -> None:
+        """A frame received then became this pose."""
+        self.predicted += 1
+        self.model_id = model_id
+        self.last_pose, self.last_pose_received_ns = message, received_ns
 
     def effects_of(self, model: ServedModel) -> LaneEffects:
         """The state of the effects of ``model``, a fresh one if the glove had another model before."""

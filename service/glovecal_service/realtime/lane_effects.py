@@ -10,36 +10,19 @@ from __future__ import annotations
 
 import logging
 from collections import Counter
-from typing import Any, NamedTuple
-
-import numpy as np
+from collections.abc import Mapping
+from typing import Any
 
 from glovecal_client.wire.frame import Frame
 from glovecal_client.wire.pose import PoseFlag
-from glovecal_models.calibration.doubt import Doubt
-from glovecal_models.calibration.effect_correction import usable_correction
 from glovecal_models.effects.history_effect import LONGEST_GAP_S
 from glovecal_service.realtime.served_model import ServedModel
 from glovecal_service.realtime.worn_gloves import WornGlove
 
 _RESET = int(PoseFlag.STATE_RESET)
 _SETTLING = int(PoseFlag.SETTLING)
-_FAULTY_SENSOR = int(PoseFlag.FAULTY_SENSOR)
 
 _log = logging.getLogger("glovecal.realtime")
-
-
-class Correction(NamedTuple):
-    """What the effects say about one frame."""
-
-    degrees: np.ndarray
-    """(R,), to be added to the base's prediction; may hold what is unusable."""
-    flags: int
-    """PoseFlag bits."""
-    undefined: np.ndarray | None = None
-    """(R,) True where an effect had no value and was left out; None: nowhere."""
-    doubt: Doubt | None = None
-    """What the effects add to the claimed variance, and where a sensor fails; None: nothing."""
 
 
 class LaneEffects:
@@ -53,56 +36,52 @@ class LaneEffects:
         """Frames in which some correction had no value, was no number or absurd: flagged, and left out."""
         self.faulty: Counter[str] = Counter()
         """Frames in which each sensor failed."""
-        self._stream = model.predictor.stream()
+        self.stream = model.predictor.stream()
+        self.context: Mapping[str, float] = {}
+        self.wearing = ""
+        """Both of the last frame, as the effects are told."""
         self._run_id: int | None = None
         self._wearing = ""
         self._started_s = 0.0
         self._last_s = 0.0
         self._settling = False
-        self._seen: tuple[frozenset[str], str] | None = None
 
-    def correct(self, frame: Frame, worn: WornGlove, base: np.ndarray) -> Correction:
-        """``base``: the finite prediction (R,) of the next frame, degrees. Raises nothing."""
-        time_s = frame.monotonic_ns / 1e9
+    def begin_frame(self, frame: Frame, worn: WornGlove) -> int:
+        """Look at the next frame, reset what has to start anew with it; the pose's flags about the state."""
         wearing = worn.wearing_of(frame)
         begins = self._begins(frame.run_id, wearing)
-        flags = self._follow(time_s, begins)
-        context = worn.context_of(frame, self._stream.context)
-        self._seen = frozenset(context), wearing
-        try:
-            if begins:
-                self._stream.reset()
-            readings = frame.readings.astype(np.float64)
-            degrees = self._stream.of_frame(time_s, base, readings, context, wearing)
-        except Exception as error:  # an effect may be somebody else's code; the poses must go on
-            degrees = np.zeros_like(base)
-            degrees[self._stream.rows] = np.nan
-            self._give_up(str(error) or type(error).__name__)
-        else:
-            if not usable_correction(degrees).all():
-                self._give_up("a correction is no number, or more than a full turn")
-            elif self._stream.undefined is not None:
-                self._count("an effect has no value for some readings")
-        doubt = self._stream.doubt
-        if self._stream.faulty_sensors:
-            self.faulty.update(self._stream.faulty_sensors)
-        if doubt is not None and doubt.is_faulty.any():
-            flags |= _FAULTY_SENSOR
-        return Correction(degrees, flags, self._stream.undefined, doubt)
+        flags = self._follow(frame.monotonic_ns / 1e9, begins)
+        self.context, self.wearing = worn.context_of(frame, self.stream.context), wearing
+        if begins:
+            try:
+                self.stream.reset()
+            except Exception as error:  # an effect may be somebody else's code; the poses must go on
+                self.stream = self.model.predictor.stream()
+                self._count(f"an effect cannot start anew: {error}")
+        return flags
+
+    def end_frame(self, problem: str, *, is_undefined: bool) -> None:
+        """``problem``: why the frame's correction cannot be used, "" if it can; then they start anew."""
+        if problem:
+            self._count(problem)
+            self._run_id = None  # a state that is no number would stay so for ever
+        elif is_undefined:
+            self._count("an effect has no value for some readings")
+        if self.stream.faulty_sensors:
+            self.faulty.update(self.stream.faulty_sensors)
 
     def status(self) -> dict[str, Any]:
         """For the status document: what is not corrected, and why; which sensors fail."""
-        seen = self._seen
         failing = [
             f"sensor {name} fails: the rotations read from it keep their last good angle"
-            for name in self._stream.faulty_sensors
+            for name in self.stream.faulty_sensors
         ]
         return {
             "settling": self._settling,
             "starts": self.starts,
             "unusable_corrections": self.unusable,
             "faulty_frames": dict(self.faulty),
-            "sentences": failing + ([] if seen is None else list(self._stream.silent(*seen))),
+            "sentences": failing + list(self.stream.silent(frozenset(self.context), self.wearing)),
         }
 
     def _begins(self, run_id: int, wearing: str) -> bool:
@@ -116,7 +95,7 @@ class LaneEffects:
 
     def _follow(self, time_s: float, begins: bool) -> int:
         """The pose's flags about the state."""
-        settling_s = self._stream.settling_s
+        settling_s = self.stream.settling_s
         is_start = begins or not 0.0 <= time_s - self._last_s <= LONGEST_GAP_S
         self._last_s = time_s
         if not settling_s:
@@ -126,11 +105,6 @@ class LaneEffects:
             self.starts += 1
         self._settling = time_s - self._started_s < settling_s
         return (_RESET if is_start else 0) | (_SETTLING if self._settling else 0)
-
-    def _give_up(self, problem: str) -> None:
-        """Start anew with the next frame: a state that is no number would stay so for ever."""
-        self._count(problem)
-        self._run_id = None
 
     def _count(self, problem: str) -> None:
         if not self.unusable:

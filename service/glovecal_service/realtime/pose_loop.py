@@ -18,10 +18,18 @@ import numpy as np
 from glovecal_client.errors import BadName
 from glovecal_client.keys import parse_glove_key
 from glovecal_client.wire.frame import Frame, FrameFlag
-from glovecal_client.wire.pose import Pose, PoseFlag, encode_pose
+from glovecal_client.wire.pose import (
+    Pose,
+    PoseFlag,
+    decode_pose,
+    encode_around,
+    encode_pose,
+    encode_rotations,
+)
+from glovecal_models.calibration.predictor import GloveAngles
 from glovecal_service.realtime.arrivals import Arrival, Arrivals
 from glovecal_service.realtime.corrected_frames import corrected
-from glovecal_service.realtime.glove_lane import GloveLane, Waiting
+from glovecal_service.realtime.glove_lane import GloveLane
 from glovecal_service.realtime.refusal import Refusal, Refused
 from glovecal_service.realtime.served_model import ServedModel, ServedModels
 from glovecal_service.realtime.worn_gloves import WornGloves
@@ -42,8 +50,6 @@ _EXTRAPOLATING = int(PoseFlag.EXTRAPOLATING)
 _TOO_UNCERTAIN = int(PoseFlag.TOO_UNCERTAIN)
 _POSE_FLAGS = (0, _EXTRAPOLATING, _TOO_UNCERTAIN, _EXTRAPOLATING | _TOO_UNCERTAIN)
 """A pose's flags by the union of its rotations' flags 1 (extrapolating) and 2 (too uncertain)."""
-_NO_ANGLES = np.empty(0, np.float32)
-_NO_FLAGS = np.empty(0, np.uint8)
 
 PublishPose = Callable[[str, bytes], None]
 """Glove name and encoded pose."""
@@ -81,11 +87,11 @@ class PoseLoop:
     def run(self, stopped: Event) -> None:
         """Until ``stopped``."""
         while not stopped.is_set():
-            self.step(0.1)
+            self.step()
 
-    def step(self, timeout_s: float) -> None:
-        """Wait for a frame, then serve until nothing is pending."""
-        first = self._arrivals.wait(timeout_s)
+    def step(self) -> None:
+        """Wait for a frame, a tenth of a second at most, then serve until nothing is pending."""
+        first = self._arrivals.wait()
         if first is not None:
             self._sort_in([first])
             self._sort_in(self._arrivals.drain())
@@ -100,10 +106,6 @@ class PoseLoop:
             if lane is not None:
                 lane.add(arrival.payload, arrival.received_ns)
                 self._pending[lane] = None
-        for key, count in self._arrivals.take_refused().items():
-            lane = self._lane(key)
-            if lane is not None:
-                lane.add_skipped(count)
 
     def _lane(self, key: str) -> GloveLane | None:
         lane = self._lanes_by_key.get(key)
@@ -147,64 +149,83 @@ class PoseLoop:
     def _serve(self, model: ServedModel, lanes: list[GloveLane], limit: int) -> int:
         opened: list[tuple[GloveLane, Frame, int]] = []
         for lane in lanes:
-            opened.extend((lane, *item) for item in self._open(lane, model, limit))
+            for frame, received_ns in self._open(lane, limit):
+                try:
+                    model.check_count(frame.readings)
+                except Refused as refused:
+                    lane.refusals.add(refused)
+                else:
+                    opened.append((lane, frame, received_ns))
         if opened:
             self._predict_and_send(model, opened)
         return len(opened)
 
     def _predict_and_send(self, model: ServedModel, opened: list[tuple[GloveLane, Frame, int]]) -> None:
+        readings = np.stack([frame.readings for _, frame, _ in opened]).astype(np.float64)
+        refused = model.out_of_range(readings)
+        if refused:
+            for row, why in refused.items():
+                opened[row][0].refusals.add(why)
+            opened = [item for row, item in enumerate(opened) if row not in refused]
+            readings = np.delete(readings, list(refused), axis=0)
         try:
-            angles = model.predict([frame.readings for _, frame, _ in opened])
+            angles = model.predictor.predict(readings)
         except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
             for lane, frame, _ in opened:
                 lane.refusals.add(_not_predictable(frame, model, str(error)))
             return
-        angles, effect_flags = corrected(model, opened, angles, self._worn)
-        usable: list[bool] = np.min(np.isfinite(angles.mean + angles.sd), axis=1).tolist()
-        any_flags = np.bitwise_or.reduce(angles.flags, axis=1).tolist()
-        mean, sd = angles.mean.astype(np.float32), angles.sd.astype(np.float32)
-        for row, (lane, frame, received_ns) in enumerate(opened):
-            if not usable[row]:
+        angles, effect_flags = corrected(model, opened, readings, angles, self._worn)
+        usable: np.ndarray = np.logical_and.reduce(np.isfinite(angles.mean + angles.sd), axis=1)
+        if not usable.all():
+            for row in np.flatnonzero(~usable).tolist():
+                lane, frame, _ = opened[row]
                 lane.refusals.add(_not_predictable(frame, model, "an angle is not finite"))
-                continue
-            flags = _simulated(frame) | _POSE_FLAGS[any_flags[row] & 3] | effect_flags[row]
-            values = (mean[row], sd[row], angles.flags[row], model.model_id, flags)
-            self._send(lane, frame, received_ns, *values)
-
-    def _serve_uncalibrated(self, lane: GloveLane) -> None:
-        lane.effects = None
-        for frame, received_ns in self._open(lane, None, len(lane)):
-            flags = int(PoseFlag.UNCALIBRATED) | _simulated(frame)
-            self._send(lane, frame, received_ns, _NO_ANGLES, _NO_ANGLES, _NO_FLAGS, None, flags)
-
-    def _open(self, lane: GloveLane, model: ServedModel | None, limit: int) -> list[tuple[Frame, int]]:
-        self._pending.pop(lane)
-        opened = []
-        for waiting in lane.newest(limit, time.monotonic_ns() - self._oldest_ns):
-            frame = _checked(lane, waiting, model)
-            if frame is not None:
-                opened.append((frame, waiting.received_ns))
-        return opened
+            opened = [item for row, item in enumerate(opened) if usable[row]]
+            effect_flags = [flags for row, flags in enumerate(effect_flags) if usable[row]]
+            angles = GloveAngles(angles.mean[usable], angles.sd[usable], angles.flags[usable])
+        self._send(model, opened, angles, effect_flags)
 
     def _send(
         self,
-        lane: GloveLane,
-        frame: Frame,
-        received_ns: int,
-        degrees: np.ndarray,
-        deviations: np.ndarray,
-        rotation_flags: np.ndarray,
-        model_id: str | None,
-        flags: int,
+        model: ServedModel,
+        opened: list[tuple[GloveLane, Frame, int]],
+        angles: GloveAngles,
+        effect_flags: list[int],
     ) -> None:
-        pose = Pose(
-            frame.sequence, frame.run_id, frame.monotonic_ns, frame.wall_ns, degrees, deviations,
-            rotation_flags, model_id, flags, lane.skipped_in_run, _age_us(received_ns),
-        )  # fmt: skip
-        self._publish(lane.glove, encode_pose(pose))
-        lane.predicted += 1
-        lane.model_id = model_id
-        lane.last_pose, lane.last_pose_received_ns = pose, received_ns
+        rotations = encode_rotations(angles.mean.astype("<f4"), angles.sd.astype("<f4"), angles.flags)
+        any_flags = np.bitwise_or.reduce(angles.flags, axis=1).tolist()
+        for item, of_frame, any_flag, effect_flag in zip(
+            opened, rotations, any_flags, effect_flags, strict=True
+        ):
+            lane, frame, received_ns = item
+            flags = _simulated(frame) | _POSE_FLAGS[any_flag & 3] | effect_flag
+            message = encode_around(
+                of_frame, frame.sequence, frame.run_id, frame.monotonic_ns, frame.wall_ns,
+                model.name_in_pose, flags, lane.skipped_in_run, _age_us(received_ns),
+            )  # fmt: skip
+            self._publish(lane.glove, message)
+            lane.note_pose(message, received_ns, model.model_id)
+
+    def _serve_uncalibrated(self, lane: GloveLane) -> None:
+        lane.effects = None
+        for frame, received_ns in self._open(lane, len(lane)):
+            flags = int(PoseFlag.UNCALIBRATED) | _simulated(frame)
+            pose = Pose(
+                frame.sequence, frame.run_id, frame.monotonic_ns, frame.wall_ns,
+                flags=flags, skipped=lane.skipped_in_run, age_us=_age_us(received_ns),
+            )  # fmt: skip
+            message = encode_pose(pose)
+            self._publish(lane.glove, message)
+            lane.note_pose(message, received_ns, None)
+
+    def _open(self, lane: GloveLane, limit: int) -> list[tuple[Frame, int]]:
+        self._pending.pop(lane)
+        opened = []
+        for waiting in lane.newest(limit, time.monotonic_ns() - self._oldest_ns):
+            frame = lane.open(waiting)
+            if frame is not None:
+                opened.append((frame, waiting.received_ns))
+        return opened
 
     def _look_around(self) -> None:
         now = time.monotonic_ns()
@@ -219,28 +240,15 @@ class PoseLoop:
 
     def _repeat_stale(self, lane: GloveLane, now: int) -> None:
         """Half a second after the last good frame, and once a second from then on: the last pose, marked."""
-        pose = lane.last_pose
-        if pose is None or now - lane.last_pose_received_ns < STALE_AFTER_NS:
+        if lane.last_pose is None or now - lane.last_pose_received_ns < STALE_AFTER_NS:
             return
         if now - lane.stale_published_ns < STALE_AGAIN_NS:
             return
         lane.stale_published_ns = now
-        age_us = _age_us(lane.last_pose_received_ns)
+        pose, age_us = decode_pose(lane.last_pose), _age_us(lane.last_pose_received_ns)
         flags = pose.flags | int(PoseFlag.STALE)
         stale = replace(pose, flags=flags, age_us=age_us, skipped=lane.skipped_in_run)
         self._publish(lane.glove, encode_pose(stale))
-
-
-def _checked(lane: GloveLane, waiting: Waiting, model: ServedModel | None) -> Frame | None:
-    frame = lane.open(waiting)
-    if frame is None or model is None:
-        return frame
-    try:
-        model.check(frame.readings)
-    except Refused as refused:
-        lane.refusals.add(refused)
-        return None
-    return frame
 
 
 def _not_predictable(frame: Frame, model: ServedModel, why: str) -> Refused:

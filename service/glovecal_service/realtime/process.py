@@ -90,9 +90,9 @@ def _serve(
     if started is not None:
         started()
     stopped.wait()
-    arrivals.close()
     for thread in threads:
         thread.join(5.0)
+    arrivals.close()
     if failures:
         raise RealTimeFailed("; ".join(failures))
 

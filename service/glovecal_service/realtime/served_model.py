@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import timeit
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 
+from glovecal_client.wire.pose import model_bytes
 from glovecal_models.calibration.effect_correction import EffectCorrection
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.predictor import GloveAngles, GlovePredictor
+from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_service.realtime.pace import Pace
 from glovecal_service.realtime.refusal import Refusal, Refused
 
@@ -25,6 +25,7 @@ class ServedModel:
 
     model_id: str
     """sha256, 64 hexadecimal digits."""
+    name_in_pose: bytes
     subject: str
     layout: str
     method: str
@@ -49,6 +50,7 @@ class ServedModel:
         seconds = min(timeit.repeat(frame, number=1, repeat=3))
         return cls(
             model_id=model_id,
+            name_in_pose=model_bytes(model_id),
             subject=model.subject,
             layout=model.layout.name,
             method=model.method,
@@ -61,31 +63,36 @@ class ServedModel:
             pace=Pace(2 * seconds + BESIDES_PREDICTION_S),
         )
 
-    def check(self, readings: np.ndarray) -> None:
+    def check_count(self, readings: np.ndarray) -> None:
         """Raise Refused for readings (S,) that are not this layout's."""
         if len(readings) != len(self.sensors):
             raise Refused(
                 Refusal.SENSOR_COUNT,
                 f"{len(readings)} readings, but layout {self.layout} has {len(self.sensors)} sensors",
             )
-        if self.counts is not None:
-            low, high = self.counts
-            if readings.min() < low or readings.max() > high:
-                column = int(np.argmax((readings < low) | (readings > high)))
-                raise Refused(
-                    Refusal.OUT_OF_RANGE,
-                    f"{self.sensors[column]} reads {readings[column]:g}; "
-                    f"layout {self.layout} sends {low:g} to {high:g}",
-                )
 
-    def predict(self, readings: Sequence[np.ndarray]) -> GloveAngles:
-        """Angles of several frames at once, each (S,)."""
-        return self.predictor.predict(np.stack(readings).astype(np.float64))
+    def out_of_range(self, readings: np.ndarray) -> dict[int, Refused]:
+        """Why frames must not be predicted, by their rows in ``readings`` (N, S)."""
+        if self.counts is None:
+            return {}
+        low, high = self.counts
+        if readings.min() >= low and readings.max() <= high:
+            return {}
+        outside = (readings < low) | (readings > high)
+        return {
+            row: Refused(
+                Refusal.OUT_OF_RANGE,
+                f"{self.sensors[column]} reads {readings[row, column]:g}; "
+                f"layout {self.layout} sends {low:g} to {high:g}",
+            )
+            for row in np.flatnonzero(outside.any(axis=1)).tolist()
+            for column in (int(np.argmax(outside[row])),)
+        }
 
 
 def _predict_one(predictor: GlovePredictor, effects: EffectCorrection, readings: np.ndarray) -> None:
-    base = predictor.predict(readings).mean[0]
-    effects.of_frame(0.0, base, readings[0], {}, "")
+    base = predictor.predict(readings).mean
+    EffectCorrection.of_frames([effects], np.zeros(1), base, readings, [{}], [""])
 
 
 class ServedModels:
