@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import time
+from dataclasses import replace
+from typing import cast
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+from loop_by_hand import ByHand
+from realtime_support import linear_model
 
 from glovecal_client.keys import GloveKeys
 from glovecal_client.wire.frame import Frame, encode_frame
+from glovecal_service.realtime.arrivals import Arrival, Arrivals
 from glovecal_service.realtime.glove_lane import WAITING_LIMIT, GloveLane
 from glovecal_service.realtime.pace import Pace
+from glovecal_service.realtime.pose_loop import PoseLoop
+from glovecal_service.realtime.served_model import ServedModel, ServedModels
+from glovecal_service.realtime.worn_gloves import WornGloves
 
 MILLISECOND = 1_000_000
 
@@ -121,3 +131,74 @@ def test_pace_always_lets_something_go_on(turns: list[tuple[int, float]]) -> Non
     for frames, seconds in turns:
         pace.observe(frames, seconds)
         assert 1 <= pace.frames_within(0.010) <= 10_000
+
+
+class CostlyPace(Pace):
+    """A machine that needs 5 ms for a frame of this model; keeps how many frames each turn had."""
+
+    def __init__(self) -> None:
+        super().__init__(5e-3)
+        self.turns: list[int] = []
+
+    def observe(self, frames: int, seconds: float) -> None:
+        self.turns.append(frames)
+
+
+class NeverEmpty(ByHand):
+    """While the loop works, a frame of every glove arrives each turn, ``rounds`` times."""
+
+    def __init__(self, gloves: int, rounds: int) -> None:
+        super().__init__()
+        self._gloves, self._rounds, self._sequence = gloves, rounds, 0
+
+    def wait(self) -> Arrival | None:
+        return self._arrivals().pop() if self._sequence == 0 else None
+
+    def drain(self) -> list[Arrival]:
+        return self._arrivals() if self._sequence < self._rounds else []
+
+    def _arrivals(self) -> list[Arrival]:
+        frames = [
+            Frame(self._sequence, number + 1, self._sequence + 1, 0, np.full(3, 120.0, np.float32))
+            for number in range(self._gloves)
+        ]
+        self._sequence += 1
+        now = time.monotonic_ns()
+        return [
+            Arrival(GloveKeys("lab", f"g{frame.run_id}").raw, encode_frame(frame), now) for frame in frames
+        ]
+
+
+def overloaded(gloves: int, models: int) -> tuple[list[CostlyPace], list[GloveLane]]:
+    """What a loop did that has 20 ms for a round, and frames of 5 ms each."""
+    served = [
+        replace(
+            ServedModel.prepare(f"{number + 1:064x}", linear_model("anna", degrees_per_count=0.5)),
+            pace=CostlyPace(),
+        )
+        for number in range(models)
+    ]
+    table = ServedModels()
+    for number in range(gloves):
+        table.put(f"g{number + 1}", served[number % models])
+    loop = PoseLoop(
+        cast(Arrivals, NeverEmpty(gloves, 24)), table, lambda *_: None, WornGloves(), oldest_ns=600 * 10**9,
+        round_budget_s=0.020,
+    )  # fmt: skip
+    loop.step()
+    return [cast(CostlyPace, model.pace) for model in served], loop.lanes
+
+
+def test_under_overload_a_turn_has_a_frame_of_each_glove_of_its_model() -> None:
+    """A frame costs least in a full turn: with four models, and four times as much to do, it stays full."""
+    for models in (1, 4):
+        paces, _ = overloaded(4 * models, models)
+        assert all(turn == 4 for pace in paces for turn in pace.turns[1:]), [pace.turns for pace in paces]
+
+
+def test_under_overload_every_glove_gets_as_many_poses_and_the_books_balance() -> None:
+    _, lanes = overloaded(12, 1)
+    assert max(lane.predicted for lane in lanes) - min(lane.predicted for lane in lanes) <= 1
+    assert sum(lane.skipped for lane in lanes) > 0
+    for lane in lanes:
+        assert lane.received == lane.predicted + lane.skipped + lane.refusals.total

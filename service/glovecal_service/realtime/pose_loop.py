@@ -1,8 +1,9 @@
 """The thread that turns frames into poses: takes what arrived, predicts, publishes, keeps the books.
 
-Turns go round the models: gloves that share a model share a turn and one prediction. A round of turns is
-kept to a few milliseconds by what earlier turns cost, and takes the newest frames; normally that is all.
-So under overload every glove still gets fresh poses, fewer of them, and the frames left out are counted.
+Turns go round the models: gloves that share a model share a turn and one prediction. A turn takes the newest
+frames, as many of each glove as keep a round of turns to a few milliseconds by what earlier turns cost;
+normally that is all. Under overload it takes one of each glove, and the frames left out are counted: a frame
+costs least in a full turn, so more load never means fewer poses, and every glove gets as many.
 """
 
 from __future__ import annotations
@@ -140,10 +141,11 @@ class PoseLoop:
             for lane in lanes:
                 self._serve_uncalibrated(lane)
             return
-        share = len(lanes) / len(self._pending)  # so that all models have had a turn within the budget
-        allowed = model.pace.frames_within(self._round_budget_s * share)
-        lanes = lanes[:allowed]
-        served = self._serve(model, lanes, allowed // len(lanes))
+        lanes = lanes[: model.pace.frames_within(self._round_budget_s)]
+        # several frames of each glove only while all models have had a turn within the budget
+        share = len(lanes) / len(self._pending)
+        limit = max(1, model.pace.frames_within(self._round_budget_s * share) // len(lanes))
+        served = self._serve(model, lanes, limit)
         model.pace.observe(served, time.perf_counter() - started)
 
     def _serve(self, model: ServedModel, lanes: list[GloveLane], limit: int) -> int:
