@@ -23,14 +23,14 @@ FRAMES = 2000
 MOST_ADDED_MS = 0.2
 
 
-def cost_of_effects(base: CalibrationModel) -> dict[str, Any]:
+def cost_of_effects(base: CalibrationModel, frames_count: int = FRAMES) -> dict[str, Any]:
     """Milliseconds a frame without and with hysteresis and creep on all rotations of ``base``."""
     names = base.rotation_names
     lanes, sensors = len(names), len(base.layout.sensors)
     effects = (everywhere("hysteresis", names, [4.0]), everywhere("creep", names, [0.6, 2.4, 10.0]))
     model = ServedModel.prepare("1" * 64, replace(base, effects=effects))
     lane, worn = GloveLane(GloveKeys("bench", "glove")), WornGloves()
-    readings = np.random.default_rng(1).uniform(60, 190, (FRAMES, sensors)).astype(np.float32)
+    readings = np.random.default_rng(1).uniform(60, 190, (frames_count, sensors)).astype(np.float32)
     frames = [Frame(number, 1, number * 8_333_333, 0, row) for number, row in enumerate(readings)]
 
     def without() -> None:
@@ -42,7 +42,7 @@ def cost_of_effects(base: CalibrationModel) -> dict[str, Any]:
             row = frame.readings[None].astype(np.float64)
             corrected(model, [(lane, frame, 0)], row, model.predictor.predict(row), worn)
 
-    before, after = _milliseconds(without), _milliseconds(with_effects)
+    before, after = (_seconds(work) / frames_count * 1e3 for work in (without, with_effects))
     return {
         "case": f"two effects on {lanes} rotations, {sensors} sensors, one frame, no network",
         "without_ms": before,
@@ -76,5 +76,5 @@ def sentence(cost: dict[str, Any]) -> str:
     )
 
 
-def _milliseconds(work: Callable[[], None]) -> float:
-    return min(timeit.repeat(work, number=1, repeat=3)) / FRAMES * 1e3
+def _seconds(work: Callable[[], None]) -> float:
+    return min(timeit.repeat(work, number=1, repeat=3))

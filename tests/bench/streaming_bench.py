@@ -1,6 +1,6 @@
 """Frames in, poses out, through the running service and real zenoh: latency, age, and where every frame went.
 
-    python tests/bench/streaming_bench.py [--gloves 16,32,64] [--seconds S] [--quick] [--json FILE]
+    python tests/bench/streaming_bench.py [--gloves 16,32,64] [--seconds S] [--quick] [--smoke] [--json FILE]
 
 Two processes: the real-time process of the product, and one that stands for all gloves and all readers of
 poses (``streaming_load.py``). Latency is from just before a frame's ``put`` to the pose callback (two hops
@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from effects_cost import cost_of_effects, everywhere, sentence
+from effects_cost import FRAMES, cost_of_effects, everywhere, sentence
 from streaming_load import Load, ProcessCost, drive
 
 from glovecal_client.keys import all_services
@@ -71,13 +71,18 @@ def main() -> None:
     parser.add_argument("--gloves", type=_numbers, help="only so many gloves with effects, such as 16,32,64")
     parser.add_argument("--seconds", type=float, help="length of a run with --gloves; default 20")
     parser.add_argument("--quick", action="store_true", help="shorter runs")
+    parser.add_argument(
+        "--smoke", action="store_true", help="only whether it runs: no figure is worth reading"
+    )
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     arguments = parser.parse_args()
     pin_blas_to_one_thread()
-    effects = cost_of_effects(random_model("nobody", 100, seed=0))
+    effects = cost_of_effects(random_model("nobody", 100, seed=0), 20 if arguments.smoke else FRAMES)
     print(sentence(effects), flush=True)
     results: list[dict[str, Any]] = []
-    for result in run_all(arguments.gloves, arguments.seconds, quick=arguments.quick):
+    smoke = map(run, [Case("2 gloves, smoke test", 2, 120.0, 1.0, nodes=10, effects=True)])
+    cases = run_all(arguments.gloves, arguments.seconds, quick=arguments.quick)
+    for result in smoke if arguments.smoke else cases:
         print_result(result)
         results.append(result)
     print(f"\nload of the machine during the last minute: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
