@@ -131,15 +131,16 @@ def run(case: Case) -> dict[str, Any]:
         _store_models(settings, case)
         service = running.enter_context(_service(settings))
         load = Load(settings.zenoh, settings.site, case.gloves, PEOPLE, case.rate_hz, case.seconds)
-        driver = running.enter_context(_helper(drive, load))
+        driver, driving = running.enter_context(_helper(drive, load))
         driver.recv()
-        with ProcessCost(service) as cost:
+        with ProcessCost(service) as cost, ProcessCost(driving) as load_cost:
             driver.send("start")
             sent = driver.recv()
         status = _service_status(settings)
         driver.send("enough")
         latency_ms, age_ms = driver.recv()
     figures = _figures(case, sent, status, latency_ms, age_ms) | _cost_figures(case, cost, status)
+    figures["load_cpu_cores"] = sum(load_cost.cpu_s.values()) / case.seconds
     return figures | {"targets": _targets(case, figures)}
 
 
@@ -214,7 +215,8 @@ def print_result(result: dict[str, Any]) -> None:
     print("  " + ", ".join(f"{name.removesuffix('_ms')} {result[name]:.2f} ms" for name in times))
     print(
         f"  real-time process: {result['cpu_cores']:.2f} of a core, {result['cpu_us_per_frame']:.0f} us a "
-        f"predicted frame, CPU seconds by thread {result['cpu_s_by_thread']}"
+        f"predicted frame, CPU seconds by thread {result['cpu_s_by_thread']}; "
+        f"the load itself: {result['load_cpu_cores']:.2f} of a core"
     )
     print(f"  memory: {memory[0]:.0f} MiB after 1 s, {max(memory):.0f} at most, {memory[-1]:.0f} at the end")
     for target in result["targets"]:
@@ -295,12 +297,14 @@ def _service(settings: Settings) -> Iterator[int]:
 
 
 @contextmanager
-def _helper(work: Callable[..., None], *arguments: Any) -> Iterator[Any]:
+def _helper(work: Callable[..., None], *arguments: Any) -> Iterator[tuple[Any, int]]:
+    """A process with a pipe to it, and its id."""
     here, there = SPAWN.Pipe()
     process = SPAWN.Process(target=work, args=(there, *arguments))
     process.start()
     try:
-        yield here
+        assert process.pid is not None
+        yield here, process.pid
     finally:
         process.join(10)
         if process.is_alive():

@@ -177,9 +177,9 @@ class ProcessCost:
             self.cpu_s[name] = self.cpu_s.get(name, 0.0) + spent
 
     def growth_mib(self, after_s: float) -> float:
-        """By how much memory grew at most beyond what it was ``after_s`` seconds after the start."""
+        """Median memory of the last half minute less that of the half minute ``after_s`` after the start."""
         later = [mib for at, mib in self.memory if at >= after_s]
-        return max(later) - later[0] if later else float("nan")
+        return float(np.median(later[-30:]) - np.median(later[:30])) if later else float("nan")
 
     def _follow_memory(self) -> None:
         while not self._ended.wait(1.0):

@@ -31,8 +31,11 @@ class FrameFlag(IntFlag):
     REPAIRED = 4
 
 
+_NOTHING = np.empty(0, np.float32)
+
+
 def _no_values() -> np.ndarray:
-    return np.empty(0, np.float32)
+    return _NOTHING
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,7 +107,7 @@ def decode_frame(message: bytes) -> Frame:
         )
     check_seal(message, "frame")
     readings = np.frombuffer(message, "<f4", sensors, _HEAD.size)
-    context = np.frombuffer(message, "<f4", contexts, _HEAD.size + 4 * sensors)
+    context = np.frombuffer(message, "<f4", contexts, _HEAD.size + 4 * sensors) if contexts else _NOTHING
     _check_values(readings, context)
     return Frame(sequence, run_id, monotonic_ns, wall_ns, readings, context, flags)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -35,6 +34,19 @@ class SignalScale:
     def others(self, readings: np.ndarray) -> dict[str, np.ndarray]:
         """Each sensor (N,), from ``readings`` (N, S) raw counts."""
         return dict(zip(self.sensors, ((readings - self.centre) / self.scale).T, strict=True))
+
+
+class _Others:
+    """The neighbours' signals of some frames, worked out once when an effect asks for them."""
+
+    def __init__(self, scale: SignalScale, readings: np.ndarray) -> None:
+        self._scale, self._readings = scale, readings
+        self._found: dict[str, np.ndarray] | None = None
+
+    def __call__(self) -> dict[str, np.ndarray]:
+        if self._found is None:
+            self._found = self._scale.others(self._readings)
+        return self._found
 
 
 class Corrections(NamedTuple):
@@ -175,7 +187,7 @@ class EffectCorrection:
         total = base - first
         if not of_all._lanes:
             return Corrections(total, None, doubt, {})
-        others = cache(partial(of_all._scale.others, readings))
+        others = _Others(of_all._scale, readings)
         problems: dict[int, str] = {}
         undefined: np.ndarray | None = None
         for number, (item, lanes) in enumerate(of_all._lanes):

@@ -76,9 +76,9 @@ class ServedModel:
         if self.counts is None:
             return {}
         low, high = self.counts
-        if readings.min() >= low and readings.max() <= high:
-            return {}
         outside = (readings < low) | (readings > high)
+        if not outside.any():
+            return {}
         return {
             row: Refused(
                 Refusal.OUT_OF_RANGE,
