@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -23,7 +24,7 @@ from realtime_support import (
 )
 
 from glovecal_client.errors import NoAnswer
-from glovecal_client.keys import all_services
+from glovecal_client.keys import GloveKeys, all_services
 from glovecal_client.pose_subscriber import PoseSubscriber
 from glovecal_client.queries import ask_json
 from glovecal_client.session import open_client
@@ -358,3 +359,43 @@ def test_status_and_liveliness_tell_that_the_service_is_there(
     tokens = [reply.ok for reply in session.liveliness().get(all_services(settings.site), timeout=60)]
     assert [str(token.key_expr).split("/")[3] for token in tokens if token] == [status["instance"]]
     assert (settings.data / "realtime.alive").exists()
+
+
+def test_junk_on_many_names_keeps_no_new_glove_out(
+    session: zenoh.Session, settings: Settings, store: Store
+) -> None:
+    model_id = store_model(store, "newcomer", degrees_per_count=0.5)
+    enough = threading.Event()
+
+    def send_junk() -> None:
+        while not enough.is_set():
+            for number in range(300):
+                session.put(GloveKeys(settings.site, f"junk{number}").raw, b"GLVF is no frame")
+            enough.wait(0.05)
+
+    thread = threading.Thread(target=send_junk)
+    thread.start()
+    try:
+        eventually(lambda: places(session, settings)["refused_messages"]["no_room"], "all places are taken")
+        glove = WireGlove(session, settings, "g-newcomer", subject="newcomer")
+        poses = Poses(session, glove)
+        glove.say_meta()
+
+        def is_served() -> bool:
+            glove.send()
+            return bool(poses.live) and poses.live[-1].model_sha256 == model_id
+
+        eventually(is_served, "poses of the new glove")
+    finally:
+        enough.set()
+        thread.join()
+    books = eventually(lambda: balanced(session, settings, glove), "balanced books")
+    assert (books["predicted"], books["refused"]) == (glove.sent, {})
+    document = places(session, settings)
+    assert document["served"] == document["limit"]
+    assert document["given_up"]["gloves"] >= 1
+    assert "junk" in document["sentence"]
+
+
+def places(session: zenoh.Session, settings: Settings) -> dict:
+    return service_status(session, settings)["places"]

@@ -16,6 +16,7 @@ from glovecal_client.keys import GloveKeys
 from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_service.realtime.arrivals import Arrival, Arrivals
 from glovecal_service.realtime.glove_lane import WAITING_LIMIT, GloveLane
+from glovecal_service.realtime.glove_lanes import VALID_WITHIN_NS, GloveLanes
 from glovecal_service.realtime.pace import Pace
 from glovecal_service.realtime.pose_loop import PoseLoop
 from glovecal_service.realtime.served_model import ServedModel, ServedModels
@@ -202,3 +203,40 @@ def test_under_overload_every_glove_gets_as_many_poses_and_the_books_balance() -
     assert sum(lane.skipped for lane in lanes) > 0
     for lane in lanes:
         assert lane.received == lane.predicted + lane.skipped + lane.refusals.total
+
+
+def frame_of(sequence: int) -> bytes:
+    return encode_frame(Frame(sequence, 1, sequence + 1, 0, np.zeros(3, np.float32)))
+
+
+@given(st.lists(st.tuples(st.integers(0, 9), st.booleans(), st.integers(0, 400)), max_size=120))
+def test_junk_neither_takes_nor_keeps_a_place(arrivals: list[tuple[int, bool, int]]) -> None:
+    """A glove whose frame is valid is served, unless as many others sent one within the last second."""
+    lanes, now, valid_at = GloveLanes(limit=3), 10**12, dict[str, int]()
+    for sequence, (glove, valid, after_ms) in enumerate(arrivals):
+        now += after_ms * MILLISECOND
+        key = GloveKeys("lab", f"g{glove}").raw
+        message = frame_of(sequence) if valid else b"junk"
+        before = {lane.keys.raw for lane in lanes.all()}
+        live = {name for name, at in valid_at.items() if now - at < VALID_WITHIN_NS and name in before}
+        lane = lanes.of(key, message, now)
+        served = {lane.keys.raw for lane in lanes.all()}
+        assert live <= served, "no glove that sends valid frames is displaced"
+        assert len(served) <= 3
+        if valid:
+            assert (lane is not None) == (key in before or len(live) < 3)
+        if lane is not None:
+            lane.add(message, now)
+            for waiting in lane.newest(64, 0):
+                if lane.open(waiting) is not None:
+                    valid_at[key] = now
+    document = lanes.document()
+    received = sum(lane.received for lane in lanes.all()) + document["given_up"]["messages"]
+    assert received + sum(document["refused_messages"].values()) == len(arrivals)
+
+
+def test_a_name_that_cannot_be_is_counted_and_told() -> None:
+    lanes = GloveLanes()
+    assert lanes.of("glovecal/lab/Bad Name/raw", frame_of(0), 1) is None
+    assert lanes.document()["refused_messages"] == {"unusable_name": 1, "no_room": 0}
+    assert "Bad Name" in lanes.document()["sentence"]

@@ -29,8 +29,7 @@ class FrameGate:
         """How many runs began so far; grows when another publisher takes over."""
         self.missing = 0
         """Frames that were sent, as the numbers of those that passed tell, and never arrived."""
-        self.passed_at_ns = 0
-        """When the newest frame arrived that was whole and in order."""
+        self._passed_at_ns = 0
         self._order = SequenceOrder()
         self._monotonic_ns = 0
         self._unread = 0
@@ -75,7 +74,7 @@ class FrameGate:
                 Refusal.TIME_BACKWARDS,
                 f"frame {frame.sequence} went back in time by {(before - frame.monotonic_ns) / 1e9:.6f} s",
             )
-        self.passed_at_ns = received_ns
+        self._passed_at_ns = received_ns
         return frame
 
     def _follow(self, sequence: int, received_ns: int) -> None:
@@ -85,7 +84,7 @@ class FrameGate:
         self._overflowed -= overflowed
 
     def _begin_run(self, frame: Frame, received_ns: int) -> None:
-        if self.run_id is not None and received_ns - self.passed_at_ns <= TAKEOVER_AFTER_NS:
+        if self.run_id is not None and received_ns - self._passed_at_ns <= TAKEOVER_AFTER_NS:
             self._note_refused_run(frame.run_id)
             raise Refused(
                 Refusal.SECOND_PUBLISHER,

@@ -39,7 +39,8 @@ class GloveLane:
         self.skipped_in_run = 0
         self._skipped_unseen = 0
         """Skipped since the last frame that passed: perhaps the first frames of a run still unknown."""
-        self.last_received_ns = 0
+        self.valid_ns = 0
+        """When its newest valid frame arrived, 0 before the first."""
         self.last_pose: bytes | None = None
         self.last_pose_received_ns = 0
         self.stale_published_ns = 0
@@ -54,7 +55,6 @@ class GloveLane:
     def add(self, message: bytes, received_ns: int) -> None:
         """Let a message wait; the oldest goes when too many do."""
         self.received += 1
-        self.last_received_ns = received_ns
         if len(self._waiting) >= WAITING_LIMIT:
             self._waiting.popleft()
             self.gate.note_unread(1)
@@ -87,6 +87,7 @@ class GloveLane:
         except Refused as refused:
             self.refusals.add(refused)
             return None
+        self.valid_ns = waiting.received_ns
         if self.gate.runs != runs:
             # a run's frames before its first that passed are as many as its sequence number says, at most
             self.skipped_in_run = min(self._skipped_unseen, frame.sequence)

@@ -32,6 +32,10 @@ class GloveMetas:
     def of(self, glove: str) -> dict[str, Any] | None:
         return self._metas.get(glove)
 
+    def forget(self, glove: str) -> None:
+        """No longer remember when it was asked."""
+        self._asked_at.pop(glove, None)
+
     def news(self, lanes: Iterable[GloveLane]) -> set[str]:
         """Gloves whose meta changed since the last call; a glove that streams without one is asked for it."""
         changed = {self._note(item.key, item.payload) for item in self._arrivals.drain()}

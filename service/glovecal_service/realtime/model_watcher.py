@@ -70,7 +70,9 @@ class ModelWatcher:
         """One look; problems end up in ``database_problem`` and in the gloves' sentences."""
         lanes = self._lanes()
         self._unnoted |= self._metas.news(lanes)
-        self._to_choose |= {lane.glove for lane in lanes} - self._gloves
+        heard = {lane.glove for lane in lanes if lane.gate.run_id is not None}  # not names with junk only
+        self._forget([glove for glove in self._gloves - heard if self._metas.of(glove) is None])
+        self._to_choose |= heard - self._gloves
         try:
             self._follow(self._opened())
         except (StoreError, SQLAlchemyError, OSError) as error:
@@ -79,6 +81,16 @@ class ModelWatcher:
             self.database_problem = str(error)
         else:
             self.database_problem = ""
+
+    def _forget(self, gloves: list[str]) -> None:
+        """Names that lost their place and of which no capture daemon knows anything."""
+        for glove in gloves:
+            self._gloves.discard(glove)
+            self._troubled_at.pop(glove, None)
+            self._models.put(glove, None)
+            self._pose_metas.forget(glove)
+            self._worn.forget(glove)
+            self._metas.forget(glove)
 
     def _opened(self) -> Store:
         if self._store is None:

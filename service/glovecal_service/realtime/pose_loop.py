@@ -16,8 +16,6 @@ from threading import Event
 
 import numpy as np
 
-from glovecal_client.errors import BadName
-from glovecal_client.keys import parse_glove_key
 from glovecal_client.wire.frame import Frame, FrameFlag
 from glovecal_client.wire.pose import (
     Pose,
@@ -31,6 +29,7 @@ from glovecal_models.calibration.predictor import GloveAngles
 from glovecal_service.realtime.arrivals import Arrival, Arrivals
 from glovecal_service.realtime.corrected_frames import corrected
 from glovecal_service.realtime.glove_lane import GloveLane
+from glovecal_service.realtime.glove_lanes import GloveLanes
 from glovecal_service.realtime.refusal import Refusal, Refused
 from glovecal_service.realtime.served_model import ServedModel, ServedModels
 from glovecal_service.realtime.worn_gloves import WornGloves
@@ -40,8 +39,6 @@ OLDEST_NS = 25_000_000
 ROUND_BUDGET_S = 0.020
 STALE_AFTER_NS = 500_000_000
 STALE_AGAIN_NS = 1_000_000_000
-GLOVES_LIMIT = 256
-FORGET_AFTER_NS = 600_000_000_000
 _COLLECT_EVERY_NS = 10_000_000_000
 
 # plain numbers: arithmetic with enumerations costs microseconds
@@ -74,16 +71,14 @@ class PoseLoop:
         self._models = models
         self._publish = publish
         self._worn = worn
-        self._lanes_by_key: dict[str, GloveLane] = {}
+        self.gloves = GloveLanes()
         self._pending: dict[GloveLane, None] = {}
         self._looked_for_stale_ns = 0
         self._collected_ns = time.monotonic_ns()
-        self.unusable_keys = 0
-        """Messages on keys that name no glove, or one glove too many."""
 
     @property
     def lanes(self) -> list[GloveLane]:
-        return list(self._lanes_by_key.values())
+        return self.gloves.all()
 
     def run(self, stopped: Event) -> None:
         """Until ``stopped``."""
@@ -103,35 +98,10 @@ class PoseLoop:
 
     def _sort_in(self, arrivals: Iterable[Arrival]) -> None:
         for arrival in arrivals:
-            lane = self._lane(arrival.key)
+            lane = self.gloves.of(arrival.key, arrival.payload, arrival.received_ns)
             if lane is not None:
                 lane.add(arrival.payload, arrival.received_ns)
                 self._pending[lane] = None
-
-    def _lane(self, key: str) -> GloveLane | None:
-        lane = self._lanes_by_key.get(key)
-        if lane is None:
-            lane = self._new_lane(key)
-        return lane
-
-    def _new_lane(self, key: str) -> GloveLane | None:
-        try:
-            keys, _ = parse_glove_key(key)
-        except BadName:
-            self.unusable_keys += 1
-            return None
-        if len(self._lanes_by_key) >= GLOVES_LIMIT and not self._forget_a_silent_lane():
-            self.unusable_keys += 1
-            return None
-        lane = self._lanes_by_key[key] = GloveLane(keys)
-        return lane
-
-    def _forget_a_silent_lane(self) -> bool:
-        key, lane = min(self._lanes_by_key.items(), key=lambda item: item[1].last_received_ns)
-        if time.monotonic_ns() - lane.last_received_ns < FORGET_AFTER_NS:
-            return False
-        del self._lanes_by_key[key]
-        return True
 
     def _take_turn(self) -> None:
         started = time.perf_counter()
@@ -234,7 +204,7 @@ class PoseLoop:
         if now - self._looked_for_stale_ns < 100_000_000:
             return
         self._looked_for_stale_ns = now
-        for lane in self._lanes_by_key.values():
+        for lane in self.gloves.all():
             self._repeat_stale(lane, now)
         if now - self._collected_ns >= _COLLECT_EVERY_NS:
             self._collected_ns = now

@@ -62,6 +62,10 @@ class PoseMetas:
             GloveKeys(self._site, glove).pose_meta, json.dumps(document), encoding=JSON_ENCODING
         )
 
+    def forget(self, glove: str) -> None:
+        with self._lock:
+            self._documents.pop(glove, None)
+
     def documents(self) -> dict[str, dict[str, Any]]:
         """All documents by glove."""
         with self._lock:

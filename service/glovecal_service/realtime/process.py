@@ -76,7 +76,7 @@ def _serve(
         session,
         settings.site,
         instance,
-        lambda: loop.lanes,
+        loop.gloves,
         pose_metas,
         lambda: watcher.database_problem,
         settings.data,

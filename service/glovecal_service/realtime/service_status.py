@@ -14,7 +14,7 @@ from typing import Any
 import zenoh
 
 from glovecal_client.keys import JSON_ENCODING, service_alive_key
-from glovecal_service.realtime.glove_lane import GloveLane
+from glovecal_service.realtime.glove_lanes import GloveLanes
 from glovecal_service.realtime.pose_meta import PoseMetas
 
 PERIOD_S = 1.0
@@ -35,14 +35,14 @@ class ServiceStatus:
         session: zenoh.Session,
         site: str,
         instance: str,
-        lanes: Callable[[], list[GloveLane]],
+        gloves: GloveLanes,
         pose_metas: PoseMetas,
         problem: Callable[[], str],
         data: Path,
     ) -> None:
         self._key = service_status_key(site, instance)
         self._instance = instance
-        self._lanes = lanes
+        self._gloves = gloves
         self._pose_metas = pose_metas
         self._problem = problem
         self._alive_file = data / ALIVE_FILE
@@ -60,7 +60,7 @@ class ServiceStatus:
     def document(self) -> dict[str, Any]:
         """``database`` is "" while the store answers, else why it does not."""
         metas = self._pose_metas.documents()
-        lanes = {lane.glove: lane.status() for lane in self._lanes()}
+        lanes = {lane.glove: lane.status() for lane in self._gloves.all()}
         gloves = {
             glove: {
                 **lanes.get(glove, {}),
@@ -76,6 +76,7 @@ class ServiceStatus:
             "process": os.getpid(),
             "started_wall_ns": self._started_wall_ns,
             "database": self._problem(),
+            "places": self._gloves.document(),
             "gloves": gloves,
         }
 

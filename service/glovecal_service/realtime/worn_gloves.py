@@ -57,5 +57,8 @@ class WornGloves:
     def put(self, glove: str, worn: WornGlove) -> None:
         self._gloves[glove] = worn
 
+    def forget(self, glove: str) -> None:
+        self._gloves.pop(glove, None)
+
 
 _UNKNOWN = WornGlove()
