@@ -21,6 +21,8 @@ from glovecal_service.cli.printing import err, out, show
 from glovecal_service.cli.refusal import NobodyThere, Refusal
 
 if TYPE_CHECKING:
+    import zenoh
+
     from glovecal_client.pose_subscriber import PoseSubscriber
     from glovecal_client.wire.pose import Pose
 
@@ -45,7 +47,7 @@ def watch(
         with open_client([connect], wait_s=WAIT_S) as session, PoseSubscriber(session, site, glove) as poses:
             until = None if seconds is None else time.monotonic() + seconds
             with suppress(KeyboardInterrupt):
-                _follow(poses, glove, until, as_json)
+                _follow(poses, _Counts(session, site, glove), glove, until, as_json)
             came = poses.latest is not None
     except NoAnswer as error:
         raise NobodyThere(str(error)) from error
@@ -56,22 +58,51 @@ def watch(
 _HINT = "is it captured (glovecal glove list shows the gloves seen), and at this site?"
 
 
-def _follow(poses: PoseSubscriber, glove: str, until: float | None, as_json: bool) -> None:
+class _Counts:
+    """What the service says became of the glove's frames, once a second."""
+
+    def __init__(self, session: zenoh.Session, site: str, glove: str) -> None:
+        import zenoh
+
+        from glovecal_client.queries import ask_json
+        from glovecal_service.realtime.service_status import all_service_statuses
+
+        self.newest: dict[str, int] | None = None
+        self._glove = glove
+        handler = zenoh.handlers.Callback(self._hear, indirect=True)
+        self._subscriber = session.declare_subscriber(all_service_statuses(site), handler)
+        with suppress(NoAnswer):
+            self._note(ask_json(session, all_service_statuses(site), timeout_s=1.0))
+
+    def _hear(self, sample: zenoh.Sample) -> None:
+        from glovecal_client.queries import json_object
+
+        self._note(json_object(sample.payload.to_bytes()) or {})
+
+    def _note(self, status: dict[str, Any]) -> None:
+        counts = status.get("gloves", {}).get(self._glove, {})
+        if "sent" in counts:
+            names = ("sent", "received", "missing", "predicted", "skipped")
+            self.newest = {name: counts[name] for name in names}
+            self.newest["refused"] = sum(counts["refused"].values())
+
+
+def _follow(poses: PoseSubscriber, counts: _Counts, glove: str, until: float | None, as_json: bool) -> None:
     if not as_json and out.is_terminal:
         with Live(console=out, auto_refresh=False) as live:
             for pose in _poses(poses, until, glove):
-                live.update(_picture(poses, pose, glove), refresh=True)
+                live.update(_picture(poses, counts, pose, glove), refresh=True)
         return
     last = None
     for pose in _poses(poses, until, glove):
         if pose is None:
             continue
         last = pose
-        if as_json and (document := _document(poses, pose)) is not None:
+        if as_json and (document := _document(poses, counts, pose)) is not None:
             sys.stdout.write(json.dumps(document) + "\n")
             sys.stdout.flush()
     if last is not None and not as_json:
-        show(_picture(poses, last, glove))
+        show(_picture(poses, counts, last, glove))
 
 
 def _poses(poses: PoseSubscriber, until: float | None, glove: str) -> Iterator[Pose | None]:
@@ -94,7 +125,7 @@ def _names(poses: PoseSubscriber, pose: Pose) -> tuple[str, ...] | None:
         return None
 
 
-def _document(poses: PoseSubscriber, pose: Pose) -> dict[str, Any] | None:
+def _document(poses: PoseSubscriber, counts: _Counts, pose: Pose) -> dict[str, Any] | None:
     names = _names(poses, pose)
     if names is None:
         return None
@@ -104,20 +135,23 @@ def _document(poses: PoseSubscriber, pose: Pose) -> dict[str, Any] | None:
         "model": pose.model_sha256,
         "age_ms": pose.age_us / 1000,
         "skipped": pose.skipped,
+        "frames": counts.newest,
         "degrees": dict(zip(names, (round(float(v), 3) for v in pose.degrees), strict=True)),
         "sd_deg": dict(zip(names, (round(float(v), 3) for v in pose.deviations), strict=True)),
     }
 
 
-def _picture(poses: PoseSubscriber, pose: Pose | None, glove: str) -> Group:
-    """A line on the whole pose, then a table with a line for each rotation."""
+def _picture(poses: PoseSubscriber, counts: _Counts, pose: Pose | None, glove: str) -> Group:
+    """A line on the whole pose, one on the glove's frames, then a table with a line for each rotation."""
     pose = pose or poses.latest
     if pose is None:
         return Group(Text(f"{glove}: no pose yet", style="bold"))
     model = f"model {pose.model_sha256[:12]}" if pose.model_sha256 else "no model is active"
     title = f"{glove}: {_state(poses, pose)}; {model}; age {pose.age_us / 1000:.1f} ms"
     names = _names(poses, pose)
-    return Group(Text(title, style="bold"), *([_rotations(names, pose)] if names else []))
+    frames = ", ".join(f"{name} {count}" for name, count in (counts.newest or {}).items())
+    lines = [Text(f"frames: {frames}")] if frames else []
+    return Group(Text(title, style="bold"), *lines, *([_rotations(names, pose)] if names else []))
 
 
 def _rotations(names: tuple[str, ...], pose: Pose) -> Table:

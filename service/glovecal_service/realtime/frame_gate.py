@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from glovecal_client.errors import WireError
 from glovecal_client.wire.frame import Frame, decode_frame
 from glovecal_service.realtime.refusal import Refusal, Refused
@@ -13,6 +15,25 @@ TAKEOVER_AFTER_NS = 500_000_000
 _VERSION_AT = 4
 _KNOWN_VERSION = 1
 _REFUSED_RUNS = 8
+_Place = tuple[int, int, int]
+
+
+class Standing(NamedTuple):
+    """How far a glove is, all of one moment: what other threads may read."""
+
+    run_id: int
+    sequence: int
+    """Of the newest frame in order."""
+    at_ns: int
+    """When it arrived."""
+    missing: int
+    """Frames that were sent until then, as the numbers of those that passed tell, and never arrived."""
+    messages: int
+    """All that arrived until then."""
+    began: _Place
+    """The first frame of all: run, sequence number, when it arrived."""
+    ended: _Place | None
+    """The newest frame of the run before this one, likewise."""
 
 
 class FrameGate:
@@ -27,15 +48,14 @@ class FrameGate:
         self.run_id: int | None = None
         self.runs = 0
         """How many runs began so far; grows when another publisher takes over."""
-        self.missing = 0
-        """Frames that were sent, as the numbers of those that passed tell, and never arrived."""
+        self.standing: Standing | None = None
+        """None before the first frame."""
+        self._missing = self._messages = 0
         self._passed_at_ns = 0
         self._order = SequenceOrder()
         self._monotonic_ns = 0
         self._unread = 0
         """Messages since then of which nobody knows the number."""
-        self._overflowed = 0
-        """The same, but newer than messages that still wait."""
         self._refused_of_run: dict[int, int] = {}
 
     @property
@@ -50,24 +70,27 @@ class FrameGate:
 
     def note_unread(self, count: int) -> None:
         """So many messages came before the next one for ``pass_frame`` and are thrown away without a look."""
+        self._messages += count
         self._unread += count
-
-    def note_overflow(self, count: int) -> None:
-        """So many messages were thrown away, newer than some that will be given to ``pass_frame`` yet."""
-        self._overflowed += count
 
     def pass_frame(self, message: bytes, received_ns: int) -> Frame:
         """The frame in ``message``, received at ``received_ns`` of this process' monotonic clock."""
+        self._messages += 1
         try:
             frame = decode_frame(message)
         except WireError as error:
             self._unread += 1
             raise Refused(_reason(message, error), str(error)) from error
-        if frame.run_id != self.run_id:
-            self._begin_run(frame, received_ns)
+        known = self.standing
+        if known is None or frame.run_id != self.run_id:
+            began, ended = self._begin_run(frame, received_ns)
         else:
-            self._follow(frame.sequence, received_ns)
+            began, ended = known.began, known.ended
+            self._missing += self._order.follow(frame.sequence, received_ns, unread=self._unread)
         self._unread = 0
+        self.standing = Standing(
+            frame.run_id, frame.sequence, received_ns, self._missing, self._messages, began, ended
+        )
         before, self._monotonic_ns = self._monotonic_ns, frame.monotonic_ns
         if frame.monotonic_ns <= before:
             raise Refused(
@@ -77,25 +100,25 @@ class FrameGate:
         self._passed_at_ns = received_ns
         return frame
 
-    def _follow(self, sequence: int, received_ns: int) -> None:
-        unread, lost = self._unread, sequence - self._order.last - 1
-        overflowed = min(self._overflowed, max(0, lost - unread)) if self._overflowed else 0
-        self.missing += self._order.follow(sequence, received_ns, unread=unread + overflowed)
-        self._overflowed -= overflowed
-
-    def _begin_run(self, frame: Frame, received_ns: int) -> None:
-        if self.run_id is not None and received_ns - self._passed_at_ns <= TAKEOVER_AFTER_NS:
+    def _begin_run(self, frame: Frame, received_ns: int) -> tuple[_Place, _Place | None]:
+        """The first frame of all, and the newest of the run that is over."""
+        there_ns = max(self._passed_at_ns, self._order.tried_ns)
+        if self.run_id is not None and received_ns - there_ns <= TAKEOVER_AFTER_NS:
             self._note_refused_run(frame.run_id)
             raise Refused(
                 Refusal.SECOND_PUBLISHER,
                 f"run {frame.run_id:016x} publishes while run {self.run_id:016x} has the glove; stop one",
             )
+        known = self.standing
         unread = self._unread + self._refused_of_run.pop(frame.run_id, 0)
-        whole = self.run_id is not None
-        self.missing += self._order.begin(frame.sequence, received_ns, unread=unread, whole=whole)
+        whole = known is not None
+        self._missing += self._order.begin(frame.sequence, received_ns, unread=unread, whole=whole)
         self.run_id = frame.run_id
         self.runs += 1
         self._monotonic_ns = frame.monotonic_ns - 1  # clocks of two runs cannot be compared
+        if known is None:
+            return (frame.run_id, frame.sequence, received_ns), None
+        return known.began, (known.run_id, known.sequence, known.at_ns)
 
     def _note_refused_run(self, run_id: int) -> None:
         """Count a frame that a run lost because another had the glove; of a few runs only."""

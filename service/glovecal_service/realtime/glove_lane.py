@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from glovecal_client.keys import GloveKeys
 from glovecal_client.wire.frame import Frame
-from glovecal_service.realtime.frame_gate import FrameGate
+from glovecal_service.realtime.frame_gate import FrameGate, Standing
 from glovecal_service.realtime.lane_effects import LaneEffects
 from glovecal_service.realtime.refusal import RefusalCount, Refused
 from glovecal_service.realtime.served_model import ServedModel
@@ -106,15 +107,26 @@ class GloveLane:
             self.effects = LaneEffects(model)
         return self.effects
 
-    def status(self) -> dict[str, Any]:
-        """Counts for the status document."""
+    def status(self, unheard: Callable[[str, Standing | None, int], int]) -> dict[str, Any]:
+        """Counts for the status document, all of one moment. ``unheard``: as of ``CaptureReports``.
+
+        ``sent`` = ``received`` + ``missing``, and
+        ``received`` = ``predicted`` + ``skipped`` + all ``refused`` + ``waiting``.
+        """
         run_id, effects = self.gate.run_id, self.effects
+        standing = self.gate.standing
+        missing = max(0, (standing.missing if standing else 0) + unheard(self.glove, standing, self.received))
+        # what became of a message is counted after its receipt: so this is read before ``received``
+        refused, predicted, skipped = self.refusals.by_reason(), self.predicted, self.skipped
+        received = self.received
         return {
-            "received": self.received,
-            "predicted": self.predicted,
-            "skipped": self.skipped,
-            "refused": self.refusals.by_reason(),
-            "waiting": len(self),
+            "sent": received + missing,
+            "received": received,
+            "missing": missing,
+            "predicted": predicted,
+            "skipped": skipped,
+            "refused": refused,
+            "waiting": received - predicted - skipped - sum(refused.values()),
             "last_refusal": self.refusals.last_sentence,
             "run_id": None if run_id is None else f"{run_id:016x}",
             "runs": self.gate.runs,

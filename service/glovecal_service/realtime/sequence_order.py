@@ -51,6 +51,8 @@ class SequenceOrder:
         """How often the numbers went on somewhere else."""
         self.jumped_to = 0
         """The first of the numbers taken up last; those up to ``last`` were refused until then."""
+        self.tried_ns = 0
+        """When a number last fitted others that are not confirmed yet: their publisher is there."""
         self._loss = PlausibleLoss(0)
         self._followed = 0
         self._tracks: list[_Track] = []
@@ -101,6 +103,8 @@ class SequenceOrder:
                 return track
             if track.last < sequence and track.loss.allows(sequence - track.last - 1, at_ns):
                 track.last, track.last_ns, track.frames = sequence, at_ns, track.frames + 1
+                if track.frames >= CONFIRMED_BY_FRAMES:
+                    self.tried_ns = at_ns
                 return track
         if len(self._tracks) >= _TRACKS:
             late_ns = at_ns - CONFIRMED_AFTER_NS

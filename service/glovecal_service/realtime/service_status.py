@@ -13,7 +13,8 @@ from typing import Any
 
 import zenoh
 
-from glovecal_client.keys import JSON_ENCODING, service_alive_key
+from glovecal_client.keys import JSON_ENCODING, all_services, service_alive_key
+from glovecal_service.realtime.capture_reports import CaptureReports
 from glovecal_service.realtime.glove_lanes import GloveLanes
 from glovecal_service.realtime.pose_meta import PoseMetas
 
@@ -25,6 +26,11 @@ ALIVE_FILE = "realtime.alive"
 def service_status_key(site: str, instance: str) -> str:
     """Beside the process' liveliness token."""
     return service_alive_key(site, instance).removesuffix("alive") + "status"
+
+
+def all_service_statuses(site: str) -> str:
+    """Key expression for the status of every service process of a site."""
+    return all_services(site).removesuffix("alive") + "status"
 
 
 class ServiceStatus:
@@ -47,6 +53,7 @@ class ServiceStatus:
         self._problem = problem
         self._alive_file = data / ALIVE_FILE
         self._started_wall_ns = time.time_ns()
+        self._reports = CaptureReports(session, site)
         self._publisher = session.declare_publisher(self._key, encoding=JSON_ENCODING)
         self._queryable = session.declare_queryable(self._key, self._answer)
 
@@ -58,12 +65,13 @@ class ServiceStatus:
                 self._alive_file.touch()
 
     def document(self) -> dict[str, Any]:
-        """``database`` is "" while the store answers, else why it does not."""
+        """As the wire README says; ``database`` is "" while the store answers, else why it does not."""
         metas = self._pose_metas.documents()
-        lanes = {lane.glove: lane.status() for lane in self._gloves.all()}
+        unheard = self._reports.unheard
+        lanes = {lane.glove: lane.status(unheard) for lane in self._gloves.all()}
         gloves = {
             glove: {
-                **lanes.get(glove, {}),
+                **(lanes.get(glove) or _nothing_received(unheard(glove, None, 0))),
                 **{
                     name: metas.get(glove, {}).get(name)
                     for name in ("state", "subject", "wearing", "layout", "sentence")
@@ -83,3 +91,8 @@ class ServiceStatus:
     def _answer(self, query: zenoh.Query) -> None:
         with query:
             query.reply(self._key, json.dumps(self.document()), encoding=JSON_ENCODING)
+
+
+def _nothing_received(missing: int) -> dict[str, Any]:
+    counts = dict.fromkeys(("received", "predicted", "skipped", "waiting"), 0)
+    return {"sent": missing, "missing": missing, **counts, "refused": {}}

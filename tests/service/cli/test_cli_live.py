@@ -118,6 +118,12 @@ def test_a_recorded_take_becomes_a_model_that_predicts_live(live, recorded):
         assert drawn.out.startswith(f"{GLOVE}: ")
         assert f"model {model['id'][:12]}" in drawn.out
         assert "I_MCP" in drawn.out
+        assert re.search(
+            r"^frames: sent \d+, received \d+, missing \d+, predicted \d+", drawn.out, re.MULTILINE
+        )
+        frames = poses[-1]["frames"]
+        assert frames["sent"] == frames["received"] + frames["missing"]
+        assert frames["predicted"] > 0
         _run_the_subscriber_of_the_readme(live)
         _watch_until_interrupted(live)
         _record_with_lead_in(live)

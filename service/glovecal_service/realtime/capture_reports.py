@@ -1,0 +1,113 @@
+"""How far the capture daemons say they are: frames that never arrived, and none came after them to tell."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from dataclasses import dataclass, field
+from threading import Lock
+from typing import NamedTuple
+
+import zenoh
+
+from glovecal_client.errors import BadName
+from glovecal_client.keys import all_gloves, parse_glove_key
+from glovecal_client.plausible_loss import PlausibleLoss
+from glovecal_client.queries import json_object
+from glovecal_service.realtime.arrivals import Arrival, Arrivals
+from glovecal_service.realtime.frame_gate import Standing
+from glovecal_service.realtime.glove_lanes import GLOVES_LIMIT
+
+SETTLED_AFTER_NS = 500_000_000
+"""Frames sent before a report are here by then, or lost."""
+_REPORTS = 8
+
+
+class _Report(NamedTuple):
+    run_id: int
+    sequence: int
+    """The last number given, -1 before the first."""
+    heard_ns: int
+
+
+@dataclass
+class _Glove:
+    first: _Report
+    newest: deque[_Report] = field(default_factory=lambda: deque(maxlen=_REPORTS))
+    ended: dict[int, int] = field(default_factory=dict)
+    """Frames missing after the last one that came of runs that are over, by run."""
+
+
+class CaptureReports:
+    """The newest ``status`` of each glove's capture daemon; may be asked by any thread."""
+
+    def __init__(self, session: zenoh.Session, site: str) -> None:
+        self._arrivals = Arrivals(session, all_gloves(site, "status"), limit=1024)
+        self._lock = Lock()
+        self._gloves: dict[str, _Glove] = {}
+
+    def unheard(self, glove: str, standing: Standing | None, received: int) -> int:
+        """Frames that were sent before or after those that ``standing`` knows of, and never arrived.
+
+        ``received``: messages of the glove so far; None for ``standing``: not one valid frame among them.
+        """
+        with self._lock:
+            for arrival in self._arrivals.drain():
+                self._note(arrival)
+            known = self._gloves.get(glove)
+            if known is None:
+                return 0
+            before_ns = time.monotonic_ns() - SETTLED_AFTER_NS
+            settled = next((report for report in reversed(known.newest) if report.heard_ns < before_ns), None)
+            if standing is None:
+                return 0 if settled is None else _possible(settled.sequence, known.first, settled) - received
+            missing = self._of_ended_runs(known, standing) + _before_the_first(known.first, standing)
+            if settled is None:
+                return missing
+            return missing + max(0, _after(standing, settled) - (received - standing.messages))
+
+    def _note(self, arrival: Arrival) -> None:
+        document = json_object(arrival.payload) or {}
+        try:
+            glove = parse_glove_key(arrival.key)[0].glove
+            sequence = document["sequence"]
+            run_id, sequence = int(document["run_id"], 16), -1 if sequence is None else int(sequence)
+        except (BadName, KeyError, TypeError, ValueError):
+            return
+        report = _Report(run_id, sequence, arrival.received_ns)
+        if glove in self._gloves or len(self._gloves) < 2 * GLOVES_LIMIT:
+            self._gloves.setdefault(glove, _Glove(report)).newest.append(report)
+
+    def _of_ended_runs(self, known: _Glove, standing: Standing) -> int:
+        if standing.ended is not None:
+            run_id, sequence, at_ns = standing.ended
+            for report in known.newest:
+                if report.run_id == run_id:
+                    missing = _possible(report.sequence, _Report(run_id, sequence, at_ns), report)
+                    known.ended[run_id] = max(known.ended.get(run_id, 0), missing)
+        return sum(known.ended.values())
+
+
+def _possible(sequence: int, since: _Report, report: _Report) -> int:
+    """Frames from ``since`` to ``sequence``; 0 where no glove can have sent so many until ``report``."""
+    missing = max(0, sequence - since.sequence)
+    return missing if PlausibleLoss(since.heard_ns).allows(missing, report.heard_ns) else 0
+
+
+def _before_the_first(first: _Report, standing: Standing) -> int:
+    """Of the first run: between the first report on it and the first frame that came."""
+    run_id, sequence, at_ns = standing.began
+    if first.run_id != run_id or first.heard_ns > at_ns:
+        return 0
+    return _possible(sequence - 1, first, _Report(run_id, sequence, at_ns))
+
+
+def _after(standing: Standing, settled: _Report) -> int:
+    """Between the newest frame that came and what was reported; of a new run, all its frames."""
+    newest = _Report(standing.run_id, standing.sequence, standing.at_ns)
+    if settled.run_id == standing.run_id:
+        return _possible(settled.sequence, newest, settled)
+    ended = standing.ended is not None and standing.ended[0] == settled.run_id
+    if ended or settled.heard_ns < standing.at_ns:
+        return 0
+    return _possible(settled.sequence, newest._replace(sequence=-1), settled)
