@@ -28,7 +28,7 @@ LINEAR_DEG = {  # person and side: flexion, inversion
 }
 LMC_GPR_DEG = {  # with 1000 samples a rotation, which take a quarter of the time
     ("P002", "R"): (2.59, 3.00),
-    ("P003", "L"): (3.11, 3.31),
+    ("P003", "L"): (3.11, 3.06),
 }
 LIVE = [f"G{number:02d}" for number in range(20) if number not in (8, 15, 16)]
 """The CyberGlove's sensors that move: G08 and G16 never do, G15 does in one file only."""
