@@ -202,7 +202,7 @@ def test_rows_of_an_earlier_schema_are_hashed_and_what_was_damaged_stays_so(stor
         with store.database.write() as connection:
             jobs = connection.scalars(text("SELECT id FROM jobs ORDER BY id")).all()
             connection.execute(text("UPDATE models SET method = 'spgp' WHERE parent = 'none'"))
-    assert schema.newest_revision() > "0003"
+    assert schema.newest_revision() > "0004"
     with Store.open(store_settings) as store:
         assert read_all(store) == before
         _as_before_hashes(store)
@@ -220,7 +220,7 @@ def test_rows_of_an_earlier_schema_are_hashed_and_what_was_damaged_stays_so(stor
 
 
 def _as_before_hashes(store: Store) -> None:
-    """Schema 0003: five tables without a hash, the hashes of the other two over NULLs as well."""
+    """Schema 0004: five tables without a hash, the hashes of the other two over NULLs as well."""
     with store.database.write() as connection:
         for name in ("takes", "model_takes", "recordings", "samplings", "jobs"):
             connection.execute(text(f"ALTER TABLE {name} DROP COLUMN row_sha256"))
@@ -234,7 +234,7 @@ def _as_before_hashes(store: Store) -> None:
                 written = json.dumps([name, values], sort_keys=True, separators=(",", ":"))
                 digest = hashlib.sha256(written.encode("ascii")).hexdigest()
                 connection.execute(update(table).where(table.c.id == row.id).values(row_sha256=digest))
-        connection.execute(text("UPDATE alembic_version SET version_num = '0003'"))
+        connection.execute(text("UPDATE alembic_version SET version_num = '0004'"))
 
 
 def _plain(value: Any) -> Any:
