@@ -11,6 +11,7 @@
     ├── DamagedLog          a recording cannot be read at all (a damaged tail is repaired instead)
     ├── CaptureRefused      capture must not start (another publisher has the glove)
     ├── NoAnswer            nobody answered a query; the sentence says what was asked
+    │   └── QueryRefused    somebody answered, with an error instead of data
     └── ServiceError        the service answered a REST call with a problem (status, title, detail)
 
 Messages name the thing, the value and what would be right.
@@ -61,6 +62,10 @@ class CaptureRefused(ClientError):
 
 class NoAnswer(ClientError):
     """Nobody answered a query, or the answer was empty."""
+
+
+class QueryRefused(NoAnswer):
+    """Somebody answered a query with an error: asking again soon will not help."""
 
 
 class ServiceError(ClientError):

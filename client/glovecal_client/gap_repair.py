@@ -36,7 +36,7 @@ def fetch_frames(
     keys = GloveKeys(site, glove)
     found: list[Frame] = []
     while first <= last:
-        block = _fetch_block(session, keys, run_id, first, last, timeout_s)
+        block = fetch_block(session, keys, run_id, first, last, timeout_s=timeout_s)
         if not block:
             break
         found += block
@@ -46,10 +46,14 @@ def fetch_frames(
     return found
 
 
-def _fetch_block(
-    session: zenoh.Session, keys: GloveKeys, run_id: int, first: int, last: int, timeout_s: float
+def fetch_block(
+    session: zenoh.Session, keys: GloveKeys, run_id: int, first: int, last: int, *, timeout_s: float = 5.0
 ) -> list[Frame]:
-    """As many frames as one reply holds; of several replies the first good one."""
+    """As many of the frames as one reply holds, in order, flagged as repaired; of several replies the first.
+
+    Empty: the log has none of them. Raises NoAnswer if nobody answers, QueryRefused if the log cannot be read
+    or is not there, WireError if the answer is damaged.
+    """
     selector = f"{keys.log}?run={run_id:016x};from={first};to={last}"
     reply = ask(session, selector, timeout_s=timeout_s)[0]
     frames = split_frames(reply.payload.to_bytes())

@@ -7,13 +7,16 @@ from typing import Any
 
 import zenoh
 
-from glovecal_client.errors import NoAnswer
+from glovecal_client.errors import NoAnswer, QueryRefused
+
+REFUSAL_ENCODING = "text/plain"
+"""Of an answerer's own sentence; zenoh's errors, such as a timeout, come with another one."""
 
 
 def ask(session: zenoh.Session, selector: str, *, timeout_s: float = 5.0) -> list[zenoh.Sample]:
-    """All good replies. Raises NoAnswer with the answerer's own sentence, or if nobody answered."""
+    """All good replies. Raises QueryRefused with the answerer's own sentence, NoAnswer if nobody answered."""
     samples: list[zenoh.Sample] = []
-    refusal = "nobody answered"
+    problem, refused = "nobody answered", False
     replies = session.get(
         selector,
         timeout=timeout_s,
@@ -24,9 +27,10 @@ def ask(session: zenoh.Session, selector: str, *, timeout_s: float = 5.0) -> lis
         if reply.ok is not None:
             samples.append(reply.ok)
         elif reply.err is not None:
-            refusal = reply.err.payload.to_bytes().decode(errors="replace")[:500]
+            problem = reply.err.payload.to_bytes().decode(errors="replace")[:500]
+            refused = str(reply.err.encoding) == REFUSAL_ENCODING
     if not samples:
-        raise NoAnswer(f"{selector}: {refusal}")
+        raise (QueryRefused if refused else NoAnswer)(f"{selector}: {problem}")
     return samples
 
 

@@ -1,14 +1,18 @@
-"""The recorder and the real capture daemon, each in a thread of the test."""
+"""The recorder and the real capture daemon, in threads of the test or processes to be killed."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 from realtime_support import LAYOUT, SteadyDevice, free_endpoint
 
+from glovecal_client import Frame, FrameLog, encode_frame
 from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings
 from glovecal_client.keys import GloveKeys
 from glovecal_client.session import open_client
@@ -62,3 +66,32 @@ def recording_thread(settings: Settings) -> Iterator[Recorder]:
         finally:
             stop.set()
             thread.join(120)
+
+
+def logged(settings: Settings) -> list[Path]:
+    """Oldest first."""
+    logs = (settings.data / "captured" / "capture" / "lab" / GLOVE).glob("*.glvlog")
+    return sorted(logs, key=lambda log: log.stat().st_mtime_ns)
+
+
+def replay_source(folder: Path) -> Path:
+    log = FrameLog.create(folder / "source.glvlog", {"layout": LAYOUT.name, "sensors": list(LAYOUT.sensors)})
+    for i in range(400):
+        log.append(encode_frame(Frame(i, 1, i * 5_000_000, 0, np.array([i % 250, 1, 2], np.float32))))
+    log.close()
+    return log.path
+
+
+@contextmanager
+def capture_process(settings: Settings) -> Iterator[subprocess.Popen[bytes]]:
+    source = settings.data / "source.glvlog"
+    source = source if source.exists() else replay_source(settings.data)
+    command = [sys.executable, "-m", "glovecal_client.capture.command", "--device", f"replay:{source}"]
+    command += ["--option", "loop=yes", "--glove", GLOVE, "--subject", "anna", "--wearing", "morning"]
+    command += ["--connect", settings.zenoh, "--data", str(settings.data / "captured")]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()

@@ -53,6 +53,21 @@ def test_workers_train_the_model_that_one_process_trains(trained, method):
     assert load(trained.models.load_bytes(model.id)).simulated
 
 
+def test_a_take_that_is_being_repaired_is_used_with_a_sentence(trained):
+    accounting = {"complete": False, "pending_frames": 38}
+    take = trained.takes.add(
+        make_take(7), subject="ben", layout=LAYOUT.name, source="recording", accounting=accounting
+    )
+    assert take.state == "repairing"
+    payload = {"subject": "ben", "layout": LAYOUT.name, "takes": [take.id], "method": "linear", "folds": 0}
+    result = result_of(trained, trained.jobs.create("train", payload).id)
+    assert [text for text in result["sentences"] if "incomplete" in text] == [
+        f"Take {take.name} is incomplete: 38 frames, and any after its last one, may still come from the "
+        "capture log. What is there is used; train again once the take is complete."
+    ]
+    assert trained.models.get(result["model"]).facts["sentences"] == result["sentences"]
+
+
 def test_training_again_gives_the_same_model_at_once(trained):
     first = result_of(trained, create(trained, method="lmc_gpr"))
     again = create(trained, method="lmc_gpr")

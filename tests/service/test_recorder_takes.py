@@ -49,15 +49,23 @@ def finished(store: Store, id: str) -> RecordingRecord:
     return store.recordings.get(id)
 
 
+def settled(store: Store, id: str) -> RecordingRecord:
+    eventually(lambda: store.recordings.get(id).state in ("done", "failed"), "nothing is left to repair")
+    return store.recordings.get(id)
+
+
 def check_exact(store: Store, record: RecordingRecord) -> None:
     """Sent is recorded plus missing, by counts and by ranges; the take holds what was recorded."""
     facts = record.facts
     assert record.state == "done", facts
+    assert facts["complete"] is True
+    assert facts["pending"] == []
     assert facts["sent"] == facts["recorded"] + facts["missing_frames"]
     assert facts["missing_frames"] == sum(last - first + 1 for first, last in facts["missing"])
     take = store.takes.load(facts["take"])
     assert len(take.time_s) == facts["recorded"] + facts["lead_in"]["frames"]
-    assert store.takes.get(facts["take"]).recording == record.id
+    kept = store.takes.get(facts["take"])
+    assert (kept.recording, kept.state) == (record.id, "complete")
 
 
 def test_a_recording_becomes_a_take_with_nothing_missing(settings: Settings, store: Store) -> None:
@@ -101,8 +109,8 @@ def test_frames_missed_while_the_router_was_away_are_repaired(settings: Settings
     assert record.facts["repaired"] > 50
 
 
-def test_what_capture_can_no_longer_give_is_reported_missing(settings: Settings, store: Store) -> None:
-    """Capture is gone, and with it the log: the account says which frames are missing."""
+def test_what_capture_cannot_be_asked_for_is_pending(settings: Settings, store: Store) -> None:
+    """Nobody answers for the log: the take can be used, and says which frames are not in it yet."""
     with open_router([settings.zenoh]), open_client([settings.zenoh]) as session, recording_thread(settings):
         glove = WireGlove(session, settings, GLOVE, subject="anna")
         store.gloves.seen(GLOVE, {"layout": LAYOUT.name, "sensors": list(LAYOUT.sensors), "subject": "anna"})
@@ -115,10 +123,13 @@ def test_what_capture_can_no_longer_give_is_reported_missing(settings: Settings,
         eventually(frames(store, asked.id, 16), "16 frames")
         store.recordings.stop(asked.id)
         record = finished(store, asked.id)
-    check_exact(store, record)
-    assert record.facts["missing"] == [[20, 24], [30, 30]]
+    assert (record.state, store.takes.get(record.facts["take"]).state) == ("repairing", "repairing")
+    assert (record.facts["pending"], record.facts["pending_frames"]) == ([[20, 24], [30, 30]], 6)
+    assert (record.facts["missing"], record.facts["missing_frames"]) == ([], 0)
     assert (record.facts["sent"], record.facts["recorded"], record.facts["refused"]) == (22, 16, 1)
-    assert record.facts["end_known"] is False
+    assert len(store.takes.load(record.facts["take"]).time_s) == 16
+    assert "incomplete, repairing: " in sentence(store, asked.id)
+    assert "6 still to be fetched from the capture log" in sentence(store, asked.id)
     assert record.facts["lead_in"]["frames"] == 0
     assert "capture's log did not give more: " in record.facts["lead_in"]["sentence"]
 
@@ -195,6 +206,12 @@ def test_a_full_disk_is_said_and_what_was_recorded_stays(
         time.sleep(0.5)
         store.recordings.stop(asked.id)
         record = finished(store, asked.id)
+        assert record.state == "repairing"
+        assert record.facts["pending_frames"] > 0
+        assert "the disk is full" in record.facts["sentence"]
+        kept = store.takes.get(record.facts["take"])
+        assert kept.frames == record.facts["recorded"] + record.facts["lead_in"]["frames"] > 100
+        subprocess.run(["mount", "-o", "remount,size=4m", str(small_disk)], check=True)
+        record = settled(store, asked.id)
     check_exact(store, record)
-    assert record.facts["recorded"] > 100
-    assert record.facts["missing_frames"] > 0
+    assert record.facts["missing"] == []

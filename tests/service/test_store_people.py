@@ -1,5 +1,7 @@
 """Subjects, layouts, gloves and who wears them."""
 
+from datetime import UTC, datetime
+
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -175,8 +177,14 @@ def test_a_recording_moves_forward_only(store):
     assert store.recordings.stop(recording.id).state == "stopping"
     assert store.recordings.update(recording.id, state="recording").state == "stopping"
     facts = {"last_sequence": 99, "sent": 93, "recorded": 90, "missing": [[50, 52]]}
+    repairing = store.recordings.update(recording.id, state="repairing")
+    assert not repairing.is_open
+    assert store.recordings.unsettled() == [repairing]
     done = store.recordings.update(recording.id, state="done", **facts)
-    assert done.facts == {"lead_in": {"asked_s": 60.0}, "first_sequence": 7, **facts}
+    recording_facts = dict(done.facts)
+    asked_s = recording_facts.pop("stop_asked_s")
+    assert done.ended_at == datetime.fromtimestamp(asked_s, UTC)
+    assert recording_facts == {"lead_in": {"asked_s": 60.0}, "first_sequence": 7, **facts}
     assert store.recordings.stop(recording.id).state == "done"
     assert store.recordings.update(recording.id, state="failed").state == "done"
     second = store.recordings.request("left", name="run")

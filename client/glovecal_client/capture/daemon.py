@@ -78,6 +78,7 @@ class CaptureDaemon:
         self._status = CaptureStatus(self._run_id, time.time_ns())
         self._check = ReadingCheck(device)
         self._refusal: str | None = None
+        self._earlier_runs: list[dict[str, Any]] = []
         self._flags = FrameFlag.SIMULATED if device.simulated else FrameFlag(0)
 
     def run(self, stop: threading.Event) -> CaptureSummary:
@@ -85,6 +86,7 @@ class CaptureDaemon:
         folder = LogFolder(self._settings.data, self._settings.keys)
         try:
             folder.repair(self._report)
+            self._earlier_runs = folder.runs()
             self._log = folder.create(self._run_id, self._meta())
             return self._run_with_log(folder, stop)
         finally:
@@ -212,7 +214,7 @@ class CaptureDaemon:
     def _meta_now(self) -> str:
         self._index.extend()
         in_log = {"log_from": self._index.first, "log_to": self._index.last}
-        return json.dumps(self._meta() | in_log, allow_nan=False)
+        return json.dumps(self._meta() | in_log | {"earlier_runs": self._earlier_runs}, allow_nan=False)
 
     def _summary(self) -> CaptureSummary:
         status = self._status

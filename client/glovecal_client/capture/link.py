@@ -16,7 +16,7 @@ from glovecal_client.capture.log_queries import LogQueries
 from glovecal_client.capture.other_publisher import describe_publisher, other_publisher
 from glovecal_client.errors import CaptureRefused, ClientError, NoAnswer
 from glovecal_client.keys import JSON_ENCODING, GloveKeys
-from glovecal_client.queries import json_object
+from glovecal_client.queries import REFUSAL_ENCODING, json_object
 from glovecal_client.session import open_client
 from glovecal_client.wire.frame import FRAME_ENCODING
 
@@ -175,7 +175,7 @@ class CaptureLink:
             try:
                 found = self._sources.log.answer(str(query.parameters))
             except (ClientError, OSError) as error:
-                query.reply_err(str(error), encoding="text/plain")
+                query.reply_err(str(error), encoding=REFUSAL_ENCODING)
             else:
                 query.reply(self._keys.log, found)
 

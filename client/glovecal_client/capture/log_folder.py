@@ -12,10 +12,11 @@ from typing import Any, BinaryIO
 from glovecal_client.errors import CaptureRefused, DamagedLog
 from glovecal_client.frame_log import FrameLog
 from glovecal_client.keys import GloveKeys
-from glovecal_client.log_records import cut_damaged_tail
+from glovecal_client.log_records import Recording, cut_damaged_tail
 from glovecal_client.private_files import make_private
 
 SUFFIX = ".glvlog"
+EARLIER_RUNS = 16
 
 
 class LogFolder:
@@ -70,6 +71,15 @@ class LogFolder:
             return FrameLog.create(path, meta)
         except OSError as error:
             raise CaptureRefused(f"capture does not start without its recording: {path}: {error}") from error
+
+    def runs(self) -> list[dict[str, Any]]:
+        """``run_id`` and ``started_wall_ns`` of the newest logs, oldest first; damaged ones are left out."""
+        found = []
+        for path in sorted(self.path.glob(f"*{SUFFIX}"), key=lambda log: log.name)[-EARLIER_RUNS:]:
+            with suppress(DamagedLog, OSError, KeyError):
+                meta = Recording.open(path).meta
+                found.append({name: meta[name] for name in ("run_id", "started_wall_ns")})
+        return sorted(found, key=lambda run: run["started_wall_ns"])
 
     def find(self, run_id: int) -> Path | None:
         """The log of a run, None if there is none."""

@@ -67,6 +67,7 @@ class CaptureStatus:
                 "sentence": self.disk_problem or self.refusal or self._silence(age) or self.sentence,
                 "run_id": f"{self.run_id:016x}",
                 "started_wall_ns": self.started_wall_ns,
+                "wall_ns": time.time_ns(),
             }
 
     def _silence(self, age_s: float | None) -> str | None:

@@ -58,11 +58,18 @@ def record(
         print_json(finished)
         return
     facts = finished["facts"]
-    out.print(
-        f"Take {facts['take'][:12]}: {facts['recorded']} of {facts['sent']} frames sent, "
-        f"{facts['repaired']} of them fetched again from the capture log, {len(facts['missing'])} gaps left."
-    )
-    if lead_in:
+    if "take" in facts:
+        out.print(
+            f"Take {facts['take'][:12]}: {facts['recorded']} of {facts['sent']} frames sent, "
+            f"{facts['repaired']} of them fetched from the capture log, {facts['missing_frames']} missing."
+        )
+    if finished["state"] == "repairing":
+        err.print(
+            f"Recording {finished['id']} is {facts['sentence']}. It is completed as soon as capture answers; "
+            "glovecal take list shows its state.",
+            style="yellow",
+        )
+    if lead_in and "take" in facts:
         out.print(f"Lead-in: {facts['lead_in']['sentence']}.")
 
 
@@ -80,10 +87,13 @@ def _wait_for_the_recorder(service: RestClient, recording: str, glove: str) -> N
 
 
 def finish_recording(service: RestClient, recording: str) -> dict[str, Any]:
-    """Stop a recording and wait for its take. Raises ServiceError when it failed or takes too long."""
+    """Stop a recording and wait for its account, complete or being repaired.
+
+    Raises ServiceError when it failed or takes too long.
+    """
     service.post(f"/recordings/{recording}/stop")
     until = time.monotonic() + PATIENCE_S
-    while (document := service.get(f"/recordings/{recording}"))["state"] != "done":
+    while (document := service.get(f"/recordings/{recording}"))["state"] not in ("done", "repairing"):
         if document["state"] == "failed":
             raise ServiceError(
                 409, "Recording failed", document["facts"].get("sentence", "no reason was given")

@@ -82,6 +82,7 @@ def _facts(found: dict[str, Any]) -> dict[str, Any]:
         "added": moment(take["created_at"]),
         "frames": f"{take['frames']} in {take['duration_s']:.2f} s",
         **({"lead-in": f"{found['lead_in_frames']} of them in {lead_in_s:.2f} s"} if lead_in_s else {}),
+        "state": take["state"],
         **({"frames sent": accounting["sent"]} if "sent" in accounting else {}),
         "rate (Hz)": found["rate_hz"],
         "gaps": gaps,

@@ -15,6 +15,7 @@ COLUMNS = {
     "wearing": "wearing",
     "duration_s": "seconds",
     "measured": "angles",
+    "state": "state",
     "simulated": "sim",
 }
 

@@ -13,7 +13,7 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_service.plain import plain
 from glovecal_service.store import Store
-from glovecal_service.store.records import ModelRecord, TakeRecord
+from glovecal_service.store.records import ModelRecord, TakeRecord, incomplete_sentences
 
 
 def artifact_array(model: CalibrationModel) -> np.ndarray:
@@ -50,6 +50,7 @@ def keep_child(
                 "simulated": model.simulated,
                 "settings": asdict(settings),
                 **facts,
+                "sentences": [*incomplete_sentences(takes), *facts.get("sentences", ())],
             }
         ),
     )

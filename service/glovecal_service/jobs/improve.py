@@ -20,7 +20,7 @@ from glovecal_service.jobs.model_work import is_short, text_in
 from glovecal_service.jobs.task_key import task_key
 from glovecal_service.plain import plain
 from glovecal_service.store import Store
-from glovecal_service.store.records import JobRecord, TakeRecord
+from glovecal_service.store.records import JobRecord, TakeRecord, incomplete_sentences
 
 MOST_STEPS = 6
 
@@ -63,7 +63,10 @@ class ImproveJob:
         }
 
         def finish(results: Sequence[TaskResult]) -> dict[str, Any]:
-            return _keep(store, results[0], layout, takes, work.settings, bool(payload.get("activate")))
+            activate = bool(payload.get("activate"))
+            kept = _keep(store, results[0], layout, takes, work.settings, activate)
+            sentences = [*incomplete_sentences([*takes, *holdout]), *kept["sentences"]]
+            return {**kept, "sentences": sentences}
 
         return JobPlan(
             tasks=[Task(task_key("improve", facts), f"improving {work.subject}", run, work)],

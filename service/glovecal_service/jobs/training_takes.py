@@ -12,7 +12,7 @@ from glovecal_models.guided.taught_take import TaughtTake
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 from glovecal_service.store import Store
-from glovecal_service.store.records import SubjectRecord, TakeRecord
+from glovecal_service.store.records import SubjectRecord, TakeRecord, incomplete_sentences
 
 
 @dataclass(frozen=True)
@@ -43,14 +43,15 @@ class TrainingTakes:
             for record in records
             if record not in sampled and (record.has_reference or not record.sampling)
         )
+        incomplete = incomplete_sentences(records)
         if not sampled:
-            return cls(plain, layout, settings)
+            return cls(plain, layout, settings, tuple(incomplete))
         taught = [
             TaughtTake.from_document(store.takes.load(record.id), record.sampling or {}) for record in sampled
         ]
         measured = subject.skeleton() if subject.dimensions else None
         guided = guided_samples(taught, layout, measured)
-        said = [*guided.sentences]
+        said = [*incomplete, *guided.sentences]
         if measured is None and any(each.contacts for each in taught):
             said.append(
                 f"Touches are not used: nobody measured {subject.name}'s hand. Its length is enough: "

@@ -66,7 +66,7 @@ def worn_since(record: RecordingRecord, glove: GloveRecord, others: list[Recordi
         if other.id == record.id or other.requested_at > record.requested_at:
             continue
         if _worn(other) != _worn(record):
-            return max(other.updated_at, since or other.updated_at)
+            return max(other.ended_at, since or other.ended_at)
         if not as_the_glove:
             since = other.requested_at
     return since

@@ -4,50 +4,53 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from threading import Event
 from typing import Any
 
 import zenoh
 
 from glovecal_client.errors import NoAnswer, WireError
-from glovecal_client.gap_repair import fetch_frames
 from glovecal_client.keys import GloveKeys
-from glovecal_client.queries import ask_json
+from glovecal_client.queries import json_object
 from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_service.realtime.arrivals import Arrivals
+from glovecal_service.realtime.capture_log import CaptureLog
 from glovecal_service.realtime.frame_gate import TAKEOVER_AFTER_NS
 from glovecal_service.realtime.lead_in import LeadIn
 from glovecal_service.realtime.lead_in_wish import LeadInWish
-from glovecal_service.realtime.recording_file import RecordingFile, RunBooks, decoded
+from glovecal_service.realtime.reconciliation import OutOfTime, Patience, fill_gaps, reconcile
+from glovecal_service.realtime.recording_account import Settlement, recording_account
+from glovecal_service.realtime.recording_file import RecordingFile, decoded
 from glovecal_service.realtime.refusal import Refusal, Refused
 from glovecal_service.realtime.sequence_order import SequenceOrder
 from glovecal_service.store.recordings import LEAD_IN
 
-WAITING_LIMIT = 65536
+WAITING_LIMIT, STATUSES_LIMIT = 65536, 1024
 HELD_LIMIT = 1024
 """Frames with numbers that do not fit yet."""
 REPAIR_AFTER_S = 0.5
 """A gap this old is asked for; a shorter one may still be on its way."""
-ANSWER_WITHIN_S = 2.0
-LEAD_IN_PATIENCE_S = 5.0
-"""At the end of a recording; ten minutes at 120 Hz come in about as long."""
-END_OF_RUN = (1 << 63) - 1
+ON_THE_WAY_S = 0.05
+"""Frames captured just before the stop arrive within this time; what takes longer is fetched."""
 
 
 class LiveRecording:
     """Reads its glove's frames by a subscription of its own, which cannot hold up anybody else.
 
-    The lead-in is fetched once a frame is there to lead to.
+    It listens before ``open_file`` says where the recording begins, so that no frame is lost in between. The
+    lead-in is fetched once a frame is there to lead to.
     """
 
     def __init__(
-        self, session: zenoh.Session, keys: GloveKeys, file: RecordingFile, wish: LeadInWish
+        self, session: zenoh.Session, keys: GloveKeys, open_file: Callable[[], RecordingFile]
     ) -> None:
-        self.file = file
+        """Raises what ``open_file`` raises."""
         self.keys = keys
         self.refused = 0
         """Messages of a second publisher, damaged ones, and numbers that no glove can have reached."""
         self._session = session
-        self._wish = wish
         self._lead_in: LeadIn | None = None
         self._run_id: int | None = None
         self._heard_ns = 0
@@ -55,12 +58,32 @@ class LiveRecording:
         self._held: deque[tuple[Frame, bytes, bool]] = deque(maxlen=HELD_LIMIT)
         """Frames with their messages, and whether they were counted as refused."""
         self._repair_at = 0.0
+        self._log = CaptureLog(session, keys)
         self._arrivals = Arrivals(session, keys.raw, limit=WAITING_LIMIT)
+        self._statuses = Arrivals(session, keys.status, limit=STATUSES_LIMIT)
+        try:
+            self.file = open_file()
+        except BaseException:
+            self._close_arrivals()
+            raise
+        self._wish = LeadInWish.of_document(self.file.meta.get(LEAD_IN))
 
     def take_in(self) -> None:
         """Write what arrived since the last call."""
         for arrival in self._arrivals.drain():
             self._record(arrival.payload, arrival.received_ns)
+        for arrival in self._statuses.drain():
+            self._note_end_of_run(arrival.payload)
+
+    def _note_end_of_run(self, message: bytes) -> None:
+        """The last status of a run says how far it came; once capture is gone nobody can be asked."""
+        status = json_object(message) or {}
+        run_id, last = status.get("run_id"), status.get("sequence")
+        if status.get("state") != "stopped" or not isinstance(last, int):
+            return
+        for books in self.file.runs.values():
+            if f"{books.run_id:016x}" == run_id:
+                books.last, books.ended = max(books.last, last), True
 
     def take_lead_in(self) -> None:
         """Write what was fetched of the lead-in since the last call; never waits."""
@@ -134,49 +157,29 @@ class LiveRecording:
         if now < self._repair_at:
             return
         self._repair_at = now + REPAIR_AFTER_S
-        if not self.repair() and self._gaps():
+        if not self._repair(Patience(REPAIR_AFTER_S, Event())) and self.file.has_gaps:
             self._repair_at = now + 10 * REPAIR_AFTER_S
 
-    def repair(self) -> int:
-        """Fetch missing frames; how many came."""
-        return sum(
-            self._fetch(books, first, last)
-            for books in list(self.file.runs.values())
-            for first, last in books.missing()
-        )
+    def _repair(self, patience: Patience) -> bool:
+        """Fetch missing frames; whether some came."""
+        before = sum(books.recorded_frames for books in self.file.runs.values())
+        with suppress(NoAnswer, WireError, OutOfTime):
+            for books in list(self.file.runs.values()):
+                fill_gaps(self.file, books, self._log, patience)
+        return sum(books.recorded_frames for books in self.file.runs.values()) > before
 
-    def _fetch(self, books: RunBooks, first: int, last: int) -> int:
-        try:
-            frames = fetch_frames(
-                self._session, self.keys.site, self.keys.glove, books.run_id, first, last,
-                timeout_s=ANSWER_WITHIN_S,
-            )  # fmt: skip
-        except (NoAnswer, WireError):
-            return 0
-        return sum(self.file.add(frame, encode_frame(frame)) for frame in frames)
-
-    def _gaps(self) -> bool:
-        return any(books.missing() for books in self.file.runs.values())
-
-    def finish(self, *, patience_s: float = 3.0) -> bool:
-        """Stop: learn where capture is, wait for or fetch everything up to there, close the file.
-
-        False if capture did not say how far it is: then the account ends with the last frame received.
-        """
-        known = bool(self.file.runs) and self._learn_the_end()
-        self._arrivals.close()
-        self.take_in()
-        deadline = time.monotonic() + (patience_s if known else 0.0)
-        while self._gaps() and (self.repair() or time.monotonic() < deadline):
-            time.sleep(0.05)
-        self._finish_lead_in()
+    def finish(self, stop_wall_ns: int | None, patience: Patience) -> Settlement:
+        """Stop: fetch or wait for everything captured up to the stop, close the file; as in ``reconcile``."""
+        patience.wait(ON_THE_WAY_S)
+        self._stop_listening()
+        outcome = reconcile(self.file, self._log, stop_wall_ns, patience)
+        self._finish_lead_in(patience)
         self.file.close()
-        return known
+        return Settlement.of(self.file, outcome, refused=self.refused, why_shorter=self._why_shorter())
 
-    def _finish_lead_in(self) -> None:
+    def _finish_lead_in(self, patience: Patience) -> None:
         self.take_lead_in()
-        deadline = time.monotonic() + LEAD_IN_PATIENCE_S
-        while self._lead_in is not None and self._lead_in.goes_on and time.monotonic() < deadline:
+        while self._lead_in is not None and self._lead_in.goes_on and not patience.is_over:
             self._write_some(self._lead_in)
             time.sleep(0.01)
         if self._lead_in is not None:
@@ -184,48 +187,27 @@ class LiveRecording:
 
     def abandon(self) -> None:
         """Close the file as it is; a later process resumes it."""
-        self._arrivals.close()
-        self.take_in()
+        self._stop_listening()
         if self._lead_in is not None:
             self._lead_in.stop()
             self._lead_in.wait()
         self.file.close()
 
-    def _learn_the_end(self) -> bool:
-        try:
-            status = ask_json(self._session, self.keys.status, timeout_s=1.0)
-            run_id, sequence = int(status["run_id"], 16), int(status["sequence"])
-        except (NoAnswer, KeyError, TypeError, ValueError):
-            return False
-        for ended in [books for books in self.file.runs.values() if books.run_id != run_id]:
-            self._fetch(ended, ended.last + 1, END_OF_RUN)
-        books = self.file.open_run(run_id)
-        books.last = max(books.last, sequence)
-        return True
+    def _stop_listening(self) -> None:
+        self._close_arrivals()
+        self.take_in()
 
-    def _why_shorter(self) -> str:
-        if self._lead_in is not None:
-            return self._lead_in.why_shorter
-        if self.file.first_frame is None:
-            return "no frame has come yet"
-        return "the recording was interrupted" if self.file.lead_in_s < self._wish.most_s - 1.0 else ""
+    def _close_arrivals(self) -> None:
+        self._arrivals.close()
+        self._statuses.close()
 
     def account(self) -> dict[str, Any]:
-        """Facts for the recording's row; over all runs ``sent`` = ``recorded`` + missing frames.
+        """Facts for the recording's row while it goes on."""
+        return recording_account(
+            self.file, complete=False, refused=self.refused, why_shorter=self._why_shorter()
+        )
 
-        The lead-in is counted apart, and nothing of it is ever missing.
-        """
-        runs = [books.document() for books in self.file.runs.values()]
-        return {
-            "first_sequence": runs[0]["first_sequence"] if runs else None,
-            "last_sequence": runs[-1]["last_sequence"] if runs else None,
-            "sent": sum(run["sent"] for run in runs),
-            "recorded": sum(run["recorded"] for run in runs),
-            "repaired": sum(run["repaired"] for run in runs),
-            "missing": [gap for run in runs for gap in run["missing"]],
-            "missing_frames": sum(last - first + 1 for run in runs for first, last in run["missing"]),
-            "refused": self.refused,
-            LEAD_IN: self._wish.account(len(self.file.lead_in), self.file.lead_in_s, self._why_shorter()),
-            "runs": runs,
-            "file": self.file.path.name,
-        }
+    def _why_shorter(self) -> str | None:
+        if self._lead_in is not None:
+            return self._lead_in.why_shorter
+        return "no frame has come yet" if self.file.first_frame is None else None

@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -15,14 +17,19 @@ from sqlalchemy.exc import SQLAlchemyError
 from glovecal_client.errors import ClientError, NoAnswer
 from glovecal_client.keys import GloveKeys
 from glovecal_client.queries import ask_json
-from glovecal_models.errors import GlovecalError
-from glovecal_service.realtime.lead_in_wish import LeadInWish, lead_in_wish
+from glovecal_models.errors import BadInput, GlovecalError
+from glovecal_service.realtime.capture_log import CaptureLog
+from glovecal_service.realtime.lead_in_wish import lead_in_wish
 from glovecal_service.realtime.live_recording import LiveRecording
-from glovecal_service.realtime.recording_file import SUFFIX, RecordingFile
+from glovecal_service.realtime.reconciliation import Patience
+from glovecal_service.realtime.recording_account import Settlement
+from glovecal_service.realtime.recording_file import BEGIN, CREATED, SUFFIX, RecordingFile
+from glovecal_service.realtime.recording_repair import repair, settle
 from glovecal_service.realtime.recording_result import keep_as_take
 from glovecal_service.settings import Settings
 from glovecal_service.store.clock import now
 from glovecal_service.store.errors import (
+    Conflict,
     DamagedRows,
     NotFound,
     StorageFull,
@@ -30,7 +37,7 @@ from glovecal_service.store.errors import (
     StoreError,
     StoreUnavailable,
 )
-from glovecal_service.store.recordings import LEAD_IN
+from glovecal_service.store.recordings import ENDED_BY, LEAD_IN, STOP_ASKED
 from glovecal_service.store.records import RecordingRecord
 from glovecal_service.store.store import Store
 
@@ -38,8 +45,31 @@ LOOK_EVERY_S = 0.05
 REPORT_EVERY_S = 1.0
 RESUME_WITHIN_S = 60.0
 """A recording interrupted for longer is finished as it is: nobody meant the hours in between."""
+GIVE_UP_AFTER_S = 7 * 86400.0
+"""What no capture log gave until then is missing."""
+FINISH_WITHIN_S = 5.0
+"""For the account and the lead-in; ten minutes of it at 120 Hz come in about as long."""
+NOTICED_AFTER_S = 2 * LOOK_EVERY_S
+"""A recorder that runs sees a stop by then, and so long one that did not run would have recorded."""
+MOST_AT_ONCE = 32
 
 _log = logging.getLogger("glovecal.recorder")
+
+
+@dataclass(frozen=True)
+class Pause:
+    """Between two attempts to repair a recording: 1 s at first, at most 10 s."""
+
+    seconds: float = 0.5
+    until: float = 0.0
+
+    @property
+    def is_over(self) -> bool:
+        return time.monotonic() >= self.until
+
+    def longer(self) -> Pause:
+        seconds = min(2 * self.seconds, 10.0)
+        return Pause(seconds, time.monotonic() + seconds)
 
 
 class Recorder:
@@ -54,15 +84,21 @@ class Recorder:
         self._looked_at = 0.0
         self._reported_at = 0.0
         self._live: dict[str, LiveRecording] = {}
-        self._unfinished: dict[str, dict[str, Any]] = {}
-        """Recordings whose file is closed and whose take is not stored yet, with their accounts."""
+        self._settling: dict[str, Future[Settlement | None]] = {}
+        """Recordings that are over: their account is made, or repaired, each in a thread of its own."""
+        self._pauses: dict[str, Pause] = {}
+        """Until the next attempt to repair a recording."""
+        self._threads = ThreadPoolExecutor(MOST_AT_ONCE, thread_name_prefix="recording")
+        self._stopping = Event()
 
     def run(self, stopped: Event) -> None:
         """Until ``stopped``; recordings that go on are left for the next process to resume."""
         while not stopped.wait(LOOK_EVERY_S):
             self.look()
+        self._stopping.set()
         for live in self._live.values():
             live.abandon()
+        self._threads.shutdown(cancel_futures=True)
         if self._store is not None:
             self._store.close()
 
@@ -94,20 +130,26 @@ class Recorder:
 
     def _follow(self, store: Store) -> None:
         revision = store.revision()
-        if revision != self._revision:
-            records = _sound_recordings(store, only_open=True)
-            settled = [self._move(store, record) for record in records]
+        if revision != self._revision or self._is_anything_due():
+            settled = [self._move(store, record) for record in _sound(store.recordings.unsettled)]
             self._revision = revision if all(settled) else None
+
+    def _is_anything_due(self) -> bool:
+        return any(future.done() for future in self._settling.values()) or any(
+            pause.is_over and id not in self._settling for id, pause in self._pauses.items()
+        )
 
     def _move(self, store: Store, record: RecordingRecord) -> bool:
         """Bring a recording one state on; False if that has to be tried again."""
         try:
-            if record.id not in self._live and record.id not in self._unfinished:
-                record = self._begin(store, record)
-            if record.state == "stopping" and record.id in self._live:
-                self._end(record)
-            if record.state == "stopping" and record.id in self._unfinished:
+            if record.id in self._settling:
                 self._finish(store, record)
+            elif record.state == "repairing":
+                self._repair(record)
+            elif record.id not in self._live:
+                self._begin(store, record)
+            elif record.state == "stopping":
+                self._end(record)
         except (StoreUnavailable, SQLAlchemyError):
             raise
         except StorageFull as error:
@@ -118,69 +160,129 @@ class Recorder:
             self._fail(store, record, str(error))
         return True
 
-    def _begin(self, store: Store, record: RecordingRecord) -> RecordingRecord:
-        keys = GloveKeys(self._settings.site, record.glove)
-        path = self._settings.recordings_folder / f"{record.id}{SUFFIX}"
+    def _begin(self, store: Store, record: RecordingRecord) -> None:
+        """Record from now on, or go on with the file of a recorder that was killed, or end that."""
+        path = self._path(record)
         interrupted = path.exists()
-        file = RecordingFile.resume(path) if interrupted else self._create(store, record, keys, path)
-        wish = LeadInWish.of_document(file.meta.get(LEAD_IN))
-        self._live[record.id] = LiveRecording(self._session, keys, file, wish)
+        if record.state == "stopping" and not interrupted:
+            raise BadInput(f"recording {record.name} was stopped before it began: nothing was recorded")
+        silent_s = (now() - record.updated_at).total_seconds()
+        if record.state == "recording" and silent_s > RESUME_WITHIN_S:
+            note = f"ended with its last frame: no recorder was running for {silent_s:.0f} s"
+            record = store.recordings.update(record.id, state="stopping", **{ENDED_BY: note})
+        if record.state == "stopping":
+            self._settling[record.id] = self._threads.submit(
+                settle,
+                path,
+                CaptureLog(self._session, self._keys(record)),
+                _stop_wall_ns(record, NOTICED_AFTER_S),
+                refused=record.facts.get("refused", 0),
+                patience=Patience(FINISH_WITHIN_S, self._stopping),
+            )
+            return
+
+        def file() -> RecordingFile:
+            return RecordingFile.resume(path) if interrupted else self._create(store, record, path)
+
+        live = self._live[record.id] = LiveRecording(self._session, self._keys(record), file)
         facts = {}
         if interrupted:
-            facts["interruptions"] = [*record.facts.get("interruptions", []), _interruption(file)]
+            facts["interruptions"] = [*record.facts.get("interruptions", []), _interruption(live.file)]
         _log.info(
             "recording %s of glove %s %s", record.name, record.glove, "resumed" if interrupted else "began"
         )
-        record = store.recordings.update(record.id, state="recording", sentence="recording", **facts)
-        silent_s = time.time() - file.last_wall_ns / 1e9
-        if interrupted and (record.state == "stopping" or silent_s > RESUME_WITHIN_S):
-            return self._end_interrupted(store, record)
-        return record
+        store.recordings.update(record.id, state="recording", sentence="recording", **facts)
 
-    def _create(self, store: Store, record: RecordingRecord, keys: GloveKeys, path: Path) -> RecordingFile:
+    def _keys(self, record: RecordingRecord) -> GloveKeys:
+        return GloveKeys(self._settings.site, record.glove)
+
+    def _path(self, record: RecordingRecord) -> Path:
+        return self._settings.recordings_folder / f"{record.id}{SUFFIX}"
+
+    def _create(self, store: Store, record: RecordingRecord, path: Path) -> RecordingFile:
+        keys = self._keys(record)
+        meta: dict[str, Any] = {"recording": record.id, "name": record.name, "glove": record.glove}
+        meta[CREATED] = time.time_ns()
         try:
-            capture = ask_json(self._session, keys.meta, timeout_s=5.0)
+            meta["capture"] = ask_json(self._session, keys.meta, timeout_s=5.0)
+            standing = CaptureLog(self._session, keys).standing()
+            meta[BEGIN] = {
+                "run_id": f"{standing.runs[-1].run_id:016x}",
+                "sequence": standing.sequence,
+                "wall_ns": time.time_ns() + standing.clock_ahead_ns,
+            }
         except NoAnswer:
-            capture = _stored_meta(store, record.glove)
-        meta: dict[str, Any] = {
-            "recording": record.id,
-            "name": record.name,
-            "glove": record.glove,
-            "capture": capture,
-        }
-        others = _sound_recordings(store, record.glove)
+            meta.setdefault("capture", _stored_meta(store, record.glove))
+        others = _sound(lambda: store.recordings.list(record.glove))
         meta[LEAD_IN] = lead_in_wish(record, store.gloves.get(record.glove), others, now()).document()
         try:
             return RecordingFile.create(path, meta)
         except OSError as error:
             raise StorageFull(f"recording {record.name}: {path.name} cannot be written: {error}") from error
 
-    def _end_interrupted(self, store: Store, record: RecordingRecord) -> RecordingRecord:
-        """Close it with the last frame it had; gaps before that are still repaired."""
-        live = self._live.pop(record.id)
-        live.repair()
-        live.abandon()
-        self._unfinished[record.id] = live.account() | {"end_known": False}
-        return store.recordings.stop(record.id)
-
     def _end(self, record: RecordingRecord) -> None:
         live = self._live.pop(record.id)
-        known = live.finish()
-        self._unfinished[record.id] = live.account() | {"end_known": known}
+        self._settling[record.id] = self._threads.submit(
+            live.finish, _stop_wall_ns(record), Patience(FINISH_WITHIN_S, self._stopping)
+        )
+
+    def _repair(self, record: RecordingRecord) -> None:
+        """Try again when it is time; a recorder that was just started tries at once."""
+        pause = self._pauses.get(record.id)
+        if pause is None or pause.is_over:
+            self._settling[record.id] = self._threads.submit(
+                repair,
+                self._path(record),
+                CaptureLog(self._session, self._keys(record)),
+                _stop_wall_ns(record, NOTICED_AFTER_S),
+                refused=record.facts.get("refused", 0),
+                stopped=self._stopping,
+                last_try=(now() - record.requested_at).total_seconds() > GIVE_UP_AFTER_S,
+            )
 
     def _finish(self, store: Store, record: RecordingRecord) -> None:
-        account = self._unfinished[record.id]
-        facts = keep_as_take(store, record, account, self._settings.recordings_folder)
-        store.recordings.update(record.id, state="done", **account, **facts)
-        del self._unfinished[record.id]
-        _log.info("recording %s: %s", record.name, facts["sentence"])
+        """Store what the thread came to, once it is through."""
+        future = self._settling[record.id]
+        if not future.done():
+            return
+        try:
+            settlement = future.result()
+        except OSError as error:
+            if record.state != "repairing":
+                raise
+            _log.warning("recording %s cannot be repaired now: %s", record.name, error)
+            settlement = None
+        if settlement is not None and not self._keep(store, record, settlement):
+            return
+        del self._settling[record.id]
+        if settlement is None or not settlement.outcome.complete:
+            self._pauses[record.id] = self._pauses.get(record.id, Pause()).longer()
+        else:
+            self._pauses.pop(record.id, None)
+
+    def _keep(self, store: Store, record: RecordingRecord, settlement: Settlement) -> bool:
+        """Store account and take; False if a user changed the take at this very moment: then once more."""
+        record = store.recordings.update(record.id, **settlement.account)
+        try:
+            facts = keep_as_take(store, record, settlement, self._settings.recordings_folder)
+        except Conflict:
+            if "take" in record.facts:
+                return False
+            raise
+        if facts["sentence"] != record.facts.get("sentence"):
+            _log.info("recording %s: %s", record.name, facts["sentence"])
+        state = "done" if settlement.outcome.complete else "repairing"
+        store.recordings.update(record.id, state=state, **facts)
+        return True
 
     def _fail(self, store: Store, record: RecordingRecord, problem: str) -> None:
         _log.warning("recording %s failed: %s", record.name, problem)
         live = self._live.pop(record.id, None)
         if live is not None:
             live.abandon()
-        account = self._unfinished.pop(record.id, {} if live is None else live.account())
+        self._settling.pop(record.id, None)
+        self._pauses.pop(record.id, None)
+        account = {} if live is None else live.account()
         store.recordings.update(record.id, state="failed", sentence=problem, **account)
 
     def _report(self, store: Store) -> None:
@@ -201,11 +303,10 @@ class Recorder:
             return
 
 
-def _sound_recordings(
-    store: Store, glove: str | None = None, *, only_open: bool = False
-) -> list[RecordingRecord]:
+def _sound(recordings: Callable[[], list[RecordingRecord]]) -> list[RecordingRecord]:
+    """Those that can be read; the others are logged."""
     try:
-        return store.recordings.list(glove, only_open=only_open)
+        return recordings()
     except DamagedRows as error:
         _log.warning("recordings that cannot be read: %s", "; ".join(error.damaged))
         return error.sound
@@ -213,6 +314,12 @@ def _sound_recordings(
 
 def _interruption(file: RecordingFile) -> dict[str, Any]:
     return {"last_frame_wall_s": file.last_wall_ns / 1e9, "resumed_wall_s": time.time()}
+
+
+def _stop_wall_ns(record: RecordingRecord, later_s: float = 0.0) -> int | None:
+    """When its end was asked for, ``later_s`` added; None: nobody asked for it."""
+    asked_s = record.facts.get(STOP_ASKED)
+    return None if asked_s is None else round((asked_s + later_s) * 1e9)
 
 
 def _stored_meta(store: Store, glove: str) -> dict[str, Any]:

@@ -16,6 +16,10 @@ from glovecal_client.wire.frame import Frame, decode_frame
 from glovecal_service.realtime.sequence_ranges import SequenceRanges
 
 SUFFIX = ".glog"
+BEGIN = "begin"
+"""Of the header: ``run_id``, ``sequence`` and ``wall_ns`` (its clock) where capture stood when the recording
+began. Where it did not say so the recording begins with the first frame that came."""
+CREATED = "created_wall_ns"
 LEFT_FREE_BYTES = 256 << 20
 """Of the disk, for frames that were asked for: hours of one glove."""
 
@@ -31,9 +35,16 @@ class RunBooks:
     repaired: int = 0
     """Of the recorded frames, those fetched from the capture log."""
     last: int = -1
-    """The last frame that belongs to the recording, as far as is known."""
+    """The last frame that belongs to the recording, as far as is known; ``first - 1``: none."""
+    last_wall_ns: int = 0
+    """Of the last frame recorded."""
+    ended: bool = False
+    """Capture said that the run is over, and that ``last`` was its last frame."""
     earlier: list[RunBooks] = field(default_factory=list)
     """What came before each jump of the publisher's numbers; the numbers jumped over were never sent."""
+
+    def __post_init__(self) -> None:
+        self.last = max(self.last, self.first - 1)
 
     def missing(self) -> list[tuple[int, int]]:
         before = [gap for books in self.earlier for gap in books.missing()]
@@ -59,18 +70,19 @@ class RunBooks:
         self.earlier.append(RunBooks(self.run_id, self.first, self.recorded, last=self.last))
         self.first, self.last, self.recorded = sequence, sequence - 1, SequenceRanges()
 
-    def enter(self, sequence: int) -> bool:
+    def enter(self, frame: Frame) -> bool:
         """Note a frame as recorded; False if it was."""
         for books in self.earlier:
-            if books.lacks(sequence):
-                return books.recorded.add(sequence)
-        if not self.recorded.add(sequence):
+            if books.lacks(frame.sequence):
+                return books.recorded.add(frame.sequence)
+        if not self.recorded.add(frame.sequence):
             return False
-        self.last = max(self.last, sequence)
+        if frame.sequence >= self.last:
+            self.last, self.last_wall_ns = frame.sequence, frame.wall_ns
         return True
 
     def document(self) -> dict[str, Any]:
-        """``sent`` equals ``recorded`` plus the frames in ``missing``."""
+        """``sent`` equals ``recorded`` plus the frames in ``missing``, which may still come."""
         return {
             "run_id": f"{self.run_id:016x}",
             "first_sequence": (*self.earlier, self)[0].first,
@@ -89,7 +101,15 @@ class RecordingFile:
         self._log = log
         self.runs: dict[int, RunBooks] = {}
         """In the order they were first met."""
+        begin = log.meta.get(BEGIN)
+        if begin is not None:
+            run_id = int(begin["run_id"], 16)
+            self.runs[run_id] = RunBooks(run_id, begin["sequence"] + 1)
+        self._begin_wall_ns = 0 if begin is None else int(begin["wall_ns"])
+        self.created_wall_ns = int(log.meta.get(CREATED) or 0)
+        """By this computer's clock."""
         self.last_wall_ns = 0
+        """Of all frames that were asked for; by the capture computer's clock."""
         self.first_frame: Frame | None = None
         """The first frame that was asked for."""
         self.lead_in = SequenceRanges()
@@ -122,7 +142,9 @@ class RecordingFile:
             return False
         else:
             lost = frame.sequence - books.last - 1
-        return lost < 0 or not PlausibleLoss(self.last_wall_ns).allows(lost, frame.wall_ns)
+        return lost < 0 or not PlausibleLoss(self.last_wall_ns or self._begin_wall_ns).allows(
+            lost, frame.wall_ns
+        )
 
     @property
     def path(self) -> Path:
@@ -146,6 +168,20 @@ class RecordingFile:
             return False
         self._log.append(message)
         return True
+
+    @property
+    def lost_records(self) -> int:
+        """Frames that the full disk did not take."""
+        return self._log.lost_records
+
+    @property
+    def has_gaps(self) -> bool:
+        return any(books.missing() for books in self.runs.values())
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether capture said that the last run met is over."""
+        return bool(self.runs) and next(reversed(self.runs.values())).ended
 
     @property
     def lead_in_s(self) -> float:
@@ -179,12 +215,13 @@ class RecordingFile:
             books = self.runs[frame.run_id] = RunBooks(frame.run_id, first)
         elif jumped:
             books.jump_to(frame.sequence)
-        if self.first_frame is None:
-            self.first_frame = self.oldest_frame = frame
         if frame.sequence < books.first and not books.lacks(frame.sequence):
             return frame.repaired and self._enter_lead_in(frame)
-        if not books.enter(frame.sequence):
+        if not books.enter(frame):
             return False
+        if books is next(iter(self.runs.values())):
+            self.first_frame = _earlier(frame, self.first_frame)
+            self.oldest_frame = _earlier(frame, self.oldest_frame)
         books.repaired += frame.repaired
         self.last_wall_ns = max(self.last_wall_ns, frame.wall_ns)
         return True
@@ -192,8 +229,7 @@ class RecordingFile:
     def _enter_lead_in(self, frame: Frame) -> bool:
         if not self.lead_in.add(frame.sequence):
             return False
-        if self.oldest_frame is None or frame.sequence < self.oldest_frame.sequence:
-            self.oldest_frame = frame
+        self.oldest_frame = _earlier(frame, self.oldest_frame)
         return True
 
     def sync(self) -> None:
@@ -208,11 +244,15 @@ class RecordingFile:
     def _count_again(self) -> None:
         self.lead_in, self.oldest_frame = SequenceRanges(), self.first_frame
         for run in self.runs.values():
-            run.repaired = 0
+            run.repaired = run.last_wall_ns = 0
             for books in (*run.earlier, run):
                 books.recorded = SequenceRanges()
         for frame in Recording.open(self.path).frames():
             self._enter(frame)
+
+
+def _earlier(frame: Frame, other: Frame | None) -> Frame:
+    return frame if other is None or frame.monotonic_ns < other.monotonic_ns else other
 
 
 def decoded(message: bytes) -> Frame | None:

@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from glovecal_models.errors import BadInput
+from glovecal_service.realtime.recording_account import Settlement
 from glovecal_service.realtime.recording_file import SUFFIX
 from glovecal_service.realtime.recording_take import read_take
 from glovecal_service.store.errors import NotFound
+from glovecal_service.store.recordings import ENDED_BY
 from glovecal_service.store.records import RecordingRecord, TakeRecord
 from glovecal_service.store.store import Store
 
 
 def keep_as_take(
-    store: Store, record: RecordingRecord, account: Mapping[str, Any], folder: Path
+    store: Store, record: RecordingRecord, settlement: Settlement, folder: Path
 ) -> dict[str, Any]:
-    """Store the recording's take, once, and return the facts that end the recording.
+    """Store the recording's take, or bring the one there is up to date; the facts that end the recording.
 
-    A subject that only the capture daemon knew is created. Raises BadInput (nothing recorded, nobody wore
-    the glove), StorageFull.
+    A subject that only the capture daemon knew is created. A recording without a frame that may still be
+    repaired has no take yet. Raises BadInput (nothing recorded, nobody wore the glove), StorageFull,
+    Conflict.
     """
+    account, sentence = settlement.account, _sentence(record, settlement)
     if not account["recorded"]:
+        if not settlement.outcome.complete and account["runs"]:
+            return {"sentence": sentence}
         raise BadInput(f"no frame of glove {record.glove} arrived; is its capture running?")
     glove = store.gloves.get(record.glove)
     subject = record.subject or glove.subject
@@ -35,29 +41,38 @@ def keep_as_take(
         raise BadInput(
             f"glove {record.glove} has not said which layout it has; frames stay in {account['file']}"
         )
-    take = _stored_before(store, subject, record.id)
+    recorded = read_take(
+        folder / f"{record.id}{SUFFIX}",
+        name=record.name,
+        wearing=record.wearing or "",
+        first_sequence=account["first_sequence"],
+    )
+    accounting = {**account, **recorded.clock}
+    take = _stored_before(store, subject, record)
+    if take is None and "take" in record.facts:
+        return {"sentence": f"{sentence}; its take was removed"}
     if take is None:
-        recorded = read_take(
-            folder / f"{record.id}{SUFFIX}",
-            name=record.name,
-            wearing=record.wearing or "",
-            first_sequence=account["first_sequence"],
-        )
         _require_subject(store, subject)
         take = store.takes.add(
             recorded.take,
             subject=subject,
             layout=layout,
             source="recording",
-            accounting={**account, **recorded.clock},
+            accounting=accounting,
             recording=record.id,
         )
-    return {"take": take.id, "sentence": _sentence(account)}
+    elif take.accounting != accounting:
+        take = store.takes.repair(take.id, recorded.take, accounting)
+    return {"take": take.id, "sentence": sentence}
 
 
-def _stored_before(store: Store, subject: str, recording: str) -> TakeRecord | None:
-    """The take of this recording, when a process died between storing it and saying so."""
-    return next((take for take in store.takes.list(subject) if take.recording == recording), None)
+def _stored_before(store: Store, subject: str, record: RecordingRecord) -> TakeRecord | None:
+    """The take of this recording, also when a process died between storing it and saying so."""
+    if "take" in record.facts:
+        with suppress(NotFound):
+            return store.takes.get(record.facts["take"])
+        return None
+    return next((take for take in store.takes.list(subject) if take.recording == record.id), None)
 
 
 def _require_subject(store: Store, subject: str) -> None:
@@ -67,9 +82,13 @@ def _require_subject(store: Store, subject: str) -> None:
         store.subjects.create(subject)
 
 
-def _sentence(account: Mapping[str, Any]) -> str:
+def _sentence(record: RecordingRecord, settlement: Settlement) -> str:
+    account, why = settlement.account, settlement.outcome.why
     counts = f"{account['sent']} frames sent, {account['recorded']} recorded ({account['repaired']} repaired)"
-    missing = f"{account['missing_frames']} missing"
-    if account.get("end_known", True):
-        return f"{counts}, {missing}"
-    return f"{counts}, {missing}; capture did not say how far it was at the end"
+    if not settlement.outcome.complete:
+        pending = f"{account['pending_frames']} still to be fetched from the capture log"
+        return f"incomplete, repairing: {counts}, {pending}; {why}"
+    told = [f"{counts}, {account['missing_frames']} missing"]
+    told += [f"the capture log cannot tell of all: {why}"] if why else []
+    told += [record.facts[ENDED_BY]] if ENDED_BY in record.facts else []
+    return "; ".join(told)

@@ -95,7 +95,11 @@ class SamplingRunner:
             self._give_up(store, live.record, str(error) or type(error).__name__)
 
     def _recordings_are_done(self, store: Store, record: SamplingRecord) -> bool:
-        return not any(store.recordings.get(id).is_open for id in record.recordings)
+        """What waits for repair is used as it is, if there is anything."""
+        recordings = [store.recordings.get(id) for id in record.recordings]
+        return not any(
+            item.is_open or (item.state == "repairing" and "take" not in item.facts) for item in recordings
+        )
 
     def _finish(self, store: Store, live: LiveSampling) -> None:
         takes, missing = keep_sampled_takes(store, live.record)

@@ -41,7 +41,7 @@ class Recording(BaseModel):
     wearing: str | None
     state: RecordingState
     facts: dict[str, Any] = Field(
-        description="`sent`, `recorded`, `repaired`, `missing`, `lead_in`, `take` ..."
+        description="`sent`, `recorded`, `repaired`, `missing`, `pending`, `lead_in`, `take`, `sentence` ..."
     )
     requested_at: datetime
     updated_at: datetime
@@ -79,5 +79,6 @@ def get_recording(id: IdInPath, store: StoreNeeded) -> RecordingRecord:
 
 @router.post("/{id}/stop", response_model=Recording, summary="Stop a recording", responses=change_problems())
 def stop_recording(id: IdInPath, store: StoreNeeded) -> RecordingRecord:
-    """Asking again changes nothing. The take is there once `state` is `done`."""
+    """Asking again changes nothing. The take is there once `state` is `done`, or `repairing`: then frames are
+    not there yet, and the take is completed, and `done`, once the capture log could be asked for them."""
     return store.recordings.stop(id)

@@ -44,7 +44,7 @@ from glovecal_service.rest.table_upload import (
     keep_table,
 )
 from glovecal_service.rest.take_import import Import, import_takes
-from glovecal_service.store.records import TakeRecord
+from glovecal_service.store.records import TakeRecord, incomplete_sentences
 
 router = APIRouter(prefix="/takes", tags=["takes"])
 
@@ -67,6 +67,9 @@ class Take(BaseModel):
     duration_s: float
     simulated: bool
     recording: str | None
+    state: Literal["complete", "repairing"] = Field(
+        description="`repairing`: frames of its recording may still be fetched from the capture log."
+    )
     accounting: dict[str, Any] | None
     facts: dict[str, Any]
     created_at: datetime | None
@@ -193,7 +196,9 @@ def get_take(id: IdInPath, store: StoreNeeded) -> TakeRecord:
     responses=problems(),
 )
 def check_one_take(id: IdInPath, store: StoreNeeded) -> dict[str, Any]:
-    return {"take": store.takes.get(id), **plain(asdict(check_take(store.takes.load(id))))}
+    record = store.takes.get(id)
+    found = plain(asdict(check_take(store.takes.load(id))))
+    return {"take": record, **found, "sentences": [*incomplete_sentences([record]), *found["sentences"]]}
 
 
 class TakeLayout(StrictBody):

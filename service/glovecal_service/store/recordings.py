@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
-from sqlalchemy import Connection, select
+from sqlalchemy import ColumnElement, Connection, select
 
 from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier
@@ -19,10 +20,24 @@ from glovecal_service.store.texts import check_text
 
 LEAD_IN = "lead_in"
 """Fact of a recording: how much of the time before it was asked for, and came."""
+STOP_ASKED = "stop_asked_s"
+"""Fact of a recording: when its end was asked for, Unix seconds of the service's clock."""
+ENDED_BY = "ended_by"
+"""Fact of a recording whose end nobody asked for: what ended it."""
 LEAD_IN_S = 60.0
 LONGEST_LEAD_IN_S = 600.0
 
-_ORDER: dict[str, int] = {"requested": 0, "recording": 1, "stopping": 2, "done": 3, "failed": 3}
+_ORDER: dict[str, int] = {
+    "requested": 0,
+    "recording": 1,
+    "stopping": 2,
+    "repairing": 3,
+    "done": 4,
+    "failed": 4,
+}
+
+
+_STOPPING = _ORDER["stopping"]
 
 
 class Recordings:
@@ -82,7 +97,8 @@ class Recordings:
         """Ask for the end of a recording; asking again, or after its end, changes nothing."""
         with self._database.write() as connection:
             revision.grow(connection)
-            return _move(connection, id, "stopping", {})
+            asked = {STOP_ASKED: time.time()} if _ORDER[_require(connection, id).state] < _STOPPING else {}
+            return _move(connection, id, "stopping", asked)
 
     def update(self, id: str, *, state: RecordingState | None = None, **facts: Any) -> RecordingRecord:
         """Report what became of it: facts are merged, the state only moves forward.
@@ -102,16 +118,21 @@ class Recordings:
         with self._database.read() as connection:
             return _require(connection, id)
 
+    def unsettled(self) -> list[RecordingRecord]:
+        """Recordings that are open, or to be repaired, newest first."""
+        return self._select(tables.recordings.c.state.in_((*OPEN_RECORDING_STATES, "repairing")))
+
     def list(self, glove: str | None = None, *, only_open: bool = False) -> list[RecordingRecord]:
         """Recordings, newest first."""
         table = tables.recordings
-        statement = select(table).order_by(table.c.requested_at.desc(), table.c.id)
-        if glove is not None:
-            statement = statement.where(table.c.glove == glove)
+        wanted = [] if glove is None else [table.c.glove == glove]
         if only_open:
-            statement = statement.where(
-                table.c.state.not_in([s for s, order in _ORDER.items() if order == 3])
-            )
+            wanted.append(table.c.state.in_(OPEN_RECORDING_STATES))
+        return self._select(*wanted)
+
+    def _select(self, *wanted: ColumnElement[bool]) -> list[RecordingRecord]:
+        table = tables.recordings
+        statement = select(table).where(*wanted).order_by(table.c.requested_at.desc(), table.c.id)
         with self._database.read() as connection:
             return sound_rows(connection, table, statement, _record)
 

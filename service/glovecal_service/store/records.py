@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import UTC, datetime
 from typing import Any, Literal
 
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import Handedness, Skeleton, hand_skeleton
 from glovecal_models.sampling.sampled_takes import is_lesson
 
-RecordingState = Literal["requested", "recording", "stopping", "done", "failed"]
+RecordingState = Literal["requested", "recording", "stopping", "repairing", "done", "failed"]
+"""``repairing``: it is over and its take can be used, but frames may still come from the capture log."""
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 
 FINISHED_JOB_STATES: tuple[JobState, ...] = ("done", "failed", "cancelled")
@@ -96,6 +98,23 @@ class TakeRecord:
         return self.reference_rows > 0 and bool(self.rotations)
 
     @property
+    def state(self) -> Literal["complete", "repairing"]:
+        """``repairing``: frames of its recording may still be fetched from the capture log."""
+        return "complete" if (self.accounting or {}).get("complete", True) else "repairing"
+
+    @property
+    def incomplete_sentence(self) -> str:
+        """What whoever works with the take has to know; "" for a complete one."""
+        if self.state == "complete":
+            return ""
+        frames = (self.accounting or {}).get("pending_frames", 0)
+        pending = f"{frames} frames, and any after its last one," if frames else "frames after its last one"
+        return (
+            f"Take {self.name} is incomplete: {pending} may still come from the capture log. What is there "
+            "is used; train again once the take is complete."
+        )
+
+    @property
     def sampling(self) -> dict[str, Any] | None:
         """What a guided sampling asked for in this take; None when it is of none."""
         return (self.accounting or {}).get("sampling")
@@ -105,6 +124,11 @@ class TakeRecord:
         """Whether a calibration can learn from it: from angles, or as a part of a whole guided sampling (a
         check of a later wearing is none)."""
         return self.has_reference or (self.sampling is not None and is_lesson(self.sampling))
+
+
+def incomplete_sentences(takes: Iterable[TakeRecord]) -> list[str]:
+    """One for each take that is being repaired."""
+    return [take.incomplete_sentence for take in takes if take.incomplete_sentence]
 
 
 @dataclass(frozen=True)
@@ -146,14 +170,20 @@ class RecordingRecord:
     wearing: str | None
     state: RecordingState
     facts: dict[str, Any]
-    """``first_sequence``, ``last_sequence``, ``sent``, ``recorded``, ``repaired``, ``missing``, ``lead_in``,
-    ``take``"""
+    """``first_sequence``, ``last_sequence``, ``sent``, ``recorded``, ``repaired``, ``missing``, ``pending``,
+    ``lead_in``, ``take``"""
     requested_at: datetime
     updated_at: datetime
 
     @property
     def is_open(self) -> bool:
         return self.state in OPEN_RECORDING_STATES
+
+    @property
+    def ended_at(self) -> datetime:
+        """When its end was asked for; else, and while it goes on, when it last reported."""
+        asked_s = self.facts.get("stop_asked_s")
+        return self.updated_at if asked_s is None else datetime.fromtimestamp(asked_s, UTC)
 
 
 @dataclass(frozen=True)

@@ -157,6 +157,24 @@ class Takes:
         total = earlier.facts.get(CLOCK_OFFSET, 0.0) - seconds
         return self._replace(earlier, take, {CLOCK_OFFSET: round(total, 9)})
 
+    def repair(self, id: str, frames: Take, accounting: Mapping[str, Any]) -> TakeRecord:
+        """Give a recorded take the frames that were fetched later; its reference and pose names stay.
+
+        ``frames`` is the whole take as recorded. Raises NotFound, StorageFull, Conflict if the take was
+        changed meanwhile.
+        """
+        earlier = self.get(id)
+        before = load_take(self._artifacts.get(earlier.artifact))
+        take = dataclasses.replace(
+            frames,
+            rotations=before.rotations,
+            reference_time_s=before.reference_time_s,
+            reference=before.reference,
+            poses=before.poses and poses_at_frames(frames.time_s, before.time_s, before.poses),
+        )
+        found = {"accounting": dict(accounting), "frames_sha256": frames_hash(take)}
+        return self._replace(earlier, take, {}, **found)
+
     def use_layout(self, id: str, layout: Layout) -> TakeRecord:
         """Read a take's rotations as ``layout`` says from now on; its frames stay as they are.
 
@@ -169,14 +187,13 @@ class Takes:
             change_rows(connection, tables.takes, tables.takes.c.id == id, {"layout": layout.name})
             return _require(connection, id)
 
-    def _replace(self, earlier: TakeRecord, take: Take, facts: dict[str, Any]) -> TakeRecord:
-        """Store ``take`` in the place of ``earlier``, whose artifact stays on file."""
+    def _replace(self, earlier: TakeRecord, take: Take, facts: dict[str, Any], **columns: Any) -> TakeRecord:
+        """Store ``take`` in the place of ``earlier``, whose artifact, if another, stays on file."""
         content = self._content(take)
-        history = [
-            *earlier.facts.get("history", []),
-            {"artifact": earlier.artifact, "until": now().isoformat()},
-        ]
-        values = {**content, "facts": {**earlier.facts, **facts, "history": history}}
+        history = earlier.facts.get("history", [])
+        if content["artifact"] != earlier.artifact:
+            history = [*history, {"artifact": earlier.artifact, "until": now().isoformat()}]
+        values = {**content, **columns, "facts": {**earlier.facts, **facts, "history": history}}
         same = (tables.takes.c.id == earlier.id) & (tables.takes.c.artifact == earlier.artifact)
         with self._database.write() as connection:
             if not change_rows(connection, tables.takes, same, values):

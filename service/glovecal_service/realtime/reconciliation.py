@@ -1,0 +1,157 @@
+"""Bringing a recording to agree with the capture log: what is not in it is fetched, or missing for good.
+
+A recording ends when somebody asked for its end, whether the recorder was running then or not. So its end is
+a time; the capture log, which has every frame with its time, tells which frame was the last one.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from threading import Event
+from typing import Protocol
+
+import zenoh
+
+from glovecal_client.errors import NoAnswer, QueryRefused, WireError
+from glovecal_client.wire.frame import Frame, encode_frame
+from glovecal_service.realtime.capture_log import CaptureStanding
+from glovecal_service.realtime.recording_file import RecordingFile, RunBooks
+
+END_OF_RUN = (1 << 63) - 1
+TRY_AGAIN_AFTER_S = 0.1
+UNANSWERED_FOR_S = 2.0
+"""A router that was restarted has everybody back by then."""
+REFUSALS = 3
+"""So often refused in a row, the frames asked for do not exist any more: their log was removed or damaged."""
+
+
+class Log(Protocol):
+    """``CaptureLog``, as far as it is needed here."""
+
+    def standing(self) -> CaptureStanding: ...
+
+    def block(self, run_id: int, first: int, last: int) -> list[Frame]: ...
+
+
+class OutOfTime(Exception):
+    """The capture log answers, but has more frames to give than could be fetched so far."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """``complete``: nothing more can come, and what the file lacks is missing for good."""
+
+    complete: bool
+    why: str = ""
+    """A clause: why it is not complete; or, where it is, what the capture log could not tell."""
+
+
+class Patience:
+    """So many seconds from now, or until ``stopped`` is set."""
+
+    def __init__(self, seconds: float, stopped: Event) -> None:
+        self._until = time.monotonic() + seconds
+        self._stopped = stopped
+
+    @property
+    def is_over(self) -> bool:
+        return self._stopped.is_set() or time.monotonic() >= self._until
+
+    def wait(self, seconds: float) -> None:
+        self._stopped.wait(seconds)
+
+
+def reconcile(file: RecordingFile, log: Log, stop_wall_ns: int | None, patience: Patience) -> Outcome:
+    """Fetch what is not in ``file``, as far as the log can be asked.
+
+    ``stop_wall_ns`` is when the end was asked for, by this computer's clock; None: the last frame there is
+    ends the recording.
+    """
+    refusals, unanswered_until = 0, time.monotonic() + UNANSWERED_FOR_S
+    while True:
+        try:
+            _reconcile_once(file, log, stop_wall_ns, patience)
+            return Outcome(True)
+        except QueryRefused as error:
+            why, refusals = str(error), refusals + 1
+            if refusals >= REFUSALS:
+                return Outcome(True, why)
+        except (NoAnswer, WireError, zenoh.ZError) as error:
+            why, refusals = str(error), 0
+        except OutOfTime:
+            return Outcome(False, "the capture log has more to give")
+        if patience.is_over or time.monotonic() > unanswered_until:
+            return Outcome(False, why)
+        patience.wait(TRY_AGAIN_AFTER_S)
+
+
+def _reconcile_once(file: RecordingFile, log: Log, stop_wall_ns: int | None, patience: Patience) -> None:
+    """Raises NoAnswer, WireError, OutOfTime; QueryRefused when all else was done."""
+    try:
+        standing = log.standing()
+    except NoAnswer:
+        if (stop_wall_ns is None or file.has_ended) and not file.has_gaps:
+            return
+        raise
+    end_ns = None if stop_wall_ns is None else stop_wall_ns + standing.clock_ahead_ns
+    if end_ns is not None:
+        _open_runs_of(file, standing, end_ns)
+    refused = None
+    for books in list(file.runs.values()):
+        try:
+            fill_gaps(file, books, log, patience)
+            if end_ns is not None and not books.ended:
+                _go_on_to(end_ns, file, books, log, standing, patience)
+        except QueryRefused as error:
+            refused = error
+    if refused is not None:
+        raise refused
+
+
+def _open_runs_of(file: RecordingFile, standing: CaptureStanding, end_ns: int) -> None:
+    """The runs that began after the last one known and before the end: they belong to the recording whole."""
+    began_ns = file.last_wall_ns or file.created_wall_ns + standing.clock_ahead_ns
+    for run in standing.runs:
+        if began_ns < run.started_wall_ns <= end_ns:
+            file.open_run(run.run_id)
+
+
+def fill_gaps(file: RecordingFile, books: RunBooks, log: Log, patience: Patience) -> int:
+    """Fetch what is missing of a run up to its last frame known; how many came. Raises as ``Log`` does."""
+    came = 0
+    for first, last in books.missing():
+        while first <= last and (block := _block(log, books, first, last, patience)):
+            came += sum(file.add(frame, encode_frame(frame)) for frame in block)
+            first = block[-1].sequence + 1
+    return came
+
+
+def _go_on_to(
+    end_ns: int,
+    file: RecordingFile,
+    books: RunBooks,
+    log: Log,
+    standing: CaptureStanding,
+    patience: Patience,
+) -> None:
+    """Fetch what was captured after the last frame known and before the end, capture's clock."""
+    if books.last_wall_ns > end_ns:
+        return
+    at = max(books.first, books.last + 1)
+    while block := _block(log, books, at, END_OF_RUN, patience):
+        for frame in block:
+            if frame.wall_ns > end_ns:
+                return
+            file.add(frame, encode_frame(frame))
+        at = block[-1].sequence + 1
+    if books.run_id == standing.runs[-1].run_id and standing.sequence > books.last:
+        if standing.disk_full:
+            raise NoAnswer("the capture computer's disk is full: frames wait there to be logged")
+        books.last = standing.sequence
+
+
+def _block(log: Log, books: RunBooks, first: int, last: int, patience: Patience) -> list[Frame]:
+    if patience.is_over:
+        raise OutOfTime
+    return log.block(books.run_id, first, last)

@@ -1,0 +1,184 @@
+"""kill -9 of the recorder, and the stop before it is back: every frame captured is in the account."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from realtime_support import eventually, part_of_service
+from recorder_support import (
+    GLOVE,
+    capture_process,
+    capturing,
+    logged,
+    recorder_settings,
+    recording_thread,
+    store_with_glove,
+)
+
+from glovecal_client import Recording
+from glovecal_client.session import open_router
+from glovecal_service.serve import recorder
+from glovecal_service.settings import Settings
+from glovecal_service.store import Store
+from glovecal_service.store.records import RecordingRecord
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Settings:
+    return recorder_settings(tmp_path)
+
+
+@pytest.fixture
+def store(settings: Settings) -> Iterator[Store]:
+    with store_with_glove(settings) as store:
+        yield store
+
+
+def begun(store: Store, name: str) -> str:
+    asked = store.recordings.request(GLOVE, name=name, lead_s=0)
+    eventually(lambda: store.recordings.get(asked.id).state == "recording", "it is recorded")
+    return asked.id
+
+
+def settled(store: Store, id: str) -> RecordingRecord:
+    eventually(lambda: store.recordings.get(id).state in ("done", "failed"), "nothing is left to repair")
+    return store.recordings.get(id)
+
+
+def check_law(settings: Settings, record: RecordingRecord, stopped_ns: int) -> None:
+    """What was numbered up to the stop is recorded or missing; nothing that is logged is missing."""
+    facts = record.facts
+    assert (record.state, facts["complete"], facts["pending"]) == ("done", True, []), facts
+    frames = [frame for log in logged(settings) for frame in Recording.open(log).frames()]
+    in_log = {(frame.run_id, frame.sequence): frame.wall_ns for frame in frames}
+    file = settings.recordings_folder / facts["file"]
+    recorded = {(frame.run_id, frame.sequence) for frame in Recording.open(file).frames()}
+    missing = {
+        (int(run["run_id"], 16), number)
+        for run in facts["runs"]
+        for first, last in run["missing"]
+        for number in range(first, last + 1)
+    }
+    assert not missing & set(in_log)
+    begins_ns = in_log[int(facts["runs"][0]["run_id"], 16), facts["first_sequence"]]
+    due = {key for key, wall_ns in in_log.items() if begins_ns <= wall_ns <= stopped_ns}
+    assert due <= recorded | missing
+    assert facts["sent"] == facts["recorded"] + facts["missing_frames"] == len(recorded) + len(missing)
+
+
+@pytest.mark.parametrize(("recorded_s", "away_s"), [(0.0, 0.0), (0.5, 0.4)])
+def test_stopped_while_the_recorder_is_away(
+    settings: Settings, store: Store, recorded_s: float, away_s: float
+) -> None:
+    with open_router([settings.zenoh]), capturing(settings):
+        with part_of_service(recorder, settings) as process:
+            id = begun(store, "killed")
+            time.sleep(recorded_s)
+            process.kill()
+            process.join()
+        time.sleep(away_s)
+        store.recordings.stop(id)
+        stopped_ns = time.time_ns()
+        time.sleep(0.3)
+        with recording_thread(settings):
+            record = settled(store, id)
+    check_law(settings, record, stopped_ns)
+    assert record.facts["missing"] == []
+    in_log = len(list(Recording.open(logged(settings)[-1]).frames()))
+    assert record.facts["last_sequence"] < in_log - 1, "what came after the stop is not asked for"
+
+
+def kill(process: subprocess.Popen[bytes]) -> None:
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+
+
+def test_while_capture_is_away_too_it_is_incomplete_and_repaired_as_soon_as_it_is_back(
+    settings: Settings, store: Store
+) -> None:
+    """Recorder and capture killed; another run of capture begins before the stop, a third one comes later."""
+    with open_router([settings.zenoh]):
+        with capture_process(settings) as capture:
+            with part_of_service(recorder, settings) as process:
+                id = begun(store, "both killed")
+                time.sleep(0.4)
+                process.kill()
+                process.join()
+            time.sleep(0.3)
+            kill(capture)
+        with capture_process(settings) as capture:
+            eventually(lambda: len(logged(settings)) == 2, "a second run")
+            time.sleep(0.3)
+            store.recordings.stop(id)
+            stopped_ns = time.time_ns()
+            time.sleep(0.3)
+            kill(capture)
+        with recording_thread(settings):
+            eventually(lambda: store.recordings.get(id).state == "repairing", "it says so")
+        record = store.recordings.get(id)
+        assert record.facts["sentence"].startswith("incomplete, repairing: ")
+        take = store.takes.get(record.facts["take"])
+        assert take.state == "repairing"
+        before = store.takes.load(take.id)
+        store.takes.attach_reference(take.id, before.time_s, ["I_MCP"], np.ones((len(before.time_s), 1)))
+        with capture_process(settings), recording_thread(settings):
+            record = settled(store, id)
+    check_law(settings, record, stopped_ns)
+    assert (record.facts["missing"], len(record.facts["runs"])) == ([], 2)
+    whole = store.takes.get(take.id)
+    assert (whole.state, whole.frames) == ("complete", record.facts["recorded"])
+    assert whole.frames > take.frames
+    assert whole.reference_rows == take.frames
+    repaired = store.takes.load(take.id)
+    assert set(before.time_s) < set(repaired.time_s)
+    np.testing.assert_array_equal(repaired.reference_time_s, before.time_s)
+
+
+def test_capture_that_ended_by_itself_needs_no_repair(settings: Settings, store: Store) -> None:
+    """Its last status said how far it came."""
+    with open_router([settings.zenoh]), recording_thread(settings):
+        with capturing(settings):
+            id = begun(store, "ended")
+            time.sleep(0.3)
+        store.recordings.stop(id)
+        stopped_ns = time.time_ns()
+        record = settled(store, id)
+    check_law(settings, record, stopped_ns)
+    assert record.facts["missing"] == []
+
+
+def test_what_the_log_does_not_have_is_missing_for_good(settings: Settings, store: Store) -> None:
+    with open_router([settings.zenoh]):
+        with capture_process(settings) as capture:
+            with part_of_service(recorder, settings) as process:
+                id = begun(store, "log removed")
+                time.sleep(0.3)
+                process.kill()
+                process.join()
+            time.sleep(0.3)
+            store.recordings.stop(id)
+            kill(capture)
+        logged(settings)[-1].unlink()
+        with capture_process(settings), recording_thread(settings):
+            record = settled(store, id)
+    assert (record.state, record.facts["missing"]) == ("done", [])
+    assert record.facts["recorded"] == record.facts["sent"] > 0
+    assert "the capture log cannot tell of all: " in record.facts["sentence"]
+    assert "was not recorded here" in record.facts["sentence"]
+
+
+def test_a_recording_stopped_before_it_began_says_so(settings: Settings, store: Store) -> None:
+    asked = store.recordings.request(GLOVE, name="too short")
+    store.recordings.stop(asked.id)
+    with open_router([settings.zenoh]), recording_thread(settings):
+        record = settled(store, asked.id)
+    assert (record.state, record.facts["sentence"]) == (
+        "failed",
+        "recording too short was stopped before it began: nothing was recorded",
+    )

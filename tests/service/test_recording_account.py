@@ -1,0 +1,199 @@
+"""The account of a recording, whatever arrives, is lost, is killed, or cannot be asked for a while.
+
+No network: the recording's file and the capture daemon's logs are real, and lie on disk.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from contextlib import ExitStack, closing
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Event
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from glovecal_client import Frame, Recording, encode_frame
+from glovecal_client.capture.log_folder import LogFolder
+from glovecal_client.capture.log_queries import LogQueries
+from glovecal_client.errors import BadName, NoAnswer, QueryRefused
+from glovecal_client.gap_repair import split_frames
+from glovecal_client.keys import GloveKeys
+from glovecal_service.realtime import reconciliation
+from glovecal_service.realtime.capture_log import CaptureRun, CaptureStanding
+from glovecal_service.realtime.reconciliation import Patience, reconcile
+from glovecal_service.realtime.recording_account import Settlement
+from glovecal_service.realtime.recording_file import BEGIN, RecordingFile
+
+MS = 1_000_000
+CLOCK_AHEAD_NS = 3_600_000 * MS
+"""The capture computer's clock is an hour ahead."""
+
+
+@dataclass
+class NumberedFrame:
+    frame: Frame
+    logged: bool
+
+
+class Capture:
+    """Numbers frames into real logs, as the daemon does; ``now_ns`` is the service's clock."""
+
+    def __init__(self, folder: Path) -> None:
+        self.open = ExitStack()
+        self.folder = self.open.enter_context(closing(LogFolder(folder, GloveKeys("lab", "g1"))))
+        self.numbered: list[NumberedFrame] = []
+        self.now_ns = 1_000_000 * MS
+        self.reachable = True
+        self.runs: list[CaptureRun] = []
+        self.restart()
+
+    def restart(self) -> None:
+        self.now_ns += 50 * MS
+        self.runs.append(CaptureRun(len(self.runs) + 1, self.now_ns + CLOCK_AHEAD_NS))
+        self.log = self.open.enter_context(closing(self.folder.create(self.runs[-1].run_id, {})))
+        self.queries = LogQueries(self.folder)
+        self.sequence = -1
+
+    def frame(self, logged: bool) -> Frame:
+        self.now_ns += 8 * MS
+        self.sequence += 1
+        wall_ns = self.now_ns + CLOCK_AHEAD_NS
+        readings = np.array([self.sequence], np.float32)
+        frame = Frame(self.sequence, self.runs[-1].run_id, self.now_ns, wall_ns, readings)
+        if logged:
+            self.log.append(encode_frame(frame))
+        self.numbered.append(NumberedFrame(frame, logged))
+        return frame
+
+    def standing(self) -> CaptureStanding:
+        self._check()
+        return CaptureStanding(tuple(self.runs), self.sequence, False, CLOCK_AHEAD_NS)
+
+    def block(self, run_id: int, first: int, last: int) -> list[Frame]:
+        self._check()
+        try:
+            return split_frames(self.queries.answer(f"run={run_id:016x};from={first};to={last}"))
+        except BadName as error:
+            raise QueryRefused(str(error)) from error
+
+    def _check(self) -> None:
+        if not self.reachable:
+            raise NoAnswer("nobody answered")
+
+
+STEPS = st.lists(
+    st.one_of(
+        st.tuples(st.just("received"), st.integers(1, 5)),
+        st.tuples(st.just("lost"), st.integers(1, 5)),
+        st.tuples(st.just("received, not logged"), st.integers(1, 2)),
+        st.tuples(st.just("lost, not logged"), st.integers(1, 2)),
+        st.tuples(st.just("killed"), st.integers(0, 5)),
+        st.tuples(st.just("restarted"), st.integers(0, 2)),
+        st.tuples(st.just("unreachable"), st.just(0)),
+    ),
+    min_size=1,
+    max_size=12,
+)
+
+
+class Story:
+    """A recording from its begin on."""
+
+    def __init__(self, folder: Path) -> None:
+        self.capture = Capture(folder)
+        for _ in range(3):
+            self.capture.frame(True)
+        self.path = folder / "recording.glog"
+        begin = {"run_id": f"{1:016x}", "sequence": self.capture.sequence}
+        self.file = self.opened(RecordingFile.create(self.path, {BEGIN: begin}))
+        self.begin = len(self.capture.numbered)
+
+    def tell(self, what: str, count: int) -> None:
+        if what == "killed":
+            self.file = self.kill(count)
+        elif what == "restarted":
+            self.capture.restart()
+        elif what == "unreachable":
+            self.capture.reachable = not self.capture.reachable
+            return
+        for _ in range(count):
+            frame = self.capture.frame("not logged" not in what)
+            if what.startswith("received"):
+                self.file.add(frame, encode_frame(frame))
+
+    def kill(self, frames_meanwhile: int) -> RecordingFile:
+        """The process is gone with what it knew; the file is left as it was."""
+        for _ in range(frames_meanwhile):
+            self.capture.frame(True)
+        return self.opened(RecordingFile.resume(self.path))
+
+    def opened(self, file: RecordingFile) -> RecordingFile:
+        """A killed process' file is closed at the very end; nothing waits in it that this would write."""
+        return self.capture.open.enter_context(closing(file))
+
+    def settle(self, stop_ns: int) -> Settlement:
+        file = RecordingFile.resume(self.path)
+        outcome = reconcile(file, self.capture, stop_ns, Patience(60.0, Event()))
+        file.close()
+        return Settlement.of(file, outcome)
+
+    def keys(self, runs: list[dict], what: str) -> set[tuple[int, int]]:
+        ranges = [(int(run["run_id"], 16), *gap) for run in runs for gap in run[what]]
+        return {(run, number) for run, first, last in ranges for number in range(first, last + 1)}
+
+
+def check(story: Story, settlement: Settlement, stop_ns: int) -> None:
+    account = settlement.account
+    lacking = story.keys(account["runs"], "missing")
+    assert account["sent"] == account["recorded"] + account["missing_frames"] + account["pending_frames"]
+    assert len(lacking) == account["missing_frames"] + account["pending_frames"]
+    if not account["complete"]:
+        assert account["missing"] == []
+        return
+    recorded = {(frame.run_id, frame.sequence) for frame in Recording.open(story.path).frames()}
+    first = (account["runs"][0]["run_id"], account["first_sequence"])
+    last = {run["run_id"]: run["last_sequence"] for run in account["runs"]}
+    for item in story.capture.numbered[story.begin :]:
+        key = (item.frame.run_id, item.frame.sequence)
+        run_id = f"{key[0]:016x}"
+        if run_id == first[0] and key[1] < first[1]:
+            continue
+        if item.logged:
+            assert key not in lacking, "nothing that is logged is missing"
+            is_due = item.frame.wall_ns <= stop_ns + CLOCK_AHEAD_NS
+            assert not is_due or key in recorded, "what was logged up to the stop is recorded"
+        elif key[1] <= last.get(run_id, -1):
+            assert key in recorded | lacking, "a number that was given is told of"
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(before=STEPS, after=STEPS)
+def test_every_frame_up_to_the_stop_is_recorded_or_missing(
+    before: list[tuple[str, int]], after: list[tuple[str, int]]
+) -> None:
+    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reconciliation, "UNANSWERED_FOR_S", -1.0)
+        story = Story(Path(folder))
+        with story.capture.open:
+            for what, count in before:
+                story.tell(what, count)
+            stop_ns = story.capture.now_ns
+            first = story.settle(stop_ns)
+            check(story, first, stop_ns)
+            assert first.account["complete"] or not story.capture.reachable
+            for what, count in after:
+                if "received" not in what and "lost" not in what:
+                    story.tell(what, count)
+                else:
+                    for _ in range(count):
+                        story.capture.frame(True)
+            story.capture.reachable = True
+            last = story.settle(stop_ns)
+            assert last.account["complete"]
+            check(story, last, stop_ns)
+            again = story.settle(stop_ns)
+            assert again.account == last.account, "a second repair changes nothing"
