@@ -6,6 +6,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from types import TracebackType
 from typing import Any
 
@@ -110,6 +111,16 @@ class PoseSubscriber:
                     f"the pose is of {pose.model_sha256!r} with {len(pose.degrees)} rotations"
                 )
         return names
+
+    def explanation(self) -> str:
+        """Why the glove is served as it is: why without a model, or not with the newest; "" if all is well.
+
+        Asks the service the first time, and knows it from then on.
+        """
+        if self._meta is None:
+            with suppress(NoAnswer):
+                self._meta = ask_json(self._session, self._keys.pose_meta, timeout_s=2.0)
+        return str((self._meta or {}).get("sentence", ""))
 
     def angles(self, pose: Pose) -> dict[str, float]:
         """Rotations by name, in degrees; empty when uncalibrated. Raises NoAnswer as ``rotations``."""

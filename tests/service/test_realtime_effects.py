@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from effect_models import HYSTERESIS, LAG, MODEL, UNITS, added, model_with
 from loop_by_hand import (
     LoopByHand,
@@ -21,6 +22,7 @@ from realtime_support import LAYOUT
 
 from glovecal_client.wire.frame import encode_frame
 from glovecal_models.calibration.predictor import GlovePredictor
+from glovecal_models.errors import BadInput
 from glovecal_service.realtime.frame_gate import TAKEOVER_AFTER_NS
 from glovecal_service.realtime.recording_file import RecordingFile
 from glovecal_service.realtime.recording_take import read_take
@@ -42,6 +44,25 @@ def test_a_stream_gives_what_the_recorded_take_gives() -> None:
     assert_published(by_hand.poses["g1"], expected)
     assert np.abs(expected[:400] - base.mean).max() > 1.0
     assert by_hand.status("g1")["skipped"] == 0
+
+
+def test_sensors_in_another_order_are_read_by_their_names() -> None:
+    """Effects that look at other sensors too: the same numbers, whatever the order of the columns."""
+    coupled = added(
+        "cross_coupling", (), (0.2, 0.1), ("I_PIP",), settings={"neighbours": ["M_MCP", "I_MCP"], **UNITS}
+    )
+    model = replace(model_with(HYSTERESIS, coupled), sensor_centre=np.array([100.0, 120.0, 140.0]))
+    readings = np.random.default_rng(3).uniform(30.0, 220.0, (200, 3))
+    time_s = np.arange(200) / 100.0
+    order = [2, 0, 1]
+    other = model.with_sensor_order([LAYOUT.sensors[column] for column in order])
+    found = GlovePredictor(model).predict_take(time_s, readings, {}, "w")
+    again = GlovePredictor(other).predict_take(time_s, readings[:, order], {}, "w")
+    np.testing.assert_allclose(again.mean, found.mean, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(again.flags, found.flags)
+    assert not np.allclose(found.mean, GlovePredictor(model_with()).predict(readings).mean)
+    with pytest.raises(BadInput, match="cannot be put in the order"):
+        model.with_sensor_order(["I_MCP", "I_PIP", "T_IP"])
 
 
 def test_before_it_is_rounded_for_the_wire_it_agrees_to_1e_9() -> None:

@@ -47,6 +47,7 @@ def settings(tmp_path_factory: pytest.TempPathFactory) -> Settings:
 @pytest.fixture(scope="module")
 def store(settings: Settings) -> Iterator[Store]:
     with Store.open(settings) as store:
+        store.layouts.put(LAYOUT)
         yield store
 
 
@@ -321,8 +322,54 @@ def test_a_glove_with_other_sensors_than_its_model_stays_uncalibrated(
     glove = WireGlove(session, settings, "g-emil", subject="emil")
     glove.say_meta(sensors=["A", "B"])
     sentence = eventually(lambda: ask_meta(session, glove).get("sentence"), "the reason")
-    assert "sends 2 sensors" in sentence
+    assert "needs sensors I_MCP, I_PIP, M_MCP, which this glove does not send" in sentence
     assert ask_meta(session, glove)["model"] is None
+
+
+def test_a_layout_is_matched_by_its_sensors_whatever_its_name_and_their_order(
+    session: zenoh.Session, settings: Settings, store: Store
+) -> None:
+    model_id = store_model(store, "gina", degrees_per_count=0.5)
+    glove = WireGlove(session, settings, "g-gina", subject="gina")
+    poses = Poses(session, glove)
+    glove.say_meta(layout="monday-frames", sensors=list(reversed(LAYOUT.sensors)))
+    meta = eventually(lambda: served(session, glove, model_id), "the glove is served")
+    assert (meta["layout"], meta["sentence"]) == ("monday-frames", "")
+    glove.send((140.0, 130.0, 120.0))
+    eventually(lambda: poses.live, "a pose")
+    expected = GlovePredictor(linear_model("gina", degrees_per_count=0.5)).predict(
+        np.array([(120.0, 130.0, 140.0)])
+    )
+    np.testing.assert_allclose(poses.live[0].degrees, expected.mean[0], rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("sensors", "why"),
+    [
+        (["I_MCP", "I_PIP"], "needs sensor M_MCP, which this glove does not send"),
+        ([*LAYOUT.sensors, "P_PIP"], "does not know sensor P_PIP, which this glove sends"),
+        ([*LAYOUT.sensors[:2], "I_PIP"], "cannot read a glove that names a sensor twice"),
+    ],
+)
+def test_where_no_model_fits_the_sentence_says_why(store: Store, sensors: list[str], why: str) -> None:
+    model_id = store_model(store, "hugo", degrees_per_count=0.5)
+    store.gloves.seen("g-hugo", {"layout": "other", "subject": "hugo"})
+    serving = choose(store, "g-hugo", {"sensors": sensors}, {})
+    assert serving.model is None
+    assert f"model {model_id[:12]} {why}" in serving.sentence
+    assert serving.sentence.startswith("subject hugo has no active model for this glove (layout other); ")
+
+
+def test_models_that_are_not_active_are_named(store: Store) -> None:
+    store.gloves.seen("g-ida", {"layout": "other", "subject": "ida"})
+    meta = {"sensors": list(LAYOUT.sensors)}
+    store.subjects.create("ida")
+    assert "subject ida has no model yet; train one" in choose(store, "g-ida", meta, {}).sentence
+    store_model(store, "ida", degrees_per_count=0.5, activate=False)
+    newest = store_model(store, "ida", degrees_per_count=0.7, activate=False)
+    sentence = choose(store, "g-ida", meta, {}).sentence
+    assert "2 models exist that would fit, activate one" in sentence
+    assert f"glovecal model activate {newest[:12]}" in sentence
 
 
 def test_a_flood_is_accounted_for_to_the_last_frame(

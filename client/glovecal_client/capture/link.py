@@ -54,6 +54,7 @@ class CaptureLink:
         self._thread: threading.Thread | None = None
         self._stopped: Callable[[], bool] = self._stop.is_set
         self._put_problem: str | None = None
+        self._served = ""
         self._open = ExitStack()
         self._frames: zenoh.Publisher | None = None
         self._documents: dict[str, zenoh.Publisher] = {}
@@ -110,6 +111,8 @@ class CaptureLink:
         opened.enter_context(
             session.declare_subscriber(keys.status, watch, allowed_origin=zenoh.Locality.REMOTE)
         )
+        served = zenoh.handlers.Callback(self._hear_pose_meta, indirect=True)
+        opened.enter_context(session.declare_subscriber(keys.pose_meta, served))
         answers = {keys.status: self._answer_status, keys.meta: self._answer_meta, keys.log: self._answer_log}
         for key, answer in answers.items():
             opened.enter_context(session.declare_queryable(key, answer))
@@ -178,6 +181,18 @@ class CaptureLink:
                 query.reply_err(str(error), encoding=REFUSAL_ENCODING)
             else:
                 query.reply(self._keys.log, found)
+
+    def _hear_pose_meta(self, sample: zenoh.Sample) -> None:
+        """How the service serves this run: once a change, what the person at the glove has to know."""
+        document = json_object(sample.payload.to_bytes()) or {}
+        if document.get("run_id") != f"{self._run[1]:016x}":
+            return
+        model, sentence = document.get("model"), str(document.get("sentence") or "")
+        told = sentence if model is None else "; ".join(filter(None, [f"model {model:.12}", sentence]))
+        served = f"poses: {'without a model' if model is None else 'calibrated'}; {told}"
+        if served != self._served:
+            self._served = served
+            self._report(served)
 
     def _hear_status(self, sample: zenoh.Sample) -> None:
         """Two captures that started while the router was away meet here; the later one gives way."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import itertools
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,6 +83,11 @@ def _names(meta: dict[str, Any], key: str, path: Path) -> tuple[str, ...]:
     return tuple(check_channel_name(name, key) for name in names)
 
 
+def _identifier(text: str) -> str:
+    """A table names no layout; its file's name, as far as it can be one, tells the user which it was."""
+    return re.sub(r"[^a-z0-9_-]+", "-", text.lower()).strip("-_")[:64] or "table"
+
+
 class _TableRecording:
     """A take table; ``c.simulated`` other than 0 in its first row marks it, and is no context."""
 
@@ -89,7 +95,7 @@ class _TableRecording:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self.layout = path.stem
+        self.layout = _identifier(path.stem)
         with path.open(encoding="utf-8-sig", newline="") as file:
             rows = csv.reader(file)
             header, first = next(rows, []), next(rows, [])

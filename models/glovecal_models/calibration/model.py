@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -87,6 +87,22 @@ class CalibrationModel:
         noise = np.array([item.regressor.noise_variance for item in self.rotations])
         return EffectCorrection(
             self.effects, self.rotation_names, SignalScale(sensors, centre, spread), noise
+        )
+
+    def with_sensor_order(self, sensors: Sequence[str]) -> CalibrationModel:
+        """The same model for readings whose columns are in the order of ``sensors``, the same names.
+
+        Raises BadInput for other names.
+        """
+        order = self.layout.sensors
+        if sorted(sensors) != sorted(order):
+            raise BadInput(f"readings of {', '.join(sensors)} cannot be put in the order {', '.join(order)}")
+        columns = [order.index(name) for name in sensors]
+        return replace(
+            self,
+            layout=replace(self.layout, sensors=tuple(sensors)),
+            sensor_centre=None if self.sensor_centre is None else self.sensor_centre[columns],
+            sensor_scale=None if self.sensor_scale is None else self.sensor_scale[columns],
         )
 
     @property

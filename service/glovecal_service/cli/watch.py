@@ -132,6 +132,7 @@ def _document(poses: PoseSubscriber, counts: _Counts, pose: Pose) -> dict[str, A
     return {
         "sequence": pose.sequence,
         "state": _state(poses, pose),
+        **({} if pose.model_sha256 else {"why": poses.explanation()}),
         "model": pose.model_sha256,
         "age_ms": pose.age_us / 1000,
         "skipped": pose.skipped,
@@ -146,8 +147,9 @@ def _picture(poses: PoseSubscriber, counts: _Counts, pose: Pose | None, glove: s
     pose = pose or poses.latest
     if pose is None:
         return Group(Text(f"{glove}: no pose yet", style="bold"))
+    why = f": {poses.explanation()}" if poses.explanation() else ""
     model = f"model {pose.model_sha256[:12]}" if pose.model_sha256 else "no model is active"
-    title = f"{glove}: {_state(poses, pose)}; {model}; age {pose.age_us / 1000:.1f} ms"
+    title = f"{glove}: {_state(poses, pose)}; {model}{why}; age {pose.age_us / 1000:.1f} ms"
     names = _names(poses, pose)
     frames = ", ".join(f"{name} {count}" for name, count in (counts.newest or {}).items())
     lines = [Text(f"frames: {frames}")] if frames else []

@@ -1,25 +1,40 @@
-"""Which model a glove is to be served with: the active one of its wearer and layout, if it is undamaged."""
+"""Which model a glove is to be served with: its wearer's newest active one that reads the glove's sensors."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from glovecal_models.calibration.artifact import load
 from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_service.realtime.pose_meta import Serving
 from glovecal_service.realtime.served_model import ServedModel
-from glovecal_service.store.errors import NotFound
+from glovecal_service.store.errors import DamagedRows, NotFound
 from glovecal_service.store.models import other_remedies
+from glovecal_service.store.records import ModelRecord
 from glovecal_service.store.store import Store
 
+Prepared = Mapping[tuple[str, tuple[str, ...]], ServedModel]
+"""Models in use, by id and by the order in which their gloves send the sensors."""
+MOST_NAMED = 4
 
-def choose(
-    store: Store, glove: str, meta: Mapping[str, Any] | None, prepared: Mapping[str, ServedModel]
-) -> Serving:
-    """How ``glove`` is to be served now; ``prepared`` holds models that are in use already, by id.
 
+@dataclass(frozen=True)
+class ActiveModel:
+    """A subject's active model of one layout."""
+
+    record: ModelRecord
+    activation: int
+    """Of two the larger one is newer."""
+    sensors: tuple[str, ...] | None
+    """None: nobody stored the layout."""
+
+
+def choose(store: Store, glove: str, meta: Mapping[str, Any] | None, prepared: Prepared) -> Serving:
+    """How ``glove`` is to be served now.
+
+    The name of a layout does not matter, nor the order of its sensors: frames are read by the sensors' names.
     A damaged or missing artifact is named in the sentence with what to do; a model that is in use stays, else
     the one that was active before it is taken. Raises StoreError when the database does not answer.
     """
@@ -28,44 +43,93 @@ def choose(
     except NotFound:
         return Serving(sentence=f"glove {glove} has not said yet which layout it has")
     subject, layout = record.subject, record.layout
-    serving = Serving(subject, layout, wearing=record.wearing)
+    serving = Serving(subject, layout, wearing=record.wearing, run_id=str((meta or {}).get("run_id") or ""))
     if layout is None:
         return replace(serving, sentence=f"glove {glove} has not said yet which layout it has")
     if subject is None:
-        return replace(serving, sentence=f"nobody wears glove {glove}; assign a subject to it")
-    layout, chain = _activations(store, subject, layout)
-    if not chain:
-        sentence = f"subject {subject} has no active model for layout {layout}; train and activate one"
+        return replace(
+            serving, sentence=f"nobody wears glove {glove}; say who: glovecal glove wear {glove} SUBJECT"
+        )
+    try:
+        models = store.models.list(subject)
+    except DamagedRows as error:
+        models = error.sound
+    if not models:
+        sentence = f"subject {subject} has no model yet; train one: glovecal train --subject {subject}"
         return replace(serving, sentence=sentence)
-    return _first_that_loads(store, chain, layout, serving, meta, prepared)
+    sent = _sensors_sent(store, layout, meta)
+    layouts = dict.fromkeys(model.layout for model in models)
+    active = [found for name in layouts if (found := _active(store, subject, name)) is not None]
+    fitting = [item for item in active if _fits(item, layout, sent)]
+    if not fitting:
+        return replace(serving, sentence=_why_none(store, serving, models, active, sent))
+    newest = max(fitting, key=lambda item: item.activation)
+    chain = _chain(store, newest.record)
+    return _first_that_loads(store, chain, newest.record.layout, serving, sent, prepared)
 
 
-def _activations(store: Store, subject: str, layout: str) -> tuple[str, list[str]]:
-    """Layout and ids of models: the active one, then what rolling back would lead to."""
-    newest = {
-        name: max((item.id for item in store.models.activations(subject, name)), default=0)
-        for name in _of_the_same_sensors(store, layout)
-        if store.models.active(subject, name) is not None
-    }
-    if not newest:
-        return layout, []
-    layout = max(newest, key=lambda name: newest[name])
-    active = store.models.active(subject, layout)
-    if active is None:
-        return layout, []
-    by_id = {item.id: item for item in store.models.activations(subject, layout)}
+def _sensors_sent(store: Store, layout: str, meta: Mapping[str, Any] | None) -> tuple[str, ...] | None:
+    """Sensors in the order of the glove's frames; None when neither it nor its layout tells."""
+    said = None if meta is None else meta.get("sensors")
+    if isinstance(said, list):
+        return tuple(map(str, said))
+    return _sensors_of(store, layout)
+
+
+def _sensors_of(store: Store, layout: str) -> tuple[str, ...] | None:
+    try:
+        return store.layouts.get(layout).sensors
+    except NotFound:
+        return None
+
+
+def _active(store: Store, subject: str, layout: str) -> ActiveModel | None:
+    record = store.models.active(subject, layout)
+    if record is None:
+        return None
+    newest = max(item.id for item in store.models.activations(subject, layout))
+    return ActiveModel(record, newest, _sensors_of(store, layout))
+
+
+def _fits(item: ActiveModel, layout: str, sent: tuple[str, ...] | None) -> bool:
+    """By its sensors; where they are not known, by the layout's name."""
+    if sent is None or item.sensors is None:
+        return item.record.layout == layout
+    return not _why_not(item.record.id, item.sensors, sent)
+
+
+def _chain(store: Store, active: ModelRecord) -> list[str]:
+    """Model ids: the active one, then what rolling back would lead to."""
+    by_id = {item.id: item for item in store.models.activations(active.subject, active.layout)}
     current, chain = by_id[max(by_id)], [active.id]
     while current.previous is not None and current.previous in by_id:
         current = by_id[current.previous]
         if current.model not in chain:
             chain.append(current.model)
-    return layout, chain
+    return chain
 
 
-def _of_the_same_sensors(store: Store, layout: str) -> list[str]:
-    """The layout, and others that read the same sensors otherwise: an examination proposes such."""
-    sensors = {record.name: set(record.document["sensors"]) for record in store.layouts.list()}
-    return [layout, *(name for name in sensors if name != layout and sensors[name] == sensors.get(layout))]
+def _why_none(
+    store: Store,
+    serving: Serving,
+    models: Sequence[ModelRecord],
+    active: Sequence[ActiveModel],
+    sent: tuple[str, ...] | None,
+) -> str:
+    """Which models there are, and why none of them can be served."""
+    misfits = {model.id: _why_not(model.id, _sensors_of(store, model.layout), sent) for model in models}
+    usable = [model for model in models if not misfits[model.id] and sent is not None]
+    said = [f"subject {serving.subject} has no active model for this glove (layout {serving.layout})"]
+    if usable:
+        count = "1 model exists" if len(usable) == 1 else f"{len(usable)} models exist"
+        newest = usable[-1].id[:12]
+        said.append(f"{count} that would fit, activate one, such as: glovecal model activate {newest}")
+    reasons = [misfits[item.record.id] for item in active if misfits[item.record.id]]
+    reasons = reasons or ([] if usable else [misfits[model.id] for model in models if misfits[model.id]])
+    said += reasons[:MOST_NAMED]
+    if len(reasons) > MOST_NAMED:
+        said.append(f"and {len(reasons) - MOST_NAMED} more that do not fit")
+    return "; ".join(said)
 
 
 def _first_that_loads(
@@ -73,22 +137,22 @@ def _first_that_loads(
     chain: list[str],
     layout: str,
     serving: Serving,
-    meta: Mapping[str, Any] | None,
-    prepared: Mapping[str, ServedModel],
+    sent: tuple[str, ...] | None,
+    prepared: Prepared,
 ) -> Serving:
     problems = []
     for model_id in chain:
-        model = prepared.get(model_id)
+        model = _in_use(prepared, model_id, sent)
         try:
             content = store.artifacts.get(model_id)
-            model = model or ServedModel.prepare(model_id, load(content, expected_id=model_id))
+            model = model or _prepare(model_id, content, sent)
         except (DamagedArtifact, NotFound, BadInput) as error:
             remedies = other_remedies(str(serving.subject), layout, can_roll_back=len(chain) > 1)
             if model is None:
                 problems.append(f"model {model_id[:12]} cannot be served: {error}{remedies}")
                 continue
             problems.append(f"model {model_id[:12]} is served as it was loaded before: {error}{remedies}")
-        misfit = _misfit(model, meta)
+        misfit = _why_not(model_id, model.sensors, sent)
         if misfit:
             return replace(serving, sentence="; ".join([*problems, misfit]))
         if model_id != chain[0]:
@@ -97,13 +161,38 @@ def _first_that_loads(
     return replace(serving, sentence="; ".join(problems))
 
 
-def _misfit(model: ServedModel, meta: Mapping[str, Any] | None) -> str:
-    """Why the model cannot read this glove, "" if it can (or the glove did not say what it sends)."""
-    sensors = None if meta is None else meta.get("sensors")
-    if not isinstance(sensors, list) or tuple(sensors) == model.sensors:
+def _in_use(prepared: Prepared, model_id: str, sent: tuple[str, ...] | None) -> ServedModel | None:
+    """The model as it is served already, reading frames whose sensors come in the order of ``sent``."""
+    for (known_id, sensors), model in prepared.items():
+        if known_id == model_id and sent in (None, sensors):
+            return model
+    return None
+
+
+def _prepare(model_id: str, content: bytes, sent: tuple[str, ...] | None) -> ServedModel:
+    model = load(content, expected_id=model_id)
+    if sent is not None and not _why_not(model_id, model.layout.sensors, sent):
+        model = model.with_sensor_order(sent)
+    return ServedModel.prepare(model_id, model)
+
+
+def _why_not(model_id: str, needed: Sequence[str] | None, sent: Sequence[str] | None) -> str:
+    """Why a model cannot read a glove, a clause; "" if it can, or if that cannot be told."""
+    if needed is None or sent is None:
         return ""
-    return (
-        f"the glove sends {len(sensors)} sensors ({', '.join(map(str, sensors[:4]))} ...), but model "
-        f"{model.model_id[:12]} reads the {len(model.sensors)} of layout {model.layout}: "
-        f"{', '.join(model.sensors)}"
-    )
+    name, count = f"model {model_id[:12]}", len(sent)
+    if len(set(sent)) != count:
+        return f"{name} cannot read a glove that names a sensor twice: {', '.join(sent)}"
+    lacking = [sensor for sensor in needed if sensor not in sent]
+    if lacking:
+        return f"{name} needs {_sensors(lacking)}, which this glove does not send"
+    unknown = [sensor for sensor in sent if sensor not in needed]
+    if unknown:
+        return f"{name} does not know {_sensors(unknown)}, which this glove sends"
+    return ""
+
+
+def _sensors(names: Sequence[str]) -> str:
+    listed = ", ".join(names[:MOST_NAMED])
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return f"sensor{'s' if len(names) > 1 else ''} {listed}{more}"

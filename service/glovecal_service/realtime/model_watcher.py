@@ -144,7 +144,8 @@ class ModelWatcher:
         model = self._models.of(glove)
         known = self._pose_metas.documents().get(glove, {})
         sentence = f"the model stays: {problem}"
-        return Serving(known.get("subject"), known.get("layout"), model, sentence, known.get("wearing"))
+        wearing, run_id = known.get("wearing"), known.get("run_id", "")
+        return Serving(known.get("subject"), known.get("layout"), model, sentence, wearing, run_id)
 
     def _serve(self, glove: str, serving: Serving) -> None:
         """Say first what the poses will mean, then let the next frame have it."""
@@ -153,8 +154,9 @@ class ModelWatcher:
         else:
             self._troubled_at.pop(glove, None)
         earlier = self._models.of(glove)
+        said = self._pose_metas.documents().get(glove, {}).get("sentence", "")
         self._pose_metas.put(glove, serving)
         self._models.put(glove, serving.model)
-        if earlier is not serving.model:
+        if earlier is not serving.model or said != serving.sentence:
             name = "no model" if serving.model is None else f"model {serving.model.model_id[:12]}"
             _log.info("glove %s: %s. %s", glove, name, serving.sentence)

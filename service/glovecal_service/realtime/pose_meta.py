@@ -22,6 +22,8 @@ class Serving:
     model: ServedModel | None = None
     sentence: str = ""
     wearing: str | None = None
+    run_id: str = ""
+    """The run of the capture daemon that this was decided for."""
 
     def document(self, glove: str) -> dict[str, Any]:
         """``rotations`` are in the order of the pose's numbers."""
@@ -33,6 +35,7 @@ class Serving:
             "subject": self.subject,
             "wearing": self.wearing,
             "layout": self.layout,
+            "run_id": self.run_id,
             "model": None if model is None else model.model_id,
             "method": None if model is None else model.method,
             "model_simulated": None if model is None else model.simulated,

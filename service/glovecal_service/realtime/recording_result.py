@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -56,7 +57,7 @@ def keep_as_take(
         take = store.takes.add(
             recorded.take,
             subject=subject,
-            layout=layout,
+            layout=_known_layout(store, subject, layout, recorded.take.sensors),
             source="recording",
             accounting=accounting,
             recording=record.id,
@@ -73,6 +74,16 @@ def _stored_before(store: Store, subject: str, record: RecordingRecord) -> TakeR
             return store.takes.get(record.facts["take"])
         return None
     return next((take for take in store.takes.list(subject) if take.recording == record.id), None)
+
+
+def _known_layout(store: Store, subject: str, said: str, sensors: Sequence[str]) -> str:
+    """The layout the glove said; where nobody stored it, the subject's newest one of the same sensors."""
+    known = {record.name: set(record.document["sensors"]) for record in store.layouts.list()}
+    same = [name for name, names in known.items() if names == set(sensors)]
+    if said in known or not same:
+        return said
+    used = [take.layout for take in store.takes.list(subject) if take.layout in same]
+    return used[-1] if used else same[0]
 
 
 def _require_subject(store: Store, subject: str) -> None:

@@ -32,6 +32,7 @@ class ServedModel:
     simulated: bool
     """The model was trained on simulated takes."""
     sensors: tuple[str, ...]
+    """In the order in which the glove sends them."""
     rotations: tuple[str, ...]
     counts: tuple[float, float] | None
     predictor: GlovePredictor
@@ -111,6 +112,6 @@ class ServedModels:
         else:
             self._models[glove] = model
 
-    def in_use(self) -> dict[str, ServedModel]:
-        """The prepared models by model id."""
-        return {model.model_id: model for model in list(self._models.values())}
+    def in_use(self) -> dict[tuple[str, tuple[str, ...]], ServedModel]:
+        """The prepared models by model id and order of the sensors."""
+        return {(model.model_id, model.sensors): model for model in list(self._models.values())}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import signal
@@ -129,6 +130,7 @@ def test_a_recorded_take_becomes_a_model_that_predicts_live(live, recorded):
         _record_with_lead_in(live)
         assert "worn by nobody" in run("glove", "wear", GLOVE, "--nobody").out
         eventually(lambda: "no model is active" in run("watch", GLOVE, "--seconds", 0.2).out, "nobody's pose")
+        assert f"nobody wears glove {GLOVE}" in run("watch", GLOVE, "--seconds", 0.3).out.replace("\n", " ")
     silent = run("watch", "left-hand", "--seconds", 0.3, "--json")
     assert (silent.code, silent.out) == (1, "")
     assert "no pose of glove left-hand came" in silent.said
@@ -165,6 +167,40 @@ def _watch_until_interrupted(live: dict[str, str]) -> None:
     said, complaints = _end(process)
     assert (process.returncode, complaints) == (0, "")
     assert all(json.loads(line) for line in said.splitlines())
+
+
+def test_a_replayed_file_is_predicted_by_the_model_trained_on_its_columns(live, tmp_path):
+    """Own columns, and a file name that is no layout's: what counts is the sensors."""
+    run = partial(glovecal, live)
+    rows = ["time_s,take,wearing,s.bend_a,s.bend_b,r.I_MCP"]
+    for frame in range(240):
+        a, b = 500 + 300 * math.sin(frame / 9), 400 + 200 * math.cos(frame / 13)
+        rows.append(f"{frame / 60:.4f},t{frame // 120},monday,{a:.3f},{b:.3f},{0.1 * a - 20:.3f}")
+    file = tmp_path / "Own Columns.frames.csv"
+    file.write_text("\n".join(rows) + "\n")
+    assert run("subject", "add", "cleo").code == 0
+    assert run("take", "import", file, "-s", "cleo").code == 0
+    trained = run("train", "-s", "cleo", "--method", "linear", "--folds", 0)
+    assert trained.code == 0, trained.err
+    (model,) = run("model", "list", "-s", "cleo", "--json").json
+    capture = ["capture", "--device", f"replay:{file}", "--glove", "replayed", "--option", "loop=yes"]
+    process = start(live, *capture, "--subject", "cleo")
+    try:
+
+        def calibrated() -> dict | None:
+            told = run("watch", "replayed", "--json", "--seconds", 0.5).out.splitlines()
+            poses = [pose for line in told if (pose := json.loads(line))["model"] == model["id"]]
+            return poses[-1] if poses else None
+
+        pose = eventually(calibrated, "poses of the model")
+        assert -1.0 < pose["degrees"]["I_MCP"] < 61.0
+        done = run("record", "replayed", "again", "--seconds", 0.3, "--json").json
+        assert done["state"] == "done"
+        takes = {take["name"]: take for take in run("take", "list", "-s", "cleo", "--json").json}
+        assert takes["again"]["layout"] == takes["t0"]["layout"] == model["layout"]
+    finally:
+        _, complaints = _end(process)
+    assert f"poses: calibrated; model {model['id'][:12]}" in complaints
 
 
 def test_a_job_is_cancelled(live, tables):
