@@ -82,3 +82,27 @@ def test_a_wait_ends_without_a_message_and_with_the_first(
     assert (found.key, found.payload) == ("glovecal/lab/g1/raw", b"one")
     assert arrivals.drain() == []
     arrivals.close()
+
+
+def test_one_glove_alone_can_be_listened_to_and_waited_for(
+    sessions: tuple[zenoh.Session, zenoh.Session],
+) -> None:
+    router, client = sessions
+    arrivals = Arrivals(client, "glovecal/lab/g1/raw")
+    router.put("glovecal/lab/g1/raw", b"one")
+    assert [item.payload for item in all_of(arrivals, 1)] == [b"one"]
+    assert arrivals.wait() is None
+    assert arrivals.drain() == []
+    arrivals.close()
+
+
+def test_what_waits_at_the_end_can_still_be_taken(sessions: tuple[zenoh.Session, zenoh.Session]) -> None:
+    router, client = sessions
+    arrivals, other = Arrivals(router, RAW), Arrivals(router, RAW)
+    client.put("glovecal/lab/g1/raw", b"one")
+    all_of(other, 1)
+    arrivals.close()
+    assert [item.payload for item in arrivals.drain()] == [b"one"]
+    assert arrivals.drain() == []
+    arrivals.close()
+    other.close()

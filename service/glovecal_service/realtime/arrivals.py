@@ -38,9 +38,10 @@ class Arrivals:
         self._clock_id = str(session.zid())
         self._looked_ns = time.monotonic_ns()
         self._closed = Event()
+        self._left: list[Arrival] = []
         self._alarm: Thread | None = None
-        # no glove can have this name
-        self._alarm_key = key_expression.replace("*", f"ALARM-{secrets.token_hex(8)}", 1)
+        self._alarm_key = key_expression.replace("*", "ALARM")  # no glove can have this name
+        self._alarm_payload = secrets.token_bytes(16)
         self._subscriber = session.declare_subscriber(key_expression, zenoh.handlers.RingChannel(limit))
 
     def wait(self) -> Arrival | None:
@@ -50,11 +51,19 @@ class Arrivals:
             self._alarm.start()
         sample = self._subscriber.recv()
         self._looked_ns = time.monotonic_ns()
-        key = str(sample.key_expr)
-        return None if key == self._alarm_key else Arrival(key, sample.payload.to_bytes(), self._looked_ns)
+        payload = sample.payload.to_bytes()
+        if payload == self._alarm_payload:
+            return None
+        return Arrival(str(sample.key_expr), payload, self._looked_ns)
 
     def drain(self) -> list[Arrival]:
         """All messages that are waiting, oldest first; does not wait."""
+        if self._closed.is_set():
+            left, self._left = self._left, []
+            return left
+        return self._take()
+
+    def _take(self) -> list[Arrival]:
         samples: list[zenoh.Sample] = []
         receive = self._subscriber.try_recv
         while len(samples) < self._limit and (sample := receive()) is not None:
@@ -66,14 +75,14 @@ class Arrivals:
         wall_less_monotonic_ns = time.time_ns() - now_ns
         taken: list[Arrival] = []
         for sample in samples:
-            key = str(sample.key_expr)
-            if key != self._alarm_key:
+            payload = sample.payload.to_bytes()
+            if payload != self._alarm_payload:
                 received_ns = (
                     self._stamped_ns(sample, now_ns + wall_less_monotonic_ns) - wall_less_monotonic_ns
                 )
                 # whatever a stamp says, it came after the look before and is here now
                 received_ns = min(max(received_ns, looked_ns), now_ns)
-                taken.append(Arrival(key, sample.payload.to_bytes(), received_ns))
+                taken.append(Arrival(str(sample.key_expr), payload, received_ns))
         return taken
 
     def _stamped_ns(self, sample: zenoh.Sample, now_ns: int) -> int:
@@ -86,10 +95,18 @@ class Arrivals:
     def _sound_alarms(self) -> None:
         """zenoh's channels cannot be waited for with a limit of time; this ends the wait."""
         while not self._closed.wait(LONGEST_WAIT_S):
-            self._session.put(self._alarm_key, b"", allowed_destination=zenoh.Locality.SESSION_LOCAL)
+            self._session.put(
+                self._alarm_key, self._alarm_payload, allowed_destination=zenoh.Locality.SESSION_LOCAL
+            )
 
     def close(self) -> None:
-        """Stop receiving. Not while another thread waits: its ``wait`` would raise zenoh.ZError."""
+        """Stop receiving; what waits can still be drained.
+
+        Not while another thread waits: its ``wait`` would raise zenoh.ZError.
+        """
+        if self._closed.is_set():
+            return
+        self._left = self._take()  # zenoh throws its ring away
         self._closed.set()
         if self._alarm is not None:
             self._alarm.join()
