@@ -35,13 +35,15 @@ class Ground:
         if not joints:
             raise BadInput("no take measured a rotation of this layout; a diagnosis needs r.ROTATION columns")
         bridge = bridge_s(takes)
-        joints = tuple(name for name in joints if _is_fitted(takes, layout, name, bridge))
-        if not joints:
+        even = [evened(take, layout.sensors, joints, bridge) for take in takes]
+        fitted = _fitted_columns(even)
+        if not fitted.any():
             raise BadInput(
                 f"no reference lasts for {SMOOTHING / RATE_HZ:.2g} s without a gap; a diagnosis needs"
                 " references that are measured several times a second"
             )
-        even = tuple(evened(take, layout.sensors, joints, bridge) for take in takes)
+        even = tuple(replace(take, reference=take.reference[:, fitted]) for take in even)
+        joints = tuple(name for name, is_fitted in zip(joints, fitted, strict=True) if is_fitted)
         return cls(even, layout, joints, linear, tuple(known))
 
     @property
@@ -72,10 +74,10 @@ class Ground:
         return self.beside(KnownEffect(effect(first.effect), where, shapes))
 
 
-def _is_fitted(takes: Sequence[Take], layout: Layout, joint: str, bridge_s: float) -> bool:
-    """Whether enough is left of its reference on even times, smoothed."""
-    even = (smoothed(evened(take, layout.sensors, [joint], bridge_s), SMOOTHING) for take in takes)
-    return sum(int(np.isfinite(take.reference[::EVERY]).sum()) for take in even) > 1
+def _fitted_columns(even: Sequence[EvenTake]) -> np.ndarray:
+    """(R,) whether enough is left of each joint's reference once it is smoothed."""
+    known = [np.isfinite(smoothed(take, SMOOTHING).reference[::EVERY]).sum(axis=0) for take in even]
+    return np.sum(known, axis=0) > 1
 
 
 def measured_joints(takes: Sequence[Take], layout: Layout) -> tuple[str, ...]:

@@ -26,7 +26,7 @@ SHAPES = settings(
     derandomize=True,
     deadline=None,
     database=None,
-    suppress_health_check=list(HealthCheck),
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
     phases=(Phase.explicit, Phase.generate),
 )
 
@@ -74,7 +74,7 @@ class AnyTakes:
     def _column(
         self, random: np.random.Generator, kind: str, time: np.ndarray, first: np.ndarray | None
     ) -> np.ndarray:
-        noise = lfilter([1.0], [1.0, -self.memory], random.normal(size=len(time))) * self.noise
+        noise = self.noise * np.asarray(lfilter([1.0], [1.0, -self.memory], random.normal(size=len(time))))
         if first is not None and kind == "same as A":
             return first + noise
         if first is not None and kind == "exact line":
