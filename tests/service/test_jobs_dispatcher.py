@@ -98,6 +98,7 @@ def test_a_refusal_is_passed_on_and_a_mistake_is_called_one(dispatched, ledger):
     broken = wait_for_job(store, create(store, ledger, [2], ending="break").id)
     assert broken.error == "an error in Glovecal itself: ZeroDivisionError: a mistake in the program"
     assert refused.traceback is None, "its sentence says everything"
+    assert broken.traceback is not None
     assert "in count\n" in broken.traceback, "the calls inside the worker process"
     assert broken.traceback.rstrip().endswith("ZeroDivisionError: a mistake in the program")
     unknown = wait_for_job(store, store.jobs.create("knit", {}).id)
