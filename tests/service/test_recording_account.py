@@ -108,7 +108,7 @@ class Story:
         for _ in range(3):
             self.capture.frame(True)
         self.path = folder / "recording.glog"
-        wall_ns = self.capture.numbered[-1].wall_ns
+        wall_ns = self.capture.numbered[-1].frame.wall_ns
         begin = {"run_id": f"{1:016x}", "sequence": self.capture.sequence, "wall_ns": wall_ns}
         self.file = self.opened(RecordingFile.create(self.path, {BEGIN: begin}))
         self.begin = len(self.capture.numbered)
