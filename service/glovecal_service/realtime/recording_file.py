@@ -11,7 +11,7 @@ from typing import Any
 from glovecal_client.errors import WireError
 from glovecal_client.frame_log import FrameLog
 from glovecal_client.log_records import Recording
-from glovecal_client.plausible_loss import PlausibleLoss
+from glovecal_client.plausible_loss import BURST_FRAMES, PlausibleLoss
 from glovecal_client.wire.frame import Frame, decode_frame
 from glovecal_service.realtime.sequence_ranges import SequenceRanges
 
@@ -142,6 +142,8 @@ class RecordingFile:
             return False
         else:
             lost = frame.sequence - books.last - 1
+            if lost < 0 and not books.recorded_frames:  # on its way when capture said where it stood
+                return -lost > BURST_FRAMES
         return lost < 0 or not PlausibleLoss(self.last_wall_ns or self._begin_wall_ns).allows(
             lost, frame.wall_ns
         )
