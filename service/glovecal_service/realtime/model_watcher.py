@@ -115,7 +115,7 @@ class ModelWatcher:
         if time.monotonic() < self._artifacts_at:
             return
         self._artifacts_at = time.monotonic() + TRY_AGAIN_AFTER_S
-        damaged = {id for id in self._models.in_use() if not store.artifacts.is_sound(id)}
+        damaged = {id for id, _ in self._models.in_use() if not store.artifacts.is_sound(id)}
         if damaged != self._damaged:
             self._to_choose |= self._gloves
         self._damaged = damaged
