@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NoReturn
 
@@ -15,6 +15,23 @@ SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 # tests start some 150 processes: each would compile all packages anew where compiled files are not kept
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+
+MASK = os.umask(0o022)
+os.umask(MASK)
+SAFE_PATH = "PYTHONSAFEPATH"
+
+
+@pytest.fixture(autouse=True)
+def process_as_it_was() -> Iterator[None]:
+    """A command sets its process's umask and import path; here many commands and tests share one process."""
+    _reset_process()
+    yield
+    _reset_process()
+
+
+def _reset_process() -> None:
+    os.umask(MASK)
+    os.environ.pop(SAFE_PATH, None)
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

@@ -54,12 +54,13 @@ def test_workers_train_the_model_that_one_process_trains(trained, method):
 
 
 def test_a_take_that_is_being_repaired_is_used_with_a_sentence(trained):
+    trained.subjects.create("dora")
     accounting = {"complete": False, "pending_frames": 38}
     take = trained.takes.add(
-        make_take(7), subject="ben", layout=LAYOUT.name, source="recording", accounting=accounting
+        make_take(7), subject="dora", layout=LAYOUT.name, source="recording", accounting=accounting
     )
     assert take.state == "repairing"
-    payload = {"subject": "ben", "layout": LAYOUT.name, "takes": [take.id], "method": "linear", "folds": 0}
+    payload = {"subject": "dora", "layout": LAYOUT.name, "takes": [take.id], "method": "linear", "folds": 0}
     result = result_of(trained, trained.jobs.create("train", payload).id)
     assert [text for text in result["sentences"] if "incomplete" in text] == [
         f"Take {take.name} is incomplete: 38 frames, and any after its last one, may still come from the "

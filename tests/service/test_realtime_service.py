@@ -397,7 +397,8 @@ def test_a_flood_is_accounted_for_to_the_last_frame(
 
     books = eventually(settled, "the flood is over")
     assert 0 < books["received"] <= 3000
-    assert books["predicted"] + books["skipped"] == books["received"]
+    refused = sum(books["refused"].values())  # after a loss, faster than any glove
+    assert books["predicted"] + books["skipped"] + refused == books["received"]
     glove.send()
     poses = Poses(session, glove)
     eventually(lambda: poses.all or (glove.send() and None), "served after the flood")

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import httpx
@@ -86,9 +87,10 @@ def listener(process: subprocess.Popen[str], port: int) -> int:
         if line.split()[1].endswith(wanted) and line.split()[3] == "0A"
     }
     for child in children(process):
-        links = [os.readlink(entry) for entry in Path(f"/proc/{child}/fd").iterdir() if entry.is_symlink()]
-        if any(f"socket:[{inode}]" in links for inode in inodes):
-            return child
+        with suppress(FileNotFoundError):  # it ends while it is looked at
+            links = [os.readlink(entry) for entry in Path(f"/proc/{child}/fd").iterdir()]
+            if any(f"socket:[{inode}]" in links for inode in inodes):
+                return child
     return 0
 
 

@@ -15,7 +15,7 @@ def imported(client: RestClient, folder: Path, name: str, offset_s: float) -> st
     generator = np.random.default_rng(len(name))
     time = np.arange(600) / 60
     motion = np.cumsum(generator.normal(size=700))
-    angle = np.interp(np.arange(600) + 50, np.arange(700), np.convolve(motion, np.ones(40) / 4, "same"))
+    angle = np.interp(np.arange(600) + 50, np.arange(700), np.convolve(motion, np.ones(40) / 8, "same"))
     frames, reference = folder / f"{name}.frames.csv", folder / f"{name}.reference.csv"
     sensor = 100 + angle + 0.1 * generator.normal(size=600)
     np.savetxt(frames, np.c_[time, sensor], delimiter=",", header="time_s,s.A", comments="")
