@@ -21,6 +21,14 @@ from glovecal_service.cli.printing import out
 Settings = dict[str, str]
 
 
+@pytest.fixture(autouse=True)
+def nothing_is_left_to_print() -> Iterator[None]:
+    """What a closed pipe did not take waits in the console, which here outlives the command."""
+    yield
+    out.begin_capture()
+    out.end_capture()
+
+
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Settings, str]:
     """Settings of a folder with a linear model of ``anna``, and the model's id."""
