@@ -9,10 +9,11 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
@@ -47,10 +48,10 @@ class Said:
 
 
 @pytest.fixture(scope="module")
-def smoke() -> Iterator[dict[str, Future[Said]]]:
+def smoke(not_here: Callable[[str], NoReturn]) -> Iterator[dict[str, Future[Said]]]:
     """All verbs, begun at once; nothing may be installed on the way."""
     if not (ROOT / ".venv").is_dir() or not (ROOT / ".tools" / "uv").is_dir():
-        pytest.skip("needs the environment that do.py makes")
+        not_here("needs the environment that do.py makes")
     before = _installed()
     with ThreadPoolExecutor(2) as pool:
         yield {verb: pool.submit(_run, verb) for verb in VERBS}
