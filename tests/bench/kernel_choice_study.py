@@ -30,7 +30,7 @@ from glovecal_models.calibration.kernel_choice import try_candidates
 from glovecal_models.calibration.representative import representative_index
 from glovecal_models.calibration.sample_weight import Recorded, fit_weighted
 from glovecal_models.calibration.samples import gather_samples
-from glovecal_models.effects.clock_scan import aligned, clock_offsets
+from glovecal_models.effects.delay.clock_scan import aligned, clock_offsets
 from glovecal_models.errors import NotTrainable
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.regression.kernel_candidates import CANDIDATES

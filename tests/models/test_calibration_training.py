@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from glovecal_models.calibration.artifact import dump, load, model_id, read_manifest
-from glovecal_models.calibration.comparison import compare
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_plan import plan_training
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.comparison.compare import compare
 from glovecal_models.errors import BadInput, Cancelled, DamagedArtifact, LayoutMismatch, NotTrainable
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from glovecal_models.calibration.left_out import first_measured, pieces
 from glovecal_models.calibration.realigned import offset_of
 from glovecal_models.calibration.samples import gather_samples
 from glovecal_models.calibration.training import train
@@ -17,8 +18,7 @@ from glovecal_models.comparison.covariates import covariates
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.evened import evened
-from glovecal_models.diagnosis.left_out import first_measured, pieces
-from glovecal_models.effects.clock_scan import clock_offsets
+from glovecal_models.effects.delay.clock_scan import clock_offsets
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.cause import Cause
 from glovecal_models.simulation.session import record_session

@@ -18,11 +18,11 @@ from paper_session import LAYOUT, SKELETON, PaperSession, paper_session
 from table_3 import PAPER_DEG, SETTLED
 
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.pose_book import own_poses
 from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_models.calibration.quick_check import quick_check
 from glovecal_models.calibration.sensor_sensitivity import sensor_sensitivity
 from glovecal_models.hand.rotations import completed
+from glovecal_models.quick_check.pose_book import own_poses
+from glovecal_models.quick_check.quick_check import quick_check
 from glovecal_models.sampling.catalogue import make_protocol
 from glovecal_models.sampling.sampled_takes import sampled_takes
 from glovecal_models.simulation.asked_session import RECORDING, asked_session

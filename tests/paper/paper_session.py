@@ -24,8 +24,6 @@ from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.samples import Samples, gather_samples
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import Method, TrainingSettings
-from glovecal_models.guided.guided_calibration import GuidedSamples, guided_samples
-from glovecal_models.guided.taught_take import TaughtTake
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import HAND_ROTATIONS, completed
 from glovecal_models.hand.skeleton import Skeleton, hand_skeleton
@@ -33,6 +31,8 @@ from glovecal_models.inverse_kinematics.steadied import steadied
 from glovecal_models.inverse_kinematics.tip_chains import TipChains
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.catalogue import Equipment, make_protocol
+from glovecal_models.sampling.guided.guided_calibration import GuidedSamples, guided_samples
+from glovecal_models.sampling.guided.taught_take import TaughtTake
 from glovecal_models.sampling.sampled_takes import sampled_takes
 from glovecal_models.simulation.asked_session import RECORDING, asked_session
 from glovecal_models.simulation.postures import KEY_POSES, POSTURES

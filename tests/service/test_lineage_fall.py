@@ -9,7 +9,7 @@ from effect_models import added, model_with
 from loop_by_hand import moving_frames
 from realtime_support import LAYOUT
 
-from glovecal_models.calibration.comparison import compare
+from glovecal_models.comparison.compare import compare
 from glovecal_models.takes.take import Take
 from glovecal_service.report.lineage_fall import lineage_fall
 

@@ -12,7 +12,7 @@ from loop_by_hand import LoopByHand, as_take, assert_published, degrees, moving_
 
 from glovecal_client.wire.pose import RotationFlag
 from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_models.effects.expression_effect import ExpressionEffect
+from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 from glovecal_models.effects.hysteresis import Hysteresis
 from glovecal_models.errors import BadInput
 from glovecal_service.realtime.served_model import ServedModel

@@ -13,7 +13,7 @@ from realtime_support import LAYOUT
 from glovecal_client.wire.frame import Frame
 from glovecal_client.wire.pose import PoseFlag, RotationFlag
 from glovecal_models.calibration.predictor import FAULTY_SENSOR, GloveAngles, GlovePredictor
-from glovecal_models.effects.fault_watch import FaultLimits
+from glovecal_models.effects.sensor_fault.fault_watch import FaultLimits
 
 LIMITS = FaultLimits(
     sensors=LAYOUT.sensors,

@@ -7,7 +7,7 @@ from loop_by_hand import LoopByHand, assert_published, moving_frames
 from realtime_support import LAYOUT, linear_model
 
 from glovecal_models.calibration.predictor import GloveAngles, GlovePredictor
-from glovecal_models.calibration.quick_check import quick_check
+from glovecal_models.quick_check.quick_check import quick_check
 from glovecal_models.takes.take import Take
 
 SHIFT = np.array([12.0, -9.0, 0.0])

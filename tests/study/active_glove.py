@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.active_sampling.candidates import candidate_steps
-from glovecal_models.active_sampling.known_readings import known_from_takes
-from glovecal_models.active_sampling.next_step import NextStep
-from glovecal_models.active_sampling.posterior_mean import assumed_angles
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.errors import NotTrainable
-from glovecal_models.guided.guided_calibration import guided_calibration
-from glovecal_models.guided.taught_take import TaughtTake
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.layout import Layout
+from glovecal_models.sampling.active.candidates import candidate_steps
+from glovecal_models.sampling.active.known_readings import known_from_takes
+from glovecal_models.sampling.active.next_step import NextStep
+from glovecal_models.sampling.active.posterior_mean import assumed_angles
 from glovecal_models.sampling.catalogue import make_protocol
 from glovecal_models.sampling.growing import Choose, NextSteps
+from glovecal_models.sampling.guided.guided_calibration import guided_calibration
+from glovecal_models.sampling.guided.taught_take import TaughtTake
 from glovecal_models.sampling.protocol import Protocol
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.sampled_takes import sampled_takes

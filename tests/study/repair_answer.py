@@ -13,14 +13,14 @@ import numpy as np
 from blind_glove import BlindGlove
 from repair_constants import repair_constants
 
+from glovecal_models.calibration.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
+from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_effect import add_effect
-from glovecal_models.improvement.held_out_check import HeldOutErrors, held_out_errors
-from glovecal_models.improvement.prepared_takes import PreparedTakes
 
 SAMPLES = 300
 """Representative frames: joints of one sensor reach the floor with so many, in seconds."""

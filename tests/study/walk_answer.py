@@ -8,9 +8,9 @@ from blind_glove import BlindGlove
 from diagnosis_answer import diagnosis_answer
 from repair_answer import training_settings
 
-from glovecal_models.improvement.held_out_check import held_out_errors
+from glovecal_models.calibration.held_out_check import held_out_errors
+from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.improvement.improve import improve
-from glovecal_models.improvement.prepared_takes import PreparedTakes
 
 
 def walk_answer(glove: BlindGlove) -> dict[str, Any]:

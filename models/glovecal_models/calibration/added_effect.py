@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from glovecal_models.effects.base.effect import Effect, Settings
+from glovecal_models.effects.base.interval_effect import IntervalEffect
 from glovecal_models.effects.catalogue import stored_effect
-from glovecal_models.effects.effect import Effect, Settings
-from glovecal_models.effects.interval_effect import IntervalEffect
 from glovecal_models.errors import BadInput
 
 

@@ -11,7 +11,7 @@ from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.doubt import Doubt
 from glovecal_models.calibration.fault_hold import FaultHold
 from glovecal_models.calibration.widening import Widening
-from glovecal_models.effects.effect import Effect, GloveFrames, Signals, Stream, Uncertainty
+from glovecal_models.effects.base.effect import Effect, GloveFrames, Signals, Stream, Uncertainty
 from glovecal_models.errors import BadInput
 
 LARGEST_CORRECTION_DEG = 360.0

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glovecal_models.effects.effect import Settings
-from glovecal_models.effects.fault_watch import FaultLimits, FaultWatch
+from glovecal_models.effects.base.effect import Settings
+from glovecal_models.effects.sensor_fault.fault_watch import FaultLimits, FaultWatch
 
 
 class Held(NamedTuple):

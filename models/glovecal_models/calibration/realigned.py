@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.effects.clock_scan import aligned
-from glovecal_models.effects.signature_effect import SignatureEffect
+from glovecal_models.effects.base.signature_effect import SignatureEffect
+from glovecal_models.effects.delay.clock_scan import aligned
 from glovecal_models.takes.take import Take
 
 CLOCK_OFFSET = "clock_offset"

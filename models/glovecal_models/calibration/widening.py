@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect
-from glovecal_models.effects.interval_effect import Interval, IntervalEffect
+from glovecal_models.effects.base.interval_effect import Interval, IntervalEffect
 
 
 class Widening:

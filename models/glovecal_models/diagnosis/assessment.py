@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import wilcoxon
 
-from glovecal_models.diagnosis.held_out import saved_share
+from glovecal_models.calibration.held_out import saved_share
 
 LEAST_CONTRAST = 0.04
 """Share of the squared error a cause must save beyond its decoy."""

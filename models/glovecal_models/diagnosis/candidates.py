@@ -15,8 +15,8 @@ from glovecal_models.diagnosis.next_take import NextTake
 from glovecal_models.diagnosis.screening import Evidence, screen
 from glovecal_models.diagnosis.session_chance import session_probability
 from glovecal_models.diagnosis.undecidable import undecidable
-from glovecal_models.effects.columnless_effect import ColumnlessEffect
-from glovecal_models.effects.effect import Effect
+from glovecal_models.effects.base.columnless_effect import ColumnlessEffect
+from glovecal_models.effects.base.effect import Effect
 
 BLOCK_ROWS = 125
 """5 s of the rows that are fitted."""

@@ -21,9 +21,9 @@ from glovecal_models.diagnosis.reference_problems import reference_problems
 from glovecal_models.diagnosis.signatures import are_held_levels, jump_beside_curve, signature_findings
 from glovecal_models.diagnosis.something_left import not_told, something_left
 from glovecal_models.diagnosis.undecided import as_known, deciding, likelier
+from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.effects.context_dependence import ContextDependence, unfamiliar_columns
-from glovecal_models.effects.effect import Effect
 from glovecal_models.errors import Cancelled
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take

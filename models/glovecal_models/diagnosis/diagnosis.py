@@ -13,7 +13,7 @@ from glovecal_models.diagnosis.naming import Naming
 from glovecal_models.diagnosis.next_take import NextTake
 from glovecal_models.diagnosis.signatures import AFTER_ALL, may_be_slip
 from glovecal_models.diagnosis.something_left import Left
-from glovecal_models.effects.signature_effect import Finding
+from glovecal_models.effects.base.signature_effect import Finding
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from glovecal_models.diagnosis.assessment import FEWEST_BLOCKS, Assessment
 from glovecal_models.diagnosis.candidates import NotJudgeable
 from glovecal_models.diagnosis.hold_drift_document import hold_document, hold_named, hold_sentence
 from glovecal_models.diagnosis.pose_labels import UNITS
-from glovecal_models.effects.signature_effect import Finding
+from glovecal_models.effects.base.signature_effect import Finding
 
 if TYPE_CHECKING:
     from glovecal_models.diagnosis.diagnosis import Diagnosis

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.diagnosis.base_features import BaseFeatures
+from glovecal_models.calibration.base_features import BaseFeatures
+from glovecal_models.calibration.held_out import BaseProducts, Rows
+from glovecal_models.calibration.left_out import are_short, first_measured, pieces
 from glovecal_models.diagnosis.evened import EvenTake
-from glovecal_models.diagnosis.held_out import BaseProducts, Rows
 from glovecal_models.diagnosis.known_effect import KnownEffect
-from glovecal_models.diagnosis.left_out import are_short, first_measured, pieces
-from glovecal_models.effects.effect import Signals
+from glovecal_models.effects.base.effect import Signals
 from glovecal_models.layout import Correspondence, Layout
 
 EVERY = 2

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.effects.history_effect import LONGEST_GAP_S
+from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
 from glovecal_models.takes.take import Take
 
 RATE_HZ = 50.0

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.effects.effect import Effect, Signals
+from glovecal_models.effects.base.effect import Effect, Signals
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from glovecal_models.calibration.held_out import HeldOut, held_out
 from glovecal_models.diagnosis.directions import Direction
-from glovecal_models.diagnosis.held_out import HeldOut, held_out
-from glovecal_models.effects.decoy import decoy_columns
-from glovecal_models.effects.effect import Effect, Settings, Signals
+from glovecal_models.effects.base.decoy import decoy_columns
+from glovecal_models.effects.base.effect import Effect, Settings, Signals
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
+from glovecal_models.calibration.held_out import ALIKE_ROWS, BaseProducts
 from glovecal_models.diagnosis.directions import Direction
-from glovecal_models.diagnosis.held_out import ALIKE_ROWS, BaseProducts
 
 EVERY = 5
 """Neighbouring rows are about equally unfamiliar."""

@@ -13,9 +13,9 @@ import numpy as np
 
 from glovecal_models.comparison.wearings import other_deals, partition_of
 from glovecal_models.diagnosis.directions import Direction
-from glovecal_models.effects.decoy import motions_of, with_context
-from glovecal_models.effects.effect import Effect, Signals
-from glovecal_models.effects.history_effect import LONGEST_GAP_S
+from glovecal_models.effects.base.decoy import motions_of, with_context
+from glovecal_models.effects.base.effect import Effect, Signals
+from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
 
 DEALS = 299
 ROWS_PER_TAKE = 80

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from glovecal_models.calibration.left_out import held_levels
 from glovecal_models.diagnosis.assessment import LEAST_SESSION_CONTRAST, Assessment
-from glovecal_models.diagnosis.left_out import held_levels
 from glovecal_models.diagnosis.naming import Naming
+from glovecal_models.effects.base.signature_effect import Finding, SignatureEffect
 from glovecal_models.effects.catalogue import catalogue
-from glovecal_models.effects.signature_effect import Finding, SignatureEffect
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 

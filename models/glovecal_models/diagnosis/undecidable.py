@@ -15,7 +15,7 @@ import numpy as np
 from glovecal_models.diagnosis.assessment import SESSION_PROBABILITY, WEARING_PROBABILITY
 from glovecal_models.diagnosis.next_take import MORE_TAKES, MORE_WEARINGS, NextTake
 from glovecal_models.diagnosis.session_chance import wearing_deals
-from glovecal_models.effects.effect import Effect, Signals
+from glovecal_models.effects.base.effect import Effect, Signals
 
 ALIKE = 0.02
 """Share of a context column's range within which takes count as alike."""

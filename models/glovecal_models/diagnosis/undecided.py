@@ -9,7 +9,7 @@ from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.naming import Naming
 from glovecal_models.diagnosis.next_take import NextTake
 from glovecal_models.diagnosis.something_left import Left
-from glovecal_models.effects.effect import Effect
+from glovecal_models.effects.base.effect import Effect
 
 
 def likelier(impossible: Sequence[NotJudgeable], naming: Naming) -> list[NotJudgeable]:

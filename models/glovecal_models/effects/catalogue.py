@@ -10,9 +10,9 @@ from functools import cache
 from importlib.metadata import entry_points
 from typing import Any
 
+from glovecal_models.effects.base.effect import Effect, Settings
 from glovecal_models.effects.context_dependence import PREFIX, ContextDependence
-from glovecal_models.effects.effect import Effect, Settings
-from glovecal_models.effects.expression_effect import ExpressionEffect
+from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
 
 GROUP = "glovecal.effects"

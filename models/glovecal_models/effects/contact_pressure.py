@@ -2,8 +2,8 @@
 
 from typing import ClassVar
 
-from glovecal_models.effects.context_effect import ContextEffect
-from glovecal_models.effects.effect import Decoy
+from glovecal_models.effects.base.context_effect import ContextEffect
+from glovecal_models.effects.base.effect import Decoy
 
 
 class ContactPressure(ContextEffect):

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from glovecal_models.effects.context_effect import ContextEffect
-from glovecal_models.effects.effect import Decoy, Settings, Signals
+from glovecal_models.effects.base.context_effect import ContextEffect
+from glovecal_models.effects.base.effect import Decoy, Settings, Signals
 
 PREFIX = "context:"
 KNOTS = 5

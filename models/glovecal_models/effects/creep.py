@@ -13,10 +13,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.effect import Parameter, Settings, Signals
-from glovecal_models.effects.history_effect import ArrayStateEffect
-from glovecal_models.effects.joint_units import on_lanes, settle_joint_units
-from glovecal_models.effects.relaxation import relax, relax_once
+from glovecal_models.effects.base.effect import Parameter, Settings, Signals
+from glovecal_models.effects.base.history_effect import ArrayStateEffect
+from glovecal_models.effects.base.joint_units import on_lanes, settle_joint_units
+from glovecal_models.effects.base.relaxation import relax, relax_once
 
 RATIO = 4.0
 """Between neighbouring time constants: close enough for a logarithmic or power law between them."""

@@ -12,8 +12,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.effect import Decoy, InstantEffect, Settings, Signals, Uncertainty
-from glovecal_models.effects.joint_units import in_joint_units, settle_joint_units
+from glovecal_models.effects.base.effect import Decoy, InstantEffect, Settings, Signals, Uncertainty
+from glovecal_models.effects.base.joint_units import in_joint_units, settle_joint_units
 
 PRIOR_DEG = 3.5
 PRIOR_WEARINGS = 2.0

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from glovecal_models.effects.slow_context_effect import SlowContextEffect
+from glovecal_models.effects.base.slow_context_effect import SlowContextEffect
 
 
 class Humidity(SlowContextEffect):

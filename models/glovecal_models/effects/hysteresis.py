@@ -12,8 +12,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.effect import Parameter, Settings, Signals
-from glovecal_models.effects.history_effect import ArrayStateEffect
+from glovecal_models.effects.base.effect import Parameter, Settings, Signals
+from glovecal_models.effects.base.history_effect import ArrayStateEffect
 
 WIDTHS = (0.2, 0.5, 1.0)
 """Of the widest play."""

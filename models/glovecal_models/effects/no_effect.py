@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from glovecal_models.effects.columnless_effect import ColumnlessEffect
-from glovecal_models.effects.effect import Signals
+from glovecal_models.effects.base.columnless_effect import ColumnlessEffect
+from glovecal_models.effects.base.effect import Signals
 
 
 class NoEffect(ColumnlessEffect):

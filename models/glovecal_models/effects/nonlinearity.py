@@ -11,8 +11,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.effect import Decoy, InstantEffect, Settings, Signals
-from glovecal_models.effects.joint_units import on_lanes
+from glovecal_models.effects.base.effect import Decoy, InstantEffect, Settings, Signals
+from glovecal_models.effects.base.joint_units import on_lanes
 
 DEGREES = (2, 3, 4, 5, 6, 7)
 PRIOR_DEG = 20.0

@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.effect import Decoy, InstantEffect, Settings, Signals
+from glovecal_models.effects.base.effect import Decoy, InstantEffect, Settings, Signals
 
 PALM = "PALM_ARCH"
 SIGNALS = (PALM, "T_TMC", "TI_ABD")

@@ -13,8 +13,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.effect import Side
-from glovecal_models.effects.signature_effect import (
+from glovecal_models.effects.base.effect import Side
+from glovecal_models.effects.base.signature_effect import (
     Finding,
     SignatureEffect,
     check_signature_input,

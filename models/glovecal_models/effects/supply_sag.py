@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.context_effect import ContextEffect
-from glovecal_models.effects.effect import Parameter, Settings, Signals
-from glovecal_models.effects.joint_units import in_joint_units
+from glovecal_models.effects.base.context_effect import ContextEffect
+from glovecal_models.effects.base.effect import Parameter, Settings, Signals
+from glovecal_models.effects.base.joint_units import in_joint_units
 
 EXPONENTS = (1.0, 2.0)
 OWN_PRIOR_DEG = 1.0

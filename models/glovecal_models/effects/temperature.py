@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from glovecal_models.effects.context_effect import ContextEffect
+from glovecal_models.effects.base.context_effect import ContextEffect
 
 
 class Temperature(ContextEffect):

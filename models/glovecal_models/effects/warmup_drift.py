@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.context_effect import PRIOR_DEG, ContextEffect
-from glovecal_models.effects.effect import Parameter, Settings, Signals
+from glovecal_models.effects.base.context_effect import PRIOR_DEG, ContextEffect
+from glovecal_models.effects.base.effect import Parameter, Settings, Signals
 
 TAU_S = (45.0, 75.0, 120.0, 200.0, 330.0, 550.0, 900.0)
 COLDEST = 0.7

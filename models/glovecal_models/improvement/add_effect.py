@@ -8,30 +8,30 @@ from typing import Any
 
 import numpy as np
 
+from glovecal_models.calibration.child_model import child_model
 from glovecal_models.calibration.effect_correction import SENSOR_FAULT
-from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.training_settings import Report, TrainingSettings
-from glovecal_models.diagnosis.signatures import own_sensors
-from glovecal_models.effects.catalogue import effect as known_effect
-from glovecal_models.effects.effect import Effect, Signals
-from glovecal_models.effects.interval_effect import IntervalEffect
-from glovecal_models.errors import BadInput
-from glovecal_models.improvement.add_interval import add_interval
-from glovecal_models.improvement.addition import Addition, total_rmse_deg
-from glovecal_models.improvement.child_model import child_model
-from glovecal_models.improvement.decoy_share import share_left_by_decoy
-from glovecal_models.improvement.effect_fit import fit_with_effects
-from glovecal_models.improvement.had_already import (
+from glovecal_models.calibration.effect_fit import fit_with_effects
+from glovecal_models.calibration.had_already import (
     repaired_takes,
     settings_of,
     trained_rotations,
     wanted_of,
 )
-from glovecal_models.improvement.held_out_check import HeldOutErrors, held_out_errors
+from glovecal_models.calibration.held_out_check import HeldOutErrors, held_out_errors
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.prepared_takes import PreparedTakes
+from glovecal_models.calibration.relearned import columnless_effects, kept_lanes
+from glovecal_models.calibration.training_settings import Report, TrainingSettings
+from glovecal_models.calibration.wanted_effect import WantedEffect
+from glovecal_models.diagnosis.signatures import own_sensors
+from glovecal_models.effects.base.effect import Effect, Signals
+from glovecal_models.effects.base.interval_effect import IntervalEffect
+from glovecal_models.effects.catalogue import effect as known_effect
+from glovecal_models.errors import BadInput
+from glovecal_models.improvement.add_interval import add_interval
+from glovecal_models.improvement.addition import Addition, total_rmse_deg
+from glovecal_models.improvement.decoy_share import share_left_by_decoy
 from glovecal_models.improvement.live_faults import LiveFaults, live_faults
-from glovecal_models.improvement.prepared_takes import PreparedTakes
-from glovecal_models.improvement.relearned import columnless_effects, kept_lanes
-from glovecal_models.improvement.wanted_effect import WantedEffect
 from glovecal_models.takes.take import Take
 
 LEAST_GAIN = 0.05

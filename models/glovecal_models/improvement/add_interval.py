@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect
+from glovecal_models.calibration.held_out_check import HeldOutErrors
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.effects.interval_effect import IntervalEffect, LeftOutErrors
+from glovecal_models.calibration.wanted_effect import WantedEffect
+from glovecal_models.effects.base.interval_effect import IntervalEffect, LeftOutErrors
 from glovecal_models.improvement.addition import Addition, total_rmse_deg
 from glovecal_models.improvement.claim_check import LEAST_FALL, ClaimCheck, check_claim
-from glovecal_models.improvement.held_out_check import HeldOutErrors
 from glovecal_models.improvement.left_out_errors import left_out_errors
-from glovecal_models.improvement.prepared_takes import PreparedTakes
-from glovecal_models.improvement.wanted_effect import WantedEffect
 
 
 def add_interval(

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from glovecal_models.calibration.held_out_check import HeldOutErrors
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.wanted_effect import WantedEffect
 from glovecal_models.improvement.claim_check import ClaimCheck
-from glovecal_models.improvement.held_out_check import HeldOutErrors
-from glovecal_models.improvement.wanted_effect import WantedEffect
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from glovecal_models.calibration.held_out_check import held_out_errors
+from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import Method, TrainingSettings
 from glovecal_models.comparison.residuals import residuals
-from glovecal_models.improvement.held_out_check import held_out_errors
-from glovecal_models.improvement.prepared_takes import PreparedTakes
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from glovecal_models.effects.effect import Settings
-from glovecal_models.effects.interval_effect import IntervalEffect, LeftOutErrors
+from glovecal_models.effects.base.effect import Settings
+from glovecal_models.effects.base.interval_effect import IntervalEffect, LeftOutErrors
 
 PARTS = 3
 LEAST_FALL, MOST_RISE = 0.005, 0.01

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.effects.clock_scan import clock_offsets
+from glovecal_models.effects.delay.clock_scan import clock_offsets
 from glovecal_models.takes.take import Take
 
 BEYOND_DELAYS_S = 0.15

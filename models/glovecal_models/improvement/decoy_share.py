@@ -14,7 +14,7 @@ from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.directions import forward
 from glovecal_models.diagnosis.evened import bridge_s, evened, smoothed
 from glovecal_models.diagnosis.ground import measured_joints
-from glovecal_models.effects.effect import Effect
+from glovecal_models.effects.base.effect import Effect
 from glovecal_models.errors import Cancelled
 from glovecal_models.improvement.known_effects import known_effects
 from glovecal_models.takes.take import Take

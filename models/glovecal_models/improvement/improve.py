@@ -6,8 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from glovecal_models.calibration.had_already import repaired_takes, settings_of, trained_rotations, wanted_of
+from glovecal_models.calibration.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.calibration.living_sensors import living_sensors
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
 from glovecal_models.comparison.floor_estimate import NoiseFloor
@@ -22,11 +25,8 @@ from glovecal_models.improvement.addition import Addition
 from glovecal_models.improvement.baselines import baselines
 from glovecal_models.improvement.clocks import clock_settings, coarse_clock_settings
 from glovecal_models.improvement.decoy_share import share_in
-from glovecal_models.improvement.had_already import repaired_takes, settings_of, trained_rotations, wanted_of
-from glovecal_models.improvement.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.improvement.improvement import CLOCK, Improvement, Step, added_document
 from glovecal_models.improvement.known_effects import known_effects
-from glovecal_models.improvement.prepared_takes import PreparedTakes
 from glovecal_models.improvement.pruning import pruned
 from glovecal_models.improvement.signature_steps import SignatureStep, repairs, widenings
 from glovecal_models.improvement.step_errors import step_errors

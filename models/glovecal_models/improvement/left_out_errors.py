@@ -7,15 +7,15 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from glovecal_models.calibration.effect_correction import EffectCorrection
+from glovecal_models.calibration.effect_fit import EffectFit, correspondence_for, fit_with_effects
 from glovecal_models.calibration.folds import folds_over_takes
+from glovecal_models.calibration.prepared_takes import PreparedTakes
+from glovecal_models.calibration.relearned import columnless_effects
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.calibration.wanted_effect import WantedEffect
 from glovecal_models.calibration.widening import Widening
-from glovecal_models.effects.interval_effect import LeftOutErrors
+from glovecal_models.effects.base.interval_effect import LeftOutErrors
 from glovecal_models.errors import BadInput
-from glovecal_models.improvement.effect_fit import EffectFit, correspondence_for, fit_with_effects
-from glovecal_models.improvement.prepared_takes import PreparedTakes
-from glovecal_models.improvement.relearned import columnless_effects
-from glovecal_models.improvement.wanted_effect import WantedEffect
 
 FEWEST_TAKES = 3
 

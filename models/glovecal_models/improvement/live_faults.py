@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.effects.effect import Settings
-from glovecal_models.effects.fault_limits import fault_limits
-from glovecal_models.effects.fault_watch import FaultLimits, FaultWatch
-from glovecal_models.effects.sensor_fault import SensorFault
-from glovecal_models.effects.signature_effect import Finding, frames_inside
+from glovecal_models.effects.base.effect import Settings
+from glovecal_models.effects.base.signature_effect import Finding, frames_inside
+from glovecal_models.effects.sensor_fault.fault_limits import fault_limits
+from glovecal_models.effects.sensor_fault.fault_watch import FaultLimits, FaultWatch
+from glovecal_models.effects.sensor_fault.sensor_fault import SensorFault
 from glovecal_models.errors import Cancelled
 from glovecal_models.regression.rule_regressor import RuleRegressor
 from glovecal_models.takes.take import Take

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from glovecal_models.calibration.held_out_check import HeldOutErrors
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.improvement.addition import Addition
-from glovecal_models.improvement.held_out_check import HeldOutErrors
 from glovecal_models.improvement.remove_effect import remove_effect, unneeded
 from glovecal_models.takes.take import Take
 

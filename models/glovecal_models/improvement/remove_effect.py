@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from glovecal_models.calibration.child_model import child_model
+from glovecal_models.calibration.effect_fit import fit_with_effects
+from glovecal_models.calibration.had_already import repaired_takes, settings_of, trained_rotations, wanted_of
+from glovecal_models.calibration.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.prepared_takes import PreparedTakes
+from glovecal_models.calibration.relearned import columnless_effects
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput
-from glovecal_models.improvement.child_model import child_model
-from glovecal_models.improvement.effect_fit import fit_with_effects
-from glovecal_models.improvement.had_already import repaired_takes, settings_of, trained_rotations, wanted_of
-from glovecal_models.improvement.held_out_check import HeldOutErrors, held_out_errors
-from glovecal_models.improvement.prepared_takes import PreparedTakes
-from glovecal_models.improvement.relearned import columnless_effects
 from glovecal_models.takes.take import Take
 
 NEEDLESS = 1.02

@@ -6,14 +6,14 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from typing import Any
 
+from glovecal_models.calibration.had_already import trained_rotations
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.pose_labels import are_pose_labels
 from glovecal_models.diagnosis.signatures import are_held_levels, own_sensors
+from glovecal_models.effects.base.signature_effect import SignatureEffect
 from glovecal_models.effects.catalogue import catalogue
-from glovecal_models.effects.saturation import saturated_bands
-from glovecal_models.effects.signature_effect import SignatureEffect
-from glovecal_models.improvement.had_already import trained_rotations
+from glovecal_models.effects.saturation.saturation import saturated_bands
 from glovecal_models.takes.take import Take
 
 REPAIRS = ("repeated_samples", "sensor_fault")

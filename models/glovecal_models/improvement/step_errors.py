@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from glovecal_models.calibration.held_out_check import HeldOutErrors
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.residuals import residuals
-from glovecal_models.improvement.held_out_check import HeldOutErrors
 from glovecal_models.takes.take import Take
 
 AT_FLOOR = 1.15

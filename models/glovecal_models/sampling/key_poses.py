@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from glovecal_models.calibration.pose_book import KEY_POSES_DEG
+from glovecal_models.quick_check.pose_book import KEY_POSES_DEG
 from glovecal_models.sampling.step import Step
 
 KEY_POSES = ("flat", "spread", "fist", "overbend")

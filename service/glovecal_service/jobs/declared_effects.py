@@ -12,9 +12,9 @@ from contextlib import contextmanager
 from typing import Any
 
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.catalogue import catalogue
-from glovecal_models.effects.effect import Effect
-from glovecal_models.effects.expression_effect import ExpressionEffect
+from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 
 _ONE_JOB = threading.RLock()
 

@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from glovecal_models.calibration.had_already import repaired_takes, wanted_of
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.comparison.rotation_noise import rotation_noise
-from glovecal_models.effects.expression_effect import ExpressionEffect
-from glovecal_models.improvement.had_already import repaired_takes, wanted_of
+from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 from glovecal_models.improvement.known_effects import known_effects
 from glovecal_models.takes.take import Take
 from glovecal_service.jobs.declared_effects import declared_in, known_by_name

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from glovecal_models.calibration.had_already import repaired_takes, trained_rotations, wanted_of
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.signatures import own_sensors, static_errors
+from glovecal_models.effects.base.signature_effect import SignatureEffect
 from glovecal_models.effects.catalogue import effect
-from glovecal_models.effects.garment_slip import GarmentSlip
-from glovecal_models.effects.saturation import saturated_bands
-from glovecal_models.effects.signature_effect import SignatureEffect
+from glovecal_models.effects.garment_slip.garment_slip import GarmentSlip
+from glovecal_models.effects.saturation.saturation import saturated_bands
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.clocks import clock_settings, coarse_clock_settings
-from glovecal_models.improvement.had_already import repaired_takes, trained_rotations, wanted_of
 from glovecal_models.improvement.known_effects import known_effects
 from glovecal_models.takes.take import Take
 from glovecal_service.jobs.added_by_signature import ADDED_BY_SIGNATURE, CLOCK, SATURATION, SLIP

@@ -15,7 +15,7 @@ from typing import Any
 
 from glovecal_client.wire.frame import Frame
 from glovecal_client.wire.pose import PoseFlag
-from glovecal_models.effects.history_effect import LONGEST_GAP_S
+from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
 from glovecal_service.realtime.served_model import ServedModel
 from glovecal_service.realtime.worn_gloves import WornGlove
 

@@ -15,7 +15,7 @@ from glovecal_client.errors import NoAnswer, WireError
 from glovecal_client.gap_repair import fetch_frames
 from glovecal_client.keys import GloveKeys
 from glovecal_client.wire.frame import Frame
-from glovecal_models.effects.history_effect import LONGEST_GAP_S
+from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
 
 BLOCK_FRAMES = 512
 MOST_FRAMES = 120_000

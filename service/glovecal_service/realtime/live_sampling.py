@@ -10,8 +10,8 @@ import zenoh
 
 from glovecal_client.keys import GloveKeys
 from glovecal_client.wire.frame import Frame
-from glovecal_models.active_sampling.next_step import NextStep
 from glovecal_models.layout import Layout
+from glovecal_models.sampling.active.next_step import NextStep
 from glovecal_models.sampling.engine import Sampling
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.state import OVER, SamplingState

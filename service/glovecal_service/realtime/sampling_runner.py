@@ -13,8 +13,8 @@ from sqlalchemy.exc import SQLAlchemyError
 from glovecal_client.errors import ClientError
 from glovecal_client.keys import GloveKeys
 from glovecal_models.errors import GlovecalError
-from glovecal_models.guided.touch_watch import TouchWatch
 from glovecal_models.layout import Layout
+from glovecal_models.sampling.guided.touch_watch import TouchWatch
 from glovecal_service.realtime.live_sampling import LiveSampling
 from glovecal_service.realtime.sampling_takes import keep_sampled_takes
 from glovecal_service.settings import Settings

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from glovecal_models.calibration.comparison import RotationErrors
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.comparison.compare import RotationErrors
 from glovecal_models.comparison.residuals import Residuals, residuals
 from glovecal_models.takes.take import Take
 from glovecal_service.report.error_fall import Fall, FloorBand, error_fall

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from html import escape
 
-from glovecal_models.calibration.comparison import Comparison, summed_up
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.comparison.compare import Comparison, summed_up
 from glovecal_models.comparison.floor_estimate import ORDER, NoiseFloor
 from glovecal_models.comparison.residuals import Residuals, residuals
 from glovecal_models.comparison.rotation_noise import RotationNoise, rotation_noise

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from glovecal_models.calibration.comparison import Comparison
+from glovecal_models.comparison.compare import Comparison
 from glovecal_models.comparison.where_it_fails import WhereItFails
 
 

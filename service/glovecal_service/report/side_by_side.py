@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 
-from glovecal_models.calibration.comparison import Comparison, RotationErrors
+from glovecal_models.comparison.compare import Comparison, RotationErrors
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_service.report.drawing import FLOOR, svg
 

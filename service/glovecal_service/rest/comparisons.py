@@ -7,8 +7,8 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field
 
-from glovecal_models.calibration.comparison import compare
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.comparison.compare import compare
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.comparison.where_it_fails import where_it_fails
 from glovecal_models.hand.dimensions import HandDimensions

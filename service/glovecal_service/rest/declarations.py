@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from glovecal_models.effects.catalogue import declared_effect
-from glovecal_models.effects.expression_effect import ExpressionEffect
+from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.records import TakeRecord
 

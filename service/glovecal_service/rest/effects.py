@@ -8,10 +8,10 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Path
 from pydantic import BaseModel, Field
 
+from glovecal_models.effects.base.columnless_effect import ColumnlessEffect
+from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.interval_effect import IntervalEffect
 from glovecal_models.effects.catalogue import GROUP, catalogue, effect
-from glovecal_models.effects.columnless_effect import ColumnlessEffect
-from glovecal_models.effects.effect import Effect
-from glovecal_models.effects.interval_effect import IntervalEffect
 from glovecal_models.errors import BadInput
 from glovecal_service.jobs.added_by_signature import ADDED_BY_SIGNATURE
 from glovecal_service.plain import plain

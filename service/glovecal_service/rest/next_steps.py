@@ -7,9 +7,9 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query
 from pydantic import BaseModel, Field
 
-from glovecal_models.active_sampling.diagnosed_takes import diagnosed_take
-from glovecal_models.active_sampling.from_model import propose_for_model
 from glovecal_models.calibration.artifact import load
+from glovecal_models.sampling.active.diagnosed_takes import diagnosed_take
+from glovecal_models.sampling.active.from_model import propose_for_model
 from glovecal_service.plain import plain
 from glovecal_service.rest.answers import problems
 from glovecal_service.rest.dependencies import StoreNeeded

@@ -8,9 +8,9 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from glovecal_models.calibration.artifact import dump
-from glovecal_models.calibration.pose_book import PoseBook, own_poses, usual_poses
-from glovecal_models.calibration.quick_check import QuickCheck, quick_check
 from glovecal_models.calibration.sensor_sensitivity import sensor_sensitivity
+from glovecal_models.quick_check.pose_book import PoseBook, own_poses, usual_poses
+from glovecal_models.quick_check.quick_check import QuickCheck, quick_check
 from glovecal_models.takes.take import Take
 from glovecal_service.jobs.model_work import trained_ids
 from glovecal_service.plain import plain

@@ -11,9 +11,9 @@ from fastapi import APIRouter, Depends, Header, Query, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import BaseModel, Field, FiniteFloat
 
-from glovecal_models.guided.touch_watch import require_possible_touches
 from glovecal_models.sampling.catalogue import ROD_MM, Equipment, ProtocolName, make_protocol
 from glovecal_models.sampling.engine import Sampling, begin_sampling
+from glovecal_models.sampling.guided.touch_watch import require_possible_touches
 from glovecal_models.sampling.state import SamplingState, Trigger
 from glovecal_models.sampling.user_events import Event, NotNow
 from glovecal_service.rest.answers import change_problems, problems

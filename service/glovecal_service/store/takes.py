@@ -10,7 +10,7 @@ import numpy as np
 from sqlalchemy import Connection, delete, select
 from sqlalchemy.exc import IntegrityError
 
-from glovecal_models.effects.clock_scan import aligned
+from glovecal_models.effects.delay.clock_scan import aligned
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 from glovecal_models.names import check_identifier

@@ -7,19 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glovecal_models.active_sampling.candidates import candidate_steps, register_candidates
-from glovecal_models.active_sampling.diagnosed_takes import diagnosed_take
-from glovecal_models.active_sampling.expected_readings import ExpectedReadings
-from glovecal_models.active_sampling.from_model import propose_for_model
-from glovecal_models.active_sampling.known_readings import known_from_state, known_from_takes
-from glovecal_models.active_sampling.next_step import LONGEST_CAPTURE_S, NextStep, still_possible
-from glovecal_models.active_sampling.posterior_mean import assumed_angles
-from glovecal_models.active_sampling.proposal import propose
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_plan import plan_training
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput, NotTrainable
 from glovecal_models.layout import Layout
+from glovecal_models.sampling.active.candidates import candidate_steps, register_candidates
+from glovecal_models.sampling.active.diagnosed_takes import diagnosed_take
+from glovecal_models.sampling.active.expected_readings import ExpectedReadings
+from glovecal_models.sampling.active.from_model import propose_for_model
+from glovecal_models.sampling.active.known_readings import known_from_state, known_from_takes
+from glovecal_models.sampling.active.next_step import LONGEST_CAPTURE_S, NextStep, still_possible
+from glovecal_models.sampling.active.posterior_mean import assumed_angles
+from glovecal_models.sampling.active.proposal import propose
 from glovecal_models.sampling.attempt import Attempt
 from glovecal_models.sampling.catalogue import Equipment, make_protocol
 from glovecal_models.sampling.engine import Sampling, begin_sampling

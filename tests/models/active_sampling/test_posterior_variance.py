@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glovecal_models.active_sampling.assumed_process import AssumedProcess, assumed_process
-from glovecal_models.active_sampling.posterior_variance import PosteriorVariance
-from glovecal_models.active_sampling.sampled_points import SampledPoints, step_errors
 from glovecal_models.layout import Layout
 from glovecal_models.regression.process_regressor import ProcessRegressor
+from glovecal_models.sampling.active.assumed_process import AssumedProcess, assumed_process
+from glovecal_models.sampling.active.posterior_variance import PosteriorVariance
+from glovecal_models.sampling.active.sampled_points import SampledPoints, step_errors
 
 LAYOUT = Layout.built_in("cyberglove18")
 SENSORS = LAYOUT.sensors

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 
 from glovecal_models.calibration.artifact import dump, load
-from glovecal_models.calibration.held_poses import held_poses
+from glovecal_models.calibration.had_already import wanted_of
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.pose_book import own_poses
 from glovecal_models.calibration.predictor import GloveAngles, GlovePredictor
-from glovecal_models.calibration.quick_check import quick_check
 from glovecal_models.calibration.sensor_sensitivity import sensor_sensitivity
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_effect import add_effect
-from glovecal_models.improvement.had_already import wanted_of
 from glovecal_models.layout import Layout
+from glovecal_models.quick_check.held_poses import held_poses
+from glovecal_models.quick_check.pose_book import own_poses
+from glovecal_models.quick_check.quick_check import quick_check
 from glovecal_models.simulation.causes.cause import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from glovecal_models.calibration.comparison import summed_up
+from glovecal_models.comparison.compare import summed_up
 from glovecal_models.comparison.fingertips import TIPS, fingertip_errors
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.hand_poses import hand_poses, tips_mm

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from glovecal_models.calibration.comparison import summed_up
+from glovecal_models.comparison.compare import summed_up
 from glovecal_models.comparison.floor_estimate import NoiseFloor, joined
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 

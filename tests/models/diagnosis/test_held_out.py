@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from glovecal_models.diagnosis.held_out import ALIKE_ROWS, BaseProducts, Rows, held_out
+from glovecal_models.calibration.held_out import ALIKE_ROWS, BaseProducts, Rows, held_out
 
 
 @pytest.fixture

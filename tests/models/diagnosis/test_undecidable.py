@@ -10,8 +10,8 @@ import pytest
 
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.undecidable import Undecidable, undecidable
+from glovecal_models.effects.base.effect import Signals
 from glovecal_models.effects.catalogue import catalogue
-from glovecal_models.effects.effect import Signals
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.cause import Cause
 from glovecal_models.simulation.session import record_session

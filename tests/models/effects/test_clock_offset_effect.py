@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glovecal_models.effects.clock_drift import clock_drift
-from glovecal_models.effects.clock_offset import ClockOffsetEffect
+from glovecal_models.effects.delay.clock_drift import clock_drift
+from glovecal_models.effects.delay.clock_offset import ClockOffsetEffect
 
 CLOCK = ClockOffsetEffect()
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from glovecal_models.effects.base.decoy import decoy_columns
 from glovecal_models.effects.catalogue import catalogue
-from glovecal_models.effects.decoy import decoy_columns
 from glovecal_models.errors import BadInput
 
 

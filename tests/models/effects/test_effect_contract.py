@@ -11,11 +11,11 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
+from glovecal_models.effects.base.columnless_effect import ColumnlessEffect
+from glovecal_models.effects.base.decoy import decoy_columns
+from glovecal_models.effects.base.effect import Decoy, Effect, Settings, Signals
 from glovecal_models.effects.catalogue import catalogue, stored_effect
-from glovecal_models.effects.columnless_effect import ColumnlessEffect
-from glovecal_models.effects.decoy import decoy_columns
-from glovecal_models.effects.effect import Decoy, Effect, Settings, Signals
-from glovecal_models.effects.expression_effect import ExpressionEffect
+from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
 
 DECLARED = [

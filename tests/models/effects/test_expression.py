@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from glovecal_models.effects.declaration import Declaration
-from glovecal_models.effects.expression import check_names, parse_expressions
-from glovecal_models.effects.expression_value import Evaluation, Memory
+from glovecal_models.effects.declared.declaration import Declaration
+from glovecal_models.effects.declared.expression import check_names, parse_expressions
+from glovecal_models.effects.declared.expression_value import Evaluation, Memory
 from glovecal_models.errors import BadInput
 
 

@@ -8,7 +8,7 @@ import pytest
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.effects.catalogue import catalogue, declared_effect
-from glovecal_models.effects.expression_effect import ExpressionEffect
+from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.improvement.addition import Addition

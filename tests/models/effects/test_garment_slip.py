@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from glovecal_models.effects.garment_slip import GarmentSlip
-from glovecal_models.effects.interval_effect import LeftOutErrors
-from glovecal_models.effects.slip_growth import GROWS_S, SlipGrowth, SlipInterval, slip_growth
-from glovecal_models.effects.slip_walk import slip_walk
+from glovecal_models.effects.base.interval_effect import LeftOutErrors
+from glovecal_models.effects.garment_slip.garment_slip import GarmentSlip
+from glovecal_models.effects.garment_slip.slip_growth import GROWS_S, SlipGrowth, SlipInterval, slip_growth
+from glovecal_models.effects.garment_slip.slip_walk import slip_walk
 
 SLIP = GarmentSlip()
 

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from glovecal_models.effects import catalogue as catalogue_module
-from glovecal_models.effects.decoy import decoy_columns
-from glovecal_models.effects.effect import Signals
-from glovecal_models.effects.expression_effect import ExpressionEffect
+from glovecal_models.effects.base.decoy import decoy_columns
+from glovecal_models.effects.base.effect import Signals
+from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
 
 DOCUMENT = Path(__file__).resolve().parents[3] / "docs" / "own-effect.md"
@@ -87,6 +87,6 @@ def test_what_is_no_effect_or_has_a_taken_name_is_refused(monkeypatch: pytest.Mo
     announce(monkeypatch, metadata.EntryPoint("odd", "collections:OrderedDict", group))
     with pytest.raises(BadInput, match=r"collections:OrderedDict of glovecal\.effects is not an effect"):
         catalogue_module.catalogue()
-    announce(monkeypatch, metadata.EntryPoint("lag", "glovecal_models.effects.lag:Lag", group))
+    announce(monkeypatch, metadata.EntryPoint("lag", "glovecal_models.effects.delay.lag:Lag", group))
     with pytest.raises(BadInput, match="two packages bring an effect of the name 'lag'"):
         catalogue_module.catalogue()

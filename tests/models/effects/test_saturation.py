@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glovecal_models.effects.interval_effect import LeftOutErrors
-from glovecal_models.effects.saturated_band import SaturatedBand
-from glovecal_models.effects.saturation import Saturation, saturated_bands
+from glovecal_models.effects.base.interval_effect import LeftOutErrors
+from glovecal_models.effects.saturation.saturated_band import SaturatedBand
+from glovecal_models.effects.saturation.saturation import Saturation, saturated_bands
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.take import Take
 

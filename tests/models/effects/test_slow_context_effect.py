@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from glovecal_models.effects.base.context_slope import SlopeState, slopes
+from glovecal_models.effects.base.effect import Signals
 from glovecal_models.effects.catalogue import catalogue
-from glovecal_models.effects.context_slope import SlopeState, slopes
-from glovecal_models.effects.effect import Signals
 
 TIME = np.arange(0, 60, 0.04)
 

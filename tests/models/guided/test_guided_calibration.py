@@ -15,8 +15,6 @@ from glovecal_models.calibration.predictor import BY_RULE, GlovePredictor
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import Method, TrainingSettings
 from glovecal_models.errors import Cancelled, LayoutMismatch, NotTrainable
-from glovecal_models.guided.guided_calibration import GuidedCalibration, guided_calibration, guided_samples
-from glovecal_models.guided.taught_take import TaughtTake
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import HAND_ROTATIONS
 from glovecal_models.hand.skeleton import hand_skeleton
@@ -25,6 +23,12 @@ from glovecal_models.inverse_kinematics.predicted_hand import predicted_hand
 from glovecal_models.inverse_kinematics.tip_chains import TipChains
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.catalogue import make_protocol
+from glovecal_models.sampling.guided.guided_calibration import (
+    GuidedCalibration,
+    guided_calibration,
+    guided_samples,
+)
+from glovecal_models.sampling.guided.taught_take import TaughtTake
 from glovecal_models.sampling.protocol import Protocol
 from glovecal_models.sampling.sampled_takes import sampled_takes
 from glovecal_models.simulation.asked_session import RECORDING, asked_session

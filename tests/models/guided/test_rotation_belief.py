@@ -9,15 +9,15 @@ import pytest
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, DotProduct
 
-from glovecal_models.guided.first_beliefs import BOW_LENGTH, BOW_SHARE, first_beliefs
-from glovecal_models.guided.rotation_belief import Prior, RotationBelief
-from glovecal_models.guided.taught_samples import TaughtSamples
-from glovecal_models.guided.touch_posterior import TouchFrames, TouchPosterior
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import HAND_ROTATIONS
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.inverse_kinematics.contact import Rod, Touch
 from glovecal_models.layout import Layout
+from glovecal_models.sampling.guided.first_beliefs import BOW_LENGTH, BOW_SHARE, first_beliefs
+from glovecal_models.sampling.guided.rotation_belief import Prior, RotationBelief
+from glovecal_models.sampling.guided.taught_samples import TaughtSamples
+from glovecal_models.sampling.guided.touch_posterior import TouchFrames, TouchPosterior
 
 LAYOUT = Layout.built_in("cyberglove18")
 HAND = hand_skeleton(HandDimensions.from_measured({"hand_length": 182}))

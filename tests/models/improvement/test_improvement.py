@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from glovecal_models.calibration.artifact import dump, load
+from glovecal_models.calibration.had_already import wanted_of
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.errors import BadInput, Cancelled
 from glovecal_models.improvement.add_effect import add_effect
-from glovecal_models.improvement.had_already import wanted_of
 from glovecal_models.improvement.improve import improve
 from glovecal_models.improvement.remove_effect import remove_effect
 from glovecal_models.layout import Layout

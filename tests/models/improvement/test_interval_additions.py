@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from glovecal_models.calibration.artifact import dump, load
-from glovecal_models.calibration.comparison import compare
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.comparison.compare import compare
 from glovecal_models.comparison.residuals import residuals
-from glovecal_models.effects.saturation import saturated_bands
+from glovecal_models.effects.saturation.saturation import saturated_bands
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.improvement.improve import improve

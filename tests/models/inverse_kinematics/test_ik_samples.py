@@ -12,7 +12,7 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.samples import gather_samples
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.effects.fault_watch import FaultLimits
+from glovecal_models.effects.sensor_fault.fault_watch import FaultLimits
 from glovecal_models.errors import BadInput, LayoutMismatch
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_models.calibration.quick_check import quick_check
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
+from glovecal_models.quick_check.quick_check import quick_check
 from glovecal_models.sampling.catalogue import PROTOCOLS, Equipment, make_protocol
 from glovecal_models.sampling.protocol import Protocol
 from glovecal_models.sampling.reading import GloveReading

@@ -1,0 +1,76 @@
+"""The calibration model of a fit with effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from glovecal_models.calibration.added_effect import AddedEffect
+from glovecal_models.calibration.effect_fit import EffectFit, correspondence_for
+from glovecal_models.calibration.held_out_check import HeldOutErrors
+from glovecal_models.calibration.model import CalibrationModel, RotationModel
+from glovecal_models.calibration.prepared_takes import PreparedTakes
+from glovecal_models.calibration.training import uncertain_above
+from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.regression.kept_choice import keeping_choice
+
+
+def child_model(
+    parent: CalibrationModel,
+    parent_id: str | None,
+    takes: PreparedTakes,
+    fit: EffectFit,
+    effects: Sequence[AddedEffect],
+    errors: HeldOutErrors,
+    settings: TrainingSettings,
+    take_hashes: Sequence[str],
+) -> CalibrationModel:
+    """``parent`` with the regressors of ``fit`` in place of its own, and with ``effects``."""
+    fresh = {name: _rotation_model(takes, name, fit, errors, settings) for name in fit.results}
+    rotations = tuple(_renewed(item, fresh.get(item.rotation)) for item in parent.rotations)
+    estimate: Mapping[str, Any] = {
+        "how": "whole takes left out" if len(takes.takes) > 1 else "stretches of the only take left out",
+        "folds": max(settings.folds, 2),
+        "rmse_deg": errors.over_all_deg,
+    }
+    return replace(
+        parent,
+        rotations=rotations,
+        parent=parent_id,
+        takes=tuple(take_hashes) or parent.takes,
+        error_estimate=estimate,
+        effects=tuple(effects),
+        sensor_centre=takes.scale.centre,
+        sensor_scale=takes.scale.scale,
+        simulated=parent.simulated or any(take.simulated for take in takes.takes),
+    )
+
+
+def _renewed(before: RotationModel, fresh: RotationModel | None) -> RotationModel:
+    """``fresh`` where there is one; how its kernel was chosen stays told."""
+    if fresh is None:
+        return before
+    return replace(fresh, regressor=keeping_choice(before.regressor, fresh.regressor))
+
+
+def _rotation_model(
+    takes: PreparedTakes, name: str, fit: EffectFit, errors: HeldOutErrors, settings: TrainingSettings
+) -> RotationModel:
+    correspondence = correspondence_for(takes, name, settings)
+    regressor = fit.regressor(name)
+    known = [np.isfinite(target) for target in takes.target(name)]
+    inputs = np.concatenate(
+        [part[rows] for part, rows in zip(takes.inputs(correspondence), known, strict=True)]
+    )
+    return RotationModel(
+        correspondence=correspondence,
+        regressor=regressor,
+        input_low=inputs.min(axis=0),
+        input_high=inputs.max(axis=0),
+        uncertain_above_deg=uncertain_above(regressor.noise_variance),
+        held_out_rmse_deg=errors.rmse_deg(name) if name in errors.square else None,
+        samples=min(len(inputs), settings.samples),
+    )

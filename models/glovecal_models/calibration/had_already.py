@@ -1,0 +1,56 @@
+"""What a model was made of, as it would be asked for again: effects, rotations, settings, repaired takes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.calibration.wanted_effect import WantedEffect
+from glovecal_models.effects.base.signature_effect import SignatureEffect
+from glovecal_models.effects.delay.clock_scan import aligned
+from glovecal_models.quick_check.quick_check import is_only_checked
+from glovecal_models.regression.kept_choice import kernel_of
+from glovecal_models.regression.kernel_candidates import CHOOSING
+from glovecal_models.regression.rule_regressor import RuleRegressor
+from glovecal_models.takes.take import Take
+
+
+def wanted_of(model: CalibrationModel) -> tuple[WantedEffect, ...]:
+    """The effects a model has, as they would be asked for again."""
+    merged: dict[str, WantedEffect] = {}
+    for item in model.effects:
+        if is_only_checked(item):
+            continue  # training takes tell nothing of a wearing that only a quick check saw
+        before = merged.get(item.name)
+        rotations = item.active if before is None else (*before.rotations, *item.active)
+        settings = item.settings if not item.weights.shape[1] else {}
+        merged[item.name] = WantedEffect(item.name, tuple(dict.fromkeys(rotations)), settings)
+    return tuple(merged.values())
+
+
+def trained_rotations(model: CalibrationModel) -> tuple[str, ...]:
+    """Rotations with a regressor of their own, no rule."""
+    return tuple(item.rotation for item in model.rotations if not isinstance(item.regressor, RuleRegressor))
+
+
+def repaired_takes(takes: Sequence[Take], wanted: Sequence[WantedEffect]) -> list[Take]:
+    """The takes with what their measurement needs: clocks on the frames' time, faulty pieces left out."""
+    result = list(takes)
+    for item in wanted:
+        if item.name == "clock_offset":
+            offsets, common = item.settings["offset_s"], float(item.settings["common_s"])
+            result = [aligned(take, float(offsets.get(take.name, common))) for take in result]
+        elif item.is_on_reference and isinstance(item.effect, SignatureEffect):
+            result = list(item.effect.repaired(result))
+    return result
+
+
+def settings_of(model: CalibrationModel, settings: TrainingSettings | None) -> TrainingSettings:
+    """How the model was trained, as far as it tells; kernels that were chosen for it stay."""
+    settings = settings or TrainingSettings(method=model.method)  # pyright: ignore[reportArgumentType]
+    if settings.method not in CHOOSING:
+        return settings
+    kernels = {item.rotation: kernel_of(item.regressor) for item in model.rotations}
+    return replace(settings, kernels=tuple((name, kind) for name, kind in kernels.items() if kind))

@@ -1,0 +1,139 @@
+"""The error of a calibration with effects, on takes that its fit never saw."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from glovecal_models.calibration.effect_correction import EffectCorrection
+from glovecal_models.calibration.effect_fit import (
+    EffectFit,
+    correspondence_for,
+    fit_with_effects,
+    own_signals,
+)
+from glovecal_models.calibration.folds import folds_over_takes
+from glovecal_models.calibration.left_out import are_short, first_measured, pieces
+from glovecal_models.calibration.prepared_takes import PreparedTakes
+from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.calibration.wanted_effect import WantedEffect
+from glovecal_models.errors import NotTrainable
+
+Report = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class HeldOutErrors:
+    """Squared errors of some rotations, summed over frames."""
+
+    square: dict[str, float]
+    """Degrees squared."""
+    count: dict[str, int]
+
+    def rmse_deg(self, rotation: str) -> float:
+        return float(np.sqrt(self.square[rotation] / max(self.count[rotation], 1)))
+
+    def with_those_of(self, other: HeldOutErrors) -> HeldOutErrors:
+        """These, replaced by the other's where it has any."""
+        return HeldOutErrors(self.square | other.square, self.count | other.count)
+
+    def of(self, rotations: Sequence[str]) -> HeldOutErrors:
+        """Those of some rotations."""
+        return HeldOutErrors(
+            {name: self.square[name] for name in rotations}, {name: self.count[name] for name in rotations}
+        )
+
+    @property
+    def over_all_deg(self) -> float:
+        """RMSE over all rotations and frames."""
+        return float(np.sqrt(sum(self.square.values()) / max(sum(self.count.values()), 1)))
+
+
+def held_out_errors(
+    takes: PreparedTakes,
+    rotations: Sequence[str],
+    wanted: Sequence[WantedEffect],
+    settings: TrainingSettings,
+    *,
+    cancelled: Callable[[], bool] | None = None,
+    report: Report | None = None,
+) -> HeldOutErrors:
+    """Leave out whole takes, in ``settings.folds`` folds, at least two. Raises NotTrainable, Cancelled.
+
+    A single take, and short takes of one motion each, are left out in pieces (``left_out``).
+    """
+    square, count = dict.fromkeys(rotations, 0.0), dict.fromkeys(rotations, 0)
+    short = len(takes.takes) == 1 or are_short(
+        [
+            take.time_s[first_measured(known) :]
+            for take, known in zip(takes.takes, takes.reference, strict=True)
+        ]
+    )
+    number = np.arange(len(takes.takes))
+    parts, folds = takes, [fold.held_out for fold in folds_over_takes(number, max(settings.folds, 2))]
+    if short:
+        parts, place = _cut(takes)
+        folds = [place == at for at in np.unique(place)]
+    for at, held in enumerate(folds):
+        if report:
+            so_far = np.sqrt(sum(square.values()) / max(sum(count.values()), 1))
+            told = f", error so far {so_far:.2f} degrees" if at else ""
+            report(f"leaving out part {at + 1} of {len(folds)}{told}", at / len(folds))
+        kept = parts.some(np.flatnonzero(~held).tolist())
+        left = parts.some(np.flatnonzero(held).tolist())
+        try:
+            fit = fit_with_effects(kept, rotations, wanted, settings, cancelled=cancelled)
+        except NotTrainable:
+            continue  # what is left of this fold cannot carry a model: it says nothing about the error
+        for name, errors in errors_of(fit, left, rotations, settings).items():
+            square[name] += float(errors @ errors)
+            count[name] += len(errors)
+    return HeldOutErrors(square, count)
+
+
+def errors_of(
+    fit: EffectFit, takes: PreparedTakes, rotations: Sequence[str], settings: TrainingSettings
+) -> dict[str, np.ndarray]:
+    """For each rotation the errors (predicted minus measured) of all measured frames, degrees."""
+    base = {
+        name: own_signals(takes, correspondence_for(takes, name, settings), fit.regressor(name))[0]
+        for name in rotations
+    }
+    found: dict[str, list[np.ndarray]] = {name: [] for name in rotations}
+    correction = EffectCorrection(fit.effects, list(rotations), takes.scale)
+    targets = {name: takes.target(name) for name in rotations}
+    for number, take in enumerate(takes.takes):
+        mean = np.column_stack([base[name][number] for name in rotations])
+        mean = mean + correction.of_take(
+            take.time_s, mean, takes.readings[number], take.context, take.wearing
+        )
+        for column, name in enumerate(rotations):
+            error = mean[:, column] - targets[name][number]
+            found[name].append(error[np.isfinite(error)])
+    return {name: np.concatenate(parts) for name, parts in found.items()}
+
+
+def _cut(takes: PreparedTakes) -> tuple[PreparedTakes, np.ndarray]:
+    """Each take in pieces, as takes of their own; and each piece's number within its take."""
+    found, reference, place = [], [], []
+    for take, measured in zip(takes.takes, takes.reference, strict=True):
+        for number, rows in enumerate(pieces(take.time_s, measured)):
+            place.append(number)
+            reference.append(measured[rows])
+            found.append(
+                replace(
+                    take,
+                    name=f"{take.name}, part {number + 1}",
+                    time_s=take.time_s[rows],
+                    readings=take.readings[rows],
+                    rotations=takes.layout.rotations,
+                    reference_time_s=take.time_s[rows],
+                    reference=measured[rows],
+                    context={name: values[rows] for name, values in take.context.items()},
+                    poses=None if take.poses is None else take.poses[rows],
+                )
+            )
+    prepared = PreparedTakes.of(found, takes.layout)
+    return replace(prepared, reference=tuple(reference), scale=takes.scale), np.array(place)

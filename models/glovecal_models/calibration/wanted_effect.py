@@ -1,0 +1,36 @@
+"""Which effects a calibration is to have, and where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from glovecal_models.effects.base.columnless_effect import ColumnlessEffect
+from glovecal_models.effects.base.effect import Effect, Settings
+from glovecal_models.effects.catalogue import effect
+
+ONE_BY_ONE = ("cross_coupling", "palm_arch")
+"""Effects whose neighbours differ from joint to joint."""
+
+
+@dataclass(frozen=True)
+class WantedEffect:
+    """An effect and the rotations it is on."""
+
+    name: str
+    rotations: tuple[str, ...]
+    settings: Settings = field(default_factory=dict)
+    """What is known already: the clocks' offsets."""
+
+    @property
+    def effect(self) -> Effect:
+        return effect(self.name)
+
+    @property
+    def has_columns(self) -> bool:
+        """It corrects the prediction; the others repair the measurement or widen the interval."""
+        return not isinstance(self.effect, ColumnlessEffect)
+
+    @property
+    def is_on_reference(self) -> bool:
+        """It repairs the measurement; nothing is predicted."""
+        return self.effect.side == "reference"

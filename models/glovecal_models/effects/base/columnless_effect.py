@@ -1,0 +1,25 @@
+"""Effects that add no columns: the calibration stays as it is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from glovecal_models.effects.base.effect import Decoy, InstantEffect, Settings, Signals
+
+
+class ColumnlessEffect(InstantEffect):
+    """Zero columns, one shape of zeros."""
+
+    decoy: ClassVar[Decoy] = "none"
+
+    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
+        return np.zeros((1, takes[0].own.shape[1], len(self.parameters)))
+
+    def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        return np.zeros((len(take), take.own.shape[1], 0))
+
+    def weight_names(self, settings: Settings) -> tuple[str, ...]:
+        return ()

@@ -1,0 +1,76 @@
+"""Effects of a recorded context column: an offset and a gain that change with it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from glovecal_models.effects.base.effect import Decoy, InstantEffect, Settings, Signals
+from glovecal_models.effects.base.joint_units import in_joint_units, settle_joint_units
+
+PRIOR_DEG = 4.0
+SQUARE_PRIOR_DEG = 6.0
+BEYOND_SHARE = 0.3
+"""Of the range seen in training: so far a slope goes on, for the next take is seldom inside all others."""
+
+
+class ContextEffect(InstantEffect):
+    """Columns h and h x joint, h a function of one context column, zero at that column's usual value.
+
+    Well outside the range seen in training the column is held: no far extrapolation.
+    """
+
+    decoy: ClassVar[Decoy] = "context of other takes"
+
+    @property
+    def column(self) -> str:
+        return self.context[0]
+
+    def settle(self, takes: Sequence[Signals]) -> Settings:
+        values = np.concatenate([take.context[self.column] for take in takes if self.column in take.context])
+        values = values[np.isfinite(values)]
+        return {
+            "low": float(values.min()),
+            "high": float(values.max()),
+            "usual": float(np.median(values)),
+            **settle_joint_units(takes),
+        }
+
+    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
+        return np.zeros((1, takes[0].own.shape[1], 0))
+
+    def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        offsets = self.functions(self.clipped(take, settings), settings, shape)
+        joint = in_joint_units(take.own, settings)[:, :, None]
+        return np.concatenate([offsets, offsets * joint], axis=2)
+
+    def clipped(self, take: Signals, settings: Settings) -> np.ndarray:
+        """The context column (N,), its usual value where unknown, held near what training saw."""
+        value = take.context.get(self.column)
+        value = np.full(len(take), settings["usual"]) if value is None else value
+        value = np.where(np.isfinite(value), value, settings["usual"])
+        beyond = BEYOND_SHARE * (settings["high"] - settings["low"])
+        return np.clip(value, settings["low"] - beyond, settings["high"] + beyond)
+
+    def functions(self, value: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        """(N, L, F) of the clipped context column (N,): its distance from the usual value, and the square."""
+        span = max(settings["high"] - settings["low"], 1e-9)
+        distance = (value - settings["usual"]) / span
+        return np.repeat(np.column_stack([distance, distance**2])[:, None, :], len(shape), axis=1)
+
+    def prior_sd(self, settings: Settings) -> np.ndarray:
+        each = np.array([PRIOR_DEG, SQUARE_PRIOR_DEG])
+        return np.concatenate([each, each])
+
+    def weight_names(self, settings: Settings) -> tuple[str, ...]:
+        span = max(settings["high"] - settings["low"], 1e-9)
+        per = f"{span:.3g}[c.{self.column}]"
+        square = f"square_of_{per}"
+        return (
+            f"offset_deg_per_{per}",
+            f"offset_deg_per_{square}",
+            f"gain_deg_per_{per}_and_sd",
+            f"gain_deg_per_{square}_and_sd",
+        )

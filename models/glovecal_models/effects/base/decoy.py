@@ -1,0 +1,130 @@
+"""Decoys: an effect's twin with the same freedom that cannot be right.
+
+What a twin gains on held-out takes, flexibility alone gains; only what an effect gains beyond it counts.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from glovecal_models.effects.base.effect import Effect, Settings, Signals
+from glovecal_models.errors import BadInput
+
+ROLLED_SHARE = (0.2, 0.8)
+"""Of a take's length."""
+MOST_DEALS = 200
+
+
+def decoy_columns(
+    effect: Effect,
+    takes: Sequence[Signals],
+    settings: Settings,
+    shape: np.ndarray,
+    generator: np.random.Generator,
+) -> list[np.ndarray]:
+    """Columns (N, L, C) of the effect's twin for each take, for the same settings and shape (L, P).
+
+    Raises BadInput when the takes allow no twin: wearings that can only be dealt as they were.
+    """
+    if effect.decoy == "reversed in time":
+        return [effect.columns(_backwards(take), settings, shape)[::-1] for take in takes]
+    if effect.decoy == "rolled in time":
+        return [effect.columns(_rolled(take, generator), settings, shape) for take in takes]
+    if effect.decoy == "context of other takes":
+        swapped = _with_other_context(takes, generator)
+        return [effect.columns(take, settings, shape) for take in swapped]
+    if effect.decoy == "dealt wearings":
+        return [effect.columns(take, settings, shape) for take in _dealt(takes, generator)]
+    return [np.zeros_like(effect.columns(take, settings, shape)) for take in takes]
+
+
+def _backwards(take: Signals) -> Signals:
+    return replace(
+        take,
+        time_s=take.time_s[0] + take.time_s[-1] - take.time_s[::-1],
+        own=take.own[::-1],
+        others={name: values[::-1] for name, values in take.others.items()},
+        context={name: values[::-1] for name, values in take.context.items()},
+    )
+
+
+def _rolled(take: Signals, generator: np.random.Generator) -> Signals:
+    """Own, others and context shifted together, so that no column stays where it was right."""
+    shift = round(generator.uniform(*ROLLED_SHARE) * len(take))
+    return replace(
+        take,
+        own=np.roll(take.own, shift, axis=0),
+        others={name: np.roll(values, shift) for name, values in take.others.items()},
+        context={name: np.roll(values, shift) for name, values in take.context.items()},
+    )
+
+
+def _with_other_context(takes: Sequence[Signals], generator: np.random.Generator) -> list[Signals]:
+    """Each take with the context of another one, of another wearing where possible.
+
+    A single take has no other: its context is rolled in time.
+    """
+    if len(takes) < 2:
+        return [replace(take, context=_rolled(take, generator).context) for take in takes]
+    cost = generator.uniform(0.0, 1e-3, (len(takes), len(takes)))
+    for row, take in enumerate(takes):
+        cost[row] += [1.0 if take.wearing == other.wearing else 0.0 for other in takes]
+        cost[row, row] += 1e6
+    _, giver = linear_sum_assignment(cost)
+    return [with_context(take, takes[other]) for take, other in zip(takes, giver, strict=True)]
+
+
+def with_context(take: Signals, giver: Signals) -> Signals:
+    """The take with another one's context columns, resampled to its frames."""
+    return replace(take, context=_stretched(giver.context, len(take)))
+
+
+def _stretched(context: Mapping[str, np.ndarray], length: int) -> dict[str, np.ndarray]:
+    """Context columns resampled to so many frames."""
+    result = {}
+    for name, values in context.items():
+        place = np.linspace(0.0, len(values) - 1.0, length)
+        result[name] = np.interp(place, np.arange(len(values)), values)
+    return result
+
+
+def _dealt(takes: Sequence[Signals], generator: np.random.Generator) -> list[Signals]:
+    """The takes dealt to other wearings, within the same motion where names tell; never as they were."""
+    true = _partition([take.wearing for take in takes])
+    for motions in (motions_of(takes), [""] * len(takes)):
+        for _ in range(MOST_DEALS):
+            dealt = _permuted([take.wearing for take in takes], motions, generator)
+            if _partition(dealt) != true:
+                return [replace(take, wearing=wearing) for take, wearing in zip(takes, dealt, strict=True)]
+    raise BadInput("these takes can be dealt to wearings in one way only; record two takes in a wearing")
+
+
+def _permuted(wearings: list[str], motions: list[str], generator: np.random.Generator) -> list[str]:
+    dealt = wearings.copy()
+    for motion in dict.fromkeys(motions):
+        members = [index for index, other in enumerate(motions) if other == motion]
+        for index, source in zip(members, map(int, generator.permutation(members)), strict=True):
+            dealt[index] = wearings[source]
+    return dealt
+
+
+def _partition(wearings: Sequence[str]) -> frozenset[frozenset[int]]:
+    """Which takes are together; names of wearings do not matter."""
+    return frozenset(
+        frozenset(index for index, other in enumerate(wearings) if other == wearing) for wearing in wearings
+    )
+
+
+def motions_of(takes: Sequence[Signals]) -> list[str]:
+    """The words of each take's name that are neither numbered nor part of its wearing's name."""
+    motions = []
+    for take in takes:
+        wearing = set(re.split(r"[^A-Za-z0-9]+", take.wearing.lower()))
+        words = [word for word in re.split(r"[^A-Za-z0-9]+", take.take.lower()) if word not in wearing]
+        motions.append(" ".join(word for word in words if not re.search(r"\d", word)))
+    return motions

@@ -1,0 +1,1 @@
+"""declared effects: a user's own, from one line of text."""

@@ -1,0 +1,284 @@
+"""An effect of the user's own, declared as an expression on the command line or over REST."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from glovecal_models.effects.base.effect import Effect, Settings, Signals, Stream
+from glovecal_models.effects.base.history_effect import LONGEST_GAP_S, elapsed_s, unbroken
+from glovecal_models.effects.base.joint_units import in_joint_units, settle_joint_units
+from glovecal_models.effects.declared.declaration import Declaration
+from glovecal_models.effects.declared.expression_value import Evaluation, Memory, Undefined
+from glovecal_models.errors import BadInput
+
+LARGEST = 1e9
+"""Of a column: squares of more lose the digits of everything fitted beside it."""
+TOO_LARGE = (
+    f"at most {LARGEST:g} can be fitted. The factor of each column is learned: write it without one,"
+    " such as own instead of own*1e300"
+)
+SAME = 1e-9
+"""Share of a column's size within which it does not change."""
+MOST_VALUES = {1: 8, 2: 6}
+"""Values tried for each parameter, by the number of parameters."""
+
+
+class ExpressionEffect(Effect):
+    """Columns as declared; the declared parameters are the shape.
+
+    A context column is held inside its declared range, or else the range of training; an unknown value counts
+    as the usual one. A frame in which a column has no value (a division by zero, say) gets zero columns; see
+    ``undefined_frames`` and the stream's ``undefined``. In training it is refused.
+    """
+
+    source: ClassVar[str] = "declared by the user"
+
+    def __init__(self, declaration: Declaration) -> None:
+        self.declaration = declaration
+        self._signals = declaration.signals
+        self._reads_own = any("own" in node.names for node in declaration.columns)
+        self._reads_time = any("t" in node.names for node in declaration.columns)
+        shown = declaration.explanation or f"Declared by the user: {declaration.columns_text}."
+        # Every other effect has these as attributes of its class; here each object has its own.
+        vars(self).update(
+            name=declaration.name,
+            explanation=shown,
+            parameters=declaration.parameters,
+            context=declaration.context,
+            decoy=declaration.decoy,
+            has_memory=any(node.has_memory for node in declaration.columns),
+        )
+
+    @property
+    def needs_time(self) -> bool:
+        return self._reads_time or self.has_memory
+
+    @classmethod
+    def parse(cls, text: str) -> ExpressionEffect:
+        """From a line such as ``name = strap; columns = c.strap_n * own``. Raises BadInput."""
+        return cls(Declaration.parse(text))
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> ExpressionEffect:
+        """From plain JSON data; ``settings["declaration"]`` of a stored model is one. Raises BadInput."""
+        return cls(Declaration.from_document(document))
+
+    def check_sizes(self) -> None:
+        """What shows before any take: raises BadInput for a factor beyond ``LARGEST``, and for a column in
+        which nothing is recorded."""
+        for column in self.declaration.columns:
+            if not column.names:
+                raise BadInput(
+                    f"effect {self.name!r}: {column.text!r} is the same in every frame; write an expression"
+                    " of own, of sensors or of context columns"
+                )
+            for node in column.walk():
+                if node.kind == "number" and not node.value <= LARGEST:
+                    raise BadInput(f"effect {self.name!r}: {node.text} in {column.text!r}: {TOO_LARGE}")
+
+    def missing(self, takes: Sequence[Signals]) -> str | None:
+        for name in self._signals:
+            if not any(name in take.others for take in takes):
+                known = sorted({other for take in takes for other in take.others})
+                return f"no signal {name} was recorded (there are {', '.join(known) or 'none'})"
+        why = super().missing(takes)
+        return self._constant(takes) if why is None else why
+
+    def _constant(self, takes: Sequence[Signals]) -> str | None:
+        """The first column that never changes, whatever its parameters: the calibration has a constant."""
+        settings, moves = self.settle(takes), np.zeros(len(self.declaration.columns), dtype=bool)
+        low = high = np.zeros(len(moves))
+        for shape in self.grid(takes, settings):
+            values = [self._evaluated(take, settings, shape)[0] for take in takes if len(take)]
+            low = np.min([part.min(axis=(0, 1)) for part in values], axis=0)
+            high = np.max([part.max(axis=(0, 1)) for part in values], axis=0)
+            moves |= high - low > SAME * np.maximum(np.abs(low), np.abs(high))
+        still = np.flatnonzero(~moves)
+        if not len(still):
+            return None
+        text = self.declaration.columns[still[0]].text
+        return f"its column {text!r} is always {low[still[0]]:g}; write one that changes with the hand"
+
+    def settle(self, takes: Sequence[Signals]) -> Settings:
+        """Raises BadInput for a name that is not recorded, and for frames in which a column has no value or
+        is larger than ``LARGEST``."""
+        others = {name for take in takes for name in take.others}
+        self.declaration.check_signals(others, {name for take in takes for name in take.context})
+        ranges = {name: (low, high) for name, low, high in self.declaration.ranges}
+        context = {}
+        for name in self.context:
+            values = np.concatenate([take.context[name] for take in takes if name in take.context])
+            values = values[np.isfinite(values)]
+            if not len(values):
+                raise BadInput(f"effect {self.name!r}: the context column c.{name} holds no number")
+            low, high = ranges.get(name, (float(values.min()), float(values.max())))
+            context[name] = {
+                "low": low,
+                "high": high,
+                "usual": float(np.median(np.clip(values, low, high))),
+            }
+        settings = {
+            "declaration": self.declaration.to_document(),
+            "context": context,
+            **settle_joint_units(takes),
+        }
+        return settings | {"scale": self._scale(takes, settings)}
+
+    def prior_sd(self, settings: Settings) -> np.ndarray:
+        """A degree for a column of its usual size, whatever the unit it is written in."""
+        scale = np.array(settings.get("scale", [1.0] * len(self.declaration.columns)))
+        return 1.0 / np.where(scale > 0, scale, 1.0)
+
+    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
+        axes = [
+            _values(item.low, item.high, start, MOST_VALUES[len(self.parameters)])
+            for item, start in zip(self.parameters, self.declaration.starts, strict=True)
+        ]
+        pairs = (
+            np.array(np.meshgrid(*axes, indexing="ij")).reshape(len(axes), -1).T if axes else np.zeros((1, 0))
+        )
+        return np.repeat(pairs[:, None, :], takes[0].own.shape[1], axis=1)
+
+    def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        values = self._evaluated(take, settings, shape)[0]
+        return np.where(np.isfinite(values).all(axis=2, keepdims=True), values, 0.0)
+
+    def undefined_frames(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        """(N,) True for frames in which some column of some lane has no value."""
+        return np.isnan(self._evaluated(take, settings, shape)[0]).any(axis=(1, 2)).astype(bool)
+
+    def stream(self, settings: Settings, shape: np.ndarray) -> ExpressionStream:
+        return ExpressionStream(self, settings, shape)
+
+    def weight_names(self, settings: Settings) -> tuple[str, ...]:
+        return tuple(f"weight_{self.declaration.unit}[{node.text}]" for node in self.declaration.columns)
+
+    def block(
+        self, take: Signals, settings: Settings, shape: np.ndarray, start_s: float, elapsed: np.ndarray,
+        memory: Memory,
+    ) -> tuple[np.ndarray, Undefined | None]:  # fmt: skip
+        """Columns (B, L, C) of an unbroken block, NaN where undefined, and the first place that is.
+
+        ``start_s`` is when the take began; ``memory`` is changed.
+        """
+        lanes = take.own.shape[1]
+        evaluation = Evaluation(self._names(take, settings, shape, start_s), elapsed, lanes, memory)
+        values = [evaluation.value(node) for node in self.declaration.columns]
+        return np.stack(values, axis=2), evaluation.undefined
+
+    def _names(
+        self, take: Signals, settings: Settings, shape: np.ndarray, start_s: float
+    ) -> dict[str, np.ndarray]:
+        rest = np.zeros(len(take))
+        names: dict[str, np.ndarray] = {"own_deg": take.own, "t": (take.time_s - start_s)[:, None]}
+        if self._reads_own:
+            names["own"] = in_joint_units(take.own, settings)
+        for column, item in enumerate(self.parameters):
+            names[item.name] = shape[None, :, column]
+        for name in self._signals:
+            names[name] = take.others.get(name, rest)[:, None]
+        for name in self.context:
+            known = settings["context"][name]
+            value = take.context.get(name)
+            value = (
+                rest + known["usual"]
+                if value is None
+                else np.where(np.isfinite(value), value, known["usual"])
+            )
+            names[f"c.{name}"] = np.minimum(np.maximum(value, known["low"]), known["high"])[:, None]
+        return names
+
+    def _evaluated(
+        self, take: Signals, settings: Settings, shape: np.ndarray
+    ) -> tuple[np.ndarray, Undefined | None]:
+        elapsed, blocks, first = elapsed_s(take.time_s), [], None
+        for part in unbroken(take.time_s):
+            piece = _piece(take, part)
+            values, undefined = self.block(
+                piece, settings, shape, float(take.time_s[0]), elapsed[part], Memory()
+            )
+            blocks.append(values)
+            if undefined is not None and first is None:
+                first = Undefined(part.start + undefined.frame, undefined.sentence)
+        return np.concatenate(blocks), first
+
+    def _scale(self, takes: Sequence[Signals], settings: Settings) -> list[float]:
+        """The usual size (RMS) of each column over all shapes. Raises BadInput for what cannot be fitted."""
+        squares, count = np.zeros(len(self.declaration.columns)), 0
+        for shape in self.grid(takes, settings):
+            for take in takes:
+                values, undefined = self._evaluated(take, settings, shape)
+                if undefined is not None:
+                    raise BadInput(
+                        f"effect {self.name!r}: {undefined.sentence} at {_place(take, undefined.frame)};"
+                        " guard it, for example with max(x, 0.001)"
+                    )
+                self._refuse_large(take, values)
+                squares += np.sum(values**2, axis=(0, 1))
+                count += values.shape[0] * values.shape[1]
+        return np.sqrt(squares / max(count, 1)).tolist()
+
+    def _refuse_large(self, take: Signals, values: np.ndarray) -> None:
+        for node, column in zip(self.declaration.columns, np.moveaxis(np.abs(values), 2, 0), strict=True):
+            if column.max(initial=0.0) > LARGEST:
+                frame = int(column.max(axis=1).argmax())
+                raise BadInput(
+                    f"effect {self.name!r}: {node.text!r} reaches {column[frame].max():.3g} at"
+                    f" {_place(take, frame)}; {TOO_LARGE}"
+                )
+
+
+class ExpressionStream(Stream):
+    """The columns frame by frame; ``undefined`` says why the last frame had none, None when it had."""
+
+    def __init__(self, effect: ExpressionEffect, settings: Settings, shape: np.ndarray) -> None:
+        self._effect, self._settings, self._shape = effect, settings, shape
+        self.reset()
+
+    def reset(self) -> None:
+        self._memory = Memory()
+        self._start_s: float | None = None
+        self._last_s = 0.0
+        self.undefined: str | None = None
+
+    def columns(self, frame: Signals) -> np.ndarray:
+        time = float(frame.time_s[0])
+        if self._start_s is None or time < self._last_s:
+            # The first frame, or a clock that was set back: as little known as after a gap.
+            self._memory, self._start_s, self._last_s = Memory(), time, time
+        elapsed = time - self._last_s
+        self._last_s = time
+        if elapsed > LONGEST_GAP_S:
+            self._memory, elapsed = Memory(), 0.0
+        values, undefined = self._effect.block(
+            frame, self._settings, self._shape, self._start_s, np.array([elapsed]), self._memory
+        )
+        self.undefined = None if undefined is None else undefined.sentence
+        return np.where(np.isfinite(values).all(axis=2, keepdims=True), values, 0.0)
+
+
+def _place(take: Signals, frame: int) -> str:
+    named = f" of take {take.take}" if take.take else ""
+    return f"frame {frame}{named} ({take.time_s[frame] - take.time_s[0]:.3f} s from its start)"
+
+
+def _values(low: float, high: float, start: float, most: int) -> np.ndarray:
+    """Values in a ratio (or, from 0 or below, in even steps), one of them moved to ``start``."""
+    values = np.geomspace(low, high, most) if low > 0 else np.linspace(low, high, most)
+    values[int(np.argmin(np.abs(values - start)))] = start
+    return values
+
+
+def _piece(take: Signals, part: slice) -> Signals:
+    return Signals(
+        take.time_s[part],
+        take.own[part],
+        {name: values[part] for name, values in take.others.items()},
+        {name: values[part] for name, values in take.context.items()},
+        take.wearing,
+        take.take,
+        take.zero_deg,
+    )

@@ -1,0 +1,1 @@
+"""lag and clock_offset: a sensor that answers late, and clocks that disagree."""

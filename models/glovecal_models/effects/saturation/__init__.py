@@ -1,0 +1,1 @@
+"""saturation: the sensor stops responding near the end of its range."""

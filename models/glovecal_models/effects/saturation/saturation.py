@@ -1,0 +1,179 @@
+"""Saturation: near one end of its range the sensor stops responding.
+
+Found by bands of 4 % of a sensor's range. In the end band readings pile up, and the reference there spreads
+more than one band's worth of angles. Where the reference rests too, it is a posture. A curve that becomes
+flat looks the same as a clipped one, and what was lost is the same: inside the band the angle is known on one
+side only. The interval there has to cover what the reference was seen to do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from glovecal_models.effects.base.effect import Settings
+from glovecal_models.effects.base.interval_effect import IntervalEffect, LeftOutErrors
+from glovecal_models.effects.base.signature_effect import Finding, check_signature_input
+from glovecal_models.effects.saturation.saturated_band import SaturatedBand, SaturationInterval
+from glovecal_models.takes.take import Take
+
+BAND = 0.04
+PILED_UP = 3.0
+SPREAD = 2.0
+LEAST_FRAMES = 30
+LEAST_VISITS = 4
+MOVES_SHARE = 0.25
+"""Of the reference's spread in the band, to be seen within visits to it: else the hand only rested there."""
+LEAST_EXTRA_DEG = 2.0
+"""A smaller loss is not worth a word."""
+LEAST_NOISE_SHARE, MOST_NOISE_SHARE = 0.05, 2.0
+
+
+class Saturation(IntervalEffect):
+    name = "saturation"
+    explanation = "The sensor stops responding near the end of its range: further bending is not seen."
+    source = "clipped converter or fully stretched sensor; bands: study of missing effects"
+
+    def find(
+        self,
+        takes: Sequence[Take],
+        sensor_of: Mapping[str, str],
+        errors: Sequence[np.ndarray] | None = None,
+    ) -> tuple[Finding, ...]:
+        check_signature_input(takes, sensor_of, errors)
+        bands = sorted(saturated_bands(takes, sensor_of), key=lambda band: -band.extra_sd_deg)
+        return tuple(_finding(band) for band in bands)
+
+    def learned(self, left_out: Sequence[LeftOutErrors], found: Settings) -> Settings:
+        bands = [SaturatedBand.of(item) for item in found["bands"]]
+        shares, learned = {}, []
+        for name in dict.fromkeys(band.rotation for band in bands):
+            own = [band for band in bands if band.rotation == name]
+            errors = [item for item in left_out if item.rotation == name]
+            shares[name] = _noise_share(own, errors)
+            learned += [band.learned(errors, shares[name]).to_settings() for band in own]
+        return {"bands": learned, "noise_share": shares}
+
+    def interval(
+        self, settings: Settings, rotations: Sequence[str], sensors: Sequence[str], noise: np.ndarray
+    ) -> SaturationInterval:
+        bands = [SaturatedBand.of(item) for item in settings["bands"]]
+        shares = np.array([settings.get("noise_share", {}).get(name, 1.0) for name in rotations])
+        return SaturationInterval(bands, shares, rotations, sensors, noise)
+
+    def sentence(self, settings: Settings, rotations: Sequence[str]) -> str:
+        bands = [SaturatedBand.of(item) for item in settings["bands"]]
+        largest = max((max(band.step_sd_deg, default=band.extra_sd_deg) for band in bands), default=0.0)
+        return (
+            "no calibration brings back what the sensor does not say; near the end of its range the claimed "
+            f"standard deviation is up to {largest:.1f} degrees"
+        )
+
+    def described_on(self, settings: Settings, rotation: str) -> dict[str, float]:
+        told: dict[str, float] = {}
+        for band in (SaturatedBand.of(item) for item in settings["bands"] if item["rotation"] == rotation):
+            told |= {
+                f"{band.end}_band_from_counts": band.low,
+                f"{band.end}_band_to_counts": band.high,
+                f"{band.end}_band_sd_deg": max(band.step_sd_deg, default=band.extra_sd_deg),
+            }
+        return told
+
+
+def _near(band: SaturatedBand, left_out: LeftOutErrors) -> np.ndarray:
+    return band.is_near(left_out.readings[:, left_out.sensors.index(band.sensor)])
+
+
+def _noise_share(bands: Sequence[SaturatedBand], left_out: Sequence[LeftOutErrors]) -> float:
+    """How much of the noise that training found is there far from the bands: it took the loss for noise."""
+    square, known, noise = 0.0, 0.0, 0.0
+    for item in left_out:
+        far = ~np.any([_near(band, item) for band in bands], axis=0)
+        square += float(np.sum(item.error[far] ** 2))
+        known += float(np.sum(item.variance[far] - item.noise))
+        noise += float(far.sum() * item.noise)
+    share = (square - known) / noise if noise > 0 else 1.0
+    return float(np.clip(share, LEAST_NOISE_SHARE, MOST_NOISE_SHARE))
+
+
+def saturated_bands(takes: Sequence[Take], sensor_of: Mapping[str, str]) -> tuple[SaturatedBand, ...]:
+    """The bands in which sensors stop responding, at most two for each rotation."""
+    found = []
+    for rotation, sensor in sensor_of.items():
+        pairs = [
+            (take.readings[:, take.sensors.index(sensor)], take.reference_at_frames([rotation])[:, 0])
+            for take in takes
+            if rotation in take.rotations
+        ]
+        if not pairs:
+            continue
+        readings, angles = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
+        known = np.isfinite(angles)
+        for sign in (1, -1):
+            band = _end_band(sensor, rotation, readings[known], angles[known], sign)
+            if band is not None:
+                found.append(band)
+    return tuple(found)
+
+
+def _end_band(
+    sensor: str, rotation: str, readings: np.ndarray, angles: np.ndarray, sign: int
+) -> SaturatedBand | None:
+    """Judge the upper end (``sign`` 1) or, on readings turned over, the lower one (-1)."""
+    if len(readings) < LEAST_FRAMES:
+        return None
+    value = sign * readings
+    # Single spikes must not stretch the range.
+    bottom, top = np.percentile(value, [0.1, 99.9])
+    width = BAND * (top - bottom)
+    if width <= 0:
+        return None
+    end, following = value >= top - width, (value < top - width) & (value >= top - 2 * width)
+    neighbours = (value < top - width) & (value >= top - 3 * width)
+    # With few readings beside it, a pile tells nothing of what the sensor does on its way there.
+    if end.sum() < LEAST_FRAMES or neighbours.sum() < LEAST_FRAMES:
+        return None
+    piled_up = 2.0 * end.sum() / neighbours.sum()
+    beside = following if following.sum() >= LEAST_FRAMES else neighbours
+    spread, usual = float(angles[end].std()), float(angles[beside].std())
+    if piled_up <= PILED_UP or spread <= SPREAD * usual:
+        return None
+    extra = float(np.sqrt(spread**2 - usual**2))
+    visits = np.cumsum(np.diff(end, prepend=False) != 0)[end]
+    if extra < LEAST_EXTRA_DEG or _moves_within(visits, angles[end]) < MOVES_SHARE * spread:
+        return None
+    towards = 1 if np.median(angles[end]) >= np.median(angles[beside]) else -1
+    edges = sorted((sign * (top - width), sign * max(float(value.max()), float(top))))
+    return SaturatedBand(
+        sensor, rotation, float(edges[0]), float(edges[1]), "high" if sign > 0 else "low", towards, extra,
+        float(piled_up), spread / max(usual, 1e-9), int(end.sum()),
+    )  # fmt: skip
+
+
+def _moves_within(visits: np.ndarray, angles: np.ndarray) -> float:
+    """Spread of angles (M,) about the mean of each of the numbered visits (M,); 0 for too few visits."""
+    _, number = np.unique(visits, return_inverse=True)
+    frames = np.bincount(number)
+    if len(frames) < LEAST_VISITS:
+        return 0.0
+    means = np.bincount(number, angles) / frames
+    return float(np.sqrt(np.mean((angles - means[number]) ** 2)))
+
+
+def _finding(band: SaturatedBand) -> Finding:
+    side = f"from {band.low:.4g} upwards" if band.end == "high" else f"from {band.high:.4g} downwards"
+    sentence = (
+        f"{band.sensor}: the sensor stops responding here, {side}; {band.rotation} spreads by "
+        f"{band.extra_sd_deg:.1f} deg there unseen. Nothing brings it back; the interval becomes wider."
+    )
+    evidence = {
+        "density_over_next_bands_1": band.piled_up,
+        "reference_spread_over_next_band_1": band.spread_ratio,
+        "band_low_counts": band.low,
+        "band_high_counts": band.high,
+    }
+    return Finding(
+        Saturation.name, (band.sensor,), sentence, kind=band.end, size_deg=band.extra_sd_deg,
+        count=band.frames, evidence=evidence,
+    )  # fmt: skip

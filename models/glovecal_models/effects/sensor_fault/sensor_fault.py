@@ -1,0 +1,170 @@
+"""Sensor fault: a broken wire, a loose plug. The stretches concerned should not train anything.
+
+Four signatures: *stuck* (one value while the reference moves), *spikes* (gone after a frame or two),
+*dropouts* (jumps to a constant and back) and a *jump* of gain or offset in the middle of a take.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from glovecal_models.effects.base.effect import Side
+from glovecal_models.effects.base.signature_effect import (
+    Finding,
+    SignatureEffect,
+    Stretch,
+    check_signature_input,
+    frames_inside,
+    named,
+    stretches_of,
+)
+from glovecal_models.effects.sensor_fault.gain_jump import gain_jump
+from glovecal_models.effects.sensor_fault.reading_faults import GRADUAL_SHARE, dropouts, spikes, stuck
+from glovecal_models.effects.sensor_fault.short_faults import (
+    FEWEST,
+    expected_readings,
+    shortly_stuck,
+    small_dropouts,
+)
+from glovecal_models.takes.take import Take
+
+REFERENCE_MOVES_DEG = 10.0
+"""The reference must travel so far while a sensor stands still."""
+LEAST_SPIKES = 3
+LEAST_OF_RANGE = (0.5, 99.5)
+
+
+class SensorFault(SignatureEffect):
+    name = "sensor_fault"
+    side: ClassVar[Side] = "reference"
+    explanation = "A wire or plug fails: the sensor stands still, spikes, drops out or jumps."
+    source = "signatures of readings against reference"
+    kinds: ClassVar[tuple[str, ...]] = ("stuck", "spikes", "dropouts", "jump")
+
+    def find(
+        self,
+        takes: Sequence[Take],
+        sensor_of: Mapping[str, str],
+        errors: Sequence[np.ndarray] | None = None,
+    ) -> tuple[Finding, ...]:
+        check_signature_input(takes, sensor_of, errors)
+        rotation_of: dict[str, str] = {}
+        for rotation, sensor in sensor_of.items():
+            rotation_of.setdefault(sensor, rotation)
+        found: list[Finding] = []
+        for sensor, rotation in rotation_of.items():
+            found += _faults(takes, sensor, rotation)
+        return tuple(sorted(found, key=lambda item: (-len(item.stretches), item.where)))
+
+    def repaired(self, takes: Sequence[Take]) -> tuple[Take, ...]:
+        """The takes without reference where the joint's own sensor failed: it neither trains nor scores."""
+        if not takes:
+            return ()
+        # Looked for in all takes together: a short fault may be rare in each of them.
+        shared = set.intersection(*(set(take.sensors) for take in takes))
+        rotations = dict.fromkeys(name for take in takes for name in take.rotations)
+        found = self.find(takes, {name: name for name in rotations if name in shared})
+        return tuple(_without_faults(take, found) for take in takes)
+
+
+def _faults(takes: Sequence[Take], sensor: str, rotation: str) -> list[Finding]:
+    columns = [take.readings[:, take.sensors.index(sensor)] for take in takes]
+    low, high = (float(v) for v in np.percentile(np.concatenate(columns), LEAST_OF_RANGE))
+    short = _short_faults(takes, sensor, rotation, low, high)
+    stretches: dict[str, list[Stretch]] = {kind: [] for kind in SensorFault.kinds}
+    frames = dict.fromkeys(SensorFault.kinds, 0)
+    jumps = []
+    for take, readings, brief in zip(takes, columns, short, strict=True):
+        angles = take.reference_at_frames([rotation])[:, 0]
+        masks = {
+            "stuck": stuck(take.time_s, readings, low, high, angles / REFERENCE_MOVES_DEG) | brief["stuck"],
+            "dropouts": dropouts(readings, high - low) | brief["dropouts"],
+        }
+        masks["dropouts"] &= ~masks["stuck"]
+        masks["spikes"] = spikes(readings, high - low) & ~masks["dropouts"]
+        for kind, mask in masks.items():
+            stretches[kind] += stretches_of(take, mask)
+            frames[kind] += int(mask.sum())
+        margin = GRADUAL_SHARE * (high - low)
+        inside = (readings >= low + margin) & (readings <= high - margin)
+        broken = masks["stuck"] | masks["dropouts"] | masks["spikes"]
+        jump = gain_jump(take.time_s, readings, np.where(broken, np.nan, angles), inside)
+        if jump is not None:
+            jumps.append(jump)
+            frames["jump"] += int((take.time_s >= jump.at_s).sum())
+            stretches["jump"].append(Stretch(take.name, jump.at_s, float(take.time_s[-1])))
+    least = {"stuck": 1, "dropouts": 1, "spikes": LEAST_SPIKES, "jump": 1}
+    size = max((jump.size_deg for jump in jumps), default=None)
+    return [
+        _finding(sensor, rotation, kind, stretches[kind], frames[kind], size if kind == "jump" else None)
+        for kind in SensorFault.kinds
+        if len(stretches[kind]) >= least[kind]
+    ]
+
+
+def _short_faults(
+    takes: Sequence[Take], sensor: str, rotation: str, low: float, high: float
+) -> list[dict[str, np.ndarray]]:
+    """For each take a mask (N,) of each kind; empty where there are too few of that kind in all takes."""
+    columns = [take.readings[:, take.sensors.index(sensor)] for take in takes]
+    angles = [take.reference_at_frames([rotation])[:, 0] for take in takes]
+    expected, gain = expected_readings(np.concatenate(columns), np.concatenate(angles))
+    parts = np.split(expected, np.cumsum([len(column) for column in columns])[:-1])
+    found = []
+    for take, column, part in zip(takes, columns, parts, strict=True):
+        moving = _others_move(take, sensor)
+        held = shortly_stuck(take.time_s, column, low, high, part, gain, moving)
+        away = small_dropouts(take.time_s, column, high - low, part, moving)
+        found.append({"stuck": held, "dropouts": away})
+    for kind in ("stuck", "dropouts"):
+        masks = [each[kind] for each in found]
+        if sum(len(stretches_of(take, mask)) for take, mask in zip(takes, masks, strict=True)) < FEWEST:
+            for mask in masks:
+                mask[:] = False
+    return found
+
+
+def _others_move(take: Take, sensor: str) -> np.ndarray:
+    """(N,) whether half of the other sensors or more changed since the frame before; never without others."""
+    others = np.delete(take.readings, take.sensors.index(sensor), axis=1)
+    if not others.shape[1]:
+        return np.zeros(len(others), dtype=bool)
+    changed = np.diff(others, axis=0, prepend=others[:1]) != 0
+    return changed.mean(axis=1) >= 0.5
+
+
+def _without_faults(take: Take, found: Sequence[Finding]) -> Take:
+    reference = take.reference_at_frames(take.rotations)
+    failed = np.zeros_like(reference, dtype=bool)
+    for item in found:
+        for name in item.where:
+            if name in take.rotations:
+                failed[:, take.rotations.index(name)] |= frames_inside(take, item.stretches)
+    if not failed.any():
+        return take
+    reference[failed] = np.nan
+    return replace(take, reference_time_s=take.time_s, reference=reference)
+
+
+def _finding(
+    sensor: str, rotation: str, kind: str, stretches: Sequence[Stretch], frames: int, size: float | None
+) -> Finding:
+    seconds = sum(item.end_s - item.start_s for item in stretches)
+    names = named(list(dict.fromkeys(item.take for item in stretches)))
+    first = f"first at {stretches[0].start_s:.2f} s of take {stretches[0].take}"
+    many = len(stretches)
+    sentence = {
+        "stuck": f"{sensor} stands still for {seconds:.1f} s while {rotation} moves ({names}); {first}.",
+        "spikes": f"{sensor} has {many} spikes of a frame or two ({names}); {first}.",
+        "dropouts": f"{sensor} drops out for a moment {many} times ({names}); {first}.",
+        "jump": f"{sensor} jumps in offset or gain by {size or 0.0:.1f} deg and stays so ({names}); {first}.",
+    }[kind]
+    evidence = {"stretches_count": float(many), "concerned_s": seconds, "concerned_frames": float(frames)}
+    return Finding(
+        SensorFault.name, (sensor,), sentence, kind=kind, size_deg=size, count=many,
+        evidence=evidence, stretches=tuple(stretches),
+    )  # fmt: skip

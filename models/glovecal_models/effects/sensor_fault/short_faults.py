@@ -1,0 +1,113 @@
+"""Faults too short or too small to show in the readings alone; the reference tells what should have come.
+
+A loose contact holds a value for some frames, or pulls it away and lets go, many times in a session. Each one
+alone might be chance or an odd movement, so they count only when there are several of them.
+
+All work on the readings (N,) of one sensor in one take and give a mask (N,) of the frames concerned;
+``expected`` (N,) are the readings that the reference asks for, NaN where there is none.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import median_filter, uniform_filter1d
+
+from glovecal_models.effects.base.signature_effect import smallest_step
+from glovecal_models.effects.sensor_fault.reading_faults import GRADUAL_SHARE, constant_runs
+
+FEWEST = 3
+"""Of either kind, in all takes together."""
+STUCK_FRAMES, STUCK_S = 6, 0.08
+STUCK_STEPS = 3.0
+"""Of the converter: the reference must ask for so much more or less while a value stays."""
+STUCK_DEG = 3.0
+SMOOTHED = 5
+RELEASED_SHARE = 0.5
+"""A sensor that lets go makes up for this much at once; friction lets go without a jump."""
+DROPOUT_S = 0.5
+DROPOUT_FRAMES = 3
+"""At least; what is shorter is a spike."""
+DROPOUT_SHARE = 0.05
+"""Of the range."""
+DROPOUT_SPREADS = 8.0
+"""Times the robust spread of a frame's change against the reference."""
+BEFORE_FRAMES = 5
+ALIKE = 0.5
+"""The jump back is between this share of the jump away and its inverse."""
+
+
+def expected_readings(readings: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, float]:
+    """What a straight line makes of the reference (N,), and its counts per degree; NaN and 0 without one."""
+    known = np.isfinite(angles)
+    if known.sum() < 100 or np.ptp(angles[known]) < STUCK_DEG:
+        return np.full(len(readings), np.nan), 0.0
+    gain, offset = np.polyfit(angles[known], readings[known], 1)
+    return gain * angles + offset, float(abs(gain))
+
+
+def shortly_stuck(
+    time_s: np.ndarray,
+    readings: np.ndarray,
+    low: float,
+    high: float,
+    expected: np.ndarray,
+    gain: float,
+    others_move: np.ndarray,
+) -> np.ndarray:
+    """Runs of one value, then a jump to where the reference went; ``others_move`` (N,): no repeated frame.
+
+    ``low`` and ``high`` are the sensor's range, ``gain`` its counts per degree.
+    """
+    found = np.zeros(len(readings), dtype=bool)
+    smooth = uniform_filter1d(expected, SMOOTHED)
+    margin = GRADUAL_SHARE * (high - low)
+    least = max(STUCK_STEPS * smallest_step(readings), STUCK_DEG * gain)
+    for start, end in constant_runs(readings):
+        if end - start < STUCK_FRAMES or end == len(readings) or time_s[end] - time_s[start] < STUCK_S:
+            continue
+        asked = smooth[end] - smooth[start]
+        released = readings[end] - readings[end - 1]
+        found[start:end] = (
+            low + margin < readings[start] < high - margin
+            and others_move[start + 1 : end].mean() > 0.5
+            and abs(asked) > least
+            and released / asked > RELEASED_SHARE
+        )
+    return found
+
+
+def small_dropouts(
+    time_s: np.ndarray, readings: np.ndarray, span: float, expected: np.ndarray, others_move: np.ndarray
+) -> np.ndarray:
+    """Pieces of three frames to half a second that stand off, entered and left by jumps of about one size.
+
+    ``span`` is the sensor's range in readings; ``others_move`` (N,): no repeated frame.
+    """
+    found = np.zeros(len(readings), dtype=bool)
+    fresh = others_move | (np.diff(readings, prepend=np.nan) != 0)
+    change = np.diff(readings - expected, prepend=np.nan)
+    known = np.isfinite(change)
+    if span <= 0 or known.sum() < 100:
+        return found
+    change[~known] = 0.0
+    # A movement that the line does not explain lasts; only what stands out from its neighbours is a jump.
+    jump = change - median_filter(change, 5)
+    spread = 1.4826 * float(np.median(np.abs(jump[known])))
+    limit = max(DROPOUT_SPREADS * spread, 4.0 * smallest_step(readings), DROPOUT_SHARE * span)
+    places = 1 + np.flatnonzero(np.abs(jump[1:]) > limit)
+    level = np.cumsum(change)
+    at = 0
+    while at + 1 < len(places):
+        away, back = places[at], places[at + 1]
+        share = -jump[back] / jump[away]
+        if not (ALIKE < share < 1.0 / ALIKE and time_s[back] - time_s[away] <= DROPOUT_S):
+            at += 1
+            continue
+        # Against the frames before, of which a small spike may have moved one.
+        before = np.median(level[max(away - BEFORE_FRAMES, 0) : away])
+        held = float(np.median(level[away:back]) - before) / jump[away]
+        lasts = back - away >= DROPOUT_FRAMES
+        found[away:back] = lasts and held > ALIKE and fresh[away + 1 : back].mean() > 0.5
+        # Both jumps are used up, by a spike too: its way back is not the beginning of a dropout.
+        at += 2 if not lasts or held > ALIKE else 1
+    return found

@@ -1,0 +1,215 @@
+"""From the takes of a guided sampling to a calibration, as Wang & Neff 2013 does it in two passes.
+
+First pass: takes with known angles. Through that model it is judged which touches happened. Second pass:
+all samples, those of the touches with angles under which all touches of the session close together
+(``touch_posterior.py``). With takes of one kind only (section 8.2) the other pass falls away: without known
+angles the first calibration is the sensors' range put on the joints' (section 5.2.2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.samples import require_layout
+from glovecal_models.calibration.training import train
+from glovecal_models.calibration.training_settings import Report, TrainingSettings
+from glovecal_models.errors import Cancelled, NotTrainable
+from glovecal_models.hand.skeleton import Skeleton
+from glovecal_models.layout import Layout
+from glovecal_models.sampling.guided.closing_touches import closing_touches
+from glovecal_models.sampling.guided.first_beliefs import first_beliefs, reading_ranges
+from glovecal_models.sampling.guided.left_out import LeftOut, left_out
+from glovecal_models.sampling.guided.second_pass import (
+    Lesson,
+    SampleCount,
+    counted,
+    known_lessons,
+    taught_layout,
+    touch_lessons,
+    with_open_variance,
+)
+from glovecal_models.sampling.guided.seen_touches import RefusedTouch, SeenTouch, seen_touches
+from glovecal_models.sampling.guided.sentences import guided_sentences, hold_sentence, nothing_left
+from glovecal_models.sampling.guided.taught_samples import hold_sd_deg, taught_samples
+from glovecal_models.sampling.guided.taught_take import FK, TaughtTake
+from glovecal_models.sampling.guided.touch_posterior import TouchPosterior
+from glovecal_models.takes.take import Take
+
+SAMPLES_SHARE = 0.3
+"""Of the work that goes before the training."""
+BASELINES = ("raw", "linear")
+"""Methods that take known angles as they are, and no touches."""
+HELD_OUT = "widgets left out, one at a time"
+
+
+@dataclass(frozen=True)
+class GuidedSamples:
+    """What a sampling teaches, ready for training; a service may spread the fits and call ``finished``."""
+
+    takes: tuple[Take, ...]
+    """With the angles of the second pass."""
+    layout: Layout
+    """To train by: the glove's own but for joints without a sensor."""
+    glove_layout: Layout
+    samples: tuple[SampleCount, ...]
+    refused: tuple[RefusedTouch, ...]
+    sentences: tuple[str, ...]
+    lessons: tuple[Lesson, ...]
+    posterior: TouchPosterior
+    """The likeliest calibration before any training."""
+    without: LeftOut
+
+    def finished(self, model: CalibrationModel) -> CalibrationModel:
+        """A ``model`` trained on ``takes`` by ``layout``, as it is to be kept.
+
+        Where it has no error estimate it gets that of ``left_out.py``.
+        """
+        model = with_open_variance(replace(model, layout=self.glove_layout), self.lessons, self.posterior)
+        return model if "rmse_deg" in model.error_estimate else self._with_estimate(model)
+
+    def _with_estimate(self, model: CalibrationModel) -> CalibrationModel:
+        errors, rmse_deg = self.without.widget_rmse_deg, self.without.rmse_deg
+        estimate: dict[str, Any] = {"how": HELD_OUT, "folds": 0, "touch_mm": self.without.touch_mm}
+        if rmse_deg is not None:
+            estimate["rmse_deg"] = rmse_deg
+        rotations = (replace(item, held_out_rmse_deg=errors.get(item.rotation)) for item in model.rotations)
+        return replace(model, rotations=tuple(rotations), error_estimate=estimate)
+
+
+@dataclass(frozen=True)
+class GuidedCalibration:
+    model: CalibrationModel
+    samples: tuple[SampleCount, ...]
+    refused: tuple[RefusedTouch, ...]
+    sentences: tuple[str, ...]
+
+
+def guided_samples(
+    takes: Sequence[TaughtTake],
+    layout: Layout,
+    skeleton: Skeleton | None,
+    *,
+    cancelled: Callable[[], bool] | None = None,
+    report: Report | None = None,
+) -> GuidedSamples:
+    """Both passes but for the training; see ``guided_calibration``. Raises as it does."""
+    say = report or (lambda sentence, fraction: None)
+    for taught in takes:
+        require_layout(taught.take, layout)
+    used = [taught.in_order(layout) for taught in takes]
+    known = [taught for taught in used if taught.kind in FK]
+    touching = [taught for taught in used if taught.contacts]
+    if not known and not touching:
+        raise NotTrainable(nothing_left(skeleton is not None, 0, ()))
+    say("what poses and widgets tell", 0.0)
+    samples = taught_samples(used)
+    readings = np.concatenate([taught.take.readings[taught.take.lead_in_frames :] for taught in used])
+    ranges = reading_ranges(layout.sensors, readings)
+    beliefs = first_beliefs(layout, samples, ranges)
+    seen: list[SeenTouch] = []
+    refused: list[RefusedTouch] = []
+    if touching and skeleton is not None:
+        say("first pass: which touches can be seen in what poses and widgets taught", 0.1)
+        first = TouchPosterior(beliefs, layout.sensors, skeleton, ())
+        seen, refused = seen_touches(touching, first, skeleton)
+        _stop_if(cancelled)
+    say("what all touches tell together", 0.5)
+    posterior = TouchPosterior(beliefs, layout.sensors, skeleton, (), cancelled)
+    if seen and skeleton is not None:
+        posterior, seen, strange = closing_touches(beliefs, layout.sensors, skeleton, seen, cancelled)
+        refused += strange
+    inferred, told = touch_lessons(seen, posterior, layout.rotations)
+    lessons = (*known_lessons(known, posterior, told), *inferred)
+    if not lessons:
+        raise NotTrainable(nothing_left(skeleton is not None, len(touching), refused))
+    say("how well the session tells what is left out of it", 0.8)
+    without = left_out(layout, samples, ranges, skeleton, seen, posterior, cancelled)
+    said = [hold_sentence(len(samples.holds), hold_sd_deg(samples, layout))] if samples.holds else []
+    said += [*guided_sentences(seen, refused, told, posterior, skeleton), *without.sentences()]
+    say("second pass: all samples have their angles", 1.0)
+    return GuidedSamples(
+        takes=tuple(lesson.take for lesson in lessons),
+        layout=taught_layout(layout, told),
+        glove_layout=layout,
+        samples=counted(lessons, told),
+        refused=tuple(refused),
+        sentences=tuple(said),
+        lessons=lessons,
+        posterior=posterior,
+        without=without,
+    )
+
+
+def guided_calibration(
+    takes: Sequence[TaughtTake],
+    layout: Layout,
+    subject: str,
+    skeleton: Skeleton | None,
+    settings: TrainingSettings | None = None,
+    *,
+    take_hashes: Sequence[str] = (),
+    parent: str | None = None,
+    cancelled: Callable[[], bool] | None = None,
+    report: Report | None = None,
+) -> GuidedCalibration:
+    """Train on the takes of one or several samplings of a subject, whose hand is ``skeleton``.
+
+    Without a skeleton, and for the methods ``raw`` and ``linear``, touches are not used. Takes of kinds
+    ``range`` and ``verification`` only show the sensors' range. Raises NotTrainable where nothing is left to
+    train on, with the reason of every touch that was refused, LayoutMismatch, Cancelled.
+    """
+    settings = settings or TrainingSettings()
+    how = {"take_hashes": take_hashes, "parent": parent, "cancelled": cancelled}
+    if settings.method in BASELINES:
+        return _plain(takes, layout, subject, settings, report=report, **how)
+    say = report or (lambda sentence, fraction: None)
+
+    def first(sentence: str, fraction: float) -> None:
+        say(sentence, SAMPLES_SHARE * fraction)
+
+    def then(sentence: str, fraction: float) -> None:
+        say(f"second pass: {sentence}", SAMPLES_SHARE + (1 - SAMPLES_SHARE) * fraction)
+
+    found = guided_samples(takes, layout, skeleton, cancelled=cancelled, report=first)
+    model = found.finished(
+        train(found.takes, found.layout, subject, replace(settings, folds=0), report=then, **how)
+    )
+    say("trained", 1.0)
+    return GuidedCalibration(model, found.samples, found.refused, found.sentences)
+
+
+def _plain(
+    takes: Sequence[TaughtTake], layout: Layout, subject: str, settings: TrainingSettings, **how: Any
+) -> GuidedCalibration:
+    """A baseline: known angles as they are."""
+    known = [taught for taught in takes if taught.kind in FK and taught.take.rotations]
+    if not known:
+        raise NotTrainable(f"method {settings.method} needs poses or widgets; touches are not used by it")
+    model = train([taught.take for taught in known], layout, subject, settings, **how)
+    samples = taught_samples(known)
+    counts = [
+        SampleCount(
+            name,
+            kind,
+            sum(
+                len(rows)
+                for taught in known
+                if taught.kind == kind and name in taught.take.rotations
+                for rows in taught.steps()
+            ),
+        )
+        for name in samples.rotations
+        for kind in FK
+    ]
+    said = f"Trained by method {settings.method}, which takes known angles as they are and no touches."
+    return GuidedCalibration(model, tuple(item for item in counts if item.samples), (), (said,))
+
+
+def _stop_if(cancelled: Callable[[], bool] | None) -> None:
+    if cancelled is not None and cancelled():
+        raise Cancelled("training was cancelled")
