@@ -30,7 +30,6 @@ from glovecal_models.calibration.kernel_choice import try_candidates
 from glovecal_models.calibration.representative import representative_index
 from glovecal_models.calibration.sample_weight import Recorded, fit_weighted
 from glovecal_models.calibration.samples import gather_samples
-from glovecal_models.effects.delay.clock_scan import aligned, clock_offsets
 from glovecal_models.errors import NotTrainable
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.regression.kernel_candidates import CANDIDATES
@@ -38,6 +37,7 @@ from glovecal_models.regression.kernel_scores import KernelScores
 from glovecal_models.simulation.protocol import evaluation_segment, free_segment, sampling_protocol
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.simulation.simulated_take import simulate_take
+from glovecal_models.takes.clock_scan import aligned, clock_offsets
 from glovecal_models.takes.table import read_takes
 from glovecal_models.takes.take import Take
 from glovecal_models.threads import pin_blas_to_one_thread

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glovecal_models.effects.delay.clock_scan import ClockOffset, aligned, clock_offsets
 from glovecal_models.simulation.protocol import evaluation_segment, sampling_protocol
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.simulation.simulated_take import simulate_take
+from glovecal_models.takes.clock_scan import ClockOffset, aligned, clock_offsets
 from glovecal_models.takes.table import read_takes, reference_beside
 from glovecal_models.takes.take import Take
 

@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 
 from glovecal_models.calibration.left_out import first_measured, pieces
-from glovecal_models.calibration.realigned import offset_of
 from glovecal_models.calibration.samples import gather_samples
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.comparison.covariates import covariates
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.diagnose import diagnose
-from glovecal_models.diagnosis.evened import evened
-from glovecal_models.effects.delay.clock_scan import clock_offsets
+from glovecal_models.diagnosis.resampled import resampled
+from glovecal_models.effects.delay.offset_to import offset_to
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.cause import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
+from glovecal_models.takes.clock_scan import clock_offsets
 from glovecal_models.takes.table import read_takes, write_takes
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.take_check import check_take
@@ -76,7 +76,7 @@ def test_no_reference_is_read_there(clock):
     known = np.all(np.isfinite(take.reference_at_frames(take.rotations)), axis=1)
     assert not known[: take.lead_in_frames].any()
     assert known[take.lead_in_frames :].mean() > 0.99
-    even = evened(take, SENSORS, SENSORS)
+    even = resampled(take, SENSORS, SENSORS)
     assert not np.isfinite(even.reference[even.time_s < take.start_s]).any()
     assert np.isfinite(even.readings[even.time_s < take.start_s]).all()
 
@@ -138,7 +138,7 @@ def test_clocks_are_judged_though_most_frames_have_no_reference(clean, marked):
     assert [item.verdict for item in found] == ["offset"] * 3
     assert [item.offset_s for item in found] == pytest.approx([0.7] * 3, abs=0.03)
     at_frames = clean[0].reference_at_frames(SENSORS)
-    assert offset_of(late[0], SENSORS, at_frames, 3.0) == pytest.approx(0.7, abs=0.03)
+    assert offset_to(late[0], SENSORS, at_frames, 3.0) == pytest.approx(0.7, abs=0.03)
 
 
 def test_quarters_and_levels_are_cut_from_what_was_measured():

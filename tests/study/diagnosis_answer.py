@@ -6,9 +6,9 @@ from typing import Any
 
 from blind_glove import BlindGlove
 
-from glovecal_models.diagnosis.assessment import Assessment
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
+from glovecal_models.effects.base.assessment import Assessment
 
 NOTHING = "nothing"
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Effect, Settings
+from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.interval_effect import IntervalEffect
 from glovecal_models.effects.catalogue import stored_effect
 from glovecal_models.errors import BadInput

@@ -9,15 +9,14 @@ import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.doubt import Doubt
-from glovecal_models.calibration.fault_hold import FaultHold
 from glovecal_models.calibration.widening import Widening
-from glovecal_models.effects.base.effect import Effect, GloveFrames, Signals, Stream, Uncertainty
+from glovecal_models.effects.base.effect import Effect, Stream, Uncertainty
+from glovecal_models.effects.base.signals import GloveFrames, Signals
+from glovecal_models.effects.base.signature_effect import Hold, SignatureEffect
 from glovecal_models.errors import BadInput
 
 LARGEST_CORRECTION_DEG = 360.0
 """No effect turns a joint by more than this; what is larger, or no number, is an effect gone wrong."""
-
-SENSOR_FAULT = "sensor_fault"
 
 
 def usable_correction(correction: np.ndarray) -> np.ndarray:
@@ -47,6 +46,15 @@ class _Others:
         if self._found is None:
             self._found = self._scale.others(self._readings)
         return self._found
+
+
+class Correction(NamedTuple):
+    """What effects say about the N frames of a take."""
+
+    degrees: np.ndarray
+    """(N, R), to be added to the base's prediction."""
+    doubt: Doubt | None
+    """Of all N frames; None: the claims stay as they are."""
 
 
 class Corrections(NamedTuple):
@@ -88,10 +96,8 @@ class EffectCorrection:
         """Of the wearing asked about last."""
         measured = np.zeros(len(rotations)) if noise is None else noise
         self._widening = Widening(effects, rotations, scale.sensors, measured)
-        self._hold = _fault_hold(effects, rotations, scale.sensors)
+        self._holds = _holds(effects, rotations, scale.sensors)
         self._started_s: float | None = None
-        self.doubt: Doubt | None = None
-        """Of the last take's frames; None: the claim stays as it is."""
         self.faulty_sensors: tuple[str, ...] = ()
         """Those that fail in the last frame."""
         self.context = tuple(dict.fromkeys(name for effect in self._effects for name in effect.context))
@@ -111,13 +117,13 @@ class EffectCorrection:
 
     @property
     def _doubts(self) -> bool:
-        return self._hold is not None or not self._widening.is_empty
+        return bool(self._holds) or not self._widening.is_empty
 
     @property
     def names(self) -> tuple[str, ...]:
         """Effects that act on poses: those that correct something, in their order, then those that doubt."""
         correcting = tuple(item.name for item, _ in self._lanes)
-        return (*correcting, *self._widening.names, *((SENSOR_FAULT,) if self._hold else ()))
+        return (*correcting, *self._widening.names, *(name for name, _ in self._holds))
 
     @property
     def rows(self) -> np.ndarray:
@@ -132,7 +138,7 @@ class EffectCorrection:
         """Names of the effects whose columns depend on when the frames were."""
         effects = (*self._effects, *self._widening.effects)
         names = tuple(effect.name for effect in effects if effect.needs_time)
-        return (*names, SENSOR_FAULT) if self._hold else names
+        return (*names, *(name for name, _ in self._holds))
 
     def silent(self, context: Collection[str], wearing: str) -> tuple[str, ...]:
         """A sentence for each effect that corrects nothing for want of something it is not told.
@@ -152,11 +158,11 @@ class EffectCorrection:
         readings: np.ndarray,
         context: Mapping[str, np.ndarray],
         wearing: str,
-    ) -> np.ndarray:
-        """(N, R) degrees to add to ``base`` (N, R); ``readings`` (N, S) raw counts."""
-        first, self.doubt = base, None
+    ) -> Correction:
+        """For the base's prediction ``base`` (N, R), degrees, and ``readings`` (N, S), raw counts."""
+        first, doubt = base, None
         if self._doubts and len(base):
-            base, readings = self._doubted(time_s, base, readings)
+            base, readings, doubt = self._doubted(time_s, base, readings)
         total = base - first
         others = self._scale.others(readings) if self._lanes else {}
         for item, lanes in self._lanes:
@@ -164,9 +170,7 @@ class EffectCorrection:
             columns = item.effect.columns(take, item.settings, item.shape)
             total[:, lanes] += np.einsum("nlc,lc->nl", columns, item.weights)
         unknown = self._unknown_variance(base, wearing)
-        if unknown is not None:
-            self.doubt = Doubt.more(self.doubt, unknown)
-        return total
+        return Correction(total, doubt if unknown is None else Doubt.more(doubt, unknown))
 
     @staticmethod
     def of_frames(
@@ -229,25 +233,25 @@ class EffectCorrection:
 
     def _doubted(
         self, time_s: np.ndarray, base: np.ndarray, readings: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """The take without what failing sensors say; sets ``doubt`` for all its frames."""
+    ) -> tuple[np.ndarray, np.ndarray, Doubt]:
+        """The take without what failing sensors say, and the doubt of all its frames."""
         variance = self._widening.added_variance(time_s - time_s[0], readings)
-        if self._hold is None:
-            self.doubt = Doubt(variance, np.zeros(base.shape, dtype=bool))
-            return base, readings
-        self._hold.reset()
-        held = [self._hold.frame(*frame) for frame in zip(time_s, base, readings, strict=True)]
-        variance += np.stack([item.variance for item in held])
-        self.doubt = Doubt(variance, np.stack([item.is_faulty for item in held]))
-        return np.stack([item.base for item in held]), np.stack([item.readings for item in held])
+        is_faulty = np.zeros(base.shape, dtype=bool)
+        for _, hold in self._holds:
+            hold.reset()
+            held = [hold.frame(*frame) for frame in zip(time_s.tolist(), base, readings, strict=True)]
+            base, readings = np.stack([item.base for item in held]), np.stack([i.readings for i in held])
+            variance += np.stack([item.variance for item in held])
+            is_faulty |= np.stack([item.is_faulty for item in held])
+        return base, readings, Doubt(variance, is_faulty)
 
     def reset(self) -> None:
         """A new wearing, or frames were lost: effects with a memory start anew."""
         for stream in self._streams:
             stream.reset()
         self._started_s = None
-        if self._hold is not None:
-            self._hold.reset()
+        for _, hold in self._holds:
+            hold.reset()
 
 
 def _columns_of(item: AddedEffect, rotations: Sequence[str]) -> np.ndarray | slice:
@@ -286,27 +290,32 @@ def _doubted_frames(
         gloves[0]._widening.added_variance(time_s - np.array(starts), readings),
         np.zeros(base.shape, dtype=bool),
     )
-    if gloves[0]._hold is None:
+    if not gloves[0]._holds:
         return base, readings, doubt
     base, readings = base.copy(), readings.copy()
     for row, glove in enumerate(gloves):
-        if glove._hold is not None:
-            held = glove._hold.frame(float(time_s[row]), base[row], readings[row])
+        failing: list[str] = []
+        for _, hold in glove._holds:
+            held = hold.frame(float(time_s[row]), base[row], readings[row])
             base[row], readings[row] = held.base, held.readings
             doubt.variance[row] += held.variance
-            doubt.is_faulty[row] = held.is_faulty
-            glove.faulty_sensors = held.sensors
+            doubt.is_faulty[row] |= held.is_faulty
+            failing += held.sensors
+        glove.faulty_sensors = tuple(dict.fromkeys(failing))
     return base, readings, doubt
 
 
-def _fault_hold(
+def _holds(
     effects: Sequence[AddedEffect], rotations: Sequence[str], sensors: Sequence[str]
-) -> FaultHold | None:
-    """For a model that knows what its sensors do when they are sound."""
-    live = [
-        item.settings["live"] for item in effects if item.name == SENSOR_FAULT and "live" in item.settings
-    ]
-    return FaultHold(live[-1], rotations, sensors) if live else None
+) -> list[tuple[str, Hold]]:
+    """What effects do to live frames, by their names; the last of each name counts."""
+    found: dict[str, Hold] = {}
+    for item in effects:
+        effect = item.effect
+        hold = effect.hold(item.settings, rotations, sensors) if isinstance(effect, SignatureEffect) else None
+        if hold is not None:
+            found[item.name] = hold
+    return list(found.items())
 
 
 def _fitting(added: AddedEffect) -> Effect:

@@ -24,7 +24,7 @@ from glovecal_models.calibration.regressor_kinds import restore_regressor
 from glovecal_models.calibration.samples import Samples
 from glovecal_models.calibration.training_plan import task_for
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.calibration.wanted_effect import ONE_BY_ONE, WantedEffect
+from glovecal_models.calibration.wanted_effect import WantedEffect
 from glovecal_models.errors import Cancelled
 from glovecal_models.layout import Correspondence
 from glovecal_models.regression.regressor import Regressor
@@ -164,11 +164,11 @@ def _groups(
     own: Mapping[str, tuple[list[np.ndarray], float]],
 ) -> list[EffectGroup]:
     names = [name for name in item.rotations if name in own]
-    sets = [(name,) for name in names] if item.name in ONE_BY_ONE else [tuple(names)]
+    sets = [(name,) for name in names] if item.effect.one_joint_at_a_time else [tuple(names)]
     groups = []
     for lanes in sets:
         values = [np.column_stack(parts) for parts in zip(*(own[name][0] for name in lanes), strict=True)]
-        without = frozenset(columns[lanes[0]].sensors) if item.name in ONE_BY_ONE else frozenset()
+        without = frozenset(columns[lanes[0]].sensors) if item.effect.one_joint_at_a_time else frozenset()
         signals = takes.signals(values, np.array([own[name][1] for name in lanes]), without)
         groups.append(EffectGroup(item, lanes, signals, item.effect.settle(signals)))
     return groups

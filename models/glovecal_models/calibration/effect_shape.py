@@ -9,7 +9,8 @@ import numpy as np
 
 from glovecal_models.calibration.held_out import BaseProducts, Rows, held_out
 from glovecal_models.calibration.wanted_effect import WantedEffect
-from glovecal_models.effects.base.effect import Settings, Signals
+from glovecal_models.effects.base.facts import Settings
+from glovecal_models.effects.base.signals import Signals
 
 REFINEMENTS = 2
 """Rounds of trying shapes between the best of a grid and its neighbours."""

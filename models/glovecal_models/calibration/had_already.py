@@ -9,8 +9,6 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.calibration.wanted_effect import WantedEffect
 from glovecal_models.effects.base.signature_effect import SignatureEffect
-from glovecal_models.effects.delay.clock_scan import aligned
-from glovecal_models.quick_check.quick_check import is_only_checked
 from glovecal_models.regression.kept_choice import kernel_of
 from glovecal_models.regression.kernel_candidates import CHOOSING
 from glovecal_models.regression.rule_regressor import RuleRegressor
@@ -21,7 +19,7 @@ def wanted_of(model: CalibrationModel) -> tuple[WantedEffect, ...]:
     """The effects a model has, as they would be asked for again."""
     merged: dict[str, WantedEffect] = {}
     for item in model.effects:
-        if is_only_checked(item):
+        if not item.effect.is_of_training(item.settings):
             continue  # training takes tell nothing of a wearing that only a quick check saw
         before = merged.get(item.name)
         rotations = item.active if before is None else (*before.rotations, *item.active)
@@ -39,11 +37,8 @@ def repaired_takes(takes: Sequence[Take], wanted: Sequence[WantedEffect]) -> lis
     """The takes with what their measurement needs: clocks on the frames' time, faulty pieces left out."""
     result = list(takes)
     for item in wanted:
-        if item.name == "clock_offset":
-            offsets, common = item.settings["offset_s"], float(item.settings["common_s"])
-            result = [aligned(take, float(offsets.get(take.name, common))) for take in result]
-        elif item.is_on_reference and isinstance(item.effect, SignatureEffect):
-            result = list(item.effect.repaired(result))
+        if item.is_on_reference and isinstance(item.effect, SignatureEffect):
+            result = list(item.effect.repaired(result, item.settings))
     return result
 
 

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glovecal_models.effects.base.assessment import saved_share
+
 BASE_RIDGE = 1e-6
 ALIKE_ROWS = 100.0
 """Rows that count for one: errors of neighbouring times are alike."""
@@ -54,12 +56,6 @@ class HeldOut:
     def saved(self) -> float:
         """Share of the held-out squared error that the columns save; negative when they harm."""
         return saved_share(self.base, self.added)
-
-
-def saved_share(before: np.ndarray, after: np.ndarray) -> float:
-    """Share of the squared errors ``before`` that is gone ``after``; 0 where there was no error to save."""
-    whole = float(before.sum())
-    return 1.0 - float(after.sum()) / whole if whole > 0 else 0.0
 
 
 class BaseProducts:

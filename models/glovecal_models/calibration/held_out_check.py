@@ -106,9 +106,8 @@ def errors_of(
     targets = {name: takes.target(name) for name in rotations}
     for number, take in enumerate(takes.takes):
         mean = np.column_stack([base[name][number] for name in rotations])
-        mean = mean + correction.of_take(
-            take.time_s, mean, takes.readings[number], take.context, take.wearing
-        )
+        readings = takes.readings[number]
+        mean += correction.of_take(take.time_s, mean, readings, take.context, take.wearing).degrees
         for column, name in enumerate(rotations):
             error = mean[:, column] - targets[name][number]
             found[name].append(error[np.isfinite(error)])

@@ -104,7 +104,7 @@ class GlovePredictor:
             return angles
         effects = self._model.correction()
         correction = effects.of_take(time_s, angles.mean, readings, context, wearing)
-        return self.corrected(angles, correction, doubt=effects.doubt)
+        return self.corrected(angles, correction.degrees, doubt=correction.doubt)
 
     def corrected(
         self,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.calibration.effect_correction import SignalScale
-from glovecal_models.effects.base.effect import Signals
+from glovecal_models.effects.base.signals import Signals
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.takes.take import Take
 

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from glovecal_models.effects.base.columnless_effect import ColumnlessEffect
-from glovecal_models.effects.base.effect import Effect, Settings
+from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.catalogue import effect
-
-ONE_BY_ONE = ("cross_coupling", "palm_arch")
-"""Effects whose neighbours differ from joint to joint."""
 
 
 @dataclass(frozen=True)
@@ -28,9 +25,9 @@ class WantedEffect:
     @property
     def has_columns(self) -> bool:
         """It corrects the prediction; the others repair the measurement or widen the interval."""
-        return not isinstance(self.effect, ColumnlessEffect)
+        return self.effect.has_columns
 
     @property
     def is_on_reference(self) -> bool:
         """It repairs the measurement; nothing is predicted."""
-        return self.effect.side == "reference"
+        return self.effect.kind == "repair"

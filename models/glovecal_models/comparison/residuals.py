@@ -9,8 +9,8 @@ import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_models.calibration.realigned import realigned, usable
 from glovecal_models.calibration.samples import require_layout
+from glovecal_models.effects.base.signature_effect import SignatureEffect
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.take import Take
 
@@ -74,11 +74,16 @@ def residuals(model: CalibrationModel, takes: Sequence[Take]) -> Residuals:
     for take in takes:
         require_layout(take, model.layout)
         given = take
-        take = usable(model, take)
+        repairs = [(item.effect, item.settings) for item in model.effects if item.effect.kind == "repair"]
+        for effect, settings in repairs:
+            if isinstance(effect, SignatureEffect) and not effect.needs_prediction:
+                take = effect.repaired([take], settings)[0]
         left_out = () if take is given else _left_out(given, take, names)
         index = [take.sensors.index(name) for name in model.layout.sensors]
         angles = predictor.predict_take(take.time_s, take.readings[:, index], take.context, take.wearing)
-        take = realigned(model, take, angles.mean)
+        for effect, settings in repairs:
+            if isinstance(effect, SignatureEffect) and effect.needs_prediction:
+                take = effect.repaired_to(take, settings, names, angles.mean)
         found.append(TakeResiduals(take, angles.mean, angles.sd, take.reference_at_frames(names), left_out))
     result = Residuals(names, tuple(found))
     if not found or not result.measured_rotations:

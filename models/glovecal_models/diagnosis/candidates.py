@@ -1,4 +1,4 @@
-"""Every effect that could be missing, assessed on the same rows."""
+"""Every effect that could be missing, assessed on the same rows, beside its decoy."""
 
 from __future__ import annotations
 
@@ -7,58 +7,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.diagnosis.assessment import LEAST_SESSION_CONTRAST, Assessment, JointErrors
-from glovecal_models.diagnosis.delay_verdict import clock_choice
-from glovecal_models.diagnosis.delays import block_starts, delay_errors
-from glovecal_models.diagnosis.directions import Direction
-from glovecal_models.diagnosis.next_take import NextTake
-from glovecal_models.diagnosis.screening import Evidence, screen
+from glovecal_models.calibration.held_out import HeldOut, held_out
+from glovecal_models.diagnosis.forward_design import ForwardDesign
+from glovecal_models.diagnosis.not_identifiable import NotJudgeable, undecidable
 from glovecal_models.diagnosis.session_chance import session_probability
-from glovecal_models.diagnosis.undecidable import undecidable
-from glovecal_models.effects.base.columnless_effect import ColumnlessEffect
+from glovecal_models.effects.base.assessment import (
+    LEAST_SESSION_CONTRAST,
+    Assessment,
+    JointErrors,
+    block_starts,
+    squared_in_blocks,
+)
+from glovecal_models.effects.base.decoy import decoy_columns
 from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.facts import Settings
+from glovecal_models.effects.base.signals import Signals
 
-BLOCK_ROWS = 125
-"""5 s of the rows that are fitted."""
 DEALS_TRIED = 5
-SESSION_DECOYS = ("context of other takes", "dealt wearings")
-
-
-@dataclass(frozen=True)
-class NotJudgeable:
-    """An effect these takes cannot show."""
-
-    effect: str
-    why: str
-    record: NextTake | None = None
-    """The recording after which they could."""
-    would_save: Assessment | None = None
-    """What it saves on takes left out, by itself or by chance."""
-
-    @property
-    def joints_saved(self) -> tuple[int, ...]:
-        """Joints on which it saves as much as a session effect must."""
-        if self.would_save is None:
-            return ()
-        errors = self.would_save.errors
-        return tuple(i for i, item in enumerate(errors) if item.saved >= LEAST_SESSION_CONTRAST)
-
-    @property
-    def saves_much(self) -> bool:
-        """Whether it may well be there."""
-        return bool(self.joints_saved)
-
-    @property
-    def saved_square(self) -> float:
-        """Squared degrees per row, summed over those joints."""
-        if self.would_save is None:
-            return 0.0
-        some = [self.would_save.errors[i] for i in self.joints_saved]
-        return float(sum((item.base.sum() - item.added.sum()) / item.rows for item in some))
 
 
 def assessed(
-    direction: Direction,
+    design: ForwardDesign,
     effects: Sequence[Effect],
     generator: np.random.Generator,
     without: Set[str] = frozenset(),
@@ -66,26 +35,23 @@ def assessed(
 ) -> tuple[list[Assessment], list[NotJudgeable]]:
     """Every judgeable effect, and why the others are not.
 
-    ``lag`` brings ``clock_offset`` with it; ``without`` names effects that the model has already.
+    ``without`` names effects that the model has already.
     """
-    effects = [effect for effect in effects if effect.name not in without or effect.name == "lag"]
-    effects = [effect for effect in effects if not isinstance(effect, ColumnlessEffect)]
+    effects = [item for item in effects if item.stage == "compared" and item.name not in without]
     found: list[Assessment] = []
     impossible: list[NotJudgeable] = []
     for number, effect in enumerate(effects):
         if report:
             report(f"trying {effect.name}", number / len(effects))
-        why = effect.missing(direction.signals)
+        why = effect.missing(design.signals)
         if why is not None:
             impossible.append(NotJudgeable(effect.name, _with_advice(effect, why)))
-        elif effect.name == "lag":
-            found.extend(item for item in _delays(direction) if item.effect not in without)
+            continue
+        item = effect.assess(design) or _assessed(design, effect, generator)
+        if isinstance(item, Assessment):
+            found.append(item)
         else:
-            item = _assessed(direction, effect, generator)
-            if isinstance(item, Assessment):
-                found.append(item)
-            else:
-                impossible.append(item)
+            impossible.append(item)
     return found, impossible
 
 
@@ -96,33 +62,34 @@ def _with_advice(effect: Effect, why: str) -> str:
 
 
 def _assessed(
-    direction: Direction, effect: Effect, generator: np.random.Generator
+    design: ForwardDesign, effect: Effect, generator: np.random.Generator
 ) -> Assessment | NotJudgeable:
-    evidence = _screened(direction, effect, generator)
-    errors = tuple(_joint_errors(item, np.array(direction.unit_take)) for item in evidence)
+    evidence = _screened(design, effect, generator)
+    errors = tuple(_joint_errors(item, np.array(design.unit_take)) for item in evidence)
     found = Assessment(
         effect.name,
-        direction.rotations,
+        design.rotations,
         errors,
         tuple(item.shape for item in evidence),
         tuple(item.true.weights for item in evidence),
         None,
         tuple(f"{item.name}_{item.unit}" for item in effect.parameters),
+        effect.certainty,
     )
-    if effect.decoy not in SESSION_DECOYS:
+    if not effect.changes_between_takes:
         return found
-    few = undecidable(direction.signals, effect)
+    few = undecidable(design.signals, effect)
     if few is not None:
         return NotJudgeable(effect.name, few.why, few.record, found)
     some = any(item.contrast >= LEAST_SESSION_CONTRAST for item in errors)
-    return replace(found, probability=session_probability(direction, effect, generator) if some else 1.0)
+    return replace(found, probability=session_probability(design, effect, generator) if some else 1.0)
 
 
-def _screened(direction: Direction, effect: Effect, generator: np.random.Generator) -> tuple[Evidence, ...]:
+def _screened(design: ForwardDesign, effect: Effect, generator: np.random.Generator) -> tuple[Evidence, ...]:
     """With one decoy; of dealt wearings the typical of several: one deal may nearly be the true one."""
     if effect.decoy != "dealt wearings":
-        return screen(direction, effect, generator)
-    tried = [screen(direction, effect, generator) for _ in range(DEALS_TRIED)]
+        return screen(design, effect, generator)
+    tried = [screen(design, effect, generator) for _ in range(DEALS_TRIED)]
     middle = [
         sorted(items, key=lambda item: item.decoy.saved)[DEALS_TRIED // 2]
         for items in zip(*tried, strict=True)
@@ -132,53 +99,75 @@ def _screened(direction: Direction, effect: Effect, generator: np.random.Generat
 
 def _joint_errors(evidence: Evidence, take: np.ndarray) -> JointErrors:
     true, decoy = evidence.true, evidence.decoy
-    starts = block_starts([len(part) for part in true.residual], BLOCK_ROWS)
+    starts = block_starts([len(part) for part in true.residual])
     return JointErrors(
-        _blocks(true.residual, starts),
-        _blocks(true.residual_added, starts),
-        _blocks(decoy.residual_added, starts),
+        squared_in_blocks(true.residual, starts),
+        squared_in_blocks(true.residual_added, starts),
+        squared_in_blocks(decoy.residual_added, starts),
         int(true.count.sum()),
         take[np.searchsorted(np.cumsum([len(part) for part in true.residual]), starts, side="right")],
     )
 
 
-def _blocks(residual: Sequence[np.ndarray], starts: np.ndarray) -> np.ndarray:
-    return np.add.reduceat(np.concatenate(residual) ** 2, starts)
+@dataclass(frozen=True)
+class Evidence:
+    """What one effect saves on one joint in one design."""
+
+    true: HeldOut
+    decoy: HeldOut
+    shape: np.ndarray
+    """(P,) of the best."""
+    settings: Settings
+
+    @property
+    def contrast(self) -> float:
+        """Share of the squared error saved beyond what the decoy saves."""
+        return self.true.saved - max(self.decoy.saved, 0.0)
 
 
-def _delays(direction: Direction) -> list[Assessment]:
-    """Clock offset, one for all joints (where that pays, one a take); lag, each joint its own."""
-    grids = delay_errors(direction, BLOCK_ROWS)
-    base = [_held_out_blocks(direction, joint) for joint in range(len(grids))]
-    rows = [int(products.count.sum()) for products in direction.products]
-    clock = clock_choice(grids)
-    offsets = [
-        JointErrors(b, b - grid.unmoved + moved, b - grid.unmoved + mirrored, n, grid.take)
-        for b, grid, moved, mirrored, n in zip(base, grids, *clock.errors(grids), rows, strict=True)
-    ]
-    lags, taus = [], []
-    for b, grid, n in zip(base, grids, rows, strict=True):
-        true, decoy = (
-            cells[np.argmin(grid.blocks[:, cells].sum(axis=0))] for cells in (grid.lag, grid.reversed_lag)
+def screen(design: ForwardDesign, effect: Effect, generator: np.random.Generator) -> tuple[Evidence, ...]:
+    """One for each joint of the design."""
+    if effect.one_joint_at_a_time:
+        return tuple(_one_joint(design, effect, joint, generator) for joint in range(len(design.rotations)))
+    return _all_joints(design, effect, design.signals, generator)
+
+
+def _one_joint(design: ForwardDesign, effect: Effect, joint: int, generator: np.random.Generator) -> Evidence:
+    signals = tuple(
+        replace(
+            take,
+            own=take.own[:, [joint]],
+            others={k: v for k, v in take.others.items() if k not in design.known[joint]},
         )
-        lags.append(
-            JointErrors(
-                b,
-                b - grid.unmoved + grid.blocks[:, true],
-                b - grid.unmoved + grid.blocks[:, decoy],
-                n,
-                grid.take,
-            )
-        )
-        taus.append(np.array([grid.cells[true, 1]]))
-    nothing = tuple(np.empty(0) for _ in grids)
-    shifts = tuple(clock.offset_s for _ in grids)
-    return [
-        Assessment("clock_offset", direction.rotations, tuple(offsets), shifts, nothing, None, ("offset_s",)),
-        Assessment("lag", direction.rotations, tuple(lags), tuple(taus), nothing, None, ("tau_s",)),
-    ]
+        for take in design.signals
+    )
+    return _all_joints(design, effect, signals, generator, joints=(joint,))[0]
 
 
-def _held_out_blocks(direction: Direction, joint: int) -> np.ndarray:
-    residual = direction.products[joint].residual
-    return _blocks(residual, block_starts([len(part) for part in residual], BLOCK_ROWS))
+def _all_joints(
+    design: ForwardDesign,
+    effect: Effect,
+    signals: Sequence[Signals],
+    generator: np.random.Generator,
+    joints: Sequence[int] | None = None,
+) -> tuple[Evidence, ...]:
+    joints = range(len(design.rotations)) if joints is None else joints
+    settings = effect.settle(signals)
+    grid = effect.grid(signals, settings)
+    shapes, lanes, numbers = grid.shape
+    tiled = tuple(replace(take, own=np.tile(take.own, (1, shapes))) for take in signals)
+    flat = grid.reshape(shapes * lanes, numbers)
+
+    def by_shape(columns: np.ndarray) -> np.ndarray:
+        return columns.reshape(len(columns), shapes, lanes, -1)
+
+    true = [by_shape(effect.columns(take, settings, flat)) for take in tiled]
+    decoy = [by_shape(part) for part in decoy_columns(effect, tiled, settings, flat, generator)]
+    prior = effect.prior_sd(settings)
+    found = []
+    for lane, joint in enumerate(joints):
+        products = design.products[joint]
+        right = held_out(products, design.rows(joint, [part[:, :, lane] for part in true]), prior)
+        wrong = held_out(products, design.rows(joint, [part[:, :, lane] for part in decoy]), prior)
+        found.append(Evidence(right, wrong, grid[right.shape, lane], settings))
+    return tuple(found)

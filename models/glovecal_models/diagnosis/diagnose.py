@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from glovecal_models.diagnosis.candidates import NotJudgeable, assessed
-from glovecal_models.diagnosis.delays_told import DELAYS, delays_told
+from glovecal_models.diagnosis.candidates import assessed
 from glovecal_models.diagnosis.diagnosis import Diagnosis
-from glovecal_models.diagnosis.directions import Direction
-from glovecal_models.diagnosis.ground import Ground
+from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.hold_drift import hold_drift
 from glovecal_models.diagnosis.hold_drift_document import hold_next_take
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.naming import Naming, named
 from glovecal_models.diagnosis.next_take import next_take
+from glovecal_models.diagnosis.not_identifiable import NotJudgeable, as_known, deciding, likelier
 from glovecal_models.diagnosis.pose_labels import WHY_NOT_JUDGEABLE, are_pose_labels
+from glovecal_models.diagnosis.problem import DiagnosisProblem
 from glovecal_models.diagnosis.reference_problems import reference_problems
-from glovecal_models.diagnosis.signatures import are_held_levels, jump_beside_curve, signature_findings
+from glovecal_models.diagnosis.resampled import SMOOTHING
+from glovecal_models.diagnosis.signatures import are_held_levels, beside_levels, signature_findings
 from glovecal_models.diagnosis.something_left import not_told, something_left
-from glovecal_models.diagnosis.undecided import as_known, deciding, likelier
 from glovecal_models.effects.base.effect import Effect
-from glovecal_models.effects.catalogue import catalogue
-from glovecal_models.effects.context_dependence import ContextDependence, unfamiliar_columns
+from glovecal_models.effects.catalogue import candidates
 from glovecal_models.errors import Cancelled
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
@@ -53,95 +53,119 @@ def diagnose(
             report(text, share)
 
     said("looking at the reference", 0.0)
-    ground = Ground.of(takes, layout, linear, known)
+    problem = DiagnosisProblem.of(takes, layout, linear, known)
     problems = reference_problems(takes, layout)
-    direction = ground.direction()
-    candidates = _candidates(direction, effects)
+    design = problem.design()
+    every = candidates(design.signals)
+    tried = every if effects is None else list(effects)
+    by_name = {item.name: item for item in (*every, *tried)}
     if are_pose_labels(takes):
-        return _of_pose_labels(takes, layout, direction, candidates, problems, seed)
-    lasting = [item for item in candidates if ground.is_sparse and (item.has_memory or item.name in DELAYS)]
-    candidates = [item for item in candidates if item not in lasting]
+        return _of_pose_labels(takes, layout, design, tried, problems, seed)
     has = _has(known)
-    found, impossible = assessed(direction, candidates, np.random.default_rng(seed), has, said)
-    naming, screened, beside = named(found), direction, ground
+    waiting = [item for item in tried if problem.is_sparse and item.needs_movement]
+    judged = [item for item in tried if item not in waiting]
+    found, impossible = assessed(design, judged, np.random.default_rng(seed), has, said)
+    naming, beside, screened = named(found), problem, design
     undecided = likelier(impossible, naming)
     if undecided:
         # What may well be there is not to get another's name: the others are judged beside it.
-        beside = ground.beside(*(as_known(item, candidates) for item in undecided))
-        others = [item for item in candidates if item.name not in {each.effect for each in impossible}]
-        screened = beside.direction()
+        beside = problem.beside(*(as_known(item, judged) for item in undecided))
+        others = [item for item in judged if item.name not in {each.effect for each in impossible}]
+        screened = beside.design()
         found, _ = assessed(screened, others, np.random.default_rng(seed), has, said)
         naming = named(found)
-    impossible += [NotJudgeable(item.name, SINGLE_POSES) for item in lasting]
-    naming = delays_told(naming, beside, screened)
-    asked = signature_findings(takes, layout, ground.joints, naming, found, has)
+    impossible += [NotJudgeable(item.name, SINGLE_POSES) for item in waiting]
+    naming = _alikes_told_apart(naming, beside, screened, by_name)
+    lacking = [item for item in every if item.name not in has]
+    asked = signature_findings(takes, layout, problem.joints, naming, found, lacking)
     findings = tuple(asked) if signatures else ()
-    naming = jump_beside_curve(naming, takes, findings)
+    naming = beside_levels(naming, takes, findings, by_name)
     said("looking at what is left", 0.95)
-    if ground.is_sparse or are_held_levels(takes):
+    if problem.is_sparse or are_held_levels(takes):
         left = not_told(SINGLE_POSES)
     else:
-        rest = ground.with_first(naming).direction()
+        rest = problem.with_first(naming, by_name).design()
         may_be = [item.effect for item in impossible if item.saves_much]
-        left = something_left(rest, ground.even, layout, seed, may_be=may_be)
+        left = something_left(rest, problem.even, layout, seed, may_be=may_be)
     said("done", 1.0)
     return Diagnosis(
-        ground.joints,
-        _held_out_errors(direction),
-        {name: float(value) for name, value in (noise_floor_deg or {}).items()},
-        naming,
-        tuple(found),
-        tuple(impossible),
-        problems,
-        findings,
-        left,
-        next_take(naming.confidence_set) or deciding(impossible, left),
+        joints=problem.joints,
+        rmse_deg=_held_out_errors(design),
+        noise_floor_deg={name: float(value) for name, value in (noise_floor_deg or {}).items()},
+        naming=naming,
+        assessments=tuple(found),
+        not_judgeable=tuple(impossible),
+        reference_problems=problems,
+        findings=findings,
+        left=left,
+        next_take=next_take(naming.confidence_set, by_name) or deciding(impossible, left),
+        effects=by_name,
     )
 
 
 def _has(known: Sequence[KnownEffect]) -> set[str]:
-    """What is left of one delay looks like the other, and a shifted reference would hide it."""
-    names = {item.effect.name for item in known}
-    return names | set(DELAYS) if names & set(DELAYS) else names
+    """The known effects, and those that what is left of them looks like."""
+    return {name for item in known for name in (item.effect.name, *item.effect.alike)}
 
 
-def _candidates(direction: Direction, effects: Sequence[Effect] | None) -> list[Effect]:
-    """The catalogue, and a curve of each context column that nothing in it asks for."""
-    if effects is not None:
-        return list(effects)
-    known = list(catalogue().values())
-    familiar = {name for item in known for name in item.context}
-    unfamiliar = unfamiliar_columns(direction.signals, sorted(familiar))
-    return [*known, *(ContextDependence.of(name, direction.signals) for name in unfamiliar)]
+def _alikes_told_apart(
+    naming: Naming, problem: DiagnosisProblem, design: ForwardDesign, effects: Mapping[str, Effect]
+) -> Naming:
+    """The ranking with look-alikes of its first put in the order that they themselves decide.
+
+    ``design`` is that of ``problem`` at the usual smoothing.
+    """
+    leading = effects[naming.ranked[0].effect] if naming.ranked else None
+    if leading is None or not leading.alike:
+        return naming
+    alike = {leading.name, *leading.alike}
+    decided = leading.told_from_alikes(
+        lambda smoothing: design if smoothing == SMOOTHING else problem.design(smoothing)
+    )
+    members = [item for item in naming.ranked if item.effect in alike]
+    if decided is None or decided[0] not in {item.effect for item in members}:
+        return naming
+    first, possible = decided
+    members.sort(key=lambda item: item.effect != first)
+    others = [item for item in naming.ranked if item.effect not in alike]
+    kept = [name for name in naming.confidence_set if name not in alike]
+    return replace(
+        naming,
+        ranked=(*members, *others),
+        confidence_set=(first, *(name for name in possible if name != first), *kept),
+    )
 
 
-def _held_out_errors(direction: Direction) -> dict[str, float]:
+def _held_out_errors(design: ForwardDesign) -> dict[str, float]:
     return {
         name: float(np.sqrt(products.error.sum() / max(products.count.sum(), 1)))
-        for name, products in zip(direction.rotations, direction.products, strict=True)
+        for name, products in zip(design.rotations, design.products, strict=True)
     }
 
 
 def _of_pose_labels(
     takes: Sequence[Take],
     layout: Layout,
-    direction: Direction,
-    candidates: Sequence[Effect],
+    design: ForwardDesign,
+    tried: Sequence[Effect],
     problems: tuple[str, ...],
     seed: int,
 ) -> Diagnosis:
     """No effect can be judged by the names of poses; what readings do while one is held can."""
     drift = hold_drift(takes, layout.sensors, seed=seed)
     return Diagnosis(
-        direction.rotations,
-        _held_out_errors(direction),
-        {},
-        Naming((), ()),
-        (),
-        tuple(NotJudgeable(item.name, WHY_NOT_JUDGEABLE) for item in candidates if item.name != "no_effect"),
-        problems,
-        (),
-        not_told("no angle was measured"),
-        hold_next_take(drift),
-        drift,
+        joints=design.rotations,
+        rmse_deg=_held_out_errors(design),
+        noise_floor_deg={},
+        naming=Naming((), ()),
+        assessments=(),
+        not_judgeable=tuple(
+            NotJudgeable(item.name, WHY_NOT_JUDGEABLE) for item in tried if item.stage != "never"
+        ),
+        reference_problems=problems,
+        findings=(),
+        left=not_told("no angle was measured"),
+        next_take=hold_next_take(drift),
+        effects={item.name: item for item in tried},
+        hold_drift=drift,
     )

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from glovecal_models.diagnosis.assessment import Assessment
-from glovecal_models.diagnosis.candidates import NotJudgeable
 from glovecal_models.diagnosis.diagnosis_document import document
 from glovecal_models.diagnosis.hold_drift import HoldDrift
 from glovecal_models.diagnosis.naming import Naming
 from glovecal_models.diagnosis.next_take import NextTake
-from glovecal_models.diagnosis.signatures import AFTER_ALL, may_be_slip
+from glovecal_models.diagnosis.not_identifiable import NotJudgeable
+from glovecal_models.diagnosis.signatures import may_explain
 from glovecal_models.diagnosis.something_left import Left
+from glovecal_models.effects.base.assessment import Assessment
+from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.signature_effect import Finding
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Diagnosis:
     """Ranked evidence for effects that a model does not know yet."""
 
@@ -33,19 +35,21 @@ class Diagnosis:
     """What is known by a signature in the recording."""
     left: Left
     next_take: NextTake | None
+    effects: Mapping[str, Effect]
+    """Those asked for, by name."""
     hold_drift: HoldDrift | None = None
     """Where the reference only names poses: what the readings do while one is held."""
 
     @property
     def signature(self) -> tuple[Finding, ...]:
         """Findings of the effect that is to be named by its signature, before any ranking; mostly none."""
-        for name in ("repeated_samples", "sensor_fault"):
-            found = tuple(item for item in self.findings if item.effect == name)
-            if found and name not in self.naming.confidence_set:
-                return found
+        repairs = {item.effect for item in self.findings if self.effects[item.effect].kind == "repair"}
+        for name in dict.fromkeys(item.effect for item in self.findings if item.effect in repairs):
+            if name not in self.naming.confidence_set:
+                return tuple(item for item in self.findings if item.effect == name)
         if self.naming.ranked:
-            slips = tuple(item for item in self.findings if item.effect in AFTER_ALL)
-            return slips if may_be_slip(self.naming) else ()
+            last = [item for item in self.findings if self.effects[item.effect].stage == "last"]
+            return tuple(item for item in last if may_explain(self.effects[item.effect], self.naming))
         return tuple(item for item in self.findings if item.effect == self.findings[0].effect)
 
     @property

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from glovecal_models.diagnosis.assessment import FEWEST_BLOCKS, Assessment
-from glovecal_models.diagnosis.candidates import NotJudgeable
 from glovecal_models.diagnosis.hold_drift_document import hold_document, hold_named, hold_sentence
+from glovecal_models.diagnosis.not_identifiable import NotJudgeable
 from glovecal_models.diagnosis.pose_labels import UNITS
+from glovecal_models.effects.base.assessment import FEWEST_BLOCKS, Assessment
 from glovecal_models.effects.base.signature_effect import Finding
 
 if TYPE_CHECKING:
@@ -27,9 +27,7 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
             name: {"rmse_deg": value, "noise_floor_deg": diagnosis.noise_floor_deg.get(name)}
             for name, value in diagnosis.rmse_deg.items()
         },
-        "named": _signature(signature, diagnosis.naming.confidence_set)
-        if signature
-        else _named_or_held(diagnosis, named),
+        "named": _signature(diagnosis, signature) if signature else _named_or_held(diagnosis, named),
         "candidates": [_candidate(item) for item in diagnosis.by_gain],
         "not_judgeable": [{"effect": item.effect, "why": item.why} for item in diagnosis.not_judgeable],
         "findings": [
@@ -112,9 +110,8 @@ def named_sentence(diagnosis: Diagnosis) -> str:
     rivals = diagnosis.naming.confidence_set[1:]
     if rivals:
         return f"{start}; these takes cannot tell it from {', '.join(rivals)}."
-    if item.effect == "cross_coupling":
-        return f"{start}, or a common cause that was not recorded, such as grip pressure or a strap."
-    return f"{start}."
+    caveat = diagnosis.effects[item.effect].caveat
+    return f"{start}, {caveat}." if caveat else f"{start}."
 
 
 def errors_deg(item: Assessment) -> tuple[float, float, float]:
@@ -137,6 +134,7 @@ def _named(diagnosis: Diagnosis, item: Assessment) -> dict[str, Any]:
     return {
         "effect": item.effect,
         "where": [item.joints[i] for i in item.touched],
+        "kind": diagnosis.effects[item.effect].kind,
         "verdict": "named" if len(diagnosis.naming.confidence_set) < 2 else "ambiguous",
         "confidence_set": list(diagnosis.naming.confidence_set),
         "parameters": {item.joints[i]: item.shape_described(i) for i in item.touched},
@@ -146,12 +144,13 @@ def _named(diagnosis: Diagnosis, item: Assessment) -> dict[str, Any]:
     }
 
 
-def _signature(findings: Sequence[Finding], rivals: Sequence[str]) -> dict[str, Any]:
-    first = findings[0]
+def _signature(diagnosis: Diagnosis, findings: Sequence[Finding]) -> dict[str, Any]:
+    first, rivals = findings[0], diagnosis.naming.confidence_set
     rivals = rivals if first.effect in rivals else (first.effect,)
     return {
         "effect": first.effect,
         "where": sorted({name for item in findings for name in item.where}),
+        "kind": diagnosis.effects[first.effect].kind,
         "verdict": "named" if len(rivals) < 2 else "ambiguous",
         "confidence_set": list(rivals),
         "parameters": dict(first.evidence),

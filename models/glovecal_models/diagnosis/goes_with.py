@@ -17,9 +17,9 @@ import numpy as np
 from glovecal_models.comparison.covariates import Covariate, covariates
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 from glovecal_models.comparison.structure import explained_when_shifted
-from glovecal_models.diagnosis.directions import Direction
-from glovecal_models.diagnosis.evened import EvenTake
-from glovecal_models.diagnosis.second_means import SecondMeans
+from glovecal_models.diagnosis.forward_design import ForwardDesign
+from glovecal_models.diagnosis.resampled import ResampledTake
+from glovecal_models.diagnosis.slow_error import SecondMeans
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
@@ -59,8 +59,8 @@ class GoesWith:
 
 
 def goes_with(
-    direction: Direction,
-    even: Sequence[EvenTake],
+    design: ForwardDesign,
+    even: Sequence[ResampledTake],
     layout: Layout,
     joints: Sequence[int],
     means: Sequence[Sequence[SecondMeans]],
@@ -68,15 +68,15 @@ def goes_with(
 ) -> tuple[GoesWith, ...]:
     """Up to five columns that the errors of ``joints`` go with, the one that explains most first.
 
-    ``even``: the takes of the direction, for their readings; ``means``: of all joints.
+    ``even``: the takes of the design, for their readings; ``means``: of all joints.
     """
     shares = generator.random((DRAWS, len(even)))
     deals = np.array([generator.permutation(len(even)) for _ in range(DRAWS)])
     tried: list[_Tried] = []
     for joint in joints:
-        errors = _errors(direction, joint, means[joint])
+        errors = _errors(design, joint, means[joint])
         square = float(np.nanmean(np.concatenate(errors) ** 2))
-        for column in _columns(direction, even, layout, joint):
+        for column in _columns(design, even, layout, joint):
             is_dealt = column.name == "wearing" or not _changes_within_takes(column)
             found = (
                 _explained_when_dealt(errors, column, deals)
@@ -84,7 +84,7 @@ def goes_with(
                 else explained_when_shifted(errors, column, shares, STEPS_AT_MOST)
             )
             if found is not None:
-                tried.append(_Tried(direction.rotations[joint], column, square, is_dealt, found))
+                tried.append(_Tried(design.rotations[joint], column, square, is_dealt, found))
     listed = [
         *_listed([each for each in tried if each.is_dealt]),
         *_listed([each for each in tried if not each.is_dealt]),
@@ -169,44 +169,42 @@ def _explained_when_dealt(
     return np.sqrt(np.sum(sums**2 / np.maximum(counts, 1.0), axis=1) / count.sum())
 
 
-def _errors(direction: Direction, joint: int, means: Sequence[SecondMeans]) -> tuple[np.ndarray, ...]:
+def _errors(design: ForwardDesign, joint: int, means: Sequence[SecondMeans]) -> tuple[np.ndarray, ...]:
     """For each take (N,), degrees: sensor minus what the base says, NaN where not fitted or unfamiliar."""
-    found = [np.full(len(take.time_s), np.nan) for take in direction.signals]
-    for (take, rows), residual in zip(
-        direction.units(joint), direction.products[joint].residual, strict=True
-    ):
+    found = [np.full(len(take.time_s), np.nan) for take in design.signals]
+    for (take, rows), residual in zip(design.units(joint), design.products[joint].residual, strict=True):
         found[take][rows] = residual
-    for values, take, seconds in zip(found, direction.signals, means, strict=True):
+    for values, take, seconds in zip(found, design.signals, means, strict=True):
         at = np.minimum((take.time_s - take.time_s[:1]).astype(int), len(seconds.weight))
         values[np.append(seconds.weight, 0.0)[at] < LEAST_WEIGHT] = np.nan
     return tuple(found)
 
 
 def _columns(
-    direction: Direction, even: Sequence[EvenTake], layout: Layout, joint: int
+    design: ForwardDesign, even: Sequence[ResampledTake], layout: Layout, joint: int
 ) -> Iterator[Covariate]:
     """Everything but readings that the error may be in itself.
 
     Those are the joint's own, which hold its noise, and those of other measured joints, which a cause common
     to all sensors shifts alike: of these the angle is taken.
     """
-    rotation = direction.rotations[joint]
-    known = {*layout.correspondence(rotation).sensors, *direction.rotations}
+    rotation = design.rotations[joint]
+    known = {*layout.correspondence(rotation).sensors, *design.rotations}
     sensors = tuple(name for name in layout.sensors if name not in known)
     takes = []
-    for take, signals in zip(even, direction.signals, strict=True):
+    for take, signals in zip(even, design.signals, strict=True):
         readings = take.readings[:, [layout.sensors.index(name) for name in sensors]]
         table = Take(
             signals.take, signals.wearing, sensors, signals.time_s, readings, context=signals.context
         )
         takes.append(TakeResiduals(table, signals.own, signals.own, signals.own))
-    yield from covariates(Residuals(direction.rotations, tuple(takes)), rotation)
-    for other, name in enumerate(direction.rotations):
+    yield from covariates(Residuals(design.rotations, tuple(takes)), rotation)
+    for other, name in enumerate(design.rotations):
         if other != joint:
-            angles = tuple(take.own[:, other] for take in direction.signals)
+            angles = tuple(take.own[:, other] for take in design.signals)
             yield Covariate(f"joint {name}", "deg", f"the angle of {name}", angles)
-    wearings = list(dict.fromkeys(take.wearing for take in direction.signals))
-    at = tuple(np.full(len(take), float(wearings.index(take.wearing))) for take in direction.signals)
+    wearings = list(dict.fromkeys(take.wearing for take in design.signals))
+    at = tuple(np.full(len(take), float(wearings.index(take.wearing))) for take in design.signals)
     if len(wearings) > 1:
         yield Covariate("wearing", "", "the wearing", at)
 

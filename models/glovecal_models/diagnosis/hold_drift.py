@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.diagnosis.hold_chance import probability_of
-from glovecal_models.diagnosis.hold_fit import HoldFit, PoseDrift
+from glovecal_models.diagnosis.hold_fit import HoldFit, PoseDrift, probability_of
 from glovecal_models.diagnosis.posed_holds import posed_holds
+from glovecal_models.effects.base.facts import HoldDrift as HoldDriftKind
+from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.takes.take import Take
 
 FEWEST_HOLDS = 4
@@ -29,8 +30,8 @@ DECIDED = 2.0
 """Standard errors from one half."""
 FAR_SHARE = 0.4
 """Of the spans, mean over the sensors: poses so far apart are reached from opposite sides."""
-WITH_THE_HOLD = ("creep", "hand_relaxing")
-WITH_TIME = ("warmup_drift", "garment_slip")
+HAND = "hand_relaxing"
+"""No effect of the glove: the wearer's hand gives way."""
 RIGID = "rigid"
 """Begins the names of poses held around a rigid form: there the hand cannot relax."""
 
@@ -166,23 +167,36 @@ def _causes(drift: HoldDrift) -> tuple[str, ...]:
         return ()
     goes_on = drift.elsewhere is None or drift.elsewhere >= HALF
     if drift.recovery is not None and drift.recovery < HALF and goes_on:
-        return WITH_TIME
+        return _over_time()
     if (drift.recovery is not None and drift.recovery >= HALF) or not goes_on:
-        return WITH_THE_HOLD
+        return _with_the_hold()
     slows = sum(item.is_slowing for item in drift.poses) > drift.holds / 2
     if drift.elsewhere is not None and (not slows or drift.poses[0].tau_is_long):
-        return WITH_TIME
-    return (*WITH_THE_HOLD, WITH_TIME[0])
+        return _over_time()
+    return (*_with_the_hold(), *drifting("slows down"))
+
+
+def drifting(how: HoldDriftKind) -> tuple[str, ...]:
+    """Effects that make readings drift so while a pose is held."""
+    return tuple(name for name, item in catalogue().items() if item.drift_in_holds == how)
+
+
+def _with_the_hold() -> tuple[str, ...]:
+    return (*drifting("begins anew with each hold"), HAND)
+
+
+def _over_time() -> tuple[str, ...]:
+    return (*drifting("slows down"), *drifting("goes on"))
 
 
 def _decided(causes: tuple[str, ...], fits: Sequence[HoldFit], seed: int) -> tuple[str, ...]:
     """Holds around a rigid form decide: there the hand cannot relax."""
     rigid = [fit for fit in fits if fit.held[0].pose.startswith(RIGID)]
     free = [fit for fit in fits if fit not in rigid]
-    if not set(WITH_THE_HOLD) <= set(causes) or sum(len(fit.held) for fit in rigid) < FEWEST_HOLDS:
+    if not set(_with_the_hold()) <= set(causes) or sum(len(fit.held) for fit in rigid) < FEWEST_HOLDS:
         return causes
     size = max(float(np.abs(fit.changes.mean(axis=0)).mean()) for fit in rigid)
     if size >= LEAST_SHARE and probability_of(rigid, np.random.default_rng(seed)) <= SURE:
-        return ("creep",)
+        return drifting("begins anew with each hold")
     others = max((float(np.abs(fit.changes.mean(axis=0)).mean()) for fit in free), default=0.0)
-    return ("hand_relaxing",) if size < HALF * others else causes
+    return (HAND,) if size < HALF * others else causes

@@ -6,15 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.diagnosis.hold_drift import LEAST_SHARE, HoldDrift, PoseDrift
+from glovecal_models.diagnosis.hold_drift import HAND, LEAST_SHARE, HoldDrift, PoseDrift, drifting
 from glovecal_models.diagnosis.next_take import NextTake
+from glovecal_models.effects.catalogue import effect
 
-SPOKEN = {
-    "creep": "creep",
-    "hand_relaxing": "the hand relaxing",
-    "warmup_drift": "warm-up",
-    "garment_slip": "the glove slipping",
-}
 MOST_SENSORS = 3
 MOSTLY = 0.8
 """Of the holds; a sensor that drifts one way in fewer is not told of."""
@@ -37,7 +32,7 @@ def hold_next_take(drift: HoldDrift) -> NextTake | None:
     """None when nothing is to be decided."""
     if len(drift.confidence_set) < 2:
         return None
-    if "hand_relaxing" in drift.confidence_set:
+    if HAND in drift.confidence_set:
         return NextTake(
             "rigid_holds",
             "Close the hand around a rigid form, such as a rod or a bottle, so that it cannot relax, and hold"
@@ -116,7 +111,7 @@ def _verdict(drift: HoldDrift) -> str:
 
 
 def _headline(drift: HoldDrift) -> str:
-    causes = [SPOKEN[name] for name in drift.confidence_set]
+    causes = ["the hand relaxing" if name == HAND else effect(name).spoken for name in drift.confidence_set]
     if len(causes) == 1:
         return f"While a pose is held the readings drift: {causes[0]}"
     return (
@@ -173,13 +168,13 @@ def _reason(drift: HoldDrift) -> str:
 
 
 def _doubt(drift: HoldDrift) -> str:
-    if drift.confidence_set == ("creep",):
+    if drift.confidence_set == drifting("begins anew with each hold"):
         return "It is there around a rigid form too, where the hand cannot relax: the sensors creep."
-    if drift.confidence_set == ("hand_relaxing",):
+    if drift.confidence_set == (HAND,):
         return "Around a rigid form, where the hand cannot relax, it is not there: the sensors do not creep."
-    if "hand_relaxing" in drift.confidence_set and drift.deg_of_span:
+    if HAND in drift.confidence_set and drift.deg_of_span:
         return "Where an angle was measured glovecal diagnose can tell them apart; else hold a rigid form."
-    if "hand_relaxing" in drift.confidence_set:
+    if HAND in drift.confidence_set:
         return (
             "Without a measured angle these cannot be told apart; hold a rigid form for 20 s, several times,"
             " to decide."

@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Effect, Signals
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.signals import Signals
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,16 @@ class KnownEffect:
         settings = self.effect.settle(single)
         shape = self.shapes[self.joints.index(joint)][None, :]
         return [self.effect.columns(take, settings, shape)[:, 0, :] for take in single]
+
+
+def known_effects(model: CalibrationModel) -> tuple[KnownEffect, ...]:
+    """One for each effect of a model; those without columns only are not looked for again."""
+    found = []
+    for item in model.effects:
+        active = item.active if item.weights.shape[1] else ()
+        shapes = tuple(item.shape[item.rotations.index(name)] for name in active)
+        found.append(KnownEffect(item.effect, active, shapes))
+    return tuple(found)
 
 
 def one_lane(take: Signals, lane: int) -> Signals:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glovecal_models.diagnosis.assessment import Assessment, over_joints
+from glovecal_models.effects.base.assessment import Assessment, over_joints
 
 BEATEN = 2.5
 """Standard errors by which a rival must be worse to leave the confidence set."""

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-FAST = "fast"
-RAMPS = "ramps"
-ONE_FINGER = "one_finger"
-CROSSED = "crossed"
-SHUFFLED = "shuffled"
+from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.facts import Motion
+
 MORE_WEARINGS = "more_wearings"
 MORE_TAKES = "more_takes"
+ANYTHING = Motion(
+    MORE_TAKES,
+    "Record three more takes of 20 s in free motion: no motion is known that decides, but more data may.",
+    60,
+)
 
 
 @dataclass(frozen=True)
@@ -25,60 +29,26 @@ class NextTake:
     """Effects; "chance" where the takes are too few to tell an effect from it."""
 
 
-_INSTRUCTIONS: dict[str, tuple[str, int]] = {
-    FAST: (
-        "Swing several fingers to and fro as fast as you comfortably can, 2 to 3.5 times a second, about 25"
-        " degrees wide.",
-        25,
-    ),
-    RAMPS: (
-        "Close and open the hand slowly, turning back half-way now and then; once at 10, once at 40 degrees a"
-        " second; then hold the fist for 20 s.",
-        40,
-    ),
-    ONE_FINGER: (
-        "Rest the hand on a table and move one finger after another while the others lie still.",
-        30,
-    ),
-    SHUFFLED: (
-        "Set the same angles once more, in another order, without touching the mounting.",
-        60,
-    ),
-    CROSSED: (
-        "Change one thing at a time: put in a fresh battery without switching off, take the glove off and on"
-        " without switching off, switch off and on without taking it off; 40 s of free motion after each.",
-        120,
-    ),
-}
-_RELATED: tuple[tuple[frozenset[str], str], ...] = (
-    (frozenset({"lag", "clock_offset"}), FAST),
-    (frozenset({"hysteresis", "lag"}), FAST),
-    (frozenset({"creep", "lag"}), FAST),
-    (frozenset({"creep", "clock_offset"}), FAST),
-    (frozenset({"hysteresis", "clock_offset"}), FAST),
-    (frozenset({"hysteresis", "creep"}), RAMPS),
-    (frozenset({"cross_coupling", "palm_arch"}), ONE_FINGER),
-    (frozenset({"cross_coupling", "contact_pressure"}), ONE_FINGER),
-    (frozenset({"nonlinearity", "saturation"}), RAMPS),
-    (frozenset({"nonlinearity", "sensor_fault"}), SHUFFLED),
-)
-_SESSION = frozenset(
-    {"warmup_drift", "temperature", "humidity", "supply_sag", "donning_shift", "garment_slip"}
-)
+def next_take(rivals: Sequence[str], effects: Mapping[str, Effect]) -> NextTake | None:
+    """For the members of a confidence set, the best first; None when nothing is to be decided.
 
-
-def next_take(rivals: Sequence[str]) -> NextTake | None:
-    """For the members of a confidence set, the best first; None when nothing is to be decided."""
+    The first pair of which one names the other as its rival decides; without such a pair the recording in
+    which the first shows most, as far as the others do not show in the same.
+    """
     if len(rivals) < 2:
         return None
-    for pair, motion in _RELATED:
-        if pair <= set(rivals):
-            return _take(motion, rivals)
-    if len(_SESSION & set(rivals)) > 1:
-        return _take(CROSSED, rivals)
-    return _take(FAST, rivals)
+    known = [effects[name] for name in rivals if name in effects]
+    pairs = itertools.combinations(known, 2)
+    motion = next((found for a, b in pairs if (found := _declared(a, b) or _declared(b, a))), None)
+    motion = motion or _shown_by_one(known) or ANYTHING
+    return NextTake(motion.name, motion.what, motion.seconds, tuple(rivals))
 
 
-def _take(motion: str, rivals: Sequence[str]) -> NextTake:
-    what, seconds = _INSTRUCTIONS[motion]
-    return NextTake(motion, what, seconds, tuple(rivals))
+def _declared(effect: Effect, other: Effect) -> Motion | None:
+    return next((item.told_apart_by for item in effect.rivals if item.effect == other.name), None)
+
+
+def _shown_by_one(effects: Sequence[Effect]) -> Motion | None:
+    """Of the motions in which effects show most, the first that is not that of all."""
+    motions = [item.shown_by for item in effects]
+    return next((item for item in motions if item is not None and motions.count(item) < len(motions)), None)

@@ -1,21 +1,132 @@
-"""What is wrong with the measurement itself: looked at before any effect is blamed."""
+"""What is wrong with the measurement itself: looked at before any effect is blamed.
+
+Takes whose references contradict each other: other units, the other sign, or another zero.
+
+Each take gets a line of the reference over the joint's own reading; takes are held against each other by it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from glovecal_models.diagnosis.contradictions import contradictions
 from glovecal_models.diagnosis.pose_labels import are_pose_labels
 from glovecal_models.layout import Layout
 from glovecal_models.takes.radians import radians_problem
 from glovecal_models.takes.take import Take
 
+SURE_CORRELATION = 0.5
+CLEAR_CORRELATION = 0.8
+"""A neighbour that moves along may turn a weaker one around."""
+RADIAN_DEG = 180.0 / np.pi
+RADIANS_WITHIN = 1.4
+"""Factor around it: gains differ between wearings."""
+LEAST_APART_DEG = 12.0
+TIMES_APART = 4.0
+"""The difference over what either line leaves."""
+
+
+@dataclass(frozen=True)
+class _Line:
+    take: Take
+    slope: float
+    """Degrees for each raw unit."""
+    correlation: float
+    mean_reading: float
+    mean_angle: float
+    left_deg: float
+    """RMS around the line."""
+
+    def at(self, reading: float) -> float:
+        return self.mean_angle + self.slope * (reading - self.mean_reading)
+
+
+def contradictions(
+    rotation: str, measured: Sequence[tuple[Take, np.ndarray]], inputs: Sequence[np.ndarray]
+) -> list[str]:
+    """Sentences; ``measured``: takes and angles at their frames, ``inputs``: the own sensor's readings."""
+    lines = [
+        _line(take, own[np.isfinite(values)], values[np.isfinite(values)])
+        for (take, values), own in zip(measured, inputs, strict=True)
+    ]
+    sure = [item for item in lines if abs(item.correlation) > SURE_CORRELATION]
+    radians = _in_radians(rotation, sure)
+    clear = [item for item in lines if abs(item.correlation) > CLEAR_CORRELATION]
+    signs = [] if radians else _against_each_other(rotation, clear)
+    return radians or signs or _apart(rotation, _of_one_sign(sure))
+
+
+def _line(take: Take, reading: np.ndarray, angle: np.ndarray) -> _Line:
+    x, y = reading - reading.mean(), angle - angle.mean()
+    square = float(x @ x)
+    slope = float(x @ y) / square if square > 0 else 0.0
+    whole = float(np.sqrt(square * (y @ y)))
+    left = float(np.sqrt(np.mean((y - slope * x) ** 2)))
+    correlation = float(x @ y) / whole if whole > 0 else 0.0
+    return _Line(take, slope, correlation, float(reading.mean()), float(angle.mean()), left)
+
+
+def _in_radians(rotation: str, lines: Sequence[_Line]) -> list[str]:
+    """Takes whose angles are 57 times smaller than the others' for the same readings."""
+    if len(lines) < 2:
+        return []
+    steepest = max(abs(item.slope) for item in lines)
+    found = [item for item in lines if abs(item.slope) * RADIAN_DEG < RADIANS_WITHIN * steepest]
+    found = [item for item in found if abs(item.slope) * RADIAN_DEG > steepest / RADIANS_WITHIN]
+    return [
+        f"{rotation} in take {item.take.name}: the reference moves {steepest / abs(item.slope):.0f} times"
+        " less than in another take for the same readings. Is it in radians? Degrees are wanted: multiply by"
+        " 57.2958."
+        for item in found
+    ]
+
+
+def _against_each_other(rotation: str, lines: Sequence[_Line]) -> list[str]:
+    """As many takes of one sign as of the other: no majority says which are flipped."""
+    rising = [item.take.name for item in lines if item.correlation > 0]
+    falling = [item.take.name for item in lines if item.correlation < 0]
+    if not rising or len(rising) != len(falling):
+        return []
+    return [
+        f"{rotation}: the reference rises with its sensor in {_some(rising)} and falls in {_some(falling)}."
+        " Is its sign flipped in one of them?"
+    ]
+
+
+def _of_one_sign(lines: Sequence[_Line]) -> list[_Line]:
+    """Without those that run the other way than most: their sign is told of elsewhere."""
+    most = np.sign(sum(np.sign(item.correlation) for item in lines))
+    return [item for item in lines if np.sign(item.correlation) == most]
+
+
+def _apart(rotation: str, lines: Sequence[_Line]) -> list[str]:
+    """Takes of one wearing whose angles differ where their readings are the same."""
+    found = []
+    for number, one in enumerate(lines):
+        for other in lines[number + 1 :]:
+            between = 0.5 * (one.mean_reading + other.mean_reading)
+            apart = abs(one.at(between) - other.at(between))
+            limit = max(LEAST_APART_DEG, TIMES_APART * max(one.left_deg, other.left_deg))
+            if one.take.wearing == other.take.wearing and apart > limit:
+                found.append((apart, one, other))
+    if not found:
+        return []
+    apart, one, other = max(found, key=lambda item: item[0])
+    return [
+        f"{rotation}: takes {one.take.name} and {other.take.name} contradict each other, by {apart:.0f}"
+        " degrees where their sensor reads the same, in one wearing. Which of the two references is right?"
+    ]
+
+
+def _some(names: Sequence[str]) -> str:
+    return f"take {names[0]}" if len(names) == 1 else f"takes {', '.join(names[:4])}"
+
+
 STILL_DEG = 0.5
 JUMP_DEG = 25.0
 """Between two frames, while the joint's sensor hardly moves."""
-SURE_CORRELATION = 0.5
 FEWEST_ROWS = 30
 
 

@@ -12,28 +12,29 @@ from dataclasses import replace
 import numpy as np
 
 from glovecal_models.comparison.wearings import other_deals, partition_of
-from glovecal_models.diagnosis.directions import Direction
+from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.effects.base.decoy import motions_of, with_context
-from glovecal_models.effects.base.effect import Effect, Signals
+from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
+from glovecal_models.effects.base.signals import Signals
 
 DEALS = 299
 ROWS_PER_TAKE = 80
 
 
-def session_probability(direction: Direction, effect: Effect, generator: np.random.Generator) -> float:
+def session_probability(design: ForwardDesign, effect: Effect, generator: np.random.Generator) -> float:
     """Share of deals that explain as much, of all joints together or of one.
 
     The smaller of the two shares is held against the smaller of each deal's own, so that choosing between
     them gains nothing.
     """
-    joints = range(len(direction.rotations))
-    deals = _deals(direction, effect, generator)
-    settings = effect.settle(direction.signals)
-    grid = effect.grid(direction.signals, settings)
-    rows = [_thinned(take.time_s) for take in direction.signals]
-    thin = [_some(take, some) for take, some in zip(direction.signals, rows, strict=True)]
-    bases, targets = zip(*(_projected(direction, joint, rows) for joint in joints), strict=True)
+    joints = range(len(design.rotations))
+    deals = _deals(design, effect, generator)
+    settings = effect.settle(design.signals)
+    grid = effect.grid(design.signals, settings)
+    rows = [_thinned(take.time_s) for take in design.signals]
+    thin = [_some(take, some) for take, some in zip(design.signals, rows, strict=True)]
+    bases, targets = zip(*(_projected(design, joint, rows) for joint in joints), strict=True)
     prior = effect.prior_sd(settings)
 
     def explained(takes: Sequence[Signals]) -> np.ndarray:
@@ -66,10 +67,10 @@ def wearing_deals(takes: Sequence[Signals], generator: np.random.Generator) -> l
     return other_deals(owners, DEALS, generator)
 
 
-def _deals(direction: Direction, effect: Effect, generator: np.random.Generator) -> list[np.ndarray]:
+def _deals(design: ForwardDesign, effect: Effect, generator: np.random.Generator) -> list[np.ndarray]:
     if effect.decoy == "dealt wearings":
-        return wearing_deals(direction.signals, generator)
-    return [generator.permutation(len(direction.signals)) for _ in range(DEALS)]
+        return wearing_deals(design.signals, generator)
+    return [generator.permutation(len(design.signals)) for _ in range(DEALS)]
 
 
 def _motion_groups(owners: np.ndarray, motions: Sequence[str]) -> list[np.ndarray]:
@@ -120,12 +121,12 @@ def _some(take: Signals, rows: np.ndarray) -> Signals:
 
 
 def _projected(
-    direction: Direction, joint: int, rows: Sequence[np.ndarray]
+    design: ForwardDesign, joint: int, rows: Sequence[np.ndarray]
 ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
     """An orthonormal base, what it leaves of the target, and which of the thinned rows were measured."""
     starts = np.cumsum([0, *(len(some) for some in rows)])
     base, target, used = [], [], []
-    for unit, (take, fitted) in zip(direction.products[joint].units, direction.units(joint), strict=True):
+    for unit, (take, fitted) in zip(design.products[joint].units, design.units(joint), strict=True):
         if not len(fitted):
             continue
         some = rows[take]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glovecal_models.diagnosis.second_means import SecondMeans
+from glovecal_models.diagnosis.slow_error import SecondMeans
 
 SHIFTS = 199
 SHORTEST_S = 8
@@ -20,7 +20,7 @@ SHORTEST_S = 8
 
 @dataclass(frozen=True)
 class SharedError:
-    """All joints of a direction."""
+    """All joints of a design."""
 
     size_deg: float
     """What pairs of joints have in common beyond chance, root mean square over pairs."""

@@ -2,35 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from glovecal_models.calibration.left_out import held_levels
-from glovecal_models.diagnosis.assessment import LEAST_SESSION_CONTRAST, Assessment
 from glovecal_models.diagnosis.naming import Naming
+from glovecal_models.effects.base.assessment import LEAST_SESSION_CONTRAST, Assessment
+from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.facts import Stage
 from glovecal_models.effects.base.signature_effect import Finding, SignatureEffect
-from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
-BEFORE_ALL = ("repeated_samples", "sensor_fault", "saturation")
-AFTER_ALL = ("garment_slip",)
-"""Creep looks like a slip: only asked when nothing else explains the error."""
-SLIP_TOO = ("donning_shift", "temperature", "humidity", "warmup_drift", "supply_sag")
-"""A walk over minutes differs between wearings, and goes along with one slow column or other, by chance."""
-CHANCE_SHARE = 0.55
-"""Of the squared error: a true cause of those saves more at 1.3 noise floors, a walk lends them less."""
 
-
-def may_be_slip(naming: Naming) -> bool:
-    """Whether nothing is ranked but what a slip brings about too, and that explains about half at most."""
+def may_explain(effect: Effect, naming: Naming) -> bool:
+    """Whether an effect that is asked for last may be behind a ranking: nothing is ranked, or only effects
+    that seem to explain a part of it, and explain no more than that."""
     if not naming.ranked:
         return True
     first = naming.ranked[0]
     share = np.mean([first.errors[joint].contrast for joint in first.touched])
-    return all(item.effect in SLIP_TOO for item in naming.ranked) and bool(share < CHANCE_SHARE)
+    only = all(item.effect in effect.also_explained_by for item in naming.ranked)
+    return only and bool(share < effect.also_explained_share)
+
+
+def by_signature(effects: Sequence[Effect], stage: Stage) -> list[SignatureEffect]:
+    """Effects asked for by their signature at a stage: repairs first, each kind by name."""
+    found = [item for item in effects if isinstance(item, SignatureEffect) and item.stage == stage]
+    return sorted(found, key=lambda item: (item.kind != "repair", item.name))
 
 
 def own_sensors(layout: Layout, joints: Sequence[str]) -> dict[str, str]:
@@ -49,22 +50,23 @@ def signature_findings(
     joints: Sequence[str],
     naming: Naming,
     assessments: Sequence[Assessment],
-    without: Set[str] = frozenset(),
+    effects: Sequence[Effect],
 ) -> Iterator[Finding]:
-    """Largest first within each effect; ``without`` names effects that the model has already."""
+    """Largest first within each effect of ``effects``, those that the model does not have."""
     sensor_of = own_sensors(layout, joints)
     if not sensor_of:
         return
+    first = by_signature(effects, "first")
     if are_held_levels(takes):
-        faults = _found("sensor_fault", takes, sensor_of, None)
-        yield from (_between_levels(item, takes, sensor_of) for item in faults if item.kind == "jump")
+        for item in first:
+            yield from item.find_between_levels(takes, sensor_of)
         return
-    for name in (name for name in BEFORE_ALL if name not in without):
-        yield from _found(name, takes, sensor_of, None)
-    if may_be_slip(naming):
-        plausible = _with_plausible_context(takes, assessments)
-        for name in (name for name in AFTER_ALL if name not in without):
-            yield from _found(name, plausible, sensor_of, static_errors(takes, sensor_of))
+    for item in first:
+        yield from item.find(takes, sensor_of)
+    for item in by_signature(effects, "last"):
+        if may_explain(item, naming):
+            plausible = _with_plausible_context(takes, assessments, effects)
+            yield from item.find(plausible, sensor_of, static_errors(takes, sensor_of))
 
 
 def are_held_levels(takes: Sequence[Take]) -> bool:
@@ -72,52 +74,27 @@ def are_held_levels(takes: Sequence[Take]) -> bool:
     return bool(takes) and all(held_levels(take.reference) is not None for take in takes)
 
 
-def jump_beside_curve(naming: Naming, takes: Sequence[Take], findings: Sequence[Finding]) -> Naming:
-    """One pass over known angles cannot tell a curve from a sensor that moved half-way: both are named."""
-    first = naming.ranked[0].effect if naming.ranked else None
+def beside_levels(
+    naming: Naming, takes: Sequence[Take], findings: Sequence[Finding], effects: Mapping[str, Effect]
+) -> Naming:
+    """One pass over known angles cannot tell what is found between them from some effects: both are named."""
     if not findings or not are_held_levels(takes):
         return naming
-    if first is None:
-        return replace(naming, confidence_set=("sensor_fault", "nonlinearity"))
-    if first != "nonlinearity":
+    found = effects[findings[0].effect]
+    if not naming.ranked:
+        return replace(naming, confidence_set=(found.name, *found.alike_between_levels))
+    if naming.ranked[0].effect not in found.alike_between_levels:
         return naming
-    return replace(naming, confidence_set=(*naming.confidence_set, "sensor_fault"))
+    return replace(naming, confidence_set=(*naming.confidence_set, found.name))
 
 
-def _between_levels(item: Finding, takes: Sequence[Take], sensor_of: dict[str, str]) -> Finding:
-    """The jump, with the known angles it lies between, and what it cannot be told from."""
-    at = item.stretches[0]
-    take = next(take for take in takes if take.name == at.take)
-    rotation = next(name for name, sensor in sensor_of.items() if sensor in item.where)
-    angle = take.reference_at_frames([rotation])[:, 0]
-    row = int(np.searchsorted(take.time_s, at.start_s))
-    before = angle[:row][angle[:row] != angle[row]]
-    if not len(before):
-        return item
-    sentence = (
-        f"{item.where[0]} may jump between {before[-1]:g} and {angle[row]:g} degrees of {rotation}, by"
-        f" {item.size_deg or 0.0:.0f} degrees: one pass over known angles cannot tell that from a curved"
-        " sensor."
-    )
-    return replace(item, sentence=sentence)
-
-
-def _found(
-    name: str, takes: Sequence[Take], sensor_of: dict[str, str], errors: Sequence[np.ndarray] | None
-) -> tuple[Finding, ...]:
-    effect = catalogue().get(name)
-    return effect.find(takes, sensor_of, errors) if isinstance(effect, SignatureEffect) else ()
-
-
-def _context_of(name: str) -> tuple[str, ...]:
-    known = catalogue().get(name)
-    return known.context if known is not None else ()
-
-
-def _with_plausible_context(takes: Sequence[Take], assessments: Sequence[Assessment]) -> list[Take]:
+def _with_plausible_context(
+    takes: Sequence[Take], assessments: Sequence[Assessment], effects: Sequence[Effect]
+) -> list[Take]:
     """Without the context columns that save too little: takes are few, and each column uses one up."""
+    context = {item.name: item.context for item in effects}
     saving = [item for item in assessments if max(e.contrast for e in item.errors) >= LEAST_SESSION_CONTRAST]
-    kept = {name for item in saving for name in _context_of(item.effect)}
+    kept = {name for item in saving for name in context.get(item.effect, ())}
     return [
         replace(take, context={name: values for name, values in take.context.items() if name in kept})
         for take in takes

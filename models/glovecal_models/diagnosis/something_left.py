@@ -11,12 +11,19 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from glovecal_models.diagnosis.directions import Direction
-from glovecal_models.diagnosis.evened import EvenTake
+from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.goes_with import GoesWith, goes_with
-from glovecal_models.diagnosis.lasting_error import FEWEST_STRETCHES, SHORTEST_S, LastingError, lasting_error
-from glovecal_models.diagnosis.second_means import SecondMeans, second_means, without_drift
+from glovecal_models.diagnosis.resampled import ResampledTake
 from glovecal_models.diagnosis.shared_error import NOTHING_SHARED, SharedError, shared_error
+from glovecal_models.diagnosis.slow_error import (
+    FEWEST_STRETCHES,
+    SHORTEST_S,
+    SecondMeans,
+    SlowError,
+    second_means,
+    slow_error,
+    without_drift,
+)
 from glovecal_models.layout import Layout
 
 HEALTHY_DEG, HEALTHY_WITHIN_DEG = 0.52, 0.38
@@ -40,9 +47,9 @@ class Left:
 
     is_left: bool
     sentence: str
-    lasting: Mapping[str, LastingError] = field(default_factory=dict)
+    lasting: Mapping[str, SlowError] = field(default_factory=dict)
     """For each joint."""
-    within_takes: Mapping[str, LastingError] = field(default_factory=dict)
+    within_takes: Mapping[str, SlowError] = field(default_factory=dict)
     """The same without each take's mean and straight line."""
     shared: SharedError = NOTHING_SHARED
     goes_with: tuple[GoesWith, ...] = ()
@@ -56,30 +63,30 @@ def not_told(why: str) -> Left:
 
 
 def something_left(
-    direction: Direction,
-    even: Sequence[EvenTake],
+    design: ForwardDesign,
+    even: Sequence[ResampledTake],
     layout: Layout,
     seed: int = 0,
     *,
     may_be: Sequence[str] = (),
 ) -> Left:
-    """Judge the held-out residuals of ``direction``, known effects included in its base.
+    """Judge the held-out residuals of ``design``, known effects included in its base.
 
     ``even``: its takes, for their readings. ``may_be``: effects that save much and that these takes cannot
     decide; they are not in the base.
     """
     generator = np.random.default_rng(seed)
-    means = [second_means(direction, joint) for joint in range(len(direction.rotations))]
-    found = _lasting(direction, means)
-    wandering = _lasting(direction, [[without_drift(take) for take in takes] for takes in means])
+    means = [second_means(design, joint) for joint in range(len(design.rotations))]
+    found = _lasting(design, means)
+    wandering = _lasting(design, [[without_drift(take) for take in takes] for takes in means])
     judged = [item for item in found if item.is_judgeable]
     if not judged:
         return not_told(_too_little(found))
     left = Left(
         False,
         "",
-        dict(zip(direction.rotations, found, strict=True)),
-        dict(zip(direction.rotations, wandering, strict=True)),
+        dict(zip(design.rotations, found, strict=True)),
+        dict(zip(design.rotations, wandering, strict=True)),
         shared_error(means, generator),
     )
     excess = [_excess(*items) for items in zip(found, wandering, strict=True)]
@@ -90,26 +97,25 @@ def something_left(
         sentence = f"Something may be left: {unsure}." if unsure else _noise_sentence(judged)
         return replace(left, sentence=sentence, not_judgeable=unsure)
     chosen = (lasts or list(range(len(found))))[:MOST_JOINTS]
-    columns = goes_with(direction, even, layout, chosen, means, generator)
-    worst = direction.rotations[lasts[0]] if lasts else None
+    columns = goes_with(design, even, layout, chosen, means, generator)
+    worst = design.rotations[lasts[0]] if lasts else None
     return replace(
         left, is_left=True, goes_with=columns, sentence=_sentence(left, worst, is_shared, columns, may_be)
     )
 
 
-def _lasting(direction: Direction, means: Sequence[Sequence[SecondMeans]]) -> list[LastingError]:
+def _lasting(design: ForwardDesign, means: Sequence[Sequence[SecondMeans]]) -> list[SlowError]:
     return [
-        lasting_error(takes, products.residual)
-        for takes, products in zip(means, direction.products, strict=True)
+        slow_error(takes, products.residual) for takes, products in zip(means, design.products, strict=True)
     ]
 
 
-def _too_little(found: Sequence[LastingError]) -> str:
+def _too_little(found: Sequence[SlowError]) -> str:
     most = max((item.stretches for item in found), default=0)
     return f"{most} stretches of {SHORTEST_S} s or more were measured, {FEWEST_STRETCHES} are needed"
 
 
-def _is_shared(shared: SharedError, judged: Sequence[LastingError]) -> bool:
+def _is_shared(shared: SharedError, judged: Sequence[SlowError]) -> bool:
     noise = float(np.median([item.noise_deg for item in judged]))
     allowed = max(HEALTHY_SHARED_DEG, HEALTHY_WITHIN_NOISES * noise)
     return shared.probability <= SHARED_PROBABILITY and shared.size_deg > allowed
@@ -130,22 +136,22 @@ def _sentence(
     return f"{sentence} It may be {' or '.join(may_be)}." if may_be else sentence
 
 
-def _excess(item: LastingError, within: LastingError) -> float:
+def _excess(item: SlowError, within: SlowError) -> float:
     """How many times more lasts than in a healthy glove, at the lower bound; 0 where it cannot be judged."""
     if not item.is_judgeable:
         return 0.0
     return max(item.at_least_deg / _allowed(item), within.at_least_deg / _allowed_within(within))
 
 
-def _allowed(item: LastingError) -> float:
+def _allowed(item: SlowError) -> float:
     return max(HEALTHY_DEG, HEALTHY_NOISES * item.noise_deg)
 
 
-def _allowed_within(item: LastingError) -> float:
+def _allowed_within(item: SlowError) -> float:
     return max(HEALTHY_WITHIN_DEG, HEALTHY_WITHIN_NOISES * item.noise_deg)
 
 
-def _lasts_sentence(joint: str, item: LastingError, within: LastingError) -> str:
+def _lasts_sentence(joint: str, item: SlowError, within: SlowError) -> str:
     if item.at_least_deg > _allowed(item):
         said, allowed, where = item, _allowed(item), "for seconds"
     else:
@@ -156,12 +162,12 @@ def _lasts_sentence(joint: str, item: LastingError, within: LastingError) -> str
     )
 
 
-def _noise_sentence(judged: Sequence[LastingError]) -> str:
+def _noise_sentence(judged: Sequence[SlowError]) -> str:
     worst = max(item.size_deg for item in judged)
     return f"What is left looks like noise: errors that last for seconds come to {worst:.1f} degrees."
 
 
-def _unsure(judged: Sequence[LastingError]) -> str | None:
+def _unsure(judged: Sequence[SlowError]) -> str | None:
     """Why a large error may yet be a healthy glove's; None when it is small or there is enough of it."""
     worst = max(judged, key=lambda item: item.size_deg)
     if worst.size_deg <= _allowed(worst) or worst.stretches >= ENOUGH_STRETCHES:

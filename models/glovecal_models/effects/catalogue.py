@@ -5,17 +5,22 @@ A package of one's own adds an effect by an entry point that names its class; no
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.metadata import entry_points
 from typing import Any
 
-from glovecal_models.effects.base.effect import Effect, Settings
-from glovecal_models.effects.context_dependence import PREFIX, ContextDependence
+from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.facts import Settings
+from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.wearing_effect import WearingEffect
+from glovecal_models.effects.context_dependence import PREFIX, ContextDependence, unfamiliar_columns
 from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
 
 GROUP = "glovecal.effects"
+DeclaredEffect = ExpressionEffect
+"""A user's own effect, declared in one line of text."""
 
 
 @cache
@@ -44,6 +49,22 @@ def effect(name: str) -> Effect:
     return known[name]
 
 
+def candidates(takes: Sequence[Signals]) -> list[Effect]:
+    """The catalogue, and a smooth curve of each recorded context column that nothing in it asks for."""
+    known = list(catalogue().values())
+    familiar = sorted({name for item in known for name in item.context})
+    unfamiliar = unfamiliar_columns(takes, familiar)
+    return [*known, *(ContextDependence.of(name, takes) for name in unfamiliar)]
+
+
+def wearing_effect() -> WearingEffect:
+    """The effect that knows wearings: a quick check sets it. Raises BadInput when there is none."""
+    for item in catalogue().values():
+        if isinstance(item, WearingEffect):
+            return item
+    raise BadInput("no effect of the catalogue knows what changes when the glove is put on again")
+
+
 def declared_effect(declaration: str | Mapping[str, Any]) -> ExpressionEffect:
     """A user's new effect from its line of text or JSON document. Raises BadInput, also for a taken name."""
     if isinstance(declaration, str):
@@ -54,6 +75,11 @@ def declared_effect(declaration: str | Mapping[str, Any]) -> ExpressionEffect:
         raise BadInput(f"there is an effect {declared.name!r} already; give yours another name")
     declared.check_sizes()
     return declared
+
+
+def effect_of_declaration(document: Mapping[str, Any]) -> Effect:
+    """A user's own effect from the JSON document that a job or a model keeps. Raises BadInput."""
+    return ExpressionEffect.from_document(document)
 
 
 def stored_effect(name: str, settings: Settings) -> Effect:

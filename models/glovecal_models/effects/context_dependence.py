@@ -11,7 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from glovecal_models.effects.base.context_effect import ContextEffect
-from glovecal_models.effects.base.effect import Decoy, Settings, Signals
+from glovecal_models.effects.base.facts import Decoy, Settings
+from glovecal_models.effects.base.signals import Signals
 
 PREFIX = "context:"
 KNOTS = 5

@@ -13,10 +13,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Parameter, Settings, Signals
+from glovecal_models.effects.base.facts import Parameter, Settings
 from glovecal_models.effects.base.history_effect import ArrayStateEffect
 from glovecal_models.effects.base.joint_units import on_lanes, settle_joint_units
+from glovecal_models.effects.base.motions import RAMPS
 from glovecal_models.effects.base.relaxation import relax, relax_once
+from glovecal_models.effects.base.signals import Signals
 
 RATIO = 4.0
 """Between neighbouring time constants: close enough for a logarithmic or power law between them."""
@@ -31,6 +33,8 @@ class Creep(ArrayStateEffect):
     name = "creep"
     explanation = "After a movement the reading goes on drifting for seconds although the joint is held."
     source = "standard linear solid, relaxations of 1 to 40 s: Springer 10.1007/978-3-030-25261-8_34"
+    shown_by: ClassVar = RAMPS
+    drift_in_holds: ClassVar = "begins anew with each hold"
     parameters: ClassVar = (
         Parameter("fast_tau", "s", 0.4, 60.0, "1 to 60 s"),
         Parameter("middle_tau", "s", 0.5, 60.0, "1 to 60 s"),

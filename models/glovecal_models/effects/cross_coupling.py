@@ -11,8 +11,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Decoy, InstantEffect, Settings, Signals
+from glovecal_models.effects.base.effect import InstantEffect
+from glovecal_models.effects.base.facts import Decoy, Rival, Settings
 from glovecal_models.effects.base.joint_units import in_joint_units, settle_joint_units
+from glovecal_models.effects.base.motions import ONE_FINGER
+from glovecal_models.effects.base.signals import Signals
 
 PRIOR_DEG = 3.0
 PALM = "PALM_ARCH"
@@ -23,6 +26,10 @@ class CrossCoupling(InstantEffect):
     name = "cross_coupling"
     explanation = "Moving a neighbouring joint changes what this sensor reads."
     source = "Wang & Neff 2013, section 3.1 and Table 1; Kahlesz, Zachmann, Klein 2004"
+    one_joint_at_a_time: ClassVar[bool] = True
+    shown_by: ClassVar = ONE_FINGER
+    rivals: ClassVar = (Rival("palm_arch", ONE_FINGER), Rival("contact_pressure", ONE_FINGER))
+    caveat = "or a common cause that was not recorded, such as grip pressure or a strap"
     decoy: ClassVar[Decoy] = "rolled in time"
 
     def missing(self, takes: Sequence[Signals]) -> str | None:

@@ -2,28 +2,34 @@
 
 A random effect: one offset and one gain per wearing, shrunk towards none. A wearing that training never saw
 gets none, and an interval as wide as wearings differ, until a quick check takes a few poses with known
-angles in it (calibration/quick_check.py).
+angles in it (quick_check/).
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Decoy, InstantEffect, Settings, Signals, Uncertainty
+from glovecal_models.effects.base.facts import Certainty, Decoy, Rival, Settings
 from glovecal_models.effects.base.joint_units import in_joint_units, settle_joint_units
+from glovecal_models.effects.base.motions import CROSSED
+from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.wearing_effect import PRIOR_DEG, WearingEffect
 
-PRIOR_DEG = 3.5
-PRIOR_WEARINGS = 2.0
-"""So many wearings' worth of belief that a joint's shifts are as large as the other joints'."""
 
-
-class DonningShift(InstantEffect):
+class DonningShift(WearingEffect):
     name = "donning_shift"
     explanation = "Putting the glove on again shifts and stretches what its sensors read."
     source = "offset about 3.5 deg from day to day: Gracia-Ibanez 2016; random effect per wearing"
+    shown_by: ClassVar = CROSSED
+    rivals: ClassVar = tuple(
+        Rival(name, CROSSED) for name in ("warmup_drift", "temperature", "humidity", "supply_sag")
+    )
+    certainty: ClassVar = Certainty(
+        clear=0.04, faint=0.01, why="wearings can be dealt in one way, where context columns have many names"
+    )
     decoy: ClassVar[Decoy] = "dealt wearings"
 
     def missing(self, takes: Sequence[Signals]) -> str | None:
@@ -33,11 +39,6 @@ class DonningShift(InstantEffect):
         if wearings == len(takes):
             return "every wearing has only one take; record two in one of them"
         return None
-
-    def lacks(self, settings: Settings, context: Collection[str], wearing: str) -> str | None:
-        if wearing in settings["wearings"]:
-            return None
-        return f"wearing {wearing!r} was not in training" if wearing else "nobody said which wearing this is"
 
     def settle(self, takes: Sequence[Signals]) -> Settings:
         return {
@@ -61,76 +62,9 @@ class DonningShift(InstantEffect):
     def prior_sd(self, settings: Settings) -> np.ndarray:
         return np.full(2 * len(settings["wearings"]), PRIOR_DEG)
 
-    def uncertainty(self, settings: Settings, weights: np.ndarray, wearing: str) -> Uncertainty | None:
-        covariance = shift_covariance(settings, weights, wearing)
-        if covariance is None:
-            return None
-        offset, both, gain = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
-
-        def variance(own: np.ndarray) -> np.ndarray:
-            joint = in_joint_units(own, settings)
-            return offset + 2 * joint * both + joint**2 * gain
-
-        return variance
-
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         wearings = settings["wearings"]
         return (
             *(f"offset_deg[{name}]" for name in wearings),
             *(f"gain_deg_per_sd[{name}]" for name in wearings),
         )
-
-
-def shift_covariance(settings: Settings, weights: np.ndarray, wearing: str) -> np.ndarray | None:
-    """(L, 2, 2), degrees squared: how uncertain offset and gain of a wearing are, ``weights`` (L, C).
-
-    None for a wearing of training, whose many frames leave no doubt worth mentioning.
-    """
-    checked = settings.get("checked", {})
-    if wearing in checked:
-        return np.array(checked[wearing])
-    if wearing in settings["wearings"]:
-        return None
-    return learned_spread(settings, weights)[:, :, None] ** 2 * np.eye(2)
-
-
-def trained_wearings(settings: Settings) -> list[str]:
-    """The wearings whose shifts were learned from training takes, not from a quick check."""
-    return [name for name in settings["wearings"] if name not in settings.get("checked", {})]
-
-
-def learned_spread(settings: Settings, weights: np.ndarray) -> np.ndarray:
-    """(L, 2): standard deviation of a new wearing's offset and gain, degrees, from the wearings of training.
-
-    Few wearings tell little of one joint, so each joint leans on all of them, and all on ``PRIOR_DEG``.
-    Where a quick check started from another prior, it is kept beside the check.
-    """
-    if "prior_sd_deg" in settings:
-        return np.array(settings["prior_sd_deg"])
-    wearings = settings["wearings"]
-    trained = np.array([wearings.index(name) for name in trained_wearings(settings)])
-    square = np.empty((len(weights), 2))
-    for kind in range(2):
-        values = weights[:, kind * len(wearings) + trained]
-        freedom = max(len(trained) - 1, 0)
-        own = values.var(axis=1) * len(trained)
-        every = (own.sum() + PRIOR_WEARINGS * PRIOR_DEG**2) / (freedom * len(own) + PRIOR_WEARINGS)
-        square[:, kind] = (own + PRIOR_WEARINGS * every) / (freedom + PRIOR_WEARINGS)
-    # The regressor stands for the mean of the wearings seen, which is itself uncertain.
-    return np.sqrt(square * (1 + 1 / max(len(trained), 1)))
-
-
-def with_checked_wearing(
-    settings: Settings, weights: np.ndarray, wearing: str, shift: np.ndarray, covariance: np.ndarray
-) -> tuple[Settings, np.ndarray]:
-    """Settings and weights (L, C) with one more wearing, known by a quick check: ``shift`` (L, 2) is its
-    offset and gain, degrees, ``covariance`` (L, 2, 2). A check of the same wearing before is replaced."""
-    wearings = list(settings["wearings"])
-    offsets, gains = weights[:, : len(wearings)], weights[:, len(wearings) :]
-    if wearing in wearings:
-        at = wearings.index(wearing)
-        offsets, gains = np.delete(offsets, at, axis=1), np.delete(gains, at, axis=1)
-        wearings.remove(wearing)
-    checked = settings.get("checked", {}) | {wearing: covariance.tolist()}
-    found = np.column_stack([offsets, shift[:, 0], gains, shift[:, 1]])
-    return {**settings, "wearings": [*wearings, wearing], "checked": checked}, found

@@ -2,6 +2,8 @@
 
 from typing import ClassVar
 
+from glovecal_models.effects.base.facts import Rival
+from glovecal_models.effects.base.motions import CROSSED
 from glovecal_models.effects.base.slow_context_effect import SlowContextEffect
 
 
@@ -9,4 +11,6 @@ class Humidity(SlowContextEffect):
     name = "humidity"
     explanation = "The reading changes with the humidity inside the glove."
     source = "linear coefficients of offset and gain, deg/%; follows within minutes"
+    shown_by: ClassVar = CROSSED
+    rivals: ClassVar = (Rival("supply_sag", CROSSED),)
     context: ClassVar = ("humidity_pct",)

@@ -12,8 +12,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Parameter, Settings, Signals
+from glovecal_models.effects.base.facts import Parameter, Rival, Settings
 from glovecal_models.effects.base.history_effect import ArrayStateEffect
+from glovecal_models.effects.base.motions import RAMPS
+from glovecal_models.effects.base.signals import Signals
 
 WIDTHS = (0.2, 0.5, 1.0)
 """Of the widest play."""
@@ -27,6 +29,8 @@ class Hysteresis(ArrayStateEffect):
         "The sensor sticks: at the same angle it reads differently on the way up and on the way down."
     )
     source = "Prandtl-Ishlinskii: Kuhnen 2003, European Journal of Control 9(4) 407; size: Mattmann 2008"
+    shown_by: ClassVar = RAMPS
+    rivals: ClassVar = (Rival("creep", RAMPS),)
     parameters: ClassVar = (Parameter("widest_play", "deg", 0.2, 30.0, "1 to 7 deg in bend sensors"),)
 
     def missing(self, takes: Sequence[Signals]) -> str | None:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import ClassVar
 
 from glovecal_models.effects.base.columnless_effect import ColumnlessEffect
-from glovecal_models.effects.base.effect import Signals
+from glovecal_models.effects.base.facts import Kind, Stage
+from glovecal_models.effects.base.signals import Signals
 
 
 class NoEffect(ColumnlessEffect):
     name = "no_effect"
     explanation = "Nothing is missing: what remains is noise."
     source = "the null hypothesis"
+    kind: ClassVar[Kind] = "nothing"
+    stage: ClassVar[Stage] = "never"
 
     def missing(self, takes: Sequence[Signals]) -> str | None:
         return None

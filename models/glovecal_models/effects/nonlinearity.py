@@ -11,8 +11,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Decoy, InstantEffect, Settings, Signals
+from glovecal_models.effects.base.effect import InstantEffect
+from glovecal_models.effects.base.facts import Decoy, Settings
 from glovecal_models.effects.base.joint_units import on_lanes
+from glovecal_models.effects.base.motions import RAMPS
+from glovecal_models.effects.base.signals import Signals
 
 DEGREES = (2, 3, 4, 5, 6, 7)
 PRIOR_DEG = 20.0
@@ -25,6 +28,7 @@ class Nonlinearity(InstantEffect):
     name = "nonlinearity"
     explanation = "The sensor is not proportional: the same movement reads differently in another posture."
     source = "smooth curve of the joint; bend sensors are curved: Kahlesz, Zachmann, Klein 2004"
+    shown_by: ClassVar = RAMPS
     decoy: ClassVar[Decoy] = "rolled in time"
 
     def missing(self, takes: Sequence[Signals]) -> str | None:

@@ -13,7 +13,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Decoy, InstantEffect, Settings, Signals
+from glovecal_models.effects.base.effect import InstantEffect
+from glovecal_models.effects.base.facts import Decoy, Settings
+from glovecal_models.effects.base.motions import ONE_FINGER
+from glovecal_models.effects.base.signals import Signals
 
 PALM = "PALM_ARCH"
 SIGNALS = (PALM, "T_TMC", "TI_ABD")
@@ -23,6 +26,8 @@ class PalmArch(InstantEffect):
     name = "palm_arch"
     explanation = "Hollowing the palm pulls at this sensor, most of all at thumb and little finger."
     source = "Krnoul, Kanis, Zelezny, Muller 2016, section 3.3.3, equations 2 to 5"
+    one_joint_at_a_time: ClassVar[bool] = True
+    shown_by: ClassVar = ONE_FINGER
     decoy: ClassVar[Decoy] = "rolled in time"
 
     def missing(self, takes: Sequence[Signals]) -> str | None:

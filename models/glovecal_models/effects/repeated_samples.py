@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Side
+from glovecal_models.effects.base.facts import Kind, Settings
 from glovecal_models.effects.base.signature_effect import (
     Finding,
     SignatureEffect,
@@ -60,7 +60,7 @@ class RepeatedSamples(SignatureEffect):
     name = "repeated_samples"
     explanation = "Lost samples were filled with the one before: the recording halts and jumps."
     source = "padded samples of recorders without synchronisation: docs.optitrack.com, Manus in Motive"
-    side: ClassVar[Side] = "reference"
+    kind: ClassVar[Kind] = "repair"
 
     def find(
         self,
@@ -74,7 +74,7 @@ class RepeatedSamples(SignatureEffect):
         found = [_finding("frames", takes, frames), _finding("reference rows", takes, rows)]
         return tuple(item for item in found if item is not None)
 
-    def repaired(self, takes: Sequence[Take]) -> tuple[Take, ...]:
+    def repaired(self, takes: Sequence[Take], settings: Settings | None = None) -> tuple[Take, ...]:
         """Without the repeated frames; repeated reference rows become unknown (NaN)."""
         drop_frames = _is_found([repeats(take.readings) for take in takes])
         drop_rows = _is_found([repeats(take.reference) for take in takes])

@@ -8,8 +8,10 @@ from typing import ClassVar
 import numpy as np
 
 from glovecal_models.effects.base.context_effect import ContextEffect
-from glovecal_models.effects.base.effect import Parameter, Settings, Signals
+from glovecal_models.effects.base.facts import Parameter, Settings
 from glovecal_models.effects.base.joint_units import in_joint_units
+from glovecal_models.effects.base.motions import CROSSED
+from glovecal_models.effects.base.signals import Signals
 
 EXPONENTS = (1.0, 2.0)
 OWN_PRIOR_DEG = 1.0
@@ -22,6 +24,7 @@ class SupplySag(ContextEffect):
     name = "supply_sag"
     explanation = "All readings shrink together as the supply voltage falls."
     source = "reading x (V / V0)^n, n about 1; small departures for each joint"
+    shown_by: ClassVar = CROSSED
     parameters: ClassVar = (Parameter("exponent", "1", 0.3, 3.0, "about 1"),)
     context: ClassVar = ("supply_v",)
 

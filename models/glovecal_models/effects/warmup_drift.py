@@ -8,7 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from glovecal_models.effects.base.context_effect import PRIOR_DEG, ContextEffect
-from glovecal_models.effects.base.effect import Parameter, Settings, Signals
+from glovecal_models.effects.base.facts import Parameter, Rival, Settings
+from glovecal_models.effects.base.motions import CROSSED
+from glovecal_models.effects.base.signals import Signals
 
 TAU_S = (45.0, 75.0, 120.0, 200.0, 330.0, 550.0, 900.0)
 COLDEST = 0.7
@@ -19,6 +21,10 @@ class WarmupDrift(ContextEffect):
     name = "warmup_drift"
     explanation = "The reading drifts during the first minutes after the glove is switched on."
     source = "exponential approach to the warm state, 1 to 15 min"
+    shown_by: ClassVar = CROSSED
+    rivals: ClassVar = tuple(Rival(name, CROSSED) for name in ("temperature", "humidity", "supply_sag"))
+    plain_name = "warm-up"
+    drift_in_holds: ClassVar = "slows down"
     parameters: ClassVar = (Parameter("tau", "s", 30.0, 1200.0, "1 to 15 min"),)
     context: ClassVar = ("power_on_s",)
 

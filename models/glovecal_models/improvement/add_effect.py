@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from glovecal_models.calibration.child_model import child_model
-from glovecal_models.calibration.effect_correction import SENSOR_FAULT
 from glovecal_models.calibration.effect_fit import fit_with_effects
 from glovecal_models.calibration.had_already import (
     repaired_takes,
@@ -24,14 +23,16 @@ from glovecal_models.calibration.relearned import columnless_effects, kept_lanes
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
 from glovecal_models.calibration.wanted_effect import WantedEffect
 from glovecal_models.diagnosis.signatures import own_sensors
-from glovecal_models.effects.base.effect import Effect, Signals
+from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.interval_effect import IntervalEffect
+from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.signature_effect import LiveCheck, SignatureEffect
 from glovecal_models.effects.catalogue import effect as known_effect
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_interval import add_interval
 from glovecal_models.improvement.addition import Addition, total_rmse_deg
-from glovecal_models.improvement.decoy_share import share_left_by_decoy
-from glovecal_models.improvement.live_faults import LiveFaults, live_faults
+from glovecal_models.improvement.control_share import share_left_by_decoy
+from glovecal_models.improvement.proposals import proposed
 from glovecal_models.takes.take import Take
 
 LEAST_GAIN = 0.05
@@ -58,19 +59,22 @@ def add_effect(
     """Learn ``model`` anew with effect ``name`` on ``rotations`` (default: all measured ones).
 
     ``takes`` are the training takes. ``constants``: settings of an effect without columns, such as the
-    clocks' offsets. ``before`` saves measuring the parent, ``decoy_share`` (of the error, that is left with
-    the effect's decoy instead) screening it. Undone, with the reason, unless the held-out RMSE of the
-    ``judged`` rotations (default: all chosen) falls by ``least_gain``; an effect that widens the interval
-    is judged by its claim (``add_interval``). Raises BadInput for an unknown
-    effect or rotation, or when the takes cannot carry it; Cancelled.
+    clocks' offsets (default: as they are found in the takes). ``before`` saves measuring the parent,
+    ``decoy_share`` (of the error, that is left with the effect's decoy instead) screening it. Undone, with
+    the reason, unless the held-out RMSE of the ``judged`` rotations (default: all chosen) falls by
+    ``least_gain``; an effect that widens the interval is judged by its claim (``add_interval``). Raises
+    BadInput for an unknown effect or rotation, or when the takes cannot carry it; Cancelled.
     """
     effect = known_effect(name)
     settings = settings_of(model, settings)
     has = wanted_of(model)
+    if constants is None and isinstance(effect, SignatureEffect):
+        proposal = proposed(model, takes, effect, rotations, cancelled)
+        constants, rotations = proposal.constants, proposal.rotations or rotations
     chosen = _chosen(model, effect, rotations)
-    fresh, faults = WantedEffect(name, chosen, dict(constants or {})), None
-    if name == SENSOR_FAULT:
-        fresh, faults = _watched_live(model, takes, has, fresh, cancelled)
+    fresh, live = WantedEffect(name, chosen, dict(constants or {})), None
+    if isinstance(effect, SignatureEffect):
+        fresh, live = _acting_live(model, takes, has, fresh, effect, cancelled)
     wanted = (*(item for item in has if item.name != name), _joined(has, fresh))
     prepared = PreparedTakes.of(repaired_takes(takes, wanted), model.layout)
     if isinstance(effect, IntervalEffect):
@@ -89,8 +93,8 @@ def add_effect(
     judged = tuple(judged or chosen)
     gain = 1.0 - total_rmse_deg(after, judged) / max(total_rmse_deg(before, judged), 1e-12)
     sentence = _sentence(name, judged, before, after, gain, least_gain)
-    if faults is not None:
-        sentence = f"{sentence} {faults.sentence}"
+    if live is not None:
+        sentence = f"{sentence} {live.sentence}"
     if gain < least_gain:
         return Addition(name, chosen, False, sentence, before, after, model, has)
     if report:
@@ -98,7 +102,7 @@ def add_effect(
     fit = fit_with_effects(prepared, chosen, wanted, settings, cancelled=cancelled)
     if decoy_share is None and fresh.has_columns:
         decoy_share = share_left_by_decoy(model, repaired_takes(takes, has), effect, chosen, cancelled)
-    evidence = _evidence(before, after, chosen, decoy_share) | (faults.to_document() if faults else {})
+    evidence = _evidence(before, after, chosen, decoy_share) | dict(live.evidence if live else {})
     effects = [*kept_lanes(model.effects, chosen), *fit.effects, *columnless_effects(wanted, model.effects)]
     effects = [replace(item, evidence=evidence) if item.name == name else item for item in effects]
     whole = before.with_those_of(after)
@@ -111,26 +115,30 @@ def add_effect(
 def _chosen(model: CalibrationModel, effect: Effect, rotations: Sequence[str] | None) -> tuple[str, ...]:
     """What is wrong with a reference is wrong for all rotations. Raises BadInput."""
     every = trained_rotations(model)
-    chosen = tuple(every if rotations is None or effect.side == "reference" else rotations)
+    chosen = tuple(every if rotations is None or effect.kind == "repair" else rotations)
     unknown = [item for item in chosen if item not in every]
     if unknown:
         raise BadInput(f"no rotation {unknown[0]!r} is trained in this model; it has {', '.join(every)}")
     return chosen
 
 
-def _watched_live(
+def _acting_live(
     model: CalibrationModel,
     takes: Sequence[Take],
     has: Sequence[WantedEffect],
     fresh: WantedEffect,
+    effect: SignatureEffect,
     cancelled: Callable[[], bool] | None,
-) -> tuple[WantedEffect, LiveFaults]:
-    """A sensor fault with the limits by which it is seen live, where it can be."""
+) -> tuple[WantedEffect, LiveCheck | None]:
+    """The effect with what it needs to act on live frames, where it can."""
     others = repaired_takes(takes, [item for item in has if item.name != fresh.name])
-    sensors = own_sensors(model.layout, trained_rotations(model))
-    faults = live_faults(model, others, sensors, cancelled)
-    live = {} if faults.live is None else {"live": faults.live}
-    return replace(fresh, settings=fresh.settings | live), faults
+    trained = trained_rotations(model)
+    reads = {
+        item.rotation: item.correspondence.sensors for item in model.rotations if item.rotation in trained
+    }
+    sensor_of = own_sensors(model.layout, trained)
+    live = effect.checked_live(others, sensor_of, model.layout.sensors, reads, cancelled)
+    return (fresh, None) if live is None else (replace(fresh, settings=fresh.settings | live.settings), live)
 
 
 def _evidence(

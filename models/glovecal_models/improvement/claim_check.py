@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Settings
+from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.interval_effect import IntervalEffect, LeftOutErrors
 
 PARTS = 3

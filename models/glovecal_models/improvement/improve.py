@@ -19,16 +19,16 @@ from glovecal_models.comparison.rotation_noise import rotation_noise
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.diagnosis_document import named_sentence
-from glovecal_models.diagnosis.pose_labels import are_pose_labels
+from glovecal_models.diagnosis.known_effect import known_effects
+from glovecal_models.effects.base.signature_effect import SignatureEffect
+from glovecal_models.effects.catalogue import catalogue, effect
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.improvement.addition import Addition
 from glovecal_models.improvement.baselines import baselines
-from glovecal_models.improvement.clocks import clock_settings, coarse_clock_settings
-from glovecal_models.improvement.decoy_share import share_in
-from glovecal_models.improvement.improvement import CLOCK, Improvement, Step, added_document
-from glovecal_models.improvement.known_effects import known_effects
+from glovecal_models.improvement.control_share import share_in
+from glovecal_models.improvement.improvement import Improvement, Step, added_document
+from glovecal_models.improvement.proposals import Proposed, repairs, widenings
 from glovecal_models.improvement.pruning import pruned
-from glovecal_models.improvement.signature_steps import SignatureStep, repairs, widenings
 from glovecal_models.improvement.step_errors import step_errors
 from glovecal_models.improvement.take_warnings import only_take_sentence, take_warnings
 from glovecal_models.improvement.walk_ending import closing_sentences, why_stopped
@@ -100,7 +100,7 @@ class _Walk:
         self.diagnosis: Diagnosis | None = None
         self.floors: dict[str, NoiseFloor] = {}
         self.errors = HeldOutErrors({}, {})
-        self.clocks_scanned = False
+        self.has_looked = False
 
     def start(self) -> None:
         """The base model, its error and its floor."""
@@ -121,11 +121,9 @@ class _Walk:
         """One round; False when the walk is over."""
         model = self.steps[-1].model
         share = 0.15 + 0.12 * len(self.steps)
-        if CLOCK not in self._has:
-            clocks = self._coarse_clocks()
-            if clocks is not None and self._add(CLOCK, None, clocks, None):
-                return True
-        if self._add_repairs():
+        found = repairs(model, self._repaired(), self._not_repaired)
+        self.has_looked = True
+        if self._add_first(found, None):
             return True
         self._say("looking for what is missing", share)
         takes = self._repaired()
@@ -139,10 +137,11 @@ class _Walk:
             if item.effect in tried:
                 continue
             where = [item.joints[i] for i in item.touched]
-            clock = None
-            if item.effect == CLOCK:
-                clock = clock_settings([take.name for take in self.takes], item.shapes[0])
-            if self._add(item.effect, where, clock, self.diagnosis):
+            tried_effect = self.diagnosis.effects[item.effect]
+            constants = None
+            if isinstance(tried_effect, SignatureEffect):
+                constants = tried_effect.constants_of(item, [take.name for take in self.takes])
+            if self._add(item.effect, where, constants, self.diagnosis):
                 return True
             self.stopped = "not_better"
             tried.add(item.effect)
@@ -176,7 +175,11 @@ class _Walk:
     ) -> bool:
         model = self.steps[-1].model
         every = trained_rotations(model)
-        chosen = every if where is None or name == CLOCK else [item for item in where if item in every]
+        chosen = (
+            every
+            if where is None or effect(name).kind == "repair"
+            else [item for item in where if item in every]
+        )
         concerned = set((constants or {}).get("where", chosen))
         judged = [item for item in chosen if item in concerned]
         self._say(f"adding {name}", 0.2 + 0.12 * len(self.steps))
@@ -199,29 +202,24 @@ class _Walk:
         self._step(model, added_document(addition, constants, diagnosis), diagnosis)
         return True
 
-    def _coarse_clocks(self) -> dict[str, Any] | None:
-        """Looked for once: the scan takes its time."""
-        if self.clocks_scanned:
-            return None
-        self.clocks_scanned = True
-        if are_pose_labels(self.takes):
-            return None
-        return coarse_clock_settings(self.takes)
-
-    def _add_repairs(self) -> bool:
-        return self._add_first(repairs(self.steps[-1].model, self._repaired(), self._tried | self._has), None)
-
     def _add_widenings(self) -> bool:
         steps = widenings(self.steps[-1].model, self._repaired(), self.diagnosis, self._tried | self._has)
         return self._add_first(steps, self.diagnosis)
 
-    def _add_first(self, steps: Sequence[SignatureStep], diagnosis: Diagnosis | None) -> bool:
+    def _add_first(self, steps: Sequence[Proposed], diagnosis: Diagnosis | None) -> bool:
         """The first of them that stays."""
-        for step in steps:
-            self.sentences += [item for item in step.sentences if item not in self.sentences]
-            if self._add(step.effect, step.rotations, step.constants, None):
+        for name, proposal in steps:
+            self.sentences += [item for item in proposal.sentences if item not in self.sentences]
+            if self._add(name, proposal.rotations, proposal.constants, None):
                 return True
         return False
+
+    @property
+    def _not_repaired(self) -> set[str]:
+        """Repairs that are not looked for any more."""
+        signatures = [item for item in catalogue().values() if isinstance(item, SignatureEffect)]
+        once = {item.name for item in signatures if item.looked_for_once and self.has_looked}
+        return self._tried | self._has | once
 
     @property
     def _has(self) -> set[str]:

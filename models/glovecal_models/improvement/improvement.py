@@ -11,9 +11,9 @@ from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.hold_drift_document import hold_document
 from glovecal_models.diagnosis.next_take import NextTake
+from glovecal_models.effects.base.signature_effect import SignatureEffect
+from glovecal_models.effects.catalogue import effect
 from glovecal_models.improvement.addition import Addition
-
-CLOCK = "clock_offset"
 
 
 @dataclass(frozen=True)
@@ -94,11 +94,9 @@ def added_document(
     if addition.effect not in rivals:
         rivals = [addition.effect]
     parameters: dict[str, Any] = dict(addition.parameters)
-    if constants is not None and addition.effect == CLOCK:
-        offsets = constants["offset_s"] if constants["per_take"] else constants["common_s"]
-        parameters = {"offset_s": offsets}
-    elif constants is not None and addition.claim is None:
-        parameters = constants
+    known = effect(addition.effect)
+    if constants is not None and addition.claim is None and isinstance(known, SignatureEffect):
+        parameters = known.described_constants(constants)
     document: dict[str, Any] = {
         "effect": addition.effect,
         "where": list((constants or {}).get("where", addition.rotations)),

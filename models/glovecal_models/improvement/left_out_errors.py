@@ -60,7 +60,7 @@ def _errors_of(
         parts = [regressor.predict(each[number]) for regressor, each in zip(regressors, inputs, strict=True)]
         base = np.column_stack([part.mean for part in parts])
         readings, since = takes.readings[number], take.time_s - take.time_s[0]
-        mean = base + correction.of_take(take.time_s, base, readings, take.context, take.wearing)
+        mean = base + correction.of_take(take.time_s, base, readings, take.context, take.wearing).degrees
         variance = np.column_stack([part.variance for part in parts]) + noise
         variance += widening.added_variance(since, readings)
         for column, name in enumerate(rotations):

@@ -10,7 +10,7 @@ import numpy as np
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.sensor_sensitivity import SensorSensitivity
-from glovecal_models.effects.base.effect import Settings
+from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.joint_units import in_joint_units
 from glovecal_models.quick_check.held_poses import HeldPose
 from glovecal_models.quick_check.pose_book import PoseBook

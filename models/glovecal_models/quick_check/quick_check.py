@@ -17,12 +17,12 @@ from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.samples import require_layout
 from glovecal_models.calibration.sensor_sensitivity import SensorSensitivity, sensor_sensitivity
-from glovecal_models.effects.donning_shift import (
-    DonningShift,
+from glovecal_models.effects.base.wearing_effect import (
     learned_spread,
     trained_wearings,
     with_checked_wearing,
 )
+from glovecal_models.effects.catalogue import wearing_effect
 from glovecal_models.errors import BadInput
 from glovecal_models.quick_check.checked_poses import CheckedPose, RefusedPose, checked_poses
 from glovecal_models.quick_check.held_poses import HeldPose, held_poses
@@ -33,11 +33,10 @@ from glovecal_models.quick_check.shift_scale import scaled_to_poses
 from glovecal_models.quick_check.wearing_shift import WearingShift, prior_shift
 from glovecal_models.takes.take import Take
 
-EFFECT = DonningShift.name
 _SEEN = "wearing {!r} was in the model's training: whole takes tell more of it than a quick check could"
 _MIXED = (
     "This model was trained on {} wearings without telling them apart: what differs between them stands in "
-    "its error, that of a full calibration included. Add the effect donning_shift first, then check again."
+    "its error, that of a full calibration included. Add the effect {} first, then check again."
 )
 
 
@@ -112,8 +111,11 @@ def quick_check(
     shift = prior.after(item.witness for item in used)
     refused = (*(RefusedPose(item.label, item.reason) for item in missed), *contradicted)
     report = shift_report(before, sensitivity, prior, shift, used)
-    if len(set(trained_wearings)) > 1 and not any(item.name == EFFECT for item in model.effects):
-        report = replace(report, sentences=(*report.sentences, _MIXED.format(len(set(trained_wearings)))))
+    if len(set(trained_wearings)) > 1 and not any(item.name == _effect_name() for item in model.effects):
+        report = replace(
+            report,
+            sentences=(*report.sentences, _MIXED.format(len(set(trained_wearings)), _effect_name())),
+        )
     child = _child(before, effect, wearing, prior, shift, parent_id, takes)
     return QuickCheck(wearing, sensitivity.rotations, prior, shift, used, refused, report, child)
 
@@ -122,9 +124,9 @@ def without_check(model: CalibrationModel, wearing: str) -> CalibrationModel:
     """The model as it predicts a wearing that nobody has checked; BadInput for a wearing of training."""
     effects = []
     for item in model.effects:
-        if item.name == EFFECT and wearing in trained_wearings(item.settings):
+        if item.name == _effect_name() and wearing in trained_wearings(item.settings):
             raise BadInput(_SEEN.format(wearing))
-        if item.name == EFFECT and wearing in item.settings["wearings"]:
+        if item.name == _effect_name() and wearing in item.settings["wearings"]:
             at, count = item.settings["wearings"].index(wearing), len(item.settings["wearings"])
             weights = item.weights.copy()
             weights[:, [at, count + at]] = 0.0
@@ -133,9 +135,8 @@ def without_check(model: CalibrationModel, wearing: str) -> CalibrationModel:
     return replace(model, effects=tuple(effects))
 
 
-def is_only_checked(item: AddedEffect) -> bool:
-    """Whether an effect of a model holds nothing but the shifts of quick checks."""
-    return item.name == EFFECT and not trained_wearings(item.settings)
+def _effect_name() -> str:
+    return wearing_effect().name
 
 
 def _one_wearing(takes: Sequence[Take]) -> str:
@@ -158,7 +159,7 @@ def _named_by_itself(take: Take, known: PoseBook) -> Take:
 
 def _effect_with_columns(model: CalibrationModel, sensitivity: SensorSensitivity) -> AddedEffect:
     """The model's own effect, widened to all trained rotations; without one, an effect of no wearing yet."""
-    own = [item for item in model.effects if item.name == EFFECT]
+    own = [item for item in model.effects if item.name == _effect_name()]
     wearings = list(dict.fromkeys(name for item in own for name in item.settings["wearings"]))
     lanes, count = len(sensitivity.rotations), len(wearings)
     settings: dict[str, Any] = {
@@ -181,7 +182,7 @@ def _effect_with_columns(model: CalibrationModel, sensitivity: SensorSensitivity
                 settings[name] = item.settings[name]
     shape = np.zeros((lanes, 0))
     evidence = own[0].evidence if own else {}
-    return AddedEffect(EFFECT, sensitivity.rotations, settings, shape, weights, zero, evidence)
+    return AddedEffect(_effect_name(), sensitivity.rotations, settings, shape, weights, zero, evidence)
 
 
 def _active(item: AddedEffect) -> list[int]:
@@ -191,7 +192,7 @@ def _active(item: AddedEffect) -> list[int]:
 
 def _learned_sd(model: CalibrationModel, sensitivity: SensorSensitivity) -> np.ndarray | None:
     """(L, 2) degrees where the model learned how wearings differ, the default elsewhere; None: nowhere."""
-    own = [item for item in model.effects if item.name == EFFECT]
+    own = [item for item in model.effects if item.name == _effect_name()]
     if not own:
         return None
     default = prior_shift(sensitivity)
@@ -219,6 +220,6 @@ def _child(
     prior_sd = np.sqrt(prior.lane_covariance[:, [0, 1], [0, 1]])
     settings["prior_sd_deg"] = prior_sd.tolist()
     added = replace(effect, settings=settings, weights=weights)
-    others = tuple(item for item in model.effects if item.name != EFFECT)
+    others = tuple(item for item in model.effects if item.name != _effect_name())
     simulated = model.simulated or any(take.simulated for take in takes)
     return replace(model, effects=(*others, added), parent=parent_id, simulated=simulated)

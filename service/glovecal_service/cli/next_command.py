@@ -42,5 +42,4 @@ def _take_of(found: Mapping[str, Any]) -> str:
 
 def _is_on_rotations(found: Mapping[str, Any]) -> bool:
     """Whether the named effect is a correction; a fault is named by its sensors or takes."""
-    ranked = {item["effect"] for item in found.get("candidates") or ()}
-    return found["named"]["effect"] in ranked - {"clock_offset"}
+    return found["named"].get("kind") == "correction"

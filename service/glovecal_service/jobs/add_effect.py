@@ -76,20 +76,16 @@ class AddEffectJob:
 
 def run(work: AdditionWork, cancelled: Callable[[], bool], report: Report) -> TaskResult:
     """In a worker. Raises BadInput, NotTrainable, Cancelled."""
-    from glovecal_service.jobs.effect_constants import effect_constants, widened_rotations  # heavy
-
     on, model = work.on, work.on.model
     with known_by_name([*declared_in(model), *declared(work.declaration)]):
         known = model.error_estimate.get("rmse_deg")
         error = "" if known is None else f", {known:.2f} degrees on takes left out so far"
         report(f"looking at the takes for {work.effect}{error}", 0.0)
-        constants = effect_constants(model, on.takes, work.effect, cancelled)
         found = add_effect(
             model,
             on.takes,
             work.effect,
-            rotations=widened_rotations(model, on.takes, work.effect, constants, work.rotations),
-            constants=constants,
+            rotations=work.rotations,
             settings=on.settings,
             parent_id=on.id,
             take_hashes=on.take_hashes,

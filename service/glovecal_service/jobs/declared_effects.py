@@ -13,8 +13,7 @@ from typing import Any
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.effects.base.effect import Effect
-from glovecal_models.effects.catalogue import catalogue
-from glovecal_models.effects.declared.expression_effect import ExpressionEffect
+from glovecal_models.effects.catalogue import catalogue, effect_of_declaration
 
 _ONE_JOB = threading.RLock()
 
@@ -35,7 +34,7 @@ def declaration_of(model: CalibrationModel, name: str) -> Mapping[str, Any] | No
 
 def declared(document: Mapping[str, Any] | None) -> list[Effect]:
     """The effect of a declaration as a list of one, or of none."""
-    return [] if document is None else [ExpressionEffect.from_document(document)]
+    return [] if document is None else [effect_of_declaration(document)]
 
 
 @contextmanager

@@ -10,8 +10,8 @@ from glovecal_models.calibration.had_already import repaired_takes, wanted_of
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.comparison.rotation_noise import rotation_noise
-from glovecal_models.effects.declared.expression_effect import ExpressionEffect
-from glovecal_models.improvement.known_effects import known_effects
+from glovecal_models.diagnosis.known_effect import known_effects
+from glovecal_models.effects.catalogue import effect_of_declaration
 from glovecal_models.takes.take import Take
 from glovecal_service.jobs.declared_effects import declared_in, known_by_name
 from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult
@@ -65,7 +65,7 @@ def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> T
     model = work.on.model
     report("measuring the noise floors", 0.0)
     floors = floors_deg(model, work.on.takes, work.seed)
-    own = [ExpressionEffect.from_document(item) for item in work.declarations]
+    own = [effect_of_declaration(item) for item in work.declarations]
     with known_by_name([*declared_in(model), *own]):
         found = diagnose(
             repaired_takes(work.on.takes, wanted_of(model)),

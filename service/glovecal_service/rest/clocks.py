@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from glovecal_models.effects.delay.clock_scan import clock_offsets
+from glovecal_models.takes.clock_scan import clock_offsets
 from glovecal_service.plain import plain
 from glovecal_service.rest.answers import change_problems
 from glovecal_service.rest.dependencies import StoreNeeded

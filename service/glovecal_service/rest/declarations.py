@@ -7,8 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from glovecal_models.effects.catalogue import declared_effect
-from glovecal_models.effects.declared.expression_effect import ExpressionEffect
+from glovecal_models.effects.catalogue import DeclaredEffect, declared_effect
 from glovecal_service.rest.strict_body import StrictBody
 from glovecal_service.store.records import TakeRecord
 
@@ -21,13 +20,13 @@ class Declared(StrictBody):
     )
 
 
-def checked_declaration(text: str, takes: Sequence[TakeRecord], sensors: Sequence[str]) -> ExpressionEffect:
+def checked_declaration(text: str, takes: Sequence[TakeRecord], sensors: Sequence[str]) -> DeclaredEffect:
     """The effect. Raises BadInput: cannot be read, name taken, or a column that no take recorded."""
     effect = declared_effect(text)
     effect.declaration.check_signals(set(sensors), {name for take in takes for name in take.context})
     return effect
 
 
-def declaration_document(effect: ExpressionEffect) -> dict[str, Any]:
+def declaration_document(effect: DeclaredEffect) -> dict[str, Any]:
     """As jobs and models keep it."""
     return effect.declaration.to_document()

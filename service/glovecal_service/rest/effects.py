@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from importlib.metadata import entry_points
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Path
 from pydantic import BaseModel, Field
 
-from glovecal_models.effects.base.columnless_effect import ColumnlessEffect
 from glovecal_models.effects.base.effect import Effect
-from glovecal_models.effects.base.interval_effect import IntervalEffect
+from glovecal_models.effects.base.facts import Kind
 from glovecal_models.effects.catalogue import GROUP, catalogue, effect
 from glovecal_models.errors import BadInput
-from glovecal_service.jobs.added_by_signature import ADDED_BY_SIGNATURE
 from glovecal_service.plain import plain
 from glovecal_service.rest.answers import problems
 from glovecal_service.rest.names import ONE_LINE
@@ -22,8 +20,6 @@ from glovecal_service.store.errors import NotFound
 router = APIRouter(prefix="/effects", tags=["effects"])
 
 OURS = "glovecal-models"
-NO_EFFECT = "no_effect"
-Kind = Literal["correction", "repair", "interval", "finding", "nothing"]
 EffectInPath = Annotated[str, Path(max_length=64, pattern=ONE_LINE, description="As in the catalogue.")]
 
 
@@ -71,20 +67,9 @@ def get_effect(name: EffectInPath) -> dict[str, Any]:
         raise NotFound(f"there is no effect {name!r}; there are {', '.join(sorted(catalogue()))}") from error
 
 
-def kind_of(item: Effect) -> Kind:
-    """What an effect does to a calibration."""
-    if item.name == NO_EFFECT:
-        return "nothing"
-    if item.side == "reference":
-        return "repair"
-    if isinstance(item, IntervalEffect):
-        return "interval"
-    return "finding" if isinstance(item, ColumnlessEffect) else "correction"
-
-
 def can_be_added(item: Effect) -> bool:
     """Corrections, and what is found in a recording as far as it can be repaired or claimed."""
-    return kind_of(item) == "correction" or item.name in ADDED_BY_SIGNATURE
+    return item.kind in ("correction", "repair", "interval")
 
 
 def effect_packages() -> dict[str, str]:
@@ -101,7 +86,7 @@ def _row(item: Effect, package: str) -> dict[str, Any]:
         {
             "name": item.name,
             "explanation": item.explanation,
-            "kind": kind_of(item),
+            "kind": item.kind,
             "can_be_added": can_be_added(item),
             "parameters": parameters,
             "context": item.context,

@@ -16,7 +16,7 @@ from glovecal_service.jobs.declared_effects import declaration_of
 from glovecal_service.rest.answers import change_problems
 from glovecal_service.rest.declarations import Declared, checked_declaration, declaration_document
 from glovecal_service.rest.dependencies import PartsNeeded
-from glovecal_service.rest.effects import EffectInPath, can_be_added, kind_of
+from glovecal_service.rest.effects import EffectInPath, can_be_added
 from glovecal_service.rest.jobs import Job
 from glovecal_service.rest.model_takes import TakesNamed, model_takes
 from glovecal_service.rest.names import ONE_LINE, Channel, ModelInPath
@@ -104,7 +104,7 @@ def _named(model: CalibrationModel, name: str, takes: Sequence[TakeRecord]) -> d
     if declaration is None:
         effect = known_effect(name)
         if not can_be_added(effect):
-            raise BadInput(f"effect {name!r} cannot be added to a model: {WHY_NOT[kind_of(effect)]}")
+            raise BadInput(f"effect {name!r} cannot be added to a model: {WHY_NOT[effect.kind]}")
         recorded = {column for take in takes for column in take.context}
         for column in effect.context:
             if column not in recorded:

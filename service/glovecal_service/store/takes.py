@@ -10,10 +10,10 @@ import numpy as np
 from sqlalchemy import Connection, delete, select
 from sqlalchemy.exc import IntegrityError
 
-from glovecal_models.effects.delay.clock_scan import aligned
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 from glovecal_models.names import check_identifier
+from glovecal_models.takes.clock_scan import aligned
 from glovecal_models.takes.pose_names import poses_at_frames
 from glovecal_models.takes.take import Take
 from glovecal_service.store import tables

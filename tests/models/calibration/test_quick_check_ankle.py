@@ -12,11 +12,11 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.effects.delay.clock_scan import aligned, clock_offsets
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.layout import Layout
 from glovecal_models.quick_check.held_poses import HeldPose
 from glovecal_models.quick_check.quick_check import quick_check
+from glovecal_models.takes.clock_scan import aligned, clock_offsets
 from glovecal_models.takes.table import read_takes
 from glovecal_models.takes.take import Take
 

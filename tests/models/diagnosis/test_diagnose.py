@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glovecal_models.diagnosis.delays import block_starts
 from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.effects.base.assessment import block_starts
 from glovecal_models.errors import BadInput, Cancelled
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.cause import Cause

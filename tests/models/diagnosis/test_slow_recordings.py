@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from glovecal_models.diagnosis.diagnose import SINGLE_POSES, diagnose
-from glovecal_models.diagnosis.evened import SHORTEST_BRIDGE_S, bridge_s
+from glovecal_models.diagnosis.resampled import SHORTEST_BRIDGE_S, bridge_s
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.cause import Cause
 from glovecal_models.simulation.session import record_session

@@ -10,9 +10,8 @@ import pytest
 from scipy.signal import lfilter
 
 from glovecal_models.diagnosis.diagnose import diagnose
-from glovecal_models.diagnosis.lasting_error import lasting_error
-from glovecal_models.diagnosis.second_means import SecondMeans, without_drift
 from glovecal_models.diagnosis.shared_error import shared_error
+from glovecal_models.diagnosis.slow_error import SecondMeans, slow_error, without_drift
 from glovecal_models.diagnosis.something_left import Left
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.session import record_session
@@ -61,7 +60,7 @@ def test_neighbouring_seconds_measure_what_lasts_and_not_the_noise():
     random = np.random.default_rng(1)
     noise = [random.normal(size=60) for _ in range(12)]
     lasting = [0.7 * wander(random, 60, 8.0) + part for part in noise]
-    without, with_it = (lasting_error(means(*parts), noise) for parts in (noise, lasting))
+    without, with_it = (slow_error(means(*parts), noise) for parts in (noise, lasting))
     assert without.size_deg < 0.25
     assert with_it.size_deg == pytest.approx(0.66, abs=0.12)
     assert with_it.at_least_deg < with_it.size_deg
@@ -72,7 +71,7 @@ def test_the_lower_bound_holds_nineteen_times_in_twenty():
     random = np.random.default_rng(2)
     true = np.exp(-1 / (2 * 5.0))
     above = [
-        lasting_error(means(*(wander(random, 40, 5.0) for _ in range(12))), []).at_least_deg > true
+        slow_error(means(*(wander(random, 40, 5.0) for _ in range(12))), []).at_least_deg > true
         for _ in range(200)
     ]
     assert np.mean(above) <= 0.09
@@ -85,7 +84,7 @@ def test_the_lower_bound_holds_beside_noise(takes, length, size, noise):
     random = np.random.default_rng(6)
     true = size * np.exp(-1 / (2 * 5.0))
     found = [
-        lasting_error(
+        slow_error(
             means(
                 *(
                     size * wander(random, length, 5.0) + noise * random.normal(size=length)
@@ -106,7 +105,7 @@ def test_a_bound_is_never_above_its_estimate(offset):
     signs = np.where(np.arange(40) // 10 % 2, -1.0, 1.0)
     values = [10.0 * np.cumprod(np.append(1.0, signs)) for _ in range(4)]
     values[0][0] *= 1.0 + offset
-    found = lasting_error(means(*values), [])
+    found = slow_error(means(*values), [])
     assert np.isfinite(found.at_least_deg)
     assert found.at_least_deg <= found.size_deg
 

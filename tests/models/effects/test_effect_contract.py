@@ -13,7 +13,9 @@ import pytest
 
 from glovecal_models.effects.base.columnless_effect import ColumnlessEffect
 from glovecal_models.effects.base.decoy import decoy_columns
-from glovecal_models.effects.base.effect import Decoy, Effect, Settings, Signals
+from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.facts import Decoy, Kind, Settings, Stage
+from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.catalogue import catalogue, stored_effect
 from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
@@ -95,7 +97,11 @@ def test_it_says_what_it_is(effect: Effect) -> None:
     assert "\n" not in effect.explanation
     assert effect.source
     assert effect.decoy in get_args(Decoy)
-    assert effect.side in ("sensor", "reference")
+    assert effect.kind in get_args(Kind)
+    assert effect.stage in get_args(Stage)
+    assert effect.has_columns == (effect.kind == "correction")
+    names = {*effect.alike, *effect.alike_between_levels, *effect.also_explained_by}
+    assert names | {item.effect for item in effect.rivals} <= set(catalogue())
     for parameter in effect.parameters:
         assert parameter.low < parameter.high
         assert parameter.unit

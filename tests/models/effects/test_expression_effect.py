@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glovecal_models.effects.base.effect import Signals
+from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.catalogue import declared_effect, stored_effect
 from glovecal_models.effects.declared.expression_effect import ExpressionEffect, ExpressionStream
 from glovecal_models.errors import BadInput

@@ -14,7 +14,7 @@ import pytest
 
 from glovecal_models.effects import catalogue as catalogue_module
 from glovecal_models.effects.base.decoy import decoy_columns
-from glovecal_models.effects.base.effect import Signals
+from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glovecal_models.effects.base.effect import Signals
+from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.base.signature_effect import frames_inside
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.effects.sensor_fault.sensor_fault import SensorFault

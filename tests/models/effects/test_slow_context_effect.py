@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from glovecal_models.effects.base.context_slope import SlopeState, slopes
-from glovecal_models.effects.base.effect import Signals
+from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.catalogue import catalogue
 
 TIME = np.arange(0, 60, 0.04)

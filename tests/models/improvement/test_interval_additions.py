@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from glovecal_models.calibration.artifact import dump, load
+from glovecal_models.calibration.had_already import trained_rotations
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
@@ -67,7 +68,10 @@ def test_a_slip_makes_long_sessions_claim_what_is_true():
     for seed in (20, 21, 22):
         session = recorded(seed, Cause("garment_slip", "random_walk", 2.0))
         model = trained(session)
-        added = add_effect(model, session.takes, "garment_slip", settings=SETTINGS, parent_id="p")
+        every = trained_rotations(model)
+        added = add_effect(
+            model, session.takes, "garment_slip", rotations=every, settings=SETTINGS, parent_id="p"
+        )
         assert added.added
         assert added.model.parent == "p"
         assert added.after == added.before, "the angles stay"

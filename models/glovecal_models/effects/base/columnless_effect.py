@@ -7,7 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Decoy, InstantEffect, Settings, Signals
+from glovecal_models.effects.base.effect import InstantEffect
+from glovecal_models.effects.base.facts import Decoy, Settings
+from glovecal_models.effects.base.signals import Signals
 
 
 class ColumnlessEffect(InstantEffect):

@@ -7,8 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Decoy, InstantEffect, Settings, Signals
+from glovecal_models.effects.base.effect import InstantEffect
+from glovecal_models.effects.base.facts import Decoy, Settings
 from glovecal_models.effects.base.joint_units import in_joint_units, settle_joint_units
+from glovecal_models.effects.base.signals import Signals
 
 PRIOR_DEG = 4.0
 SQUARE_PRIOR_DEG = 6.0

@@ -12,7 +12,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from glovecal_models.effects.base.effect import Effect, Settings, Signals
+from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.facts import Settings
+from glovecal_models.effects.base.signals import Signals
 from glovecal_models.errors import BadInput
 
 ROLLED_SHARE = (0.2, 0.8)

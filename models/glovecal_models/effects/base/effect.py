@@ -13,113 +13,24 @@ Lanes are joints (and, while a shape is searched, joints times shapes): everythi
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal, overload
+from collections.abc import Callable, Collection, Sequence
+from typing import Any
 
 import numpy as np
 
-Settings = dict[str, Any]
-"""Constants an effect takes from its training takes: plain JSON-able data."""
+from glovecal_models.effects.base.assessment import Assessment
+from glovecal_models.effects.base.facts import EffectFacts, Settings
+from glovecal_models.effects.base.problem import Problem
+from glovecal_models.effects.base.signals import GloveFrames, Signals
+
 LEAST_SETTLING_S = 1.0
 """An effect with a memory counts as settled after this or, if longer, its longest time constant."""
 Uncertainty = Callable[[np.ndarray], np.ndarray]
 """From the joints' own signal (N, L), degrees, to their correction's variance (N, L), degrees squared."""
-Side = Literal["sensor", "reference"]
-Decoy = Literal["reversed in time", "rolled in time", "context of other takes", "dealt wearings", "none"]
 
 
-@dataclass(frozen=True)
-class Parameter:
-    """A number of the effect that is learned and shown to the user."""
-
-    name: str
-    unit: str
-    low: float
-    high: float
-    prior: str
-    """What is known before any measurement, in words."""
-
-
-@dataclass(frozen=True)
-class Signals:
-    """What effects may look at in one take: N frames of L lanes."""
-
-    time_s: np.ndarray
-    """(N,), seconds, increasing."""
-    own: np.ndarray
-    """(N, L), degrees: each joint's own signal, measured (forward) or predicted without effects (inverse)."""
-    others: Mapping[str, np.ndarray] = field(default_factory=dict)
-    """Other signals (N,) by name: neighbouring sensors or joints, in standard deviations."""
-    context: Mapping[str, np.ndarray] = field(default_factory=dict)
-    """Context columns (N,) by name; NaN where unknown."""
-    wearing: str = ""
-    take: str = ""
-    """Name of the take; it may tell which motion was done."""
-    zero_deg: np.ndarray | None = None
-    """(L,): where on the scale of ``own`` a raw reading of zero lies, by a straight line; None if unknown."""
-
-    def __len__(self) -> int:
-        return len(self.time_s)
-
-
-class GloveFrames(Sequence[Signals]):
-    """The next frame of each of G gloves that share a model; item i is that of glove i, as signals."""
-
-    def __init__(
-        self,
-        time_s: np.ndarray,
-        own: np.ndarray,
-        others: Callable[[], Mapping[str, np.ndarray]],
-        context: Sequence[Mapping[str, float]],
-        wearing: Sequence[str],
-        zero_deg: np.ndarray | None,
-    ) -> None:
-        """``time_s`` (G,) on each glove's own clock, ``own`` (G, L); ``others`` gives signals (G,) by name
-        and is asked when they are needed; what follows is as in ``Signals``, glove by glove."""
-        self.time_s, self.own, self._others = time_s, own, others
-        self._context, self._wearing, self._zero_deg = context, wearing, zero_deg
-
-    def __len__(self) -> int:
-        return len(self.time_s)
-
-    @overload
-    def __getitem__(self, at: int) -> Signals: ...
-    @overload
-    def __getitem__(self, at: slice) -> list[Signals]: ...
-    def __getitem__(self, at: int | slice) -> Signals | list[Signals]:
-        if isinstance(at, slice):
-            return [self[index] for index in range(len(self))[at]]
-        others = {name: values[at : at + 1] for name, values in self._others().items()}
-        context = {name: np.array([value]) for name, value in self._context[at].items()}
-        own, time_s = self.own[at : at + 1], self.time_s[at : at + 1]
-        return Signals(time_s, own, others, context, self._wearing[at], zero_deg=self._zero_deg)
-
-    def as_one(self) -> Signals | None:
-        """All gloves as the frames of one take, for what has no memory; None if not in one wearing and with
-        the same context columns."""
-        wearing, names = self._wearing[0], self._context[0].keys()
-        if any(other != wearing for other in self._wearing) or any(c.keys() != names for c in self._context):
-            return None
-        context = {name: np.array([of_glove[name] for of_glove in self._context]) for name in names}
-        return Signals(self.time_s, self.own, self._others(), context, wearing, zero_deg=self._zero_deg)
-
-
-class Effect(ABC):
+class Effect(EffectFacts, ABC):
     """One physical cause. Stateless: settings and shape are handed in, so that a model can store them."""
-
-    name: ClassVar[str]
-    explanation: ClassVar[str]
-    """One sentence for somebody who wears the glove."""
-    source: ClassVar[str]
-    side: ClassVar[Side] = "sensor"
-    parameters: ClassVar[tuple[Parameter, ...]] = ()
-    """The shape, in the order of its last axis."""
-    context: ClassVar[tuple[str, ...]] = ()
-    """Context columns it needs, all of them."""
-    decoy: ClassVar[Decoy] = "reversed in time"
-    """The twin with the same freedom that cannot be right."""
-    has_memory: ClassVar[bool] = False
 
     def missing(self, takes: Sequence[Signals]) -> str | None:
         """Why these takes cannot show the effect, as the end of "cannot be judged: ..."; None if they can."""
@@ -134,10 +45,22 @@ class Effect(ABC):
                 return f"the context column c.{name} never changes ({values[0]:g})"
         return None
 
-    @property
-    def needs_time(self) -> bool:
-        """Whether its columns depend on when the frames were: it remembers, or it reads the time itself."""
-        return self.has_memory
+    def assess(self, problem: Problem) -> Assessment | None:
+        """What it explains of ``problem``, where that is not judged as usual: by the held-out error of its
+        columns beside that of its control. None: as usual."""
+        return None
+
+    def told_from_alikes(self, problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]] | None:
+        """Which of this effect and those in ``alike`` comes first, and all of them that remain possible.
+
+        ``problem`` gives the problem on signals smoothed over so many rows. None: the ranking decides.
+        """
+        return None
+
+    def reference_delay_s(self, found: Assessment) -> np.ndarray | None:
+        """How much later the reference has to come, seconds, (1,) for all takes or (takes,); None: it is no
+        matter of time."""
+        return None
 
     def lacks(self, settings: Settings, context: Collection[str], wearing: str) -> str | None:
         """What it would have to be told and is not, so that it corrects nothing; None if nothing.
@@ -181,6 +104,10 @@ class Effect(ABC):
     def prior_sd(self, settings: Settings) -> np.ndarray:
         """How large each of the C weights may be expected to be, as a standard deviation."""
         return np.ones(len(self.weight_names(settings)))
+
+    def is_of_training(self, settings: Settings) -> bool:
+        """Whether training takes taught it something: they are asked again when a model is learned anew."""
+        return True
 
     def described(self, settings: Settings, shape: np.ndarray, weights: np.ndarray) -> dict[str, float]:
         """Numbers with units in their names for one lane's shape (P,) and weights (C,)."""

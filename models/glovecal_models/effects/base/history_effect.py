@@ -9,7 +9,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Effect, GloveFrames, Settings, Signals, Stream
+from glovecal_models.effects.base.effect import Effect, Stream
+from glovecal_models.effects.base.facts import Settings
+from glovecal_models.effects.base.signals import GloveFrames, Signals
 
 LONGEST_GAP_S = 1.0
 """After a longer pause the state is forgotten: the hand may have done anything meanwhile."""

@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Settings
+from glovecal_models.effects.base.facts import Kind, Settings
 from glovecal_models.effects.base.signature_effect import SignatureEffect
 
 
@@ -53,6 +53,7 @@ class Interval(ABC):
 class IntervalEffect(SignatureEffect):
     """Implement what is learned, and the variance that follows from it."""
 
+    kind: ClassVar[Kind] = "interval"
     shows_later: ClassVar[bool] = False
     """Whether it grows beyond what takes of usual length show: it stays if the claim on them is no worse."""
 

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Settings, Signals
+from glovecal_models.effects.base.facts import Settings
+from glovecal_models.effects.base.signals import Signals
 from glovecal_models.errors import BadInput
 
 

@@ -6,14 +6,17 @@ What helps is to say where, to leave the frames out, or to widen the interval.
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.columnless_effect import ColumnlessEffect
-from glovecal_models.effects.base.effect import Signals
+from glovecal_models.effects.base.facts import Kind, Settings, Stage
+from glovecal_models.effects.base.signals import Signals
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.take import Take
 
@@ -47,8 +50,77 @@ class Finding:
     stretches: tuple[Stretch, ...] = ()
 
 
+@dataclass(frozen=True)
+class Recorded:
+    """Takes in which an effect is looked for by its signature."""
+
+    takes: tuple[Take, ...]
+    sensor_of: Mapping[str, str]
+    """Each rotation's own sensor."""
+    static_errors: Callable[[], list[np.ndarray]]
+    """For each take (N, len(sensor_of)), degrees: what a smooth curve of the own sensors leaves."""
+    only_held_levels: bool = False
+    """Whether the takes only hold one angle after another: nothing moves, and repeats mean nothing."""
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """An effect as it would be added."""
+
+    constants: Settings
+    rotations: tuple[str, ...] | None = None
+    """None: all."""
+    sentences: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class LiveCheck:
+    """How an effect acts on live frames, learned from takes, and how well that does on other takes."""
+
+    settings: Settings
+    """Added to the effect's; empty: it does not act live."""
+    sentence: str
+    evidence: Mapping[str, float]
+
+
+class Held(NamedTuple):
+    """One frame with what a failing sensor says left out."""
+
+    base: np.ndarray
+    """(R,) degrees."""
+    readings: np.ndarray
+    """(S,) raw counts."""
+    variance: np.ndarray
+    """(R,) degrees squared, by which the joint may have moved since."""
+    is_faulty: np.ndarray
+    """(R,)."""
+    sensors: tuple[str, ...]
+    """Those that fail."""
+
+
+class Hold(ABC):
+    """Keeps rotations at their last good angle while a sensor fails: the state of one glove, causal."""
+
+    @abstractmethod
+    def frame(self, time_s: float, base: np.ndarray, readings: np.ndarray) -> Held:
+        """For the next frame: its prediction ``base`` (R,), degrees, and readings (S,)."""
+
+    @abstractmethod
+    def reset(self) -> None:
+        """A new run or wearing."""
+
+
 class SignatureEffect(ColumnlessEffect):
     """Implement ``find``; ``repaired`` where the recording can be mended."""
+
+    kind: ClassVar[Kind] = "finding"
+    stage: ClassVar[Stage] = "first"
+    looked_for_once: ClassVar[bool] = False
+    """Whether its search takes long and finds the same after other effects were added."""
+    learns_unfound: ClassVar[bool] = False
+    """Whether it can be learned where a user asks for it, though nothing of it is found."""
+    needs_prediction: ClassVar[bool] = False
+    """Whether a take that training never saw is repaired by what a model predicts for it."""
 
     def missing(self, takes: Sequence[Signals]) -> str | None:
         """Columns cannot judge a signature; ``find`` looks for itself and finds nothing where it cannot."""
@@ -68,9 +140,56 @@ class SignatureEffect(ColumnlessEffect):
         for sensors that a take does not have and for errors of another shape.
         """
 
-    def repaired(self, takes: Sequence[Take]) -> tuple[Take, ...]:
-        """The takes with the effect taken out of the measurement; by default they stay as they are."""
+    def find_between_levels(self, takes: Sequence[Take], sensor_of: Mapping[str, str]) -> tuple[Finding, ...]:
+        """The same in takes that only hold one known angle after another; by default nothing."""
+        return ()
+
+    def proposed(self, recorded: Recorded) -> Proposal | None:
+        """What would be added for what is found in takes; None when nothing is."""
+        if recorded.only_held_levels or not recorded.sensor_of:
+            return None
+        found = self.find(recorded.takes, recorded.sensor_of)
+        where = sorted({place for item in found for place in item.where})
+        return Proposal({"where": where}, None, tuple(item.sentence for item in found)) if found else None
+
+    def constants_of(self, found: Assessment, takes: Sequence[str]) -> Settings | None:
+        """The constants that an assessment on takes of these names found; None: none."""
+        return None
+
+    def described_constants(self, constants: Settings) -> dict[str, Any]:
+        """What of the constants is told to a user."""
+        return constants
+
+    def repaired(self, takes: Sequence[Take], settings: Settings | None = None) -> tuple[Take, ...]:
+        """The takes with the effect taken out of the measurement; by default they stay as they are.
+
+        ``settings`` of a model; None: as it is found in these takes.
+        """
         return tuple(takes)
+
+    def repaired_to(
+        self, take: Take, settings: Settings, rotations: Sequence[str], predicted: np.ndarray
+    ) -> Take:
+        """A take repaired by what a model predicts for it, (N, R) degrees at its frames."""
+        return self.repaired([take], settings)[0]
+
+    def checked_live(
+        self,
+        takes: Sequence[Take],
+        sensor_of: Mapping[str, str],
+        sensors: Sequence[str],
+        reads: Mapping[str, tuple[str, ...]],
+        cancelled: Callable[[], bool] | None = None,
+    ) -> LiveCheck | None:
+        """How it acts on live frames; None: not at all.
+
+        ``reads``: the sensors that each rotation is read from, of the model's ``sensors``. Raises Cancelled.
+        """
+        return None
+
+    def hold(self, settings: Settings, rotations: Sequence[str], sensors: Sequence[str]) -> Hold | None:
+        """What it does to live frames; None: nothing."""
+        return None
 
 
 def check_signature_input(

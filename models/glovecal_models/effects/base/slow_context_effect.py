@@ -13,8 +13,10 @@ import numpy as np
 
 from glovecal_models.effects.base.context_effect import PRIOR_DEG, ContextEffect
 from glovecal_models.effects.base.context_slope import MEMORY_S, SlopeState, slopes
-from glovecal_models.effects.base.effect import Settings, Signals, Stream
+from glovecal_models.effects.base.effect import Stream
+from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
+from glovecal_models.effects.base.signals import Signals
 
 STEEPEST_SHARE = 99.0
 """Percentile of the slopes in training; steeper ones are held there."""

@@ -7,9 +7,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Effect, Settings, Signals, Stream
+from glovecal_models.effects.base.effect import Effect, Stream
+from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.history_effect import LONGEST_GAP_S, elapsed_s, unbroken
 from glovecal_models.effects.base.joint_units import in_joint_units, settle_joint_units
+from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.declared.declaration import Declaration
 from glovecal_models.effects.declared.expression_value import Evaluation, Memory, Undefined
 from glovecal_models.errors import BadInput

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize
 
-from glovecal_models.effects.delay.clock_scan import FINE_S, WORTHWHILE, Grid, on_grid, unexplained
+from glovecal_models.takes.clock_scan import FINE_S, WORTHWHILE, Grid, on_grid, unexplained
 from glovecal_models.takes.take import Take
 
 SHORTEST_S = 60.0

@@ -6,17 +6,35 @@ scan; a drift is added in takes of a minute or more where it pays.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Decoy, Parameter, Side
-from glovecal_models.effects.base.signature_effect import Finding, SignatureEffect, check_signature_input
+from glovecal_models.effects.base.assessment import Assessment
+from glovecal_models.effects.base.facts import Decoy, Kind, Parameter, Rival, Settings, Stage
+from glovecal_models.effects.base.motions import FAST
+from glovecal_models.effects.base.problem import Problem
+from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.signature_effect import (
+    Finding,
+    Proposal,
+    Recorded,
+    SignatureEffect,
+    check_signature_input,
+)
 from glovecal_models.effects.delay.clock_drift import LARGEST_PPM, ClockDrift, clock_drift, without_drift
-from glovecal_models.effects.delay.clock_scan import RANGE_S, ClockOffset, aligned, clock_offsets
+from glovecal_models.effects.delay.delay_grid import delay_errors, held_out_beside, why_no_delay_shows
+from glovecal_models.effects.delay.delay_verdict import CLOCK, LAG, clock_choice, first_delay
+from glovecal_models.effects.delay.offset_to import offset_to
+from glovecal_models.takes.clock_scan import RANGE_S, ClockOffset, aligned, clock_offsets
 from glovecal_models.takes.take import Take
+
+BEYOND_DELAYS_S = 0.15
+"""Smaller offsets are left to the comparison, which tells them from a lag."""
+NEAR_S = 0.3
+"""When training's offsets all lie within this, so will another take's."""
 
 
 @dataclass(frozen=True)
@@ -42,15 +60,68 @@ class TakeClock:
 
 
 class ClockOffsetEffect(SignatureEffect):
-    name = "clock_offset"
+    name = CLOCK
     explanation = "Glove and reference system were recorded with clocks that disagree."
     source = "two recorders without a common clock; real ankle recordings: -2.0 to 0.6 s, each take its own"
-    side: ClassVar[Side] = "reference"
+    kind: ClassVar[Kind] = "repair"
+    stage: ClassVar[Stage] = "compared"
     decoy: ClassVar[Decoy] = "reversed in time"
+    alike: ClassVar = (LAG,)
+    shown_by: ClassVar = FAST
+    rivals: ClassVar = (Rival("hysteresis", FAST), Rival("creep", FAST))
+    looked_for_once: ClassVar[bool] = True
+    needs_prediction: ClassVar[bool] = True
     parameters: ClassVar = (
         Parameter("offset", "s", -RANGE_S, RANGE_S, "some tenths of a second, each take its own"),
         Parameter("drift", "ppm", -LARGEST_PPM, LARGEST_PPM, "below 100 ppm for two good clocks"),
     )
+
+    @property
+    def needs_movement(self) -> bool:
+        return True
+
+    def missing(self, takes: Sequence[Signals]) -> str | None:
+        return why_no_delay_shows(takes)
+
+    def assess(self, problem: Problem) -> Assessment:
+        """One offset for all joints and, where that pays, one for each take."""
+        grids = delay_errors(problem)
+        clock = clock_choice(grids)
+        errors = held_out_beside(problem, *clock.errors(grids))
+        offsets, nothing = tuple(clock.offset_s for _ in grids), tuple(np.empty(0) for _ in grids)
+        return Assessment(self.name, problem.rotations, errors, offsets, nothing, None, ("offset_s",))
+
+    def told_from_alikes(self, problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]]:
+        return first_delay(problem)
+
+    def reference_delay_s(self, found: Assessment) -> np.ndarray:
+        return found.shapes[0]
+
+    def constants_of(self, found: Assessment, takes: Sequence[str]) -> Settings | None:
+        """None when the clocks agree."""
+        if not found.shapes[0].any():
+            return None
+        offsets = -np.broadcast_to(found.shapes[0], (len(takes),))
+        return {
+            "offset_s": dict(zip(takes, map(float, offsets), strict=True)),
+            "common_s": float(np.median(offsets)),
+            "per_take": bool(np.ptp(offsets) > 0),
+        }
+
+    def proposed(self, recorded: Recorded) -> Proposal | None:
+        """Large offsets, each take its own; None unless most takes that can be judged have one."""
+        found = clock_offsets(recorded.takes)
+        judged = [item for item in found if item.verdict in ("offset", "agrees")]
+        large = [item for item in judged if item.verdict == "offset" and abs(item.offset_s) > BEYOND_DELAYS_S]
+        if not large or 2 * len(large) < len(judged):
+            return None
+        offsets = {item.take: item.offset_s for item in found if item.verdict == "offset"}
+        common = float(np.median(list(offsets.values())))
+        each = {take.name: offsets.get(take.name, common) for take in recorded.takes}
+        return Proposal({"offset_s": each, "common_s": common, "per_take": True})
+
+    def described_constants(self, constants: Settings) -> dict[str, Any]:
+        return {"offset_s": constants["offset_s"] if constants["per_take"] else constants["common_s"]}
 
     def clocks(self, takes: Sequence[Take], *, drift: bool = True) -> tuple[TakeClock, ...]:
         """One answer per take, in their order; takes of one wearing are judged together."""
@@ -70,9 +141,27 @@ class ClockOffsetEffect(SignatureEffect):
         known = [item for item in found if item is not None]
         return tuple(sorted(known, key=lambda item: -abs(item.evidence["offset_s"])))
 
-    def repaired(self, takes: Sequence[Take], *, drift: bool = True) -> tuple[Take, ...]:
-        clocks = self.clocks(takes, drift=drift)
-        return tuple(clock.repaired(take) for take, clock in zip(takes, clocks, strict=True))
+    def repaired(self, takes: Sequence[Take], settings: Settings | None = None) -> tuple[Take, ...]:
+        if settings is None:
+            return tuple(clock.repaired(take) for take, clock in zip(takes, self.clocks(takes), strict=True))
+        offsets, common = settings["offset_s"], float(settings["common_s"])
+        return tuple(aligned(take, float(offsets.get(take.name, common))) for take in takes)
+
+    def repaired_to(
+        self, take: Take, settings: Settings, rotations: Sequence[str], predicted: np.ndarray
+    ) -> Take:
+        """A common offset found in training is applied as it is; where each take had its own, that of a take
+        training never saw is where its reference fits the prediction best."""
+        if len(take.reference_time_s) < 2:
+            return take
+        offsets = {str(name): float(value) for name, value in settings["offset_s"].items()}
+        if not settings["per_take"]:
+            return aligned(take, float(settings["common_s"]))
+        if take.name in offsets:
+            return aligned(take, offsets[take.name])
+        largest = max((abs(value) for value in offsets.values()), default=NEAR_S)
+        width = NEAR_S if largest < 0.5 * NEAR_S else RANGE_S
+        return aligned(take, offset_to(take, rotations, predicted, width))
 
 
 def _drift(take: Take, scan: ClockOffset) -> ClockDrift | None:

@@ -7,21 +7,30 @@ find how much smoothing the noise wants: one left 1.3 times the error of a glove
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Parameter, Settings, Signals
+from glovecal_models.effects.base.assessment import Assessment
+from glovecal_models.effects.base.facts import Parameter, Rival, Settings
 from glovecal_models.effects.base.history_effect import ArrayStateEffect
+from glovecal_models.effects.base.motions import FAST
+from glovecal_models.effects.base.problem import Problem
 from glovecal_models.effects.base.relaxation import relax, relax_once
+from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.delay.delay_grid import (
+    DelayErrors,
+    delay_errors,
+    held_out_beside,
+    why_no_delay_shows,
+)
+from glovecal_models.effects.delay.delay_verdict import CLOCK, first_delay
 
 MULTIPLES = np.array([0.5, 1.0, 2.0, 4.0, 8.0])
 TAU_S = (0.02, 0.03, 0.045, 0.065, 0.1, 0.15)
 PRIOR = 8.0
 """Of the weights: with a time constant below the lag's own they are its ratio, and of either sign."""
-FAST_SHARE = 1.0
-"""Per second: a joint is moved fast when its speed reaches so many of its own standard deviations."""
 
 
 class Lag(ArrayStateEffect):
@@ -29,10 +38,32 @@ class Lag(ArrayStateEffect):
     explanation = "The sensor follows the joint late: fast movements come out smaller and delayed."
     source = "first-order low pass, 5 to 150 ms (facts: rate-dependent flex sensors)"
     parameters: ClassVar = (Parameter("tau", "s", 0.005, 0.15, "5 to 150 ms"),)
+    alike: ClassVar = (CLOCK,)
+    shown_by: ClassVar = FAST
+    rivals: ClassVar = (
+        Rival(CLOCK, FAST),
+        Rival("hysteresis", FAST),
+        Rival("creep", FAST),
+    )
 
     def missing(self, takes: Sequence[Signals]) -> str | None:
-        fastest = max((_speed(take) for take in takes), default=0.0)
-        return None if fastest >= FAST_SHARE else "no fast motion was recorded"
+        return why_no_delay_shows(takes)
+
+    def assess(self, problem: Problem) -> Assessment:
+        grids = delay_errors(problem)
+        lags = [_best(grid, grid.lag) for grid in grids]
+        mirrored = [_best(grid, grid.reversed_lag) for grid in grids]
+        right, control = (
+            [grid.blocks[:, cell] for grid, cell in zip(grids, cells, strict=True)]
+            for cells in (lags, mirrored)
+        )
+        errors = held_out_beside(problem, right, control)
+        taus = tuple(np.array([grid.cells[cell, 1]]) for grid, cell in zip(grids, lags, strict=True))
+        nothing = tuple(np.empty(0) for _ in grids)
+        return Assessment(self.name, problem.rotations, errors, taus, nothing, None, ("tau_s",))
+
+    def told_from_alikes(self, problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]]:
+        return first_delay(problem)
 
     def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
         return np.repeat(np.array(TAU_S)[:, None, None], takes[0].own.shape[1], axis=1)
@@ -64,9 +95,5 @@ class Lag(ArrayStateEffect):
         return tuple(f"lead_{multiple:g}_tau_deg_per_deg" for multiple in MULTIPLES)
 
 
-def _speed(take: Signals) -> float:
-    """95th percentile of the speed of the liveliest joint, in its standard deviations per second."""
-    if len(take) < 10:
-        return 0.0
-    speed = np.abs(np.diff(take.own, axis=0)) / np.diff(take.time_s)[:, None]
-    return float(np.max(np.percentile(speed, 95, axis=0) / np.maximum(take.own.std(axis=0), 1e-9)))
+def _best(grid: DelayErrors, cells: np.ndarray) -> int:
+    return int(cells[np.argmin(grid.blocks[:, cells].sum(axis=0))])

@@ -15,9 +15,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Settings
+from glovecal_models.effects.base.facts import Rival, Settings, Stage
 from glovecal_models.effects.base.interval_effect import IntervalEffect, LeftOutErrors
-from glovecal_models.effects.base.signature_effect import Finding, check_signature_input
+from glovecal_models.effects.base.motions import CROSSED
+from glovecal_models.effects.base.signature_effect import Finding, Proposal, Recorded, check_signature_input
 from glovecal_models.effects.garment_slip.slip_growth import GROWS_S, SlipGrowth, SlipInterval, slip_growth
 from glovecal_models.effects.garment_slip.slip_walk import (
     OVER_NOISE,
@@ -32,7 +33,19 @@ from glovecal_models.takes.take import Take
 
 class GarmentSlip(IntervalEffect):
     name = "garment_slip"
+    plain_name = "the glove slipping"
+    stage: ClassVar[Stage] = "last"  # creep looks like a slip
     shows_later: ClassVar[bool] = True
+    learns_unfound: ClassVar[bool] = True
+    # A walk over minutes differs between wearings, and goes along with one slow column or other, by chance.
+    also_explained_by: ClassVar = ("donning_shift", "temperature", "humidity", "warmup_drift", "supply_sag")
+    also_explained_share: ClassVar = 0.55  # a true cause of those saves more at 1.3 noise floors, a walk less
+    drift_in_holds: ClassVar = "goes on"
+    shown_by: ClassVar = CROSSED
+    rivals: ClassVar = tuple(
+        Rival(name, CROSSED)
+        for name in ("warmup_drift", "temperature", "humidity", "supply_sag", "donning_shift")
+    )
     explanation = "The glove slips on the hand while it is worn: the error wanders and does not come back."
     source = "random walk of the offset, deg/sqrt(min); a known pose resets it"
 
@@ -63,6 +76,11 @@ class GarmentSlip(IntervalEffect):
         if not is_common(takes, [plain for _, plain in between]):
             found += [finding for finding, _ in between]
         return tuple(sorted(found, key=lambda item: -(item.size_deg or 0.0)))
+
+    def proposed(self, recorded: Recorded) -> Proposal | None:
+        found = self.find(recorded.takes, recorded.sensor_of, recorded.static_errors())
+        where = tuple(dict.fromkeys(name for item in found for name in item.where))
+        return Proposal({}, where, tuple(item.sentence for item in found)) if found else None
 
     @property
     def needs_time(self) -> bool:

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Settings
+from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.interval_effect import Interval, LeftOutErrors
 from glovecal_models.effects.garment_slip.slip_walk import slip_walk
 

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Settings
+from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.interval_effect import Interval, LeftOutErrors
 
 STEPS_A_BAND, BANDS = 4, 3

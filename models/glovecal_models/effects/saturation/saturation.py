@@ -9,12 +9,14 @@ side only. The interval there has to cover what the reference was seen to do.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Settings
+from glovecal_models.effects.base.facts import Rival, Settings
 from glovecal_models.effects.base.interval_effect import IntervalEffect, LeftOutErrors
-from glovecal_models.effects.base.signature_effect import Finding, check_signature_input
+from glovecal_models.effects.base.motions import RAMPS
+from glovecal_models.effects.base.signature_effect import Finding, Proposal, Recorded, check_signature_input
 from glovecal_models.effects.saturation.saturated_band import SaturatedBand, SaturationInterval
 from glovecal_models.takes.take import Take
 
@@ -34,6 +36,7 @@ class Saturation(IntervalEffect):
     name = "saturation"
     explanation = "The sensor stops responding near the end of its range: further bending is not seen."
     source = "clipped converter or fully stretched sensor; bands: study of missing effects"
+    rivals: ClassVar = (Rival("nonlinearity", RAMPS),)
 
     def find(
         self,
@@ -44,6 +47,11 @@ class Saturation(IntervalEffect):
         check_signature_input(takes, sensor_of, errors)
         bands = sorted(saturated_bands(takes, sensor_of), key=lambda band: -band.extra_sd_deg)
         return tuple(_finding(band) for band in bands)
+
+    def proposed(self, recorded: Recorded) -> Proposal | None:
+        bands = saturated_bands(recorded.takes, recorded.sensor_of)
+        where = tuple(dict.fromkeys(band.rotation for band in bands))
+        return Proposal({"bands": [band.to_settings() for band in bands]}, where) if bands else None
 
     def learned(self, left_out: Sequence[LeftOutErrors], found: Settings) -> Settings:
         bands = [SaturatedBand.of(item) for item in found["bands"]]

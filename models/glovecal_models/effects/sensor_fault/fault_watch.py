@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Settings
+from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
 from glovecal_models.effects.base.reading_track import ReadingTrack
 

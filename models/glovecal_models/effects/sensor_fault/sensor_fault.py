@@ -6,15 +6,18 @@ Four signatures: *stuck* (one value while the reference moves), *spikes* (gone a
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Side
+from glovecal_models.effects.base.facts import Kind, Rival, Settings
+from glovecal_models.effects.base.motions import SHUFFLED
 from glovecal_models.effects.base.signature_effect import (
     Finding,
+    Hold,
+    LiveCheck,
     SignatureEffect,
     Stretch,
     check_signature_input,
@@ -22,7 +25,9 @@ from glovecal_models.effects.base.signature_effect import (
     named,
     stretches_of,
 )
+from glovecal_models.effects.sensor_fault.fault_hold import FaultHold
 from glovecal_models.effects.sensor_fault.gain_jump import gain_jump
+from glovecal_models.effects.sensor_fault.live_check import live_check
 from glovecal_models.effects.sensor_fault.reading_faults import GRADUAL_SHARE, dropouts, spikes, stuck
 from glovecal_models.effects.sensor_fault.short_faults import (
     FEWEST,
@@ -40,7 +45,9 @@ LEAST_OF_RANGE = (0.5, 99.5)
 
 class SensorFault(SignatureEffect):
     name = "sensor_fault"
-    side: ClassVar[Side] = "reference"
+    kind: ClassVar[Kind] = "repair"
+    alike_between_levels: ClassVar = ("nonlinearity",)
+    rivals: ClassVar = (Rival("nonlinearity", SHUFFLED),)
     explanation = "A wire or plug fails: the sensor stands still, spikes, drops out or jumps."
     source = "signatures of readings against reference"
     kinds: ClassVar[tuple[str, ...]] = ("stuck", "spikes", "dropouts", "jump")
@@ -60,7 +67,30 @@ class SensorFault(SignatureEffect):
             found += _faults(takes, sensor, rotation)
         return tuple(sorted(found, key=lambda item: (-len(item.stretches), item.where)))
 
-    def repaired(self, takes: Sequence[Take]) -> tuple[Take, ...]:
+    def find_between_levels(self, takes: Sequence[Take], sensor_of: Mapping[str, str]) -> tuple[Finding, ...]:
+        """Jumps, each with the known angles it lies between, and what it cannot be told from."""
+        jumps = [item for item in self.find(takes, sensor_of) if item.kind == "jump"]
+        return tuple(_between_levels(item, takes, sensor_of) for item in jumps)
+
+    def checked_live(
+        self,
+        takes: Sequence[Take],
+        sensor_of: Mapping[str, str],
+        sensors: Sequence[str],
+        reads: Mapping[str, tuple[str, ...]],
+        cancelled: Callable[[], bool] | None = None,
+    ) -> LiveCheck:
+        return live_check(takes, sensors, reads, lambda some: self.find(some, sensor_of), cancelled)
+
+    def hold(self, settings: Settings, rotations: Sequence[str], sensors: Sequence[str]) -> Hold | None:
+        """For a model that knows what its sensors do when they are sound."""
+        return FaultHold(settings["live"], rotations, sensors) if "live" in settings else None
+
+    @property
+    def needs_time(self) -> bool:
+        return True
+
+    def repaired(self, takes: Sequence[Take], settings: Settings | None = None) -> tuple[Take, ...]:
         """The takes without reference where the joint's own sensor failed: it neither trains nor scores."""
         if not takes:
             return ()
@@ -148,6 +178,23 @@ def _without_faults(take: Take, found: Sequence[Finding]) -> Take:
         return take
     reference[failed] = np.nan
     return replace(take, reference_time_s=take.time_s, reference=reference)
+
+
+def _between_levels(item: Finding, takes: Sequence[Take], sensor_of: Mapping[str, str]) -> Finding:
+    at = item.stretches[0]
+    take = next(take for take in takes if take.name == at.take)
+    rotation = next(name for name, sensor in sensor_of.items() if sensor in item.where)
+    angle = take.reference_at_frames([rotation])[:, 0]
+    row = int(np.searchsorted(take.time_s, at.start_s))
+    before = angle[:row][angle[:row] != angle[row]]
+    if not len(before):
+        return item
+    sentence = (
+        f"{item.where[0]} may jump between {before[-1]:g} and {angle[row]:g} degrees of {rotation}, by"
+        f" {item.size_deg or 0.0:.0f} degrees: one pass over known angles cannot tell that from a curved"
+        " sensor."
+    )
+    return replace(item, sentence=sentence)
 
 
 def _finding(

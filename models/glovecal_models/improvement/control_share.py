@@ -7,16 +7,15 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.diagnosis.assessment import Assessment
 from glovecal_models.diagnosis.candidates import assessed
-from glovecal_models.diagnosis.delays import SMOOTHING
 from glovecal_models.diagnosis.diagnosis import Diagnosis
-from glovecal_models.diagnosis.directions import forward
-from glovecal_models.diagnosis.evened import bridge_s, evened, smoothed
-from glovecal_models.diagnosis.ground import measured_joints
+from glovecal_models.diagnosis.forward_design import forward
+from glovecal_models.diagnosis.known_effect import known_effects
+from glovecal_models.diagnosis.problem import measured_joints
+from glovecal_models.diagnosis.resampled import SMOOTHING, bridge_s, resampled, smoothed
+from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.errors import Cancelled
-from glovecal_models.improvement.known_effects import known_effects
 from glovecal_models.takes.take import Take
 
 
@@ -40,7 +39,7 @@ def share_left_by_decoy(
     if not joints:
         return None
     bridge = bridge_s(takes)
-    even = [smoothed(evened(take, model.layout.sensors, joints, bridge), SMOOTHING) for take in takes]
+    even = [smoothed(resampled(take, model.layout.sensors, joints, bridge), SMOOTHING) for take in takes]
     known = [item for item in known_effects(model) if item.effect.name != effect.name]
     linear = model.method in ("raw", "linear")
     direction = forward(even, model.layout, joints, linear=linear, known=known)

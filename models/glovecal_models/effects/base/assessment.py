@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import wilcoxon
 
-from glovecal_models.calibration.held_out import saved_share
+from glovecal_models.effects.base.facts import BETWEEN_TAKES, Certainty
 
 LEAST_CONTRAST = 0.04
 """Share of the squared error a cause must save beyond its decoy."""
@@ -22,12 +22,16 @@ FEWEST_BLOCKS = 9
 CLEAR_CONTRAST = 0.25
 """Causes that change from take to take save 0.46 and more at 1.3 noise floors, donnings of real ankles 0.26;
 healthy gloves 0.21 at most."""
-SESSION_PROBABILITY = 0.025
-WEARING_PROBABILITY = 0.04
-"""Wearings have one way to be dealt, where context columns have many names: less is asked of them."""
-FAINT_SESSION_PROBABILITY = 0.005
-FAINT_WEARING_PROBABILITY = 0.01
-"""What saves less than ``CLEAR_CONTRAST`` has to be surer."""
+
+
+BLOCK_ROWS = 125
+"""5 s of the rows that are fitted."""
+
+
+def saved_share(before: np.ndarray, after: np.ndarray) -> float:
+    """Share of the squared errors ``before`` that is gone ``after``; 0 where there was no error to save."""
+    whole = float(before.sum())
+    return 1.0 - float(after.sum()) / whole if whole > 0 else 0.0
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,8 @@ class Assessment:
     """Of a session effect, from takes dealt in other ways; None: judged block by block."""
     numbers: tuple[str, ...] = ()
     """Names of the shape's numbers, units included."""
+    certainty: Certainty = BETWEEN_TAKES
+    """Asked of ``probability``."""
 
     def shape_described(self, joint: int) -> dict[str, float]:
         """The shape of one joint by its numbers' names."""
@@ -102,11 +108,8 @@ class Assessment:
         return tuple(sorted(some))
 
     def _touched_by_session(self, probability: float) -> tuple[int, ...]:
-        faint, clear = FAINT_SESSION_PROBABILITY, SESSION_PROBABILITY
-        if self.effect == "donning_shift":
-            faint, clear = FAINT_WEARING_PROBABILITY, WEARING_PROBABILITY
         largest = max((item.contrast for item in self.errors), default=0.0)
-        if probability > (clear if largest >= CLEAR_CONTRAST else faint):
+        if probability > (self.certainty.clear if largest >= CLEAR_CONTRAST else self.certainty.faint):
             return ()
         return tuple(i for i, item in enumerate(self.errors) if item.contrast >= LEAST_SESSION_CONTRAST)
 
@@ -119,6 +122,22 @@ class Assessment:
                 for i in self.touched
             )
         )
+
+
+def block_starts(lengths: Sequence[int], block_rows: int = BLOCK_ROWS) -> np.ndarray:
+    """First row of each block when every unit is cut into blocks of about ``block_rows``; a unit that has no
+    row of this joint has no block."""
+    starts, first = [], 0
+    for length in lengths:
+        parts = max(1, round(length / block_rows)) if length else 0
+        starts.extend(first + np.arange(parts) * length // parts)
+        first += length
+    return np.array(starts, dtype=int)
+
+
+def squared_in_blocks(residual: Sequence[np.ndarray], starts: np.ndarray) -> np.ndarray:
+    """(B,) sums of squares of the residuals (N,) of all units, in the blocks that begin at ``starts``."""
+    return np.add.reduceat(np.concatenate(residual) ** 2, starts)
 
 
 def signed_rank(values: np.ndarray) -> float:

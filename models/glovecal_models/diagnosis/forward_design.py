@@ -6,17 +6,18 @@ other direction, angle from sensors, is what adding an effect tries.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from glovecal_models.calibration.base_features import BaseFeatures
 from glovecal_models.calibration.held_out import BaseProducts, Rows
 from glovecal_models.calibration.left_out import are_short, first_measured, pieces
-from glovecal_models.diagnosis.evened import EvenTake
 from glovecal_models.diagnosis.known_effect import KnownEffect
-from glovecal_models.effects.base.effect import Signals
+from glovecal_models.diagnosis.resampled import ResampledTake
+from glovecal_models.effects.base.signals import Signals
 from glovecal_models.layout import Correspondence, Layout
 
 EVERY = 2
@@ -24,7 +25,7 @@ EVERY = 2
 
 
 @dataclass(frozen=True)
-class Direction:
+class ForwardDesign:
     """All joints, sensor from angles."""
 
     rotations: tuple[str, ...]
@@ -39,6 +40,15 @@ class Direction:
     products: tuple[BaseProducts, ...]
     """For each joint."""
 
+    kept: dict[str, Any] = field(default_factory=dict, compare=False)
+    """What effects worked out together."""
+
+    def once(self, what: str, work: Callable[[], Any]) -> Any:
+        """The result of ``work``, kept for whoever asks for the same again."""
+        if what not in self.kept:
+            self.kept[what] = work()
+        return self.kept[what]
+
     def rows(self, joint: int, columns: Sequence[np.ndarray]) -> list[np.ndarray]:
         """``columns``: for each take (N, ...); the fitted rows of those."""
         return [columns[take][index] for take, index in self.units(joint)]
@@ -49,13 +59,13 @@ class Direction:
 
 
 def forward(
-    takes: Sequence[EvenTake],
+    takes: Sequence[ResampledTake],
     layout: Layout,
     rotations: Sequence[str],
     *,
     linear: bool,
     known: Sequence[KnownEffect] = (),
-) -> Direction:
+) -> ForwardDesign:
     """Own sensor, scaled to degrees, from the measured angles; ``known`` effects belong to the base."""
     names = list(rotations)
     sensor = [_own_sensor(takes, layout, rotation, column) for column, rotation in enumerate(rotations)]
@@ -108,7 +118,7 @@ def forward(
         read.append(frozenset({rotation, *neighbours, *item.sensors}))
         used.append(tuple(index))
         products.append(BaseProducts(units))
-    return Direction(tuple(rotations), signals, tuple(read), unit_take, tuple(used), tuple(products))
+    return ForwardDesign(tuple(rotations), signals, tuple(read), unit_take, tuple(used), tuple(products))
 
 
 def _read_beside(item: Correspondence, names: Sequence[str], layout: Layout) -> list[str]:
@@ -141,7 +151,7 @@ class _OwnSensor:
     """Where a reading of zero lies."""
 
 
-def _own_sensor(takes: Sequence[EvenTake], layout: Layout, rotation: str, column: int) -> _OwnSensor:
+def _own_sensor(takes: Sequence[ResampledTake], layout: Layout, rotation: str, column: int) -> _OwnSensor:
     """The measuring sensor by a straight line; without one of its own, what all inputs together predict."""
     item = layout.correspondence(rotation)
     inputs = [item.input_columns(take.readings, list(layout.sensors)) for take in takes]

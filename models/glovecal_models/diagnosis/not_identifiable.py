@@ -1,7 +1,8 @@
-"""Causes that change from take to take need takes that could have been dealt in many ways.
+"""Effects that these takes cannot decide, though they may well be there, and what to record instead.
 
-With two wearings, or few takes, or a context that hardly differs, even a cause that is there explains no more
-than a deal by chance may; then what to record is said instead of a verdict.
+Causes that change from take to take need takes that could have been dealt in many ways. With two wearings, or
+few takes, or a context that hardly differs, even a cause that is there explains no more than a deal by chance
+may; then what to record is said instead of a verdict.
 """
 
 from __future__ import annotations
@@ -12,10 +13,14 @@ from math import ceil, factorial, prod
 
 import numpy as np
 
-from glovecal_models.diagnosis.assessment import SESSION_PROBABILITY, WEARING_PROBABILITY
+from glovecal_models.diagnosis.known_effect import KnownEffect
+from glovecal_models.diagnosis.naming import Naming
 from glovecal_models.diagnosis.next_take import MORE_TAKES, MORE_WEARINGS, NextTake
 from glovecal_models.diagnosis.session_chance import wearing_deals
-from glovecal_models.effects.base.effect import Effect, Signals
+from glovecal_models.diagnosis.something_left import Left
+from glovecal_models.effects.base.assessment import LEAST_SESSION_CONTRAST, Assessment
+from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.signals import Signals
 
 ALIKE = 0.02
 """Share of a context column's range within which takes count as alike."""
@@ -26,11 +31,69 @@ ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "
 
 
 @dataclass(frozen=True)
+class NotJudgeable:
+    """An effect these takes cannot show."""
+
+    effect: str
+    why: str
+    record: NextTake | None = None
+    """The recording after which they could."""
+    would_save: Assessment | None = None
+    """What it saves on takes left out, by itself or by chance."""
+
+    @property
+    def joints_saved(self) -> tuple[int, ...]:
+        """Joints on which it saves as much as a session effect must."""
+        if self.would_save is None:
+            return ()
+        errors = self.would_save.errors
+        return tuple(i for i, item in enumerate(errors) if item.saved >= LEAST_SESSION_CONTRAST)
+
+    @property
+    def saves_much(self) -> bool:
+        """Whether it may well be there."""
+        return bool(self.joints_saved)
+
+    @property
+    def saved_square(self) -> float:
+        """Squared degrees per row, summed over those joints."""
+        if self.would_save is None:
+            return 0.0
+        some = [self.would_save.errors[i] for i in self.joints_saved]
+        return float(sum((item.base.sum() - item.added.sum()) / item.rows for item in some))
+
+
+@dataclass(frozen=True)
 class Undecidable:
     """Why takes cannot decide, and the recording after which they can."""
 
     why: str
     record: NextTake
+
+
+def likelier(impossible: Sequence[NotJudgeable], naming: Naming) -> list[NotJudgeable]:
+    """Those that would save more than the one that is to be named."""
+    if not naming.ranked:
+        return []
+    return [item for item in impossible if item.saved_square > naming.ranked[0].saved_square]
+
+
+def as_known(item: NotJudgeable, candidates: Sequence[Effect]) -> KnownEffect:
+    """On the joints where it saves much."""
+    found = item.would_save
+    assert found is not None
+    effect = next(each for each in candidates if each.name == item.effect)
+    where = tuple(found.joints[i] for i in item.joints_saved)
+    return KnownEffect(effect, where, tuple(found.shapes[i] for i in item.joints_saved))
+
+
+def deciding(impossible: Sequence[NotJudgeable], left: Left) -> NextTake | None:
+    """The recording that lets an effect be judged which may well be there, or a wearing if any may."""
+    asked = [item for item in impossible if item.record is not None]
+    likely = sorted((item for item in asked if item.saves_much), key=lambda item: -item.saved_square)
+    unexplained = left.is_left or left.not_judgeable is not None
+    wearing = [item for item in asked if item.record and item.record.motion == MORE_WEARINGS and unexplained]
+    return next((item.record for item in (*likely, *wearing)), None)
 
 
 def undecidable(takes: Sequence[Signals], effect: Effect) -> Undecidable | None:
@@ -42,7 +105,7 @@ def undecidable(takes: Sequence[Signals], effect: Effect) -> Undecidable | None:
 
 def _few_wearings(takes: Sequence[Signals], effect: Effect) -> Undecidable | None:
     ways = 1 + len(wearing_deals(takes, np.random.default_rng(0)))
-    needed = ceil(1 / WEARING_PROBABILITY)
+    needed = ceil(1 / effect.certainty.clear)
     if ways >= needed:
         return None
     names = [take.wearing for take in takes]
@@ -51,7 +114,7 @@ def _few_wearings(takes: Sequence[Signals], effect: Effect) -> Undecidable | Non
     following = ORDINALS[len(wearings)] if len(wearings) < len(ORDINALS) else f"{len(wearings) + 1}th"
     many = NUMBERS[len(wearings)] if len(wearings) < len(NUMBERS) else str(len(wearings))
     why = (
-        f"{many} wearings cannot tell a {effect.name.replace('_', ' ')} from chance"
+        f"{many} wearings cannot tell a {effect.spoken} from chance"
         f" ({_ways(ways)} to deal the takes, {needed} are needed):"
         f" record a {following} wearing, {each} takes each"
     )
@@ -65,7 +128,7 @@ def _few_wearings(takes: Sequence[Signals], effect: Effect) -> Undecidable | Non
 def _few_takes(takes: Sequence[Signals], effect: Effect) -> Undecidable | None:
     column = max(effect.context, key=lambda name: _arrangements(_levels(takes, name)))
     levels = _levels(takes, column)
-    ways, needed = _arrangements(levels), ceil(1 / SESSION_PROBABILITY)
+    ways, needed = _arrangements(levels), ceil(1 / effect.certainty.clear)
     if ways >= needed:
         return None
     more = 1

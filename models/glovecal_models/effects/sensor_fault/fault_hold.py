@@ -3,31 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Settings
+from glovecal_models.effects.base.facts import Settings
+from glovecal_models.effects.base.signature_effect import Held, Hold
 from glovecal_models.effects.sensor_fault.fault_watch import FaultLimits, FaultWatch
 
 
-class Held(NamedTuple):
-    """One frame with what a failing sensor says left out."""
-
-    base: np.ndarray
-    """(R,) degrees."""
-    readings: np.ndarray
-    """(S,) raw counts."""
-    variance: np.ndarray
-    """(R,) degrees squared, by which the joint may have moved since."""
-    is_faulty: np.ndarray
-    """(R,)."""
-    sensors: tuple[str, ...]
-    """Those that fail."""
-
-
-class FaultHold:
-    """The state of one glove, strictly causal."""
+class FaultHold(Hold):
+    """By a ``FaultWatch`` of the readings."""
 
     def __init__(self, live: Settings, rotations: Sequence[str], sensors: Sequence[str]) -> None:
         """``live``: settings of ``FaultLimits``."""
@@ -45,12 +30,10 @@ class FaultHold:
         self._last: np.ndarray | None = None
 
     def reset(self) -> None:
-        """A new run or wearing."""
         self._watch.reset()
         self._last = None
 
     def frame(self, time_s: float, base: np.ndarray, readings: np.ndarray) -> Held:
-        """For the next frame: its prediction ``base`` (R,), degrees, and readings (S,)."""
         good, age_s = self._watch.frame(time_s, readings)
         fails = age_s > 0.0
         if self._last is None or not fails.any():

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from glovecal_models.diagnosis.diagnose import diagnose
-from glovecal_models.diagnosis.undecidable import Undecidable, undecidable
-from glovecal_models.effects.base.effect import Signals
+from glovecal_models.diagnosis.not_identifiable import Undecidable, undecidable
+from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.cause import Cause

@@ -16,6 +16,8 @@ from glovecal_models.takes.take import Take
 
 RATE_HZ = 50.0
 WINDOW_S = 0.05
+SMOOTHING = 13
+"""Even times, of the signals that effects are judged on."""
 FEWEST_STEPS = 8
 """Between frames of all takes; fewer do not tell a movement from single poses."""
 SHORTEST_BRIDGE_S = 0.1
@@ -30,7 +32,7 @@ unlike as poses. A robot hand set to one pose after another has 0.42, in a rando
 
 
 @dataclass(frozen=True)
-class EvenTake:
+class ResampledTake:
     """N even times of one take."""
 
     name: str
@@ -75,9 +77,9 @@ def _go_on(takes: Sequence[Take]) -> bool:
     return float(np.median(share)) <= ALIKE_NEIGHBOURS
 
 
-def evened(
+def resampled(
     take: Take, sensors: Sequence[str], rotations: Sequence[str], bridge_s: float = SHORTEST_BRIDGE_S
-) -> EvenTake:
+) -> ResampledTake:
     """``bridge_s``: the longest time between two frames across which a straight line is drawn."""
     if len(take.time_s) < 2 or float(np.median(np.diff(take.time_s))) > bridge_s:
         return _sparse(take, sensors, rotations)
@@ -97,28 +99,28 @@ def evened(
         reference[time < take.begins_s] = np.nan
     context = {name: _carried(time, take.time_s, values) for name, values in take.context.items()}
     read = np.isfinite(readings).all(axis=1)
-    return EvenTake(
+    return ResampledTake(
         take.name, take.wearing, time[read], readings[read], reference[read],
         {name: values[read] for name, values in context.items()},
     )  # fmt: skip
 
 
-def _sparse(take: Take, sensors: Sequence[str], rotations: Sequence[str]) -> EvenTake:
+def _sparse(take: Take, sensors: Sequence[str], rotations: Sequence[str]) -> ResampledTake:
     readings = take.readings[:, [take.sensors.index(name) for name in sensors]]
     reference = take.reference_at_frames(rotations)
-    return EvenTake(
+    return ResampledTake(
         take.name, take.wearing, take.time_s, readings, reference, dict(take.context), is_sparse=True
     )
 
 
-def shifted(take: EvenTake, delay_s: float) -> EvenTake:
+def shifted(take: ResampledTake, delay_s: float) -> ResampledTake:
     """The take with its reference ``delay_s`` later, as readings that come so late ask for."""
     at = take.time_s - delay_s
     moved = [np.interp(at, take.time_s, column, np.nan, np.nan) for column in take.reference.T]
     return replace(take, reference=np.column_stack(moved))
 
 
-def smoothed(take: EvenTake, width: int) -> EvenTake:
+def smoothed(take: ResampledTake, width: int) -> ResampledTake:
     """Readings and reference both through a Hann window of ``width`` (odd) even times."""
     if take.is_sparse or len(take.time_s) <= width:
         return take

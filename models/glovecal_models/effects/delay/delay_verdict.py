@@ -7,17 +7,18 @@ That is judged on strongly smoothed signals, on which a low pass gains nothing b
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from glovecal_models.diagnosis.assessment import over_joints
-from glovecal_models.diagnosis.delays import DelayErrors
+from glovecal_models.effects.base.assessment import over_joints
+from glovecal_models.effects.base.problem import Problem
+from glovecal_models.effects.delay.delay_grid import DelayErrors, delay_errors
 
-SHAPE_SMOOTHING = 25
-"""Even times. With 13 a low pass still gained by the noise of the reference: 4 standard errors."""
+SMOOTHING, SHAPE_SMOOTHING = 13, 25
+"""Even times. With 13 a low pass still gains by taking noise from the reference: 4 standard errors."""
 CLEAR = 3.0
 """Standard errors of a decision."""
 MIDDLE = 1.5
@@ -25,6 +26,7 @@ MIDDLE = 1.5
 PER_TAKE_GAIN = 0.02
 """Share of the error without any offset that offsets of each take must save beyond a common one."""
 
+LAG, CLOCK = "lag", "clock_offset"
 DelayKind = Literal["lag", "clock_offset", "either"]
 
 
@@ -85,6 +87,14 @@ def _judged_on_other_blocks(
         for chosen, judged in (halves, halves[::-1]):
             total += judged[int(np.argmin(chosen)) if chosen.any() else common]
     return float(total)
+
+
+def first_delay(problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]]:
+    """The delay to be named first, and all that remain possible; ``problem`` by the rows smoothed over."""
+    kind, score = delay_kind(delay_errors(problem(SMOOTHING)), delay_errors(problem(SHAPE_SMOOTHING)))
+    if kind != "either":
+        return kind, (kind,)
+    return (LAG, (LAG, CLOCK)) if score > MIDDLE else (CLOCK, (CLOCK, LAG))
 
 
 def delay_kind(

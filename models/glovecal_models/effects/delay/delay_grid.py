@@ -14,16 +14,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from glovecal_models.diagnosis.directions import Direction
-from glovecal_models.diagnosis.evened import RATE_HZ
+from glovecal_models.effects.base.assessment import JointErrors, block_starts, squared_in_blocks
+from glovecal_models.effects.base.problem import Problem
+from glovecal_models.effects.base.signals import Signals
 
 STEP_S = 0.005
 LARGEST_DELAY_S = 0.2
 TAU_S = (0.005, 0.01, 0.015, 0.02, 0.025, 0.03, 0.035, 0.04, 0.05, 0.06, 0.07, 0.08, 0.1, 0.12, 0.15, 0.2)
 BOTH_TAU_S = (0.02, 0.04, 0.07, 0.12)
 BOTH_STEP_S = 0.02
-SMOOTHING = 13
-"""Even times: without it a low pass gains by taking noise from the reference."""
+FAST_SHARE = 1.0
+"""Per second: a joint is moved fast when its speed reaches so many of its own standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -58,10 +59,45 @@ class DelayErrors:
         return np.flatnonzero((self.cells[:, 0] == 0) & (self.cells[:, 1] <= 0))
 
 
-def delay_errors(direction: Direction, block_rows: int) -> tuple[DelayErrors, ...]:
-    """One for each joint of a forward direction made of smoothed takes."""
+def why_no_delay_shows(takes: Sequence[Signals]) -> str | None:
+    """None where some joint moved fast enough."""
+    fastest = max((_speed(take) for take in takes), default=0.0)
+    return None if fastest >= FAST_SHARE else "no fast motion was recorded"
+
+
+def _speed(take: Signals) -> float:
+    """95th percentile of the speed of the liveliest joint, in its standard deviations per second."""
+    if len(take) < 10:
+        return 0.0
+    speed = np.abs(np.diff(take.own, axis=0)) / np.diff(take.time_s)[:, None]
+    return float(np.max(np.percentile(speed, 95, axis=0) / np.maximum(take.own.std(axis=0), 1e-9)))
+
+
+def delay_errors(problem: Problem) -> tuple[DelayErrors, ...]:
+    """One for each joint; worked out once for all delays that are judged."""
+    return problem.once("delays", lambda: _delay_errors(problem))
+
+
+def _delay_errors(problem: Problem) -> tuple[DelayErrors, ...]:
     cells = _cells()
-    return tuple(_joint(direction, joint, cells, block_rows) for joint in range(len(direction.rotations)))
+    return tuple(_joint(problem, joint, cells) for joint in range(len(problem.rotations)))
+
+
+def held_out_beside(
+    problem: Problem, true: Sequence[np.ndarray], control: Sequence[np.ndarray]
+) -> tuple[JointErrors, ...]:
+    """What cells of the grid save: for each joint (B,) errors of the right cells and of the control's.
+
+    The grid is fitted to all units; what it saves is taken from the error on units left out.
+    """
+    found = []
+    for joint, grid in enumerate(delay_errors(problem)):
+        products = problem.products[joint]
+        starts = block_starts([len(part) for part in products.residual])
+        base = squared_in_blocks(products.residual, starts)
+        added, mirrored = (base - grid.unmoved + part[joint] for part in (true, control))
+        found.append(JointErrors(base, added, mirrored, int(products.count.sum()), grid.take))
+    return tuple(found)
 
 
 def _cells() -> np.ndarray:
@@ -73,12 +109,12 @@ def _cells() -> np.ndarray:
     return np.array(cells)
 
 
-def _joint(direction: Direction, joint: int, cells: np.ndarray, block_rows: int) -> DelayErrors:
-    products = direction.products[joint]
+def _joint(problem: Problem, joint: int, cells: np.ndarray) -> DelayErrors:
+    products = problem.products[joint]
     base = np.concatenate([unit.base for unit in products.units])
     orthogonal, _ = np.linalg.qr(base)
     target = np.concatenate([unit.target for unit in products.units])
-    used = [(direction.signals[take], rows) for take, rows in direction.units(joint)]
+    used = [(problem.signals[take], rows) for take, rows in problem.units(joint)]
     moved = np.concatenate([_moved(take.time_s, take.own[:, joint], rows, cells) for take, rows in used])
     own = np.concatenate([take.own[rows, joint] for take, rows in used])
     moved *= _slope(base, products.whole, own)[:, None]
@@ -86,25 +122,14 @@ def _joint(direction: Direction, joint: int, cells: np.ndarray, block_rows: int)
     moved -= orthogonal @ (orthogonal.T @ moved)
     np.subtract(left[:, None], moved, out=moved)
     lengths = [len(rows) for _, rows in used]
-    starts = block_starts(lengths, block_rows)
+    starts = block_starts(lengths)
     ends = np.cumsum(lengths)
     return DelayErrors(
         cells,
         np.add.reduceat(moved * moved, starts, axis=0),
         np.add.reduceat(left * left, starts),
-        np.array(direction.unit_take)[np.searchsorted(ends, starts, side="right")],
+        np.array(problem.unit_take)[np.searchsorted(ends, starts, side="right")],
     )
-
-
-def block_starts(lengths: Sequence[int], block_rows: int) -> np.ndarray:
-    """First row of each block when every take is cut into blocks of about ``block_rows``; a take that has no
-    row of this joint has no block."""
-    starts, first = [], 0
-    for length in lengths:
-        parts = max(1, round(length / block_rows)) if length else 0
-        starts.extend(first + np.arange(parts) * length // parts)
-        first += length
-    return np.array(starts, dtype=int)
 
 
 def _slope(base: np.ndarray, coefficients: np.ndarray, own: np.ndarray) -> np.ndarray:
@@ -119,7 +144,7 @@ def _slope(base: np.ndarray, coefficients: np.ndarray, own: np.ndarray) -> np.nd
 def _moved(time: np.ndarray, own: np.ndarray, rows: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """(rows, K): delayed and low-passed angle minus the angle itself."""
     result = np.empty((len(rows), len(cells)))
-    factor = round(1.0 / (RATE_HZ * STEP_S))
+    factor = max(1, round(float(np.median(np.diff(time))) / STEP_S))
     fine_time = time[0] + STEP_S * np.arange((len(time) - 1) * factor + 1)
     fine = np.interp(fine_time, time, own)
     at = np.searchsorted(fine_time, time[rows] - 1e-6)

@@ -1,0 +1,73 @@
+"""What effects look at: the signals of a take, or of the next frame of several gloves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import overload
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Signals:
+    """What effects may look at in one take: N frames of L lanes."""
+
+    time_s: np.ndarray
+    """(N,), seconds, increasing."""
+    own: np.ndarray
+    """(N, L), degrees: each joint's own signal, measured (forward) or predicted without effects (inverse)."""
+    others: Mapping[str, np.ndarray] = field(default_factory=dict)
+    """Other signals (N,) by name: neighbouring sensors or joints, in standard deviations."""
+    context: Mapping[str, np.ndarray] = field(default_factory=dict)
+    """Context columns (N,) by name; NaN where unknown."""
+    wearing: str = ""
+    take: str = ""
+    """Name of the take; it may tell which motion was done."""
+    zero_deg: np.ndarray | None = None
+    """(L,): where on the scale of ``own`` a raw reading of zero lies, by a straight line; None if unknown."""
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+
+class GloveFrames(Sequence[Signals]):
+    """The next frame of each of G gloves that share a model; item i is that of glove i, as signals."""
+
+    def __init__(
+        self,
+        time_s: np.ndarray,
+        own: np.ndarray,
+        others: Callable[[], Mapping[str, np.ndarray]],
+        context: Sequence[Mapping[str, float]],
+        wearing: Sequence[str],
+        zero_deg: np.ndarray | None,
+    ) -> None:
+        """``time_s`` (G,) on each glove's own clock, ``own`` (G, L); ``others`` gives signals (G,) by name
+        and is asked when they are needed; what follows is as in ``Signals``, glove by glove."""
+        self.time_s, self.own, self._others = time_s, own, others
+        self._context, self._wearing, self._zero_deg = context, wearing, zero_deg
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @overload
+    def __getitem__(self, at: int) -> Signals: ...
+    @overload
+    def __getitem__(self, at: slice) -> list[Signals]: ...
+    def __getitem__(self, at: int | slice) -> Signals | list[Signals]:
+        if isinstance(at, slice):
+            return [self[index] for index in range(len(self))[at]]
+        others = {name: values[at : at + 1] for name, values in self._others().items()}
+        context = {name: np.array([value]) for name, value in self._context[at].items()}
+        own, time_s = self.own[at : at + 1], self.time_s[at : at + 1]
+        return Signals(time_s, own, others, context, self._wearing[at], zero_deg=self._zero_deg)
+
+    def as_one(self) -> Signals | None:
+        """All gloves as the frames of one take, for what has no memory; None if not in one wearing and with
+        the same context columns."""
+        wearing, names = self._wearing[0], self._context[0].keys()
+        if any(other != wearing for other in self._wearing) or any(c.keys() != names for c in self._context):
+            return None
+        context = {name: np.array([of_glove[name] for of_glove in self._context]) for name in names}
+        return Signals(self.time_s, self.own, self._others(), context, wearing, zero_deg=self._zero_deg)
