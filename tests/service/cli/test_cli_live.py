@@ -20,7 +20,7 @@ from cli_running import glovecal, start
 from realtime_support import eventually, free_endpoint
 
 GLOVE = "right-hand"
-README = Path(__file__).parents[3] / "README.md"
+LIVE_PAGE = Path(__file__).parents[3] / "docs" / "live.md"
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +125,7 @@ def test_a_recorded_take_becomes_a_model_that_predicts_live(live, recorded):
         frames = poses[-1]["frames"]
         assert frames["sent"] == frames["received"] + frames["missing"]
         assert frames["predicted"] > 0
-        _run_the_subscriber_of_the_readme(live)
+        _run_the_documented_subscriber(live)
         _watch_until_interrupted(live)
         _record_with_lead_in(live)
         assert "worn by nobody" in run("glove", "wear", GLOVE, "--nobody").out
@@ -136,9 +136,9 @@ def test_a_recorded_take_becomes_a_model_that_predicts_live(live, recorded):
     assert "no pose of glove left-hand came" in silent.said
 
 
-def _run_the_subscriber_of_the_readme(live: dict[str, str]) -> None:
+def _run_the_documented_subscriber(live: dict[str, str]) -> None:
     """As it stands there, but for the address and the glove's name."""
-    (code,) = re.findall("```python\n(.*?)```", README.read_text(), re.DOTALL)
+    (code,) = re.findall("```python\n(.*?)```", LIVE_PAGE.read_text(), re.DOTALL)
     code = code.replace("tcp/127.0.0.1:7447", live["GLOVECAL_ZENOH"]).replace('"right"', f'"{GLOVE}"')
     process = subprocess.Popen([sys.executable, "-u", "-c", code], stdout=subprocess.PIPE, text=True)
     try:
