@@ -8,6 +8,7 @@
     python3 do.py check     format, lint, types
     python3 do.py bench     speed against other libraries, as ratios, with a picture
     python3 do.py paper     Wang & Neff 2013 reproduced: every table and figure, as one page (5 minutes)
+    python3 do.py docs      the documentation as a site in site/, readable without a network
     python3 do.py study     the blind study of the diagnosis: figures, confusion matrix (hours);
                             study active: active sampling against the fixed protocol (half an hour)
 
@@ -20,6 +21,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent
@@ -101,6 +103,18 @@ def study(arguments: list[str]) -> int:
     return run("python", "tests/study/study.py", *arguments)
 
 
+def docs(arguments: list[str]) -> int:
+    """A warning is an error: a link that leads nowhere must not get into the site."""
+    with tempfile.TemporaryDirectory() as temporary:
+        site = Path(temporary, "site") if SMOKE in arguments else ROOT / "site"
+        strict = ("--fail-on-warning", "--fresh-env", "--quiet", "--doctree-dir", f"{temporary}/doctrees")
+        code = run("sphinx-build", *strict, "--conf-dir", "docs", ".", str(site), groups=("docs",))
+        pages = sum(1 for _ in site.rglob("*.html"))
+    if code == 0:
+        print(f"{pages} pages built." if SMOKE in arguments else f"{pages} pages: {site / 'index.html'}")
+    return code
+
+
 def install_gpytorch() -> None:
     """GPyTorch stays out of the lock file: on Linux its torch brings gigabytes of GPU libraries.
 
@@ -125,6 +139,7 @@ VERBS = {
     "bench": bench,
     "paper": paper,
     "study": study,
+    "docs": docs,
 }
 
 

@@ -29,6 +29,7 @@ VERBS = (
     "paper",
     "study",
     "study active",
+    "docs",
 )
 
 
@@ -133,6 +134,11 @@ def test_study_of_active_sampling_compares_two_ways(smoke) -> None:
     said = smoke["study active"].result()
     errors = [said.number(rf"\| {way} \| \d+ \| \d+ \| ([\d.]+) ") for way in ("any step", "active")]
     assert all(0 < error < 90 for error in errors)
+
+
+def test_docs_builds_every_page_strictly(smoke) -> None:
+    assert smoke["docs"].result().number(r"(\d+) pages built") > 15
+    assert "WARNING" not in smoke["docs"].result().text
 
 
 def test_smoke_refuses_where_nothing_is_installed(tmp_path: Path) -> None:

@@ -1,0 +1,83 @@
+"""README is short, and every command and option that it and the pages name exists."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer.main
+
+from glovecal_service.cli.command import app
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+OF_DO_PY = {"--smoke": "do.py", "--quick": "tests/paper/paper.py", "--part": "tests/paper/paper.py"}
+OF_DO_PY |= {"--set-aside": "tests/study/study.py", "--gloves": "tests/bench/streaming_bench.py"}
+COMMAND = typer.main.get_command(app)
+
+
+def test_the_readme_is_read_in_one_go() -> None:
+    assert len((ROOT / "README.md").read_text().splitlines()) <= 150
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_commands_and_their_options_exist(page: Path) -> None:
+    for line in _commands(page.read_text()):
+        command, words = _found(line)
+        known = _options(command) | {"--help"}
+        for word in words:
+            option = word.partition("=")[0]
+            if re.fullmatch(r"--?[a-z][a-z-]*", option):
+                assert option in known, f"{line!r}: there is no {option}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_options_named_alone_exist(page: Path) -> None:
+    everywhere = _all_options(COMMAND) | {"--help"}
+    for option in re.findall(r"`(--[a-z][a-z-]*)", page.read_text()):
+        if option in OF_DO_PY:
+            assert option in (ROOT / OF_DO_PY[option]).read_text()
+        else:
+            assert option in everywhere, option
+
+
+def test_verbs_of_do_py_exist() -> None:
+    verbs = subprocess.run([sys.executable, "do.py"], cwd=ROOT, capture_output=True, text=True).stdout
+    for page in PAGES:
+        for verb in re.findall(r"python3 do\.py ([a-z]+)", page.read_text()):
+            assert f"python3 do.py {verb} " in verbs, f"{page.name}: {verb}"
+
+
+def _commands(text: str) -> list[str]:
+    """Command lines: in blocks, with or without a prompt, and in running text."""
+    blocks = re.findall(r"^```[^\n]*\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    lines = [line for block in blocks for line in block.splitlines()]
+    typed = [found[1] for line in lines if (found := re.match(r"(?:\$ |Next: )?(glovecal .*)", line))]
+    prose = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
+    return typed + re.findall(r"`(glovecal [^`]+)`", prose)
+
+
+def _found(line: str) -> tuple[Any, list[str]]:
+    """The command of a line, and the words after it; placeholders in capitals end the way down."""
+    command: Any = COMMAND
+    words = shlex.split(line, comments=True)[1:]
+    while words and getattr(command, "commands", None) and not words[0].startswith("-"):
+        if words[0].isupper():
+            break
+        assert words[0] in command.commands, f"{line!r}: there is no {words[0]}"
+        command = command.commands[words.pop(0)]
+    return command, words
+
+
+def _options(command: Any) -> set[str]:
+    return {name for each in command.params for name in (*each.opts, *each.secondary_opts)}
+
+
+def _all_options(command: Any) -> set[str]:
+    inner = [_all_options(child) for child in getattr(command, "commands", {}).values()]
+    return _options(command).union(*inner)
