@@ -6,14 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from glovecal_models.calibration.declared_effects import declared_in
 from glovecal_models.calibration.had_already import repaired_takes, wanted_of
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.comparison.rotation_noise import rotation_noise
 from glovecal_models.diagnosis.known_effect import known_effects
 from glovecal_models.effects.catalogue import effect_of_declaration
+from glovecal_models.effects.declared.known_by_name import known_by_name
 from glovecal_models.takes.take import Take
-from glovecal_service.jobs.declared_effects import declared_in, known_by_name
 from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult
 from glovecal_service.jobs.model_work import ModelWork, takes_of, text_in
 from glovecal_service.jobs.task_key import task_key

@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from glovecal_models.calibration.declared_effects import declared_in
+from glovecal_models.effects.declared.known_by_name import known_by_name
 from glovecal_models.improvement.remove_effect import remove_effect
 from glovecal_service.jobs.child_record import artifact_array, keep_child
-from glovecal_service.jobs.declared_effects import declared_in, known_by_name
 from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult
 from glovecal_service.jobs.model_work import ModelWork, takes_of, text_in
 from glovecal_service.jobs.task_key import task_key

@@ -8,11 +8,11 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Response
 from pydantic import Field, StringConstraints
 
+from glovecal_models.calibration.declared_effects import declaration_of
 from glovecal_models.calibration.had_already import trained_rotations
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.effects.catalogue import effect as known_effect
 from glovecal_models.errors import BadInput
-from glovecal_service.jobs.declared_effects import declaration_of
 from glovecal_service.rest.answers import change_problems
 from glovecal_service.rest.declarations import Declared, checked_declaration, declaration_document
 from glovecal_service.rest.dependencies import PartsNeeded

@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.stats import wilcoxon
 
 from glovecal_models.effects.base.facts import BETWEEN_TAKES, Certainty
 
@@ -144,6 +143,8 @@ def signed_rank(values: np.ndarray) -> float:
     """One-sided Wilcoxon: the probability that values symmetric about zero are so positive."""
     if len(values) < FEWEST_BLOCKS or not np.any(values):
         return 1.0
+    from scipy.stats import wilcoxon  # takes a second to load, and every effect imports this file
+
     found: Any = wilcoxon(values, alternative="greater", method="exact" if len(values) <= 25 else "approx")
     return float(found.pvalue)
 
