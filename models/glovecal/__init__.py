@@ -1,0 +1,92 @@
+"""Glovecal as a library: calibrate a data glove, find which physical effect is missing, add it.
+
+    import glovecal
+
+    takes = glovecal.read_takes("monday.csv")
+    result = glovecal.improve(takes, progress=True)
+    result.plot()
+
+Every result prints itself as a table, shows itself in a notebook, and has ``to_frame()`` (needs pandas),
+``plot()`` (needs matplotlib) and ``inner``, the result of ``glovecal_models`` behind it. Angles and errors
+are in degrees. Long calls take ``progress`` (True, or a callable of a sentence and the fraction done) and
+``cancelled`` (a callable that says True to stop). Ctrl-C ends them, and
+workers where there are any.
+"""
+
+from __future__ import annotations
+
+from glovecal._additions import Addition, add_effect, remove_effect
+from glovecal._comparison import Comparison, compare
+from glovecal._diagnosis import Diagnosis, diagnose
+from glovecal._effects import Catalogue, effects, register_effect
+from glovecal._failures import WhereItFails, where
+from glovecal._improvement import Improvement, improve
+from glovecal._layouts import read_layout
+from glovecal._model import CalibrationModel, load_model, save_model
+from glovecal._prediction import Angles, predict
+from glovecal._simulation import Session, simulate
+from glovecal._takes import Takes, read_takes, write_takes
+from glovecal._training import train
+from glovecal_models.effects.base.context_effect import ContextEffect
+from glovecal_models.effects.base.effect import Effect, InstantEffect, Stream
+from glovecal_models.effects.base.facts import Parameter, Settings
+from glovecal_models.effects.base.history_effect import ArrayStateEffect, HistoryEffect
+from glovecal_models.effects.base.joint_units import in_joint_units, settle_joint_units
+from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.signature_effect import SignatureEffect
+from glovecal_models.errors import BadInput, Cancelled, GlovecalError, NotTrainable
+from glovecal_models.layout import Layout
+from glovecal_models.takes.take import Take
+
+__all__ = [
+    "Addition",
+    "Angles",
+    "ArrayStateEffect",
+    "BadInput",
+    "CalibrationModel",
+    "Cancelled",
+    "Catalogue",
+    "Comparison",
+    "ContextEffect",
+    "Diagnosis",
+    "Effect",
+    "GlovecalError",
+    "HistoryEffect",
+    "Improvement",
+    "InstantEffect",
+    "Layout",
+    "NotTrainable",
+    "Parameter",
+    "Session",
+    "Settings",
+    "Signals",
+    "SignatureEffect",
+    "Stream",
+    "Take",
+    "Takes",
+    "WhereItFails",
+    "add_effect",
+    "compare",
+    "diagnose",
+    "effects",
+    "improve",
+    "in_joint_units",
+    "load_model",
+    "predict",
+    "read_layout",
+    "read_takes",
+    "register_effect",
+    "remove_effect",
+    "save_model",
+    "settle_joint_units",
+    "simulate",
+    "train",
+    "where",
+    "write_takes",
+]
+
+# Shown as glovecal.train, not by the file it lies in. What comes from glovecal_models keeps its home: other
+# processes unpickle it from there.
+for _name in __all__:
+    if getattr(globals()[_name], "__module__", "").startswith("glovecal._"):
+        globals()[_name].__module__ = "glovecal"

@@ -1,0 +1,168 @@
+"""Effects into a model, and out of it again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, cast
+
+from glovecal._calls import Progress, library_call
+from glovecal._effects import declared, is_declaration
+from glovecal._model import CalibrationModel, inner_model
+from glovecal._plotting import MODEL, SCALE, axes_for, finished, named_rows
+from glovecal._shown import Shown
+from glovecal._table import Column, Table
+from glovecal._takes import takes_in
+from glovecal_models.takes.take import Take
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from glovecal_models.calibration.model import CalibrationModel as InnerModel
+    from glovecal_models.calibration.training_settings import Method, TrainingSettings
+    from glovecal_models.improvement.addition import Addition as InnerAddition
+
+COLUMNS = (Column("rotation"), Column("before_rmse_deg"), Column("after_rmse_deg"), Column("learned"))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Addition(Shown):
+    """What became of an effect that was added: a model that has it, or why it was undone."""
+
+    inner: InnerAddition
+    """``glovecal_models.improvement.addition.Addition``: squared errors and frames of each rotation."""
+
+    @property
+    def effect(self) -> str:
+        """Its name."""
+        return self.inner.effect
+
+    @property
+    def rotations(self) -> tuple[str, ...]:
+        """Where it was put."""
+        return self.inner.rotations
+
+    @property
+    def added(self) -> bool:
+        """Whether the held-out error fell enough for it to stay."""
+        return self.inner.added
+
+    @property
+    def model(self) -> CalibrationModel:
+        """The model with the effect; the one it started from when the effect was undone."""
+        return CalibrationModel(self.inner.model)
+
+    @property
+    def sentence(self) -> str:
+        """The held-out errors before and after, and why it stays or not."""
+        return self.inner.sentence
+
+    @property
+    def parameters(self) -> dict[str, dict[str, float]]:
+        """What was learned, for each rotation; units in the names."""
+        return self.inner.parameters
+
+    def table(self) -> Table:
+        """One row for each rotation."""
+        document = self.inner.to_document()
+        rows = [
+            (name, document["before"][name], document["after"][name], self._learned(name))
+            for name in self.rotations
+        ]
+        return Table.of(COLUMNS, rows, after=[self.sentence])
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Held-out error of each rotation before and after; gives the axes back."""
+        axes = axes_for(ax, len(self.rotations))
+        document = self.inner.to_document()
+        for shift, key, color in ((-0.18, "before", SCALE), (0.18, "after", MODEL)):
+            rows = [row + shift for row in range(len(self.rotations))]
+            errors = [document[key][name] for name in self.rotations]
+            axes.barh(rows, errors, height=0.34, color=color, label=f"{key} {self.effect}")
+        named_rows(axes, self.rotations)
+        axes.set_xlabel("held-out error (degrees)")
+        return finished(axes)
+
+    def _learned(self, rotation: str) -> str:
+        return ", ".join(f"{name} {value:.3g}" for name, value in self.parameters.get(rotation, {}).items())
+
+
+def add_effect(
+    model: CalibrationModel,
+    takes: Take | Iterable[Take],
+    effect: str,
+    *,
+    rotations: Sequence[str] | None = None,
+    samples: int = 2000,
+    seed: int = 0,
+    cancelled: Callable[[], bool] | None = None,
+    progress: Progress = None,
+) -> Addition:
+    """Learn a model anew with one effect, and keep it only if the held-out error falls by 5 % or more.
+
+    ``takes`` are the training takes. ``effect``: a name (``effects()`` lists them), or an effect of your own
+    as text, such as ``"name = strap; columns = c.strap_n * own"``. ``rotations``: None for all. ``samples``
+    and ``seed`` as for ``train``. The model given stays as it is. Raises BadInput when the effect or a
+    rotation is unknown, or when the takes cannot carry it; Cancelled.
+    """
+    from glovecal_models.calibration.declared_effects import declared_in
+    from glovecal_models.effects.declared.known_by_name import known_by_name
+    from glovecal_models.improvement.add_effect import add_effect as add_inner
+
+    inner, takes = inner_model(model), takes_in(takes)
+    own = declared([effect]) if is_declaration(effect) else []
+    name = own[0].name if own else effect
+    asked = None if rotations is None else tuple(rotations)
+    with library_call(progress) as report, known_by_name([*declared_in(inner), *own]):
+        report(f"looking at the takes for {name}", 0.0)
+        found = add_inner(
+            inner,
+            takes,
+            name,
+            rotations=asked,
+            settings=_settings(inner, samples, seed),
+            parent_id=CalibrationModel(inner).id,
+            cancelled=cancelled,
+            report=report,
+        )
+        report("done", 1.0)
+    return Addition(found)
+
+
+def remove_effect(
+    model: CalibrationModel,
+    takes: Take | Iterable[Take],
+    effect: str,
+    *,
+    samples: int = 2000,
+    seed: int = 0,
+    cancelled: Callable[[], bool] | None = None,
+    progress: Progress = None,
+) -> CalibrationModel:
+    """The model learned anew from its training takes without one of its effects; the one given stays.
+
+    ``samples`` and ``seed`` as for ``train``. Raises BadInput when it has no such effect; Cancelled.
+    """
+    from glovecal_models.calibration.declared_effects import declared_in
+    from glovecal_models.effects.declared.known_by_name import known_by_name
+    from glovecal_models.improvement.remove_effect import remove_effect as remove_inner
+
+    inner = inner_model(model)
+    with library_call(progress) as report, known_by_name(declared_in(inner)):
+        report(f"learning without {effect}", 0.0)
+        child = remove_inner(
+            inner,
+            takes_in(takes),
+            effect,
+            settings=_settings(inner, samples, seed),
+            parent_id=CalibrationModel(inner).id,
+            cancelled=cancelled,
+        )
+        report("done", 1.0)
+    return CalibrationModel(child)
+
+
+def _settings(model: InnerModel, samples: int, seed: int) -> TrainingSettings:
+    from glovecal_models.calibration.training_settings import TrainingSettings
+
+    return TrainingSettings(cast("Method", model.method), samples=samples, seed=seed)

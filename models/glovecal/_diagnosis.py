@@ -1,0 +1,140 @@
+"""Which physical effect is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from glovecal._calls import Progress, library_call
+from glovecal._effects import declared
+from glovecal._model import CalibrationModel, inner_model
+from glovecal._plotting import CONTROL, MODEL, axes_for, finished, named_rows
+from glovecal._shown import Shown
+from glovecal._table import Column, Table
+from glovecal._takes import takes_in
+from glovecal_models.takes.take import Take
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from glovecal_models.diagnosis.diagnosis import Diagnosis as InnerDiagnosis
+
+COLUMNS = (
+    Column("effect"), Column("rotations"), Column("rmse_deg"), Column("with_effect_rmse_deg"),
+    Column("with_control_rmse_deg"), Column("p_value", 3), Column("significant"),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis(Shown):
+    """Evidence for physical effects that a model does not have, each beside its control."""
+
+    inner: InnerDiagnosis
+    """``glovecal_models.diagnosis.diagnosis.Diagnosis``: evidence for each rotation and block of time."""
+
+    @cached_property
+    def _document(self) -> dict[str, Any]:
+        return self.inner.to_document()
+
+    @property
+    def effect(self) -> str | None:
+        """The effect that is named; None when none is."""
+        named = self._document["named"]
+        return None if named is None else named["effect"]
+
+    @property
+    def rotations(self) -> tuple[str, ...]:
+        """Where the named effect acts; sensors or takes where it is a fault of those."""
+        named = self._document["named"]
+        return () if named is None else tuple(named["where"])
+
+    @property
+    def confidence_set(self) -> tuple[str, ...]:
+        """The named effect, and all that these takes cannot tell from it."""
+        named = self._document["named"]
+        return () if named is None else tuple(named["confidence_set"])
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What to know, the most important first."""
+        return tuple(self._document["sentences"])
+
+    @property
+    def not_identifiable(self) -> dict[str, str]:
+        """Effects that these takes cannot show, and why."""
+        return {item["effect"]: item["why"] for item in self._document["not_judgeable"]}
+
+    @property
+    def next_take(self) -> str | None:
+        """What to record to tell the confidence set apart; None when there is nothing to tell apart."""
+        following = self._document["next_take"]
+        return None if following is None else f"{following['seconds']} s: {following['what']}"
+
+    def table(self) -> Table:
+        """One row for each effect that was tried, those that beat their control first."""
+        rows = [
+            (
+                item["effect"], ", ".join(item["where"]), item["rmse_before_deg"], item["rmse_after_deg"],
+                item["rmse_decoy_deg"], item["probability"], item["passes"],
+            )
+            for item in self._document["candidates"]
+        ]  # fmt: skip
+        return Table.of(COLUMNS, rows, after=self.sentences)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """What each effect saves of the held-out error beside what its control saves; gives the axes back."""
+        tried = self._document["candidates"]
+        axes = axes_for(ax, len(tried))
+        for shift, key, color, label in (
+            (-0.18, "rmse_after_deg", MODEL, "effect"),
+            (0.18, "rmse_decoy_deg", CONTROL, "control"),
+        ):
+            rows = [row + shift for row in range(len(tried))]
+            saved = [item["rmse_before_deg"] - item[key] for item in tried]
+            axes.barh(rows, saved, height=0.34, color=color, label=label)
+        named_rows(axes, [item["effect"] + (" *" if item["passes"] else "") for item in tried])
+        axes.axvline(0.0, color="black", linewidth=0.6)
+        axes.set_xlabel("saved held-out error (degrees); *: significant")
+        return finished(axes)
+
+
+def diagnose(
+    model: CalibrationModel,
+    takes: Take | Iterable[Take],
+    *,
+    also: Sequence[str] = (),
+    seed: int = 0,
+    cancelled: Callable[[], bool] | None = None,
+    progress: Progress = None,
+) -> Diagnosis:
+    """Try every known effect on held-out takes, beside a control with the same freedom that cannot be right.
+
+    ``also``: effects of your own as text, such as ``"name = strap; columns = c.strap_n * own"``. ``seed`` is
+    of the controls. Raises BadInput, Cancelled.
+    """
+    from glovecal_models.calibration.declared_effects import declared_in
+    from glovecal_models.calibration.had_already import repaired_takes, wanted_of
+    from glovecal_models.comparison.residuals import residuals
+    from glovecal_models.comparison.rotation_noise import rotation_noise
+    from glovecal_models.diagnosis.diagnose import diagnose as diagnose_inner
+    from glovecal_models.diagnosis.known_effect import known_effects
+    from glovecal_models.effects.declared.known_by_name import known_by_name
+
+    inner, takes = inner_model(model), takes_in(takes)
+    own = declared(also)
+    with library_call(progress) as report, known_by_name([*declared_in(inner), *own]):
+        report("measuring the noise floors", 0.0)
+        noise = rotation_noise(residuals(inner, takes), seed=seed)
+        found = diagnose_inner(
+            repaired_takes(takes, wanted_of(inner)),
+            inner.layout,
+            linear=inner.method in ("raw", "linear"),
+            known=known_effects(inner),
+            noise_floor_deg={n: item.floor.floor_deg for n, item in noise.items() if item.floor is not None},
+            seed=seed,
+            cancelled=cancelled,
+            report=report,
+        )
+    return Diagnosis(found)

@@ -1,0 +1,96 @@
+"""Takes from and to tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Literal
+
+from glovecal._layouts import LayoutLike, layout_for
+from glovecal._shown import Shown
+from glovecal._table import Column, Table
+from glovecal_models.errors import BadInput
+from glovecal_models.takes.take import Take
+
+COLUMNS = (
+    Column("take"), Column("wearing"), Column("frames"), Column("duration_s", 1), Column("sensors"),
+    Column("rotations"), Column("context"), Column("simulated"),
+)  # fmt: skip
+
+
+class Takes(Shown, list[Take]):
+    """A list of takes that shows what they hold."""
+
+    def table(self) -> Table:
+        """One row for each take."""
+        rows = [
+            (
+                item.name, item.wearing, len(item.time_s), item.duration_s, len(item.sensors),
+                len(item.rotations), ", ".join(item.context), item.simulated,
+            )
+            for item in self
+        ]  # fmt: skip
+        return Table.of(COLUMNS, rows, before=[f"{len(self)} {'take' if len(self) == 1 else 'takes'}"])
+
+    def worn(self, *wearings: str) -> Takes:
+        """Those of the wearings of these names."""
+        return Takes(item for item in self if item.wearing in wearings)
+
+
+def read_takes(
+    *paths: str | PathLike[str],
+    layout: LayoutLike = None,
+    reference: str | PathLike[str] | None = None,
+    name: str | None = None,
+    wearing: str | None = None,
+    equal_times: Literal["refuse", "spread"] = "refuse",
+) -> Takes:
+    """All takes of CSV or Parquet files, in the order of their first rows.
+
+    Columns are ``time_s``, ``take``, ``wearing``, ``pose``, ``s.<SENSOR>`` (raw readings), ``r.<ROTATION>``
+    (degrees) and ``c.<CONTEXT>``. ``reference``: a table of reference angles with a clock of its own; beside
+    ``X.frames.csv`` it is found by itself as ``X.reference.csv``. ``layout`` refuses takes that lack a sensor
+    of it. ``name`` and ``wearing`` say what the file does not; ``equal_times="spread"`` spreads frames that
+    were stamped in batches. Raises BadInput with file, line, column and value; nothing is half read.
+    """
+    from glovecal_models.calibration.samples import require_layout
+    from glovecal_models.takes.table import read_takes as read
+
+    if reference is not None and len(paths) != 1:
+        raise BadInput(f"one reference table belongs to one file of frames, not to {len(paths)}")
+    beside = None if reference is None else Path(reference)
+    found = Takes()
+    for path in paths:
+        found += read(Path(path), beside, name=name, wearing=wearing, equal_times=equal_times)
+    if layout is not None:
+        wanted = layout_for(layout, found)
+        for take in found:
+            require_layout(take, wanted)
+    return found
+
+
+def write_takes(takes: Take | Iterable[Take], path: str | PathLike[str]) -> list[Path]:
+    """Write takes to a .csv or .parquet file; gives the files written.
+
+    There are two where the reference has a clock of its own. Reading them gives back exactly what was
+    written. Raises BadInput for takes that cannot share a file.
+    """
+    from glovecal_models.takes.table import write_takes as write
+
+    return write(takes_in(takes), Path(path))
+
+
+def takes_in(takes: Take | Iterable[Take]) -> Sequence[Take]:
+    """One take or several as a list. Raises BadInput for anything else, and for none."""
+    if isinstance(takes, Take):
+        return [takes]
+    if isinstance(takes, str | PathLike):
+        raise BadInput(f"{str(takes)!r} is a path, where takes are wanted: give read_takes({str(takes)!r})")
+    found = list(takes)
+    if not found:
+        raise BadInput("no takes were given")
+    wrong = next((item for item in found if not isinstance(item, Take)), None)
+    if wrong is not None:
+        raise BadInput(f"takes hold a {type(wrong).__name__}, which is no Take")
+    return found
