@@ -29,7 +29,7 @@ from glovecal._takes import Takes, read_takes, write_takes
 from glovecal._training import train
 from glovecal_models.effects.base.context_effect import ContextEffect
 from glovecal_models.effects.base.effect import Effect, InstantEffect, Stream
-from glovecal_models.effects.base.facts import Parameter, Settings
+from glovecal_models.effects.base.facts import Motion, Parameter, Rival, Settings
 from glovecal_models.effects.base.history_effect import ArrayStateEffect, HistoryEffect
 from glovecal_models.effects.base.joint_units import in_joint_units, settle_joint_units
 from glovecal_models.effects.base.signals import Signals
@@ -55,8 +55,10 @@ __all__ = [
     "Improvement",
     "InstantEffect",
     "Layout",
+    "Motion",
     "NotTrainable",
     "Parameter",
+    "Rival",
     "Session",
     "Settings",
     "Signals",
