@@ -262,7 +262,7 @@ def web(settings: Settings, stopped: Event, started: Callable[[], None]) -> None
     import uvicorn
 
     from glovecal_service.rest.app import create_app
-    from glovecal_service.rest.server import server_config
+    from glovecal_service.rest.http.server import server_config
 
     server = uvicorn.Server(server_config(create_app(settings), settings.host, settings.port))
     setattr(server, "capture_signals", nullcontext)  # noqa: B010  signals are ours, uvicorn takes them over

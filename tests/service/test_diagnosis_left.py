@@ -12,7 +12,7 @@ from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
-from glovecal_service.cli.diagnose import print_diagnosis
+from glovecal_service.cli.effect.diagnosis import print_diagnosis
 from glovecal_service.report.diagnosis_page import diagnosis_page
 
 SENSORS = ("I_MCP", "I_PIP")

@@ -12,7 +12,7 @@ from jobs_waiting import result_of, wait_for
 from port_attack import NOBODY, attack
 
 from glovecal_models.errors import BadInput
-from glovecal_service.cli.connection import settings_of_environment
+from glovecal_service.cli.terminal.connection import settings_of_environment
 from glovecal_service.jobs.dispatcher import Dispatcher
 from glovecal_service.settings import Settings
 

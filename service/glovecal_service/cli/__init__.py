@@ -1,1 +1,1 @@
-"""The ``glovecal`` command: one file per verb or noun, all speaking REST."""
+"""The ``glovecal`` command, all of it speaking REST: a folder per noun, a file per verb."""

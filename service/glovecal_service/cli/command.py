@@ -15,30 +15,16 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from glovecal_service.cli import (
-    capture,
-    compare,
-    demo,
-    diagnose,
-    effect_changes,
-    effects,
-    find_port,
-    glove,
-    improve,
-    job,
-    model,
-    quick_check,
-    record,
-    sample,
-    serve,
-    subject,
-    take,
-    train,
-    watch,
-    where,
-)
-from glovecal_service.cli.printing import err, out
-from glovecal_service.cli.refusal import EXPECTED, INTERRUPTED, exit_code_of, sentence_of
+from glovecal_service.cli import demo, serve
+from glovecal_service.cli.effect import catalogue, changes, diagnosis, improvement
+from glovecal_service.cli.glove import capture, find_port, layouts, recordings, watch
+from glovecal_service.cli.job import jobs
+from glovecal_service.cli.model import comparison, models, quick_check, training, where
+from glovecal_service.cli.sampling import samplings
+from glovecal_service.cli.subject import subjects
+from glovecal_service.cli.take import takes
+from glovecal_service.cli.terminal.printing import err, out
+from glovecal_service.cli.terminal.refusal import EXPECTED, INTERRUPTED, exit_code_of, sentence_of
 
 app = typer.Typer(
     name="glovecal",
@@ -54,22 +40,22 @@ app.command("serve")(serve.serve)
 app.command("capture", cls=capture.WithDeviceOptions)(capture.capture)
 app.command("find-port")(find_port.find_port)
 app.command("watch")(watch.watch)
-app.command("record")(record.record)
-app.add_typer(sample.app, name="sample")
-app.add_typer(subject.app, name="subject")
-app.add_typer(glove.app, name="glove")
-app.add_typer(take.app, name="take")
-app.command("train")(train.train)
-app.add_typer(model.app, name="model")
+app.command("record")(recordings.record)
+app.add_typer(samplings.app, name="sample")
+app.add_typer(subjects.app, name="subject")
+app.add_typer(layouts.app, name="glove")
+app.add_typer(takes.app, name="take")
+app.command("train")(training.train)
+app.add_typer(models.app, name="model")
 app.command("quick-check")(quick_check.quick_check)
-app.command("compare")(compare.compare)
+app.command("compare")(comparison.compare)
 app.command("where")(where.where)
-app.command("diagnose")(diagnose.diagnose)
-app.command("add-effect")(effect_changes.add_effect)
-app.command("remove-effect")(effect_changes.remove_effect)
-app.command("improve", cls=improve.SeveralFiles)(improve.improve)
-app.command("effects")(effects.effects)
-app.add_typer(job.app, name="job")
+app.command("diagnose")(diagnosis.diagnose)
+app.command("add-effect")(changes.add_effect)
+app.command("remove-effect")(changes.remove_effect)
+app.command("improve", cls=improvement.SeveralFiles)(improvement.improve)
+app.command("effects")(catalogue.effects)
+app.add_typer(jobs.app, name="job")
 
 
 def _print_version(wanted: bool) -> None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from glovecal_models.errors import BadInput
-from glovecal_service.cli.printing import err, out, show
+from glovecal_service.cli.terminal.printing import err, out, show
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient

@@ -23,7 +23,7 @@ def serve(
     import sys
 
     from glovecal_client.private_files import keep_private
-    from glovecal_service.cli.connection import settings_of_environment
+    from glovecal_service.cli.terminal.connection import settings_of_environment
     from glovecal_service.serve import serve as run
 
     keep_private()
@@ -37,7 +37,7 @@ def _smoke() -> None:
     import tempfile
     from pathlib import Path
 
-    from glovecal_service.cli.printing import out
+    from glovecal_service.cli.terminal.printing import out
     from glovecal_service.demo.processes import demo_place, running_service
 
     with tempfile.TemporaryDirectory(prefix="glovecal-serve-") as folder:

@@ -10,7 +10,7 @@ from typing import Any
 
 from glovecal_client.errors import ServiceError
 from glovecal_client.rest import RestClient
-from glovecal_service.cli.record import finish_recording
+from glovecal_service.cli.glove.recordings import finish_recording
 from glovecal_service.demo.live import PoseMeter, metered_poses
 from glovecal_service.demo.processes import DemoPlace, running_capture
 

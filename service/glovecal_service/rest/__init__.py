@@ -1,1 +1,1 @@
-"""REST under /v1: one router file per noun, every error an RFC 9457 problem document."""
+"""REST under /v1: a folder per noun with its routers, every error an RFC 9457 problem document."""

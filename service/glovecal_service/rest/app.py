@@ -11,42 +11,24 @@ from starlette.concurrency import run_in_threadpool
 
 from glovecal_models.threads import pin_blas_to_one_thread
 from glovecal_service.jobs.dispatcher import Dispatcher
-from glovecal_service.rest import (
-    clocks,
-    comparisons,
-    diagnosis,
-    effects,
-    examinations,
-    front,
-    gloves,
-    health,
-    holds,
-    improvements,
-    job_reports,
-    jobs,
-    metrics_page,
-    model_effects,
-    models,
-    next_steps,
-    predictions,
-    quick_checks,
-    recordings,
-    sampling,
-    subjects,
-    takes,
-    training,
-    uploads,
-)
-from glovecal_service.rest.allowed_methods import AllowedMethods
-from glovecal_service.rest.answers import install_openapi
-from glovecal_service.rest.body_guard import BodyGuard
-from glovecal_service.rest.dependencies import Parts
-from glovecal_service.rest.error_handlers import install_error_handlers
-from glovecal_service.rest.metrics import Metrics
-from glovecal_service.rest.observation import PREFIX, Observation
-from glovecal_service.rest.predictors import Predictors
-from glovecal_service.rest.request_guard import RequestGuard, is_loopback
-from glovecal_service.rest.upload_folder import UploadFolder
+from glovecal_service.rest.effect import catalogue, changes, diagnosis, improvement
+from glovecal_service.rest.glove import layouts, recordings
+from glovecal_service.rest.http import front, health, metrics_page
+from glovecal_service.rest.http.allowed_methods import AllowedMethods
+from glovecal_service.rest.http.answers import install_openapi
+from glovecal_service.rest.http.body_guard import BodyGuard
+from glovecal_service.rest.http.dependencies import Parts
+from glovecal_service.rest.http.error_handlers import install_error_handlers
+from glovecal_service.rest.http.metrics import Metrics
+from glovecal_service.rest.http.observation import PREFIX, Observation
+from glovecal_service.rest.http.predictors import Predictors
+from glovecal_service.rest.http.request_guard import RequestGuard, is_loopback
+from glovecal_service.rest.http.upload_folder import UploadFolder
+from glovecal_service.rest.job import jobs, reports
+from glovecal_service.rest.model import comparison, models, predictions, quick_check, training
+from glovecal_service.rest.sampling import next_steps, samplings
+from glovecal_service.rest.subject import subjects
+from glovecal_service.rest.take import clocks, examination, holds, takes, uploads
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
 
@@ -54,10 +36,10 @@ JSON_LIMIT_BYTES = 8_000_000
 """Enough for 20,000 frames of 18 sensors to predict."""
 BODY_PATIENCE_S = 30.0
 ROUTERS = (
-    *(subjects, gloves, clocks, holds, examinations, takes, uploads, recordings, sampling),
-    *(training, models, predictions, comparisons, diagnosis, model_effects, effects, improvements),
-    *(quick_checks, next_steps),
-    *(jobs, job_reports, health, metrics_page),
+    *(subjects, layouts, clocks, holds, examination, takes, uploads, recordings, samplings),
+    *(training, models, predictions, comparison, diagnosis, changes, catalogue, improvement),
+    *(quick_check, next_steps),
+    *(jobs, reports, health, metrics_page),
 )
 
 
@@ -102,7 +84,7 @@ def create_app(
         app.include_router(router, prefix=prefix)
     app.state.allowed_methods = AllowedMethods(routers)
     install_error_handlers(app)
-    install_openapi(app, gloves.LayoutBody)
+    install_openapi(app, layouts.LayoutBody)
     _guard(app, settings, metrics, body_patience_s)
     return app
 

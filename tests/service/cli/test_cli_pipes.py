@@ -16,7 +16,7 @@ from cli_running import COMMAND, environment, glovecal
 from small_session import write_sticky
 
 from glovecal_service.cli.command import main
-from glovecal_service.cli.printing import out
+from glovecal_service.cli.terminal.printing import out
 
 Settings = dict[str, str]
 

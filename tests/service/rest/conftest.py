@@ -16,8 +16,8 @@ from anyio.from_thread import start_blocking_portal
 
 from glovecal_client.rest import RestClient
 from glovecal_service.rest.app import create_app
+from glovecal_service.rest.http.server import server_config
 from glovecal_service.rest.in_process import PortalTransport, in_process_client
-from glovecal_service.rest.server import server_config
 from glovecal_service.settings import Settings
 
 

@@ -21,7 +21,7 @@ SERVER = """
 import sys
 import uvicorn
 from glovecal_service.rest.app import create_app
-from glovecal_service.rest.server import server_config
+from glovecal_service.rest.http.server import server_config
 from glovecal_service.settings import Settings
 settings = Settings(data=sys.argv[1], upload_limit_mb=256)
 uvicorn.Server(server_config(create_app(settings), "127.0.0.1", int(sys.argv[2]))).run()
@@ -111,7 +111,7 @@ def test_lying_lengths(serve: Callable[..., str], tmp_path: Path, declared: str)
 def test_slow_bodies_and_headers_are_ended(
     serve: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("glovecal_service.rest.server.PatientH11Protocol.header_deadline_s", 0.6)
+    monkeypatch.setattr("glovecal_service.rest.http.server.PatientH11Protocol.header_deadline_s", 0.6)
     url = serve(Settings(data=tmp_path / "data"), body_patience_s=0.5)
     slow_body = (
         b"POST /v1/takes?subject=anna HTTP/1.1\r\nHost: localhost\r\nContent-Type: text/csv\r\n"

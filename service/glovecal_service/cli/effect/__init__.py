@@ -1,0 +1,1 @@
+"""Physical effects: the catalogue, what a model is missing, adding and removing them."""

@@ -1,0 +1,1 @@
+"""Gloves: layouts, capture, live poses and recordings."""

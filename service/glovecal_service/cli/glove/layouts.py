@@ -1,0 +1,90 @@
+"""``glovecal glove``: layouts, and the gloves that were seen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from glovecal_service.cli.glove.layout_file import add_layout_file
+from glovecal_service.cli.terminal.connection import connect
+from glovecal_service.cli.terminal.options import AsJson, Glove, identifier, subject_named
+from glovecal_service.cli.terminal.printing import moment, out, print_json, print_table
+
+app = typer.Typer(help="Layouts, and the gloves that were seen.", no_args_is_help=True)
+
+Layout = Annotated[str, typer.Argument(help="Layout name.", callback=identifier("layout"))]
+
+
+@app.command("list")
+def list_gloves(as_json: AsJson = False) -> None:
+    """List layouts and the gloves seen on the network."""
+    with connect() as service:
+        document = service.get("/gloves")
+    if as_json:
+        print_json(document)
+        return
+    layouts = [
+        {**item, "sensors": len(item["sensors"]), "rotations": len(item["rotations"])}
+        for item in document["layouts"]
+    ]
+    print_table(
+        layouts,
+        {"name": "layout", "sensors": "sensors", "rotations": "rotations", "title": "what it is"},
+        empty="No layouts.",
+    )
+    out.print()
+    print_table(
+        [{**item, "last_seen_at": moment(item["last_seen_at"])} for item in document["seen"]],
+        {
+            "name": "glove",
+            "layout": "layout",
+            "subject": "worn by",
+            "wearing": "wearing",
+            "simulated": "simulated",
+            "last_seen_at": "last seen",
+        },
+        empty="No glove was seen yet. Start one: glovecal capture --device cyberglove:PORT --glove NAME",
+    )
+
+
+@app.command("show")
+def show(name: Layout, as_json: AsJson = False) -> None:
+    """Print a layout as a layout file (JSON): change its name and go on from there.
+
+    With --json everything the service knows of it.
+    """
+    with connect() as service:
+        document = service.get(f"/gloves/{name}")
+    print_json(document if as_json else document["document"])
+
+
+@app.command("add")
+def add(
+    file: Annotated[Path, typer.Argument(exists=True, dir_okay=False, help="A layout file, TOML or JSON.")],
+) -> None:
+    """Add a layout of your own from a file."""
+    with connect() as service:
+        name = add_layout_file(service, file)
+        document = service.get(f"/gloves/{name}")
+    out.print(
+        f"Added layout {name}: {len(document['sensors'])} sensors, {len(document['rotations'])} rotations."
+    )
+
+
+@app.command("wear")
+def wear(
+    glove: Glove,
+    subject: Annotated[str | None, typer.Argument(help="Who wears it now.", callback=subject_named)] = None,
+    wearing: Annotated[
+        str | None, typer.Option(help="Name of this donning; readings shift between them.")
+    ] = None,
+    nobody: Annotated[bool, typer.Option("--nobody", help="It was taken off.")] = False,
+) -> None:
+    """Say who wears a glove now; the live service changes to that subject's model."""
+    if (subject is None) != nobody:
+        raise typer.BadParameter("say who wears it: SUBJECT, or --nobody")
+    with connect() as service:
+        service.put(f"/gloves/{glove}/wearer", {"subject": subject, "wearing": wearing})
+    out.print(f"{glove} is worn by {subject or 'nobody'}.")

@@ -1,0 +1,108 @@
+"""``glovecal record``: a take from the live glove."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from glovecal_client.errors import ServiceError
+from glovecal_service.cli.terminal.connection import connect
+from glovecal_service.cli.terminal.options import AsJson, Glove, subject_named
+from glovecal_service.cli.terminal.printing import err, out, print_json
+from glovecal_service.cli.terminal.refusal import NobodyThere
+from glovecal_service.cli.terminal.waiting import wait_seconds
+
+if TYPE_CHECKING:
+    from glovecal_client.rest import RestClient
+
+BEGINS_WITHIN_S = 10.0
+PATIENCE_S = 30.0
+
+
+def record(
+    glove: Glove,
+    name: Annotated[str, typer.Argument(help="What the take will be called.")],
+    seconds: Annotated[float, typer.Option(min=0.1, help="How long.")] = 10.0,
+    subject: Annotated[
+        str | None,
+        typer.Option("--subject", "-s", help="Default: who wears it.", callback=subject_named),
+    ] = None,
+    wearing: Annotated[str | None, typer.Option(help="Default: the glove's wearing.")] = None,
+    lead_in: Annotated[
+        float,
+        typer.Option(
+            min=0, max=600, help="Seconds before it to fetch from the capture log, for effects with a memory."
+        ),
+    ] = 60.0,
+    as_json: AsJson = False,
+) -> None:
+    """Record a take from a glove that is streaming to the service. Ctrl-C ends it sooner."""
+    wanted = {"glove": glove, "name": name, "subject": subject, "wearing": wearing, "lead_s": lead_in}
+    with connect() as service:
+        started = service.post(
+            "/recordings", {key: value for key, value in wanted.items() if value is not None}
+        )
+        try:
+            _wait_for_the_recorder(service, started["id"], glove)
+            err.print(f"Recording {name} for {seconds:g} s; Ctrl-C ends it sooner.")
+            wait_seconds(seconds, f"recording {name}", quiet=as_json)
+        except KeyboardInterrupt:
+            err.print("Stopped.")
+        except SystemExit:
+            service.post(f"/recordings/{started['id']}/stop")
+            raise
+        finished = finish_recording(service, started["id"])
+    if as_json:
+        print_json(finished)
+        return
+    facts = finished["facts"]
+    if "take" in facts:
+        out.print(
+            f"Take {facts['take'][:12]}: {facts['recorded']} of {facts['sent']} frames sent, "
+            f"{facts['repaired']} of them fetched from the capture log, {facts['missing_frames']} missing."
+        )
+    if finished["state"] == "repairing":
+        err.print(
+            f"Recording {finished['id']} is {facts['sentence']}. It is completed as soon as capture answers; "
+            "glovecal take list shows its state.",
+            style="yellow",
+        )
+    if lead_in and "take" in facts:
+        out.print(f"Lead-in: {facts['lead_in']['sentence']}.")
+
+
+def _wait_for_the_recorder(service: RestClient, recording: str, glove: str) -> None:
+    """Raises NobodyThere when no recorder takes it on: then nothing would be recorded."""
+    until = time.monotonic() + BEGINS_WITHIN_S
+    while service.get(f"/recordings/{recording}")["state"] == "requested":
+        if time.monotonic() > until:
+            service.post(f"/recordings/{recording}/stop")
+            raise NobodyThere(
+                f"nobody records glove {glove}: no recorder took recording {recording} on within "
+                f"{BEGINS_WITHIN_S:g} s; is glovecal serve running on this data folder?"
+            )
+        time.sleep(0.05)
+
+
+def finish_recording(service: RestClient, recording: str) -> dict[str, Any]:
+    """Stop a recording and wait for its account, complete or being repaired.
+
+    Raises ServiceError when it failed or takes too long.
+    """
+    service.post(f"/recordings/{recording}/stop")
+    until = time.monotonic() + PATIENCE_S
+    while (document := service.get(f"/recordings/{recording}"))["state"] not in ("done", "repairing"):
+        if document["state"] == "failed":
+            raise ServiceError(
+                409, "Recording failed", document["facts"].get("sentence", "no reason was given")
+            )
+        if time.monotonic() > until:
+            raise ServiceError(
+                504,
+                "Recording not finished",
+                f"recording {recording} is still {document['state']}; is glovecal serve running?",
+            )
+        time.sleep(0.1)
+    return document

@@ -1,0 +1,1 @@
+"""Calibration models: train, show, compare, check and activate them."""

@@ -1,0 +1,144 @@
+"""``glovecal model``: a subject's calibration models."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from glovecal_service.cli.model.effect_table import EFFECT_COLUMNS, effect_rows
+from glovecal_service.cli.model.kernel_table import KERNEL_COLUMNS, kernel_rows
+from glovecal_service.cli.terminal.connection import connect
+from glovecal_service.cli.terminal.options import AsJson, Model, OnlyLayout, OnlySubject, Subject
+from glovecal_service.cli.terminal.printing import err, moment, out, print_facts, print_json, print_table
+from glovecal_service.cli.terminal.refusal import Refusal
+from glovecal_service.cli.terminal.writing import Overwrite, require_place, write_whole
+
+if TYPE_CHECKING:
+    from glovecal_client.rest import RestClient
+
+app = typer.Typer(help="Calibration models: versions, activation, export.", no_args_is_help=True)
+
+
+@app.command("list")
+def list_models(subject: OnlySubject = None, layout: OnlyLayout = None, as_json: AsJson = False) -> None:
+    """List models, oldest first; the active one of each subject and layout is marked."""
+    wanted = {"subject": subject, "layout": layout}
+    with connect() as service:
+        rows = service.get("/models", {key: value for key, value in wanted.items() if value})
+    if as_json:
+        print_json(rows)
+        return
+    shown = [
+        {**row, "short": row["id"][:12], "method": _method(row), "created_at": moment(row["created_at"])}
+        for row in rows
+    ]
+    columns = {
+        "short": "model",
+        "subject": "subject",
+        "layout": "layout",
+        "method": "method",
+        "held_out_rmse_deg": "error (°)",
+        "active": "active",
+        "created_at": "trained",
+    }
+    print_table(shown, columns, empty="No models yet. Train one: glovecal train --subject NAME")
+    for row in rows:
+        if row["damage"]:
+            err.print(f"Damaged and active: {row['damage']}", style="red")
+
+
+@app.command("show")
+def show(model: Model, as_json: AsJson = False) -> None:
+    """Show one model: errors of each rotation, effects, takes, lineage."""
+    with connect() as service:
+        document = service.get(f"/models/{model}")
+        lineage = service.get(f"/models/{document['id']}/lineage")
+    if as_json:
+        print_json({**document, "lineage": [row["id"] for row in lineage]})
+        return
+    print_facts(_facts(document, lineage))
+    out.print()
+    columns = {
+        "rotation": "rotation",
+        "kind": "kind",
+        "method": "method",
+        "held_out_rmse_deg": "error (°)",
+        "noise_deg": "noise (°)",
+        "samples": "samples",
+        "sensors": "sensors",
+    }
+    print_table(document["rotations"], columns, empty="No rotations.")
+    tried = kernel_rows(document["rotations"])
+    if tried:
+        out.print()
+        out.print("Kernels tried: errors on takes left out, evidence over the first")
+        print_table(tried, KERNEL_COLUMNS, empty="")
+        for row in document["rotations"]:
+            if row["kernel_choice"]:
+                err.print(row["kernel_choice"]["sentence"])
+    if document["effect_details"]:
+        out.print()
+        print_table(effect_rows(document["effect_details"]), EFFECT_COLUMNS, empty="")
+
+
+def _method(row: dict[str, Any]) -> str:
+    """The regressors and the effects on top of them."""
+    return " + ".join([row["method"], *([", ".join(row["effects"])] if row["effects"] else [])])
+
+
+def _facts(document: dict[str, Any], lineage: list[dict[str, Any]]) -> dict[str, Any]:
+    return {
+        "model": document["id"],
+        "subject": document["subject"],
+        "layout": document["layout"],
+        "method": document["method"],
+        "active": document["active"],
+        "error (°)": document["held_out_rmse_deg"],
+        "estimated on": document["error_estimate"].get("how"),
+        "trained on": [take["name"] for take in document["facts"].get("takes", [])],
+        "simulated": document["simulated"],
+        "trained": moment(document["created_at"]),
+        "made from": [row["id"][:12] for row in lineage[1:]],
+    }
+
+
+@app.command("activate")
+def activate(model: Model) -> None:
+    """Predict live with this model from the next frame on."""
+    with connect() as service:
+        document = service.post(f"/models/{model}/activate")
+    out.print(f"Model {document['model'][:12]} is active for {document['subject']}, {document['layout']}.")
+
+
+@app.command("rollback")
+def rollback(subject: Subject, layout: OnlyLayout = None) -> None:
+    """Return to the model that was active before. The layout is needed only if there are several."""
+    with connect() as service:
+        wanted = {"subject": subject, "layout": layout or _only_layout(service, subject)}
+        document = service.post("/models/rollback", wanted)
+    out.print(f"Model {document['model'][:12]} is active again for {subject}, {wanted['layout']}.")
+
+
+def _only_layout(service: RestClient, subject: str) -> str:
+    service.get(f"/subjects/{subject}")
+    layouts = sorted({row["layout"] for row in service.get("/models", {"subject": subject})})
+    if len(layouts) > 1:
+        raise Refusal(f"subject {subject} has models of {', '.join(layouts)}; choose one with --layout")
+    if not layouts:
+        raise Refusal(f"subject {subject} has no models; train one: glovecal train --subject {subject}")
+    return layouts[0]
+
+
+@app.command("export")
+def export(
+    model: Model,
+    file: Annotated[Path, typer.Argument(help="Where to write the artifact (.safetensors).")],
+    overwrite: Overwrite = False,
+) -> None:
+    """Write the model's artifact (safetensors with its manifest inside); its sha256 is the model's id."""
+    require_place(file, overwrite=overwrite)
+    with connect() as service:
+        write_whole({file: service.download(f"/models/{model}/export")})
+    err.print(f"In Python: glovecal_models.calibration.artifact.load(open({str(file)!r}, 'rb').read())")

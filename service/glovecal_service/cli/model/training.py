@@ -1,0 +1,133 @@
+"""``glovecal train``: a calibration model from a subject's takes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from glovecal_service.cli.take.named import find_takes
+from glovecal_service.cli.terminal.connection import connect, is_remote
+from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, Subject
+from glovecal_service.cli.terminal.printing import err, out, print_json
+from glovecal_service.cli.terminal.refusal import Refusal
+from glovecal_service.cli.terminal.waiting import wait_for_job
+
+if TYPE_CHECKING:
+    from glovecal_client.rest import RestClient
+
+Method = Literal["raw", "linear", "lmc_gpr", "spgp", "auto", "polynomial_gpr", "general_gpr"]
+
+
+def train(
+    subject: Subject,
+    layout: OnlyLayout = None,
+    method: Annotated[
+        Method,
+        typer.Option(
+            help="auto chooses each rotation's kernel by evidence and error, for hardware nobody knows. "
+            "raw is no calibration at all: the scale to read the others against."
+        ),
+    ] = "lmc_gpr",
+    take: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--take", "-t", help="Take to train on; repeat. Default: all with reference or touches."
+        ),
+    ] = None,
+    leave_out: Annotated[list[str] | None, typer.Option(help="Take to keep for testing; repeat.")] = None,
+    pseudo_inputs: Annotated[
+        int, typer.Option(min=2, max=1000, help="SPGP's number of pseudo-inputs.")
+    ] = 100,
+    samples: Annotated[
+        int, typer.Option(min=10, max=5000, help="Most samples for one rotation; fewer train faster.")
+    ] = 2000,
+    folds: Annotated[
+        int,
+        typer.Option(min=0, max=20, help="Held-out folds for the error estimate; 0: no estimate, fastest."),
+    ] = 3,
+    seed: Annotated[int, typer.Option(min=0, help="Of what is chosen at random.")] = 0,
+    keep_dead: Annotated[
+        bool,
+        typer.Option("--keep-dead", help="Refuse sensors that never move instead of leaving them out."),
+    ] = False,
+    activate: Annotated[bool, typer.Option(help="Predict live with the new model.")] = True,
+    wait: Annotated[bool, typer.Option(help="Wait for the model, else only start the job.")] = True,
+    as_json: AsJson = False,
+) -> None:
+    """Train a calibration model; the error it prints is on takes left out of training.
+
+    Ctrl-C cancels the job; what it finished is kept for the next try.
+    """
+    if folds == 1:
+        raise typer.BadParameter("--folds 1 would hold out everything; give 0, or 2 or more")
+    if not wait and not is_remote():
+        raise typer.BadParameter(
+            "--no-wait needs a service that goes on after this command: set GLOVECAL_URL"
+        )
+    with connect() as service:
+        chosen, layout = _choose(service, subject, layout, take or [], leave_out or [])
+        body: dict[str, Any] = {"subject": subject, "layout": layout, "method": method, "takes": chosen}
+        body |= {"activate": activate, "pseudo_inputs": pseudo_inputs, "samples": samples}
+        body |= {"folds": folds, "seed": seed, "keep_dead": keep_dead}
+        job = service.post("/models/train", body)
+        if not wait:
+            _say_job(job, as_json)
+            return
+        result = wait_for_job(service, job["id"], quiet=as_json)["result"]
+        document = service.get(f"/models/{result['model']}")
+    if as_json:
+        print_json({"result": result, "model": document})
+    else:
+        _say_model(result, document)
+
+
+def _say_job(job: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        print_json(job)
+    else:
+        out.print(f"Job {job['id']} is {job['state']}; wait for it with glovecal job wait {job['id']}")
+
+
+def _say_model(result: dict[str, Any], document: dict[str, Any]) -> None:
+    for sentence in result.get("sentences", []):
+        err.print(sentence)
+    error = result.get("held_out_rmse_deg")
+    how = str(document["error_estimate"].get("how"))
+    told = f"error on left-out takes {error:.2f} degrees" if error is not None else "error not estimated"
+    if error is not None and "takes" not in how:
+        told = f"error on left-out parts of its takes {error:.2f} degrees"
+    if error is not None and "widgets" in how:
+        told = f"error on widgets left out, one at a time, {error:.2f} degrees"
+    active = "Active." if document["active"] else "Not active."
+    out.print(
+        f"Model {document['id'][:12]} ({document['method']}) for {document['subject']}, {told}. {active}"
+    )
+
+
+def _choose(
+    service: RestClient, subject: str, layout: str | None, wanted: list[str], left_out: list[str]
+) -> tuple[list[str], str]:
+    """Ids of the takes to train on, and their layout."""
+    service.get(f"/subjects/{subject}")
+    rows = service.get("/takes", {"subject": subject})
+    without = {row["id"] for row in find_takes(rows, left_out)}
+    chosen = find_takes(rows, wanted) or [row for row in rows if row["teaches"]]
+    for row in chosen:
+        if not row["teaches"]:
+            raise Refusal(
+                f"take {row['name']} ({row['id']}) has no reference angles; attach some with "
+                f"glovecal take reference {row['id']} FILE"
+            )
+    chosen = [row for row in chosen if row["id"] not in without and layout in (None, row["layout"])]
+    layouts = sorted({row["layout"] for row in chosen})
+    if len(layouts) > 1:
+        raise Refusal(f"the takes have layouts {', '.join(layouts)}; choose one with --layout")
+    if not layouts:
+        of_layout = f" with layout {layout}" if layout else ""
+        besides = " besides those left out" if without else ""
+        raise Refusal(
+            f"subject {subject} has no take{of_layout} with reference angles{besides}; import some with "
+            "glovecal take import"
+        )
+    return [row["id"] for row in chosen], layouts[0]

@@ -1,0 +1,1 @@
+"""Guided sampling: ``glovecal sample``, and what to record next."""

@@ -1,0 +1,146 @@
+"""``glovecal sample``: lead a person through poses and motions whose angles are known."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from glovecal_models.names import check_identifier
+from glovecal_models.sampling.catalogue import PROTOCOLS
+from glovecal_models.sampling.state import TRIGGERS
+from glovecal_service.cli.sampling.dialogue import walk
+from glovecal_service.cli.sampling.next_steps import next_steps
+from glovecal_service.cli.sampling.options import pose_angles, sampling_id, widget_angles
+from glovecal_service.cli.terminal.connection import connect
+from glovecal_service.cli.terminal.options import AsJson, identifier, subject_named
+from glovecal_service.cli.terminal.printing import moment, out, print_json, print_table
+from glovecal_service.cli.terminal.refusal import Refusal
+
+if TYPE_CHECKING:
+    from glovecal_client.rest import RestClient
+
+app = typer.Typer(help="Guided sampling: takes with known angles.", invoke_without_command=True)
+
+
+@app.callback()
+def sample(
+    context: typer.Context,
+    glove: Annotated[str, typer.Option(help="The glove's name.")] = "",
+    subject: Annotated[
+        str | None, typer.Option("--subject", "-s", help="Who wears it.", callback=subject_named)
+    ] = None,
+    wearing: Annotated[str | None, typer.Option(help="Default: the glove's wearing.")] = None,
+    protocol: Annotated[str, typer.Option(help=f"One of {', '.join(PROTOCOLS)}.")] = "new_subject",
+    trigger: Annotated[
+        str, typer.Option(help=f"What begins a step: {', '.join(TRIGGERS)} (of the hand).")
+    ] = "key",
+    widget: Annotated[
+        list[str] | None, typer.Option(help="Widgets you have, such as IM_ABD=0,12,20; repeatable.")
+    ] = None,
+    poses: Annotated[
+        Path | None, typer.Option(help="JSON file of measured angles: pose, rotation, degrees.")
+    ] = None,
+    rod: Annotated[list[float] | None, typer.Option(help="Length of a rod in mm; repeatable.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Lead a person through a protocol. Keys: space goes on, r does again, u takes back, s leaves out,
+    q pauses and leaves."""
+    if context.invoked_subcommand is not None:
+        return
+    for what, value in (("glove", glove), ("subject", subject)):
+        if not value:
+            raise typer.BadParameter(f"give --{what}")
+    check_identifier(glove, "glove")
+    wanted: dict[str, Any] = {"glove": glove, "subject": subject, "protocol": protocol, "trigger": trigger}
+    wanted["widget_deg"] = widget_angles(widget or [])
+    wanted["pose_deg"] = pose_angles(poses)
+    if rod:
+        wanted["rod_mm"] = rod
+    if wearing is not None:
+        wanted["wearing"] = wearing
+    _require_keyboard(trigger)
+    with connect() as service:
+        _lead(service, service.post("/sampling", wanted), as_json)
+
+
+@app.command("list")
+def list_samplings(
+    glove: Annotated[
+        str | None, typer.Option(help="Only this glove's.", callback=identifier("glove"))
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Show samplings, newest first."""
+    with connect() as service:
+        found = service.get("/sampling", None if glove is None else {"glove": glove})
+    if as_json:
+        print_json(found)
+        return
+    rows = [
+        {
+            "id": view["id"],
+            "glove": view["glove"],
+            "subject": view["subject"],
+            "protocol": view["protocol"],
+            "phase": view["phase"],
+            "done": f"{sum(step['outcome'] == 'good' for step in view['steps'])} of {len(view['steps'])}",
+            "takes": len(view["takes"]),
+            "began": moment(view["created_at"]),
+        }
+        for view in found
+    ]
+    headings = {"id": "id", "glove": "glove", "subject": "subject", "protocol": "protocol", "phase": "phase"}
+    more = {"done": "steps done", "takes": "takes", "began": "began"}
+    print_table(rows, headings | more, empty="No sampling yet: glovecal sample --glove G --subject S.")
+
+
+app.command("next")(next_steps)
+
+
+@app.command("resume")
+def resume(
+    sampling: Annotated[str, typer.Argument(help="Sampling id.", callback=sampling_id)],
+    as_json: AsJson = False,
+) -> None:
+    """Go on with a sampling that was interrupted."""
+    with connect() as service:
+        view = service.get(f"/sampling/{sampling}")
+        if not view["open"]:
+            raise Refusal(f"sampling {sampling} is {view['phase']}; its takes are stored")
+        _require_keyboard(view["trigger"])
+        if view["phase"] == "paused":
+            view = service.post(f"/sampling/{sampling}/resume")
+        _lead(service, view, as_json)
+
+
+def _require_keyboard(trigger: str) -> None:
+    if trigger == "key" and not sys.stdin.isatty():
+        raise Refusal("this is no terminal, so nobody can press a key: use --trigger timer or still")
+
+
+def _lead(service: RestClient, view: dict[str, Any], as_json: bool) -> None:
+    view = walk(service, view, quiet=as_json)
+    if as_json:
+        print_json(view)
+        return
+    if view["open"]:
+        out.print(f"Interrupted. Go on with: glovecal sample resume {view['id']}")
+        return
+    bad = [step for step in view["steps"] if step["outcome"] != "good"]
+    for step in bad:
+        out.print(f"{step['name']}: {step['outcome'] or 'not done'}. {' '.join(step['reasons'])}".rstrip())
+    for sentence in (*view["sentences"], view["problem"]):
+        if sentence:
+            out.print(sentence)
+    out.print(
+        f"{len(view['takes'])} takes of {len(view['steps']) - len(bad)} steps; "
+        f"{view['capture_s']:.0f} s of capture."
+    )
+    if view["takes"] and view["protocol"] != "second_wearing":
+        out.print(f"Next: glovecal train --subject {view['subject']}")
+    elif view["takes"]:
+        named = " ".join(f"--take {take}" for take in view["takes"])
+        out.print(f"Next: glovecal quick-check --subject {view['subject']} {named} --activate")

@@ -1,0 +1,1 @@
+"""The people who wear gloves: ``glovecal subject``."""

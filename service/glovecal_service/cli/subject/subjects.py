@@ -1,0 +1,139 @@
+"""``glovecal subject``: the people who wear gloves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from glovecal_service.cli.subject.measured_hand import DimensionsFile, Hand, HandLength, measured_dimensions
+from glovecal_service.cli.terminal.connection import connect
+from glovecal_service.cli.terminal.options import AsJson, subject_named
+from glovecal_service.cli.terminal.printing import moment, out, print_facts, print_json, print_table, text
+from glovecal_service.cli.terminal.refusal import Refusal
+
+if TYPE_CHECKING:
+    from glovecal_client.rest import RestClient
+
+app = typer.Typer(help="The people who wear gloves.", no_args_is_help=True)
+
+Name = Annotated[str, typer.Argument(help="Short name: a-z, 0-9, _ and -.", callback=subject_named)]
+
+
+@app.command("add")
+def add(
+    name: Name,
+    title: Annotated[str, typer.Option(help="The name as people write it.")] = "",
+    hand_length_mm: HandLength = None,
+    dimensions: DimensionsFile = None,
+    hand: Hand = None,
+) -> None:
+    """Add a subject; with the size of the hand, errors are told in mm too."""
+    measured = measured_dimensions(hand_length_mm, dimensions)
+    body = {"name": name, "title": title, "dimensions": measured, "hand": hand or "right"}
+    with connect() as service:
+        service.post("/subjects", body)
+    out.print(f"Added subject {name}.")
+
+
+@app.command("measure")
+def measure(
+    name: Name,
+    hand_length_mm: HandLength = None,
+    dimensions: DimensionsFile = None,
+    hand: Hand = None,
+) -> None:
+    """Say how large a subject's hand is; replaces all that was measured before."""
+    if hand_length_mm is None and dimensions is None:
+        raise typer.BadParameter("give --hand-length-mm or --dimensions")
+    measured = measured_dimensions(hand_length_mm, dimensions)
+    with connect() as service:
+        hand = hand or service.get(f"/subjects/{name}")["hand"]
+        service.put(f"/subjects/{name}/hand", {"dimensions": measured, "hand": hand})
+    out.print(f"Subject {name}: {hand} hand, {text(measured)} mm.")
+
+
+@app.command("skeleton")
+def skeleton(name: Name, hand: Hand = None, as_json: AsJson = False) -> None:
+    """Show the sizes of a subject's hand; --json prints joints, axes and limits for a viewer."""
+    with connect() as service:
+        query = {"hand": hand} if hand is not None else None
+        document = service.get(f"/subjects/{name}/skeleton", query)
+    if as_json:
+        print_json(document)
+        return
+    sizes, measured = document["dimensions"]["sizes"], document["dimensions"]["measured"]
+    rows = [{"name": key, "mm": f"{mm:.1f}", "from": _origin(key, measured)} for key, mm in sizes.items()]
+    print_table(rows, {"name": f"{document['hand']} hand", "mm": "mm", "from": ""}, empty="")
+
+
+def _origin(dimension: str, measured: list[str]) -> str:
+    if dimension in measured:
+        return "measured"
+    return "from the hand length" if measured else "assumed"
+
+
+@app.command("list")
+def list_subjects(as_json: AsJson = False) -> None:
+    """List all subjects."""
+    with connect() as service:
+        rows = service.get("/subjects")
+    if as_json:
+        print_json(rows)
+        return
+    rows = [{**row, "title": row["title"] or None, "created_at": moment(row["created_at"])} for row in rows]
+    columns = {"name": "subject", "title": "name", "created_at": "added"}
+    print_table(rows, columns, empty="No subjects yet. Add one: glovecal subject add NAME")
+
+
+@app.command("show")
+def show(name: Name, as_json: AsJson = False) -> None:
+    """Show one subject: takes, models, which one predicts live."""
+    with connect() as service:
+        document = service.get(f"/subjects/{name}")
+        if as_json:
+            print_json(document)
+            return
+        takes = service.get("/takes", {"subject": name})
+        models = service.get("/models", {"subject": name})
+    print_facts(
+        {
+            "subject": name,
+            "name": document["title"] or None,
+            "hand": document["hand"],
+            "measured (mm)": document["dimensions"],
+            "added": moment(document["created_at"]),
+            "takes": len(takes),
+            "models": len(models),
+            "active": [
+                f"{row['id'][:12]} ({row['method']}, {row['layout']})" for row in models if row["active"]
+            ],
+        }
+    )
+
+
+@app.command("remove")
+def remove(
+    name: Name,
+    takes: Annotated[
+        bool, typer.Option("--takes", help="Remove the subject's takes too; never those of a model.")
+    ] = False,
+) -> None:
+    """Remove a subject that owns no takes and no models. Imported files stay in the data folder."""
+    with connect() as service:
+        if takes:
+            _remove_takes(service, name)
+        service.delete(f"/subjects/{name}")
+    out.print(f"Removed subject {name}.")
+
+
+def _remove_takes(service: RestClient, subject: str) -> None:
+    """All or none: takes that a model was trained on stay, so a subject with models keeps all."""
+    models = service.get("/models", {"subject": subject})
+    if models:
+        raise Refusal(
+            f"subject {subject} has {len(models)} models, which keep the takes they were trained on"
+        )
+    for row in service.get("/takes", {"subject": subject}):
+        service.delete(f"/takes/{row['id']}")
+        out.print(f"Removed take {row['name']} ({row['id']}).")

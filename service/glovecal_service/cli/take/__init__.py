@@ -1,0 +1,1 @@
+"""Takes: ``glovecal take``, and how other verbs find and import them."""

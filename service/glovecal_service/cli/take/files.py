@@ -1,0 +1,104 @@
+"""Takes in files for a verb that works on stored ones: imported under a subject, found again next time."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from glovecal_client.errors import ServiceError
+from glovecal_service.cli.take.import_warnings import ImportWarnings
+from glovecal_service.cli.take.two_tables import frames_among, reference_beside
+from glovecal_service.cli.terminal.printing import err
+from glovecal_service.cli.terminal.refusal import Refusal, exit_code_of, sentence_of
+
+if TYPE_CHECKING:
+    from glovecal_client.rest import RestClient
+
+PREFIX = "improve-"
+READ_BYTES = 1 << 20
+
+
+@dataclass
+class FileSubject:
+    """The subject under which files are imported, and their layout once it is known."""
+
+    service: RestClient
+    name: str
+    layout: str | None
+    spread: bool = False
+    """Whether frames stamped in batches are spread up to the next batch."""
+
+    @classmethod
+    def of(
+        cls,
+        service: RestClient,
+        files: Sequence[Path],
+        *,
+        subject: str | None,
+        layout: str | None,
+        spread: bool = False,
+    ) -> FileSubject:
+        """``subject``, else whoever has one of the files already, else a new one named after the first."""
+        hashes = [_sha256(file) for file in files]
+        rows = [] if subject is not None else service.get("/takes")
+        owners: list[str] = [row["subject"] for row in rows if row["original_sha256"] in hashes]
+        name = subject or next(iter(owners), PREFIX + hashes[0][:8])
+        if name not in {row["name"] for row in service.get("/subjects")}:
+            service.post("/subjects", {"name": name, "title": f"Takes of {files[0].name}"})
+            if subject is not None:
+                err.print(added_subject(service, subject), style="yellow")
+        return cls(service, name, layout, spread)
+
+    def take_ids(self, files: Sequence[Path]) -> list[str]:
+        """Ids of the takes in ``files``, imported unless they were. Raises Refusal that names the file."""
+        warnings = ImportWarnings()
+        rows = [row for file in frames_among(files) for row in self._imported(file, warnings)]
+        warnings.print()
+        return [row["id"] for row in rows]
+
+    def _imported(self, file: Path, warnings: ImportWarnings) -> list[dict[str, Any]]:
+        self._require_layout(file)
+        try:
+            answer = self.service.upload_takes(
+                file,
+                subject=self.name,
+                layout=self.layout,
+                reference=reference_beside(file),
+                **({"equal_times": "spread"} if self.spread else {}),
+            )
+        except ServiceError as error:
+            if exit_code_of(error) != 1:
+                raise
+            raise Refusal(f"{file}: {sentence_of(error)}") from error
+        self.layout = answer["layout"]
+        warnings.add(file, answer["warnings"])
+        return answer["takes"]
+
+    def _require_layout(self, file: Path) -> None:
+        digest = _sha256(file)
+        for row in self.service.get("/takes", {"subject": self.name}):
+            if row["original_sha256"] == digest and self.layout not in (None, row["layout"]):
+                raise Refusal(
+                    f"{file} was imported before with layout {row['layout']}, not {self.layout}; give that "
+                    "one, or set GLOVECAL_DATA to another folder"
+                )
+
+
+def _sha256(file: Path) -> str:
+    digest = hashlib.sha256()
+    with file.open("rb") as stream:
+        while chunk := stream.read(READ_BYTES):
+            digest.update(chunk)
+    return digest.hexdigest()
+
+
+def added_subject(service: RestClient, subject: str) -> str:
+    """What to say of a subject that a file's import added, so that a mistyped name is seen and undone."""
+    others = [row["name"] for row in service.get("/subjects") if row["name"] != subject]
+    near = difflib.get_close_matches(subject, others, n=3)
+    similar = f" Similar: {', '.join(near)}." if near else ""
+    return f"Added subject {subject}.{similar} To undo: glovecal subject remove {subject} --takes"

@@ -1,0 +1,39 @@
+"""Which take somebody means: by name, by id, or by the beginning of an id."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from glovecal_service.cli.terminal.refusal import Refusal
+
+MOST_SHOWN = 8
+SHORTEST_BEGINNING = 4
+
+
+def find_take(rows: Sequence[dict[str, Any]], wanted: str) -> dict[str, Any]:
+    """The one row of ``GET /takes`` that is meant. Raises Refusal that lists what could be meant."""
+    for row in rows:
+        if row["id"] == wanted:
+            return row
+    found = [row for row in rows if row["name"] == wanted]
+    if not found and len(wanted) >= SHORTEST_BEGINNING:
+        found = [row for row in rows if row["id"].startswith(wanted)]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise Refusal(f"{len(found)} takes are called {wanted!r}: {_listed(found)}; give the id of one")
+    there = f"there are {_listed(rows)}" if rows else "there are none"
+    raise Refusal(f"there is no take {wanted!r}; {there}")
+
+
+def find_takes(rows: Sequence[dict[str, Any]], wanted: Iterable[str]) -> list[dict[str, Any]]:
+    """Each take that is meant, once."""
+    found = [find_take(rows, name) for name in wanted]
+    return list({row["id"]: row for row in found}.values())
+
+
+def _listed(rows: Sequence[dict[str, Any]]) -> str:
+    shown = ", ".join(f"{row['name']} ({row['id']} of {row['subject']})" for row in rows[:MOST_SHOWN])
+    more = len(rows) - MOST_SHOWN
+    return f"{shown} and {more} more" if more > 0 else shown

@@ -1,0 +1,98 @@
+"""``glovecal take import``: take tables into the store, each file whole or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from glovecal_client.errors import ServiceError
+from glovecal_service.cli.glove.layout_file import layout_named
+from glovecal_service.cli.take.files import added_subject
+from glovecal_service.cli.take.import_warnings import ImportWarnings
+from glovecal_service.cli.take.rows import print_takes
+from glovecal_service.cli.take.two_tables import frames_among, reference_beside
+from glovecal_service.cli.terminal.connection import connect
+from glovecal_service.cli.terminal.options import AsJson, Subject
+from glovecal_service.cli.terminal.printing import err, print_json
+from glovecal_service.cli.terminal.refusal import REFUSED, sentence_of
+
+if TYPE_CHECKING:
+    from glovecal_client.rest import RestClient
+
+SERVER_FAULT = 500
+
+
+def import_takes(
+    files: Annotated[
+        list[Path], typer.Argument(exists=True, dir_okay=False, help="CSV or Parquet take tables.")
+    ],
+    subject: Subject,
+    layout: Annotated[
+        str | None,
+        typer.Option("--layout", "-l", help="Layout name or layout file. Default: made of the columns."),
+    ] = None,
+    reference: Annotated[
+        Path | None,
+        typer.Option(exists=True, dir_okay=False, help="Reference table of a single frames file."),
+    ] = None,
+    name: Annotated[
+        str | None, typer.Option(help="Name of the take. Default: in the file, else the file's.")
+    ] = None,
+    wearing: Annotated[str | None, typer.Option(help="The wearing, where the file does not say it.")] = None,
+    spread_equal_times: Annotated[
+        bool,
+        typer.Option("--spread-equal-times", help="Frames stamped in batches: spread each up to the next."),
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Import take tables. X.reference.csv beside X.frames.csv is found by itself.
+
+    A subject that is not there yet is added. A file that cannot be imported is told and the others are
+    imported; the exit code is 1 then.
+    """
+    if reference and len(files) > 1:
+        raise typer.BadParameter("--reference goes with one frames file")
+    frames = frames_among(files)
+    options = {"name": name, "wearing": wearing, "equal_times": "spread" if spread_equal_times else None}
+    rows, refused, warnings = [], 0, ImportWarnings()
+    with connect() as service:
+        chosen = layout_named(service, layout)
+        for file in frames:
+            try:
+                beside = reference or reference_beside(file)
+                rows += _import(service, file, beside, subject, chosen, options, warnings)
+            except ServiceError as error:
+                if error.status >= SERVER_FAULT:
+                    raise
+                refused += 1
+                err.print(f"{file}: not imported: {sentence_of(error)}", style="red")
+    warnings.print()
+    if as_json:
+        print_json(rows)
+    elif rows or not refused:
+        print_takes(rows, empty="Nothing was imported.")
+    if refused:
+        raise typer.Exit(REFUSED)
+
+
+def _import(
+    service: RestClient,
+    file: Path,
+    reference: Path | None,
+    subject: str,
+    layout: str | None,
+    options: dict[str, str | None],
+    warnings: ImportWarnings,
+) -> list[dict[str, Any]]:
+    given = {key: value for key, value in options.items() if value is not None}
+    answer = service.upload_takes(
+        file, reference=reference, subject=subject, layout=layout, create_subject=True, **given
+    )
+    if answer["subject_created"]:
+        err.print(added_subject(service, subject), style="yellow")
+    if not answer["imported"]:
+        err.print(f"{file}: its takes were here already", style="yellow")
+    warnings.add(file, answer["warnings"])
+    return answer["takes"]

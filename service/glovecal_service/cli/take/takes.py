@@ -1,0 +1,180 @@
+"""``glovecal take``: recordings, from files or from the live glove."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from glovecal_client.errors import ServiceError
+from glovecal_service.cli.take import clocks, examination, holds, table_import
+from glovecal_service.cli.take.named import find_take, find_takes
+from glovecal_service.cli.take.rows import print_takes
+from glovecal_service.cli.terminal.connection import connect
+from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, OnlySubject, Take, identifier
+from glovecal_service.cli.terminal.printing import err, moment, out, print_facts, print_json, print_table
+from glovecal_service.cli.terminal.writing import Overwrite, require_place, write_whole
+
+if TYPE_CHECKING:
+    from glovecal_client.rest import RestClient
+
+app = typer.Typer(help="Takes: recordings with or without reference angles.", no_args_is_help=True)
+app.command("import")(table_import.import_takes)
+app.command("clocks")(clocks.clocks)
+app.command("examine")(examination.examine)
+app.command("holds")(holds.holds)
+
+CONFLICT = 409
+"""The service's answer when a take is two tables."""
+FORMATS = (".csv", ".parquet")
+
+
+@app.command("list")
+def list_takes(subject: OnlySubject = None, layout: OnlyLayout = None, as_json: AsJson = False) -> None:
+    """List takes, oldest first."""
+    wanted = {"subject": subject, "layout": layout}
+    with connect() as service:
+        rows = service.get("/takes", {key: value for key, value in wanted.items() if value})
+    if as_json:
+        print_json(rows)
+        return
+    print_takes(rows, empty="No takes yet. Import some: glovecal take import FILE --subject NAME")
+
+
+@app.command("check")
+def check(take: Take, as_json: AsJson = False) -> None:
+    """Show one take: how long, how regular, what was measured, what looks wrong."""
+    with connect() as service:
+        found = service.get(f"/takes/{_id(service, take)}/check")
+    if as_json:
+        print_json(found)
+        return
+    print_facts(_facts(found))
+    out.print()
+    sensors = {"sensor": "sensor", "low": "lowest", "high": "highest", "changed": "changes"}
+    print_table(found["sensors"], sensors, empty="No sensors.")
+    out.print()
+    rotations = {
+        "rotation": "rotation",
+        "low_deg": "lowest (deg)",
+        "high_deg": "highest (deg)",
+        "rows": "rows",
+    }
+    print_table(
+        found["rotations"], rotations, empty="No reference angles: nothing to train on or compare with."
+    )
+    for sentence in found["sentences"]:
+        err.print(sentence, style="yellow")
+
+
+def _facts(found: dict[str, Any]) -> dict[str, Any]:
+    take = found["take"]
+    gaps = f"{found['gaps']}, longest interval {found['longest_interval_s'] or 0:.3g} s"
+    accounting, lead_in_s = take["accounting"] or {}, found["lead_in_s"]
+    return {
+        "take": f"{take['id']} {take['name']}",
+        "subject": take["subject"],
+        "layout": take["layout"],
+        "wearing": take["wearing"],
+        "simulated": take["simulated"],
+        "source": take["source"],
+        "added": moment(take["created_at"]),
+        "frames": f"{take['frames']} in {take['duration_s']:.2f} s",
+        **({"lead-in": f"{found['lead_in_frames']} of them in {lead_in_s:.2f} s"} if lead_in_s else {}),
+        "state": take["state"],
+        **({"frames sent": accounting["sent"]} if "sent" in accounting else {}),
+        "rate (Hz)": found["rate_hz"],
+        "gaps": gaps,
+        "repeated frames": f"{100 * found['repeated_frames']:.0f} %",
+        "with reference": f"{100 * found['frames_with_reference']:.0f} % of the frames",
+        "context": take["context"],
+    }
+
+
+@app.command("reference")
+def reference(
+    take: Take,
+    file: Annotated[
+        Path, typer.Argument(exists=True, dir_okay=False, help="Table with time_s and r.* columns.")
+    ],
+    clock: Annotated[
+        Literal["take", "wall"],
+        typer.Option(help="What time_s counts. take: as in the take itself; wall: Unix seconds."),
+    ] = "take",
+) -> None:
+    """Attach reference angles that were measured elsewhere to a recorded take."""
+    with connect() as service:
+        document = service.attach_reference(_id(service, take), file, clock=clock)
+        found = service.get(f"/takes/{document['id']}/check")
+    out.print(
+        f"Take {document['name']} now has {document['reference_rows']} reference rows; "
+        f"{100 * found['frames_with_reference']:.0f} % of its frames have a reference."
+    )
+    for sentence in found["sentences"]:
+        err.print(sentence, style="yellow")
+
+
+@app.command("export")
+def export(
+    take: Take,
+    file: Annotated[Path, typer.Argument(help="Where to write; .csv or .parquet.")],
+    overwrite: Overwrite = False,
+) -> None:
+    """Write a take as a take table; two tables when its reference has a clock of its own."""
+    if file.suffix.lower() not in FORMATS:
+        raise typer.BadParameter(f"{file.name!r} must end in .csv or .parquet, the formats of a take table")
+    with connect() as service:
+        write_whole(_tables(service, take, file, overwrite))
+
+
+def _tables(service: RestClient, take: str, file: Path, overwrite: bool) -> dict[Path, bytes]:
+    path, table_format = f"/takes/{_id(service, take)}/export", file.suffix.lstrip(".").lower()
+    try:
+        whole = service.download(path, {"format": table_format})
+    except ServiceError as error:
+        if error.status != CONFLICT:
+            raise
+        stem = file.stem.removesuffix(".frames")
+        parts = {part: file.with_name(f"{stem}.{part}{file.suffix}") for part in ("frames", "reference")}
+        require_place(*parts.values(), overwrite=overwrite)
+        return {
+            name: service.download(path, {"format": table_format, "part": part})
+            for part, name in parts.items()
+        }
+    require_place(file, overwrite=overwrite)
+    return {file: whole}
+
+
+@app.command("use-layout")
+def use_layout(
+    layout: Annotated[str, typer.Argument(help="The layout's name.", callback=identifier("layout"))],
+    take: Annotated[
+        list[str] | None, typer.Argument(help="Takes: names or ids. Default: all of the subject.")
+    ] = None,
+    subject: OnlySubject = None,
+) -> None:
+    """Read takes by another layout of the same sensors, such as one that take examine --keep made."""
+    if not take and subject is None:
+        raise typer.BadParameter("say which: TAKE ..., or all takes of a subject with --subject")
+    with connect() as service:
+        rows = service.get("/takes", {"subject": subject} if subject else {})
+        wanted = find_takes(rows, take) if take else rows
+        for row in wanted:
+            service.put(f"/takes/{row['id']}/layout", {"layout": layout})
+    out.print(
+        f"Read by layout {layout} from now on: {', '.join(row['name'] for row in wanted) or 'no take'}."
+    )
+
+
+@app.command("remove")
+def remove(take: Take) -> None:
+    """Remove a take that no model was trained on. The file it came from stays in the data folder."""
+    with connect() as service:
+        row = find_take(service.get("/takes"), take)
+        service.delete(f"/takes/{row['id']}")
+    out.print(f"Removed take {row['name']} ({row['id']}).")
+
+
+def _id(service: RestClient, take: str) -> str:
+    return find_take(service.get("/takes"), take)["id"]

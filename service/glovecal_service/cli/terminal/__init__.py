@@ -1,0 +1,1 @@
+"""What every verb does in a terminal: reach the service, print, wait, refuse, write files."""

@@ -1,0 +1,86 @@
+"""Waiting with a progress bar on a terminal and silence elsewhere: for a job, for some seconds."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+from rich.progress import BarColumn, Progress, Task, TextColumn, TimeElapsedColumn
+from rich.text import Text
+
+from glovecal_client.errors import ServiceError
+from glovecal_service.cli.terminal.printing import err
+from glovecal_service.cli.terminal.refusal import Refusal
+
+if TYPE_CHECKING:
+    from glovecal_client.rest import RestClient
+
+STEP_S = 0.1
+BAR_WIDTH, TEXT_WIDTH = 12, 44
+"""Text, bar, percentage and time fit into 80 columns."""
+
+
+def wait_for_job(
+    service: RestClient, job: str, *, quiet: bool = False, cancel: bool = True
+) -> dict[str, Any]:
+    """The finished job. Raises Refusal when it failed; Ctrl-C cancels it, if ``cancel``, and raises on."""
+    with _bar(quiet) as progress:
+        bar = progress.add_task("waiting for a worker", total=1.0)
+
+        def show(document: dict[str, Any]) -> None:
+            sentence = document["sentence"] or "waiting for a worker"
+            progress.update(
+                bar,
+                completed=document["fraction"],
+                description=_short(sentence),
+                left=document["detail"].get("seconds_left"),
+            )
+
+        try:
+            return service.wait_for_job(job, progress=show)
+        except (KeyboardInterrupt, SystemExit):
+            if cancel:
+                service.post(f"/jobs/{job}/cancel")
+                err.print(f"Job {job} is cancelled; what it finished is kept for the next try.")
+            raise
+        except ServiceError as error:
+            if not error.title.startswith("Job "):
+                raise
+            reason = f": {error.detail}" if error.detail else ""
+            raise Refusal(f"job {job} {error.title.removeprefix('Job ')}{reason}") from error
+
+
+def wait_seconds(seconds: float, what: str, *, quiet: bool = False) -> None:
+    """Let time pass, with a bar; Ctrl-C raises on."""
+    until = time.monotonic() + seconds
+    with _bar(quiet) as progress:
+        bar = progress.add_task(what, total=seconds)
+        while (left := until - time.monotonic()) > 0:
+            time.sleep(min(STEP_S, left))
+            progress.update(bar, completed=seconds - max(0.0, until - time.monotonic()))
+
+
+def _short(sentence: str) -> str:
+    """What fits; before a colon stands what the bar is about, after it how far that is."""
+    _, colon, news = sentence.partition(": ")
+    return (news if colon and len(sentence) > TEXT_WIDTH else sentence)[:TEXT_WIDTH]
+
+
+def _bar(quiet: bool) -> Progress:
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(BAR_WIDTH),
+        TextColumn("{task.percentage:>3.0f} %"),
+    )
+    shown = err.is_terminal and not quiet
+    return Progress(*columns, _TimeColumn(), console=err, transient=True, disable=not shown)
+
+
+class _TimeColumn(TimeElapsedColumn):
+    """How long it will still take, where the job tells; else how long it has taken."""
+
+    def render(self, task: Task) -> Text:
+        left = task.fields.get("left")
+        if left is None:
+            return super().render(task)
+        return Text(f"about {max(1, round(left))} s left", style="progress.remaining")

@@ -1,0 +1,1 @@
+"""Physical effects: ``/v1/effects``, and diagnosis, changes and improvement of models."""

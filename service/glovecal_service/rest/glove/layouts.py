@@ -1,0 +1,166 @@
+"""``gloves``: layouts (what kinds of glove there are) and the gloves that were seen on the network."""
+
+from __future__ import annotations
+
+import tomllib
+from datetime import datetime
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Request
+from fastapi.exceptions import RequestValidationError
+from pydantic import BaseModel, Field, FiniteFloat, StringConstraints, ValidationError
+from starlette.concurrency import run_in_threadpool
+
+from glovecal_models.errors import BadLayout
+from glovecal_models.layout import Layout
+from glovecal_service.rest.http.answers import change_problems, problems
+from glovecal_service.rest.http.dependencies import StoreNeeded
+from glovecal_service.rest.http.names import (
+    ONE_LINE,
+    Channel,
+    Identifier,
+    NameInPath,
+    SubjectName,
+    Title,
+    WearingName,
+)
+from glovecal_service.rest.http.problem import Problem
+from glovecal_service.rest.http.strict_body import StrictBody
+from glovecal_service.store.errors import NotFound
+from glovecal_service.store.records import GloveRecord, LayoutRecord
+
+router = APIRouter(prefix="/gloves", tags=["gloves"])
+
+MOST_CHANNELS = 512
+Channels = Annotated[list[Channel], Field(max_length=MOST_CHANNELS)]
+Expression = Annotated[str, StringConstraints(max_length=2000, pattern=ONE_LINE)]
+
+
+class LayoutBody(StrictBody):
+    """A layout file: TOML and JSON have the same keys."""
+
+    name: Identifier | None = Field(None, description="None: as in the path.")
+    title: Title = ""
+    sensors: Annotated[list[Channel], Field(min_length=1, max_length=MOST_CHANNELS)]
+    rotations: Annotated[dict[Channel, Channels], Field(max_length=MOST_CHANNELS)] = Field(
+        {}, description="Rotation: the sensors it is read from."
+    )
+    simulated: Annotated[dict[Channel, Expression], Field(max_length=MOST_CHANNELS)] = Field(
+        {}, description="Rotation without a sensor: an expression of sensors, such as `2/3 * I_PIP`."
+    )
+    palm: Channels = Field(default_factory=list)
+    context: Channels = Field(default_factory=list)
+    counts: Annotated[list[FiniteFloat], Field(min_length=2, max_length=2)] | None = None
+    order: Channels | None = None
+    also: Channels | None = None
+
+
+class LayoutView(BaseModel):
+    name: str
+    title: str
+    sensors: list[str]
+    rotations: list[str]
+    document: dict[str, Any] = Field(description="As in a layout file, every rotation spelled out.")
+    built_in: bool
+    created_at: datetime | None
+
+
+class GloveView(BaseModel):
+    name: str
+    layout: str | None
+    subject: str | None
+    wearing: str | None
+    hand: str
+    simulated: bool
+    meta: dict[str, Any]
+    first_seen_at: datetime
+    last_seen_at: datetime
+    assigned_at: datetime | None
+
+
+class Gloves(BaseModel):
+    layouts: list[LayoutView]
+    seen: list[GloveView]
+
+
+class Wearer(StrictBody):
+    subject: SubjectName | None = Field(description="None: nobody.")
+    wearing: WearingName | None = None
+
+
+@router.get("", response_model=Gloves, summary="Layouts, and gloves seen", responses=problems())
+def list_gloves(store: StoreNeeded) -> dict[str, Any]:
+    return {"layouts": [_view(record) for record in store.layouts.list()], "seen": store.gloves.list()}
+
+
+@router.get("/{layout}", response_model=LayoutView, summary="One layout", responses=problems())
+def get_layout(layout: NameInPath, store: StoreNeeded) -> LayoutView:
+    for record in store.layouts.list():
+        if record.name == layout:
+            return _view(record)
+    raise NotFound(f"there is no layout {layout!r}")
+
+
+@router.put(
+    "/{layout}",
+    response_model=LayoutView,
+    summary="Store a layout, TOML or JSON",
+    responses=change_problems(409, 415),
+    openapi_extra={
+        "requestBody": {
+            "required": True,
+            "content": {
+                "application/json": {"schema": {"$ref": "#/components/schemas/LayoutBody"}},
+                "application/toml": {"schema": {"type": "string"}},
+            },
+        }
+    },
+)
+async def put_layout(layout: NameInPath, request: Request, store: StoreNeeded) -> LayoutView:
+    """The name inside must be the name in the path. 409 when a different layout of the name is in use."""
+    body = _checked(await request.body(), request.headers.get("content-type", ""))
+    if body.name not in (None, layout):
+        raise Problem(422, "bad-layout", f"the path names layout {layout!r}, the body {body.name!r}")
+    parsed = Layout.from_document(body.model_dump(exclude_none=True) | {"name": layout})
+    return _view(await run_in_threadpool(store.layouts.put, parsed))
+
+
+@router.put(
+    "/{glove}/wearer",
+    response_model=GloveView,
+    summary="Say who wears a glove",
+    responses=change_problems(),
+)
+def set_wearer(glove: NameInPath, body: Wearer, store: StoreNeeded) -> GloveRecord:
+    """The live stream is predicted by that subject's active model from then on."""
+    return store.gloves.assign(glove, body.subject, body.wearing)
+
+
+def _view(record: LayoutRecord) -> LayoutView:
+    layout = Layout.from_document(record.document)
+    return LayoutView(
+        name=record.name,
+        title=layout.title,
+        sensors=list(layout.sensors),
+        rotations=list(layout.rotations),
+        document=record.document,
+        built_in=record.built_in,
+        created_at=record.created_at,
+    )
+
+
+def _checked(content: bytes, content_type: str) -> LayoutBody:
+    kind = content_type.partition(";")[0].strip().lower()
+    if kind not in ("application/json", "application/toml"):
+        raise Problem(
+            415, "media-type", f"send application/toml or application/json, not {kind or 'nothing'}"
+        )
+    try:
+        if kind == "application/json":
+            return LayoutBody.model_validate_json(content)
+        return LayoutBody.model_validate(tomllib.loads(content.decode("utf-8")))
+    except ValidationError as error:
+        found = error.errors(include_input=False, include_url=False)
+        raise RequestValidationError([{**item, "loc": ("body", *item["loc"])} for item in found]) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise BadLayout(f"layout: not valid TOML: {error}") from error

@@ -1,0 +1,84 @@
+"""``recordings``: takes in the making; the real-time process carries them out."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Response
+from pydantic import BaseModel, Field
+
+from glovecal_service.rest.http.answers import change_problems, problems
+from glovecal_service.rest.http.damaged_rows import without_damaged
+from glovecal_service.rest.http.dependencies import StoreNeeded
+from glovecal_service.rest.http.names import IDENTIFIER, Identifier, IdInPath, SubjectName, WearingName
+from glovecal_service.rest.http.strict_body import StrictBody
+from glovecal_service.store.recordings import LEAD_IN_S, LONGEST_LEAD_IN_S
+from glovecal_service.store.records import RecordingRecord, RecordingState
+
+router = APIRouter(prefix="/recordings", tags=["recordings"])
+
+
+class NewRecording(StrictBody):
+    glove: Identifier
+    name: WearingName = Field(description="What the take will be called.")
+    subject: SubjectName | None = Field(None, description="None: who wears the glove now.")
+    wearing: WearingName | None = None
+    lead_s: float = Field(
+        LEAD_IN_S,
+        ge=0,
+        le=LONGEST_LEAD_IN_S,
+        description="Seconds before the request that are fetched from the capture log, as far as they lie in "
+        "the same run and wearing: they tell effects with a memory where they stand.",
+    )
+
+
+class Recording(BaseModel):
+    id: str
+    glove: str
+    name: str
+    subject: str | None
+    wearing: str | None
+    state: RecordingState
+    facts: dict[str, Any] = Field(
+        description="`sent`, `recorded`, `repaired`, `missing`, `pending`, `lead_in`, `take`, `sentence` ..."
+    )
+    requested_at: datetime
+    updated_at: datetime
+
+
+@router.post(
+    "",
+    status_code=201,
+    response_model=Recording,
+    summary="Start recording a glove",
+    responses=change_problems(409),
+)
+def start_recording(body: NewRecording, store: StoreNeeded, response: Response) -> RecordingRecord:
+    """404 when the glove was never seen, 409 while it is being recorded."""
+    record = store.recordings.request(**body.model_dump())
+    response.headers["Location"] = f"/v1/recordings/{record.id}"
+    return record
+
+
+@router.get("", response_model=list[Recording], summary="Recordings, newest first", responses=problems())
+def list_recordings(
+    store: StoreNeeded,
+    response: Response,
+    glove: Annotated[str | None, Query(pattern=IDENTIFIER)] = None,
+    only_open: bool = False,
+) -> list[RecordingRecord]:
+    """Damaged rows are left out and named in `Warning` headers."""
+    return without_damaged(response, lambda: store.recordings.list(glove, only_open=only_open))
+
+
+@router.get("/{id}", response_model=Recording, summary="One recording", responses=problems())
+def get_recording(id: IdInPath, store: StoreNeeded) -> RecordingRecord:
+    return store.recordings.get(id)
+
+
+@router.post("/{id}/stop", response_model=Recording, summary="Stop a recording", responses=change_problems())
+def stop_recording(id: IdInPath, store: StoreNeeded) -> RecordingRecord:
+    """Asking again changes nothing. The take is there once `state` is `done`, or `repairing`: then frames are
+    not there yet, and the take is completed, and `done`, once the capture log could be asked for them."""
+    return store.recordings.stop(id)

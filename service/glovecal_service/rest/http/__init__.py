@@ -1,0 +1,1 @@
+"""What belongs to no noun: guards, problem documents, health, metrics, and what endpoints share."""

@@ -1,0 +1,131 @@
+"""From exceptions to problem documents: one place decides which error is which answer."""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
+from starlette.responses import Response
+
+from glovecal_models.errors import (
+    BadInput,
+    BadLayout,
+    BadTakeTable,
+    DamagedArtifact,
+    GlovecalError,
+    LayoutMismatch,
+    NotTrainable,
+)
+from glovecal_service.plain import plain_text
+from glovecal_service.rest.http.names import MEANING
+from glovecal_service.rest.http.problem import Problem
+from glovecal_service.store.errors import Conflict, NotFound, StorageFull, StoreDamaged, StoreUnavailable
+
+MOST_FIELD_PROBLEMS = 20
+
+
+def install_error_handlers(app: FastAPI) -> None:
+    """Every error on purpose becomes its problem; the rest is caught by ``Observation``."""
+    kinds = (Problem, HTTPException, RequestValidationError, ClientDisconnect, GlovecalError, OSError)
+    for kind in kinds:
+        app.add_exception_handler(kind, _answer)
+
+
+async def _answer(request: Request, error: Exception) -> Response:
+    if isinstance(error, HTTPException) and error.status_code == 405:
+        error = _method_not_allowed(request.app.state.allowed_methods(request.url.path))
+    return problem_of(error).response(getattr(request.state, "request_id", None))
+
+
+def problem_of(error: Exception) -> Problem:
+    """The problem an exception is answered with; re-raises what nobody raised on purpose."""
+    match error:
+        case Problem():
+            return error
+        case RequestValidationError():
+            return invalid_request(error.errors())
+        case HTTPException():
+            return _http_problem(error)
+        case NotFound():
+            return Problem(404, "not-found", str(error))
+        case Conflict():
+            return Problem(409, "conflict", str(error))
+        case StorageFull():
+            return storage_full(str(error))
+        case StoreDamaged() | DamagedArtifact():
+            return Problem(500, "damaged", str(error), title="Damaged data")
+        case StoreUnavailable():
+            return Problem(503, "store-unavailable", str(error), headers={"Retry-After": "5"})
+        case BadInput():
+            return _bad_input(error)
+        case ClientDisconnect():
+            return Problem(408, "body-incomplete", "The connection ended before the body; nothing was kept.")
+        case OSError() if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            return storage_full("The disk is full; nothing was kept. Free some space and send it again.")
+    raise error
+
+
+def invalid_request(errors: Sequence[Any]) -> Problem:
+    """422 from pydantic's findings. The input is left out: it may be huge, secret, or not JSON."""
+    fields = [
+        {
+            "location": plain_text(".".join(map(str, item["loc"])), 200),
+            "problem": _what_is_right(item),
+        }
+        for item in errors[:MOST_FIELD_PROBLEMS]
+    ]
+    more = f" and {len(errors) - 1} more" if len(errors) > 1 else ""
+    first = f"{fields[0]['location']}: {fields[0]['problem']}" if fields else "the request is not valid"
+    return Problem(422, "invalid-request", f"{first}{more}", errors=fields)
+
+
+def _what_is_right(item: Mapping[str, Any]) -> str:
+    pattern = item.get("ctx", {}).get("pattern")
+    return MEANING.get(pattern) or plain_text(item["msg"], 300)
+
+
+def storage_full(detail: str) -> Problem:
+    return Problem(507, "storage-full", detail)
+
+
+def _http_problem(error: HTTPException) -> Problem:
+    headers = dict(error.headers or {})
+    if error.status_code == 404:
+        return Problem(404, "not-found", "There is nothing under this path.", headers=headers)
+    if error.status_code == 400:
+        return Problem(422, "invalid-request", "The body cannot be read as JSON (too deep, or not UTF-8).")
+    return Problem(error.status_code, "http", str(error.detail), headers=headers)
+
+
+def _method_not_allowed(methods: Sequence[str]) -> Problem:
+    allowed = ", ".join(methods)
+    return Problem(
+        405, "method-not-allowed", f"This path answers to {allowed} only.", headers={"Allow": allowed}
+    )
+
+
+def _bad_input(error: BadInput) -> Problem:
+    match error:
+        case BadTakeTable():
+            return Problem(
+                422,
+                "bad-take-table",
+                str(error),
+                title="Take table cannot be imported",
+                file=error.file,
+                line=error.line,
+                column=error.column,
+                value=error.value,
+            )
+        case BadLayout():
+            return Problem(422, "bad-layout", str(error), title="Layout cannot be used")
+        case LayoutMismatch():
+            return Problem(422, "layout-mismatch", str(error), title="Layouts differ")
+        case NotTrainable():
+            return Problem(422, "not-trainable", str(error), title="Cannot be trained")
+    return Problem(422, "bad-input", str(error), title="Input cannot be used")

@@ -1,0 +1,110 @@
+"""Each request seen from outside: its id, one log line, its metrics, and no traceback to the client."""
+
+from __future__ import annotations
+
+import logging
+import re
+import secrets
+import time
+from typing import Any
+
+import structlog
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from glovecal_service.plain import plain_text
+from glovecal_service.rest.http.metrics import Metrics
+from glovecal_service.rest.http.problem import Problem
+
+PREFIX = "/v1"
+REQUEST_ID = re.compile(r"[A-Za-z0-9_-]{8,64}\Z")
+
+log: Any = structlog.wrap_logger(
+    logging.getLogger("glovecal.rest"),
+    processors=[
+        structlog.stdlib.filter_by_level,
+        structlog.processors.add_log_level,
+        structlog.processors.TimeStamper(fmt="iso", utc=True),
+        structlog.processors.format_exc_info,
+        structlog.processors.JSONRenderer(),
+    ],
+    wrapper_class=structlog.stdlib.BoundLogger,
+)
+"""Goes through the standard library's logging, so that whoever starts the process decides where to."""
+
+
+class Observation:
+    """ASGI middleware, the outermost. Logs neither headers, queries nor bodies: secrets live there."""
+
+    def __init__(self, app: ASGIApp, *, metrics: Metrics) -> None:
+        self.app = app
+        self.metrics = metrics
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        request_id = _request_id(scope)
+        scope.setdefault("state", {})["request_id"] = request_id
+        answer = _Answer(send, request_id)
+        began = time.perf_counter()
+        try:
+            await self.app(scope, receive, answer.send)
+        except Exception:
+            log.exception("request failed", request_id=request_id, route=_route(scope))
+            await _answer_failure(answer, scope, receive, request_id)
+        finally:
+            self._note(scope, answer, request_id, time.perf_counter() - began)
+
+    def _note(self, scope: Scope, answer: _Answer, request_id: str, seconds: float) -> None:
+        route = _route(scope)
+        self.metrics.answered(scope["method"], route, answer.status, seconds)
+        log.info(
+            "request",
+            request_id=request_id,
+            method=plain_text(scope["method"], 20),
+            path=plain_text(scope["path"], 200),
+            route=route,
+            status=answer.status,
+            ms=round(1e3 * seconds, 2),
+            sent_bytes=answer.sent_bytes,
+        )
+
+
+class _Answer:
+    def __init__(self, send: Send, request_id: str) -> None:
+        self._send = send
+        self._request_id = request_id.encode()
+        self.status = 0
+        self.sent_bytes = 0
+
+    async def send(self, message: Message) -> None:
+        if message["type"] == "http.response.start":
+            self.status = message["status"]
+            added = [(b"x-request-id", self._request_id), (b"x-content-type-options", b"nosniff")]
+            message = {**message, "headers": [*message.get("headers", []), *added]}
+        self.sent_bytes += len(message.get("body", b""))
+        await self._send(message)
+
+
+async def _answer_failure(answer: _Answer, scope: Scope, receive: Receive, request_id: str) -> None:
+    if answer.status:
+        raise ConnectionAbortedError("the answer broke off; see the log line before")
+    problem = Problem(
+        500, "failure", f"Something failed inside the service; its log has it under request id {request_id}."
+    )
+    await problem.response(request_id)(scope, receive, answer.send)
+
+
+def _request_id(scope: Scope) -> str:
+    for name, value in scope["headers"]:
+        if name == b"x-request-id" and REQUEST_ID.match(given := value.decode("latin-1")):
+            return given
+    return secrets.token_hex(8)
+
+
+def _route(scope: Scope) -> str:
+    """The route's pattern. Some versions of FastAPI leave the prefix of an included router out of it."""
+    path = getattr(scope.get("route"), "path", None)
+    if path is None:
+        return "unmatched"
+    return path if path.startswith(PREFIX) or not scope["path"].startswith(PREFIX) else PREFIX + path

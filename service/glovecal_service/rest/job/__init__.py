@@ -1,0 +1,1 @@
+"""Long work: ``/v1/jobs``."""

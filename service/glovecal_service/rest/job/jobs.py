@@ -1,0 +1,110 @@
+"""``jobs``: long work, its progress, and how to stop it."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator
+from datetime import datetime
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Header, Response
+from fastapi.sse import EventSourceResponse, ServerSentEvent
+from pydantic import BaseModel, Field
+
+from glovecal_service.plain import plain
+from glovecal_service.rest.http.answers import change_problems, problems
+from glovecal_service.rest.http.damaged_rows import without_damaged
+from glovecal_service.rest.http.dependencies import StoreNeeded
+from glovecal_service.rest.http.names import IdInPath, SubjectFilter
+from glovecal_service.store.records import FINISHED_JOB_STATES, JobEvent, JobRecord, JobState
+from glovecal_service.store.store import Store
+
+router = APIRouter(prefix="/jobs", tags=["jobs"])
+
+LOOK_EVERY_S = 0.25
+LONGEST_STREAM_S = 3600.0
+"""After this the stream ends without ``done``; listeners connect again with ``Last-Event-ID``."""
+
+
+class Job(BaseModel):
+    id: str
+    kind: str
+    subject: str | None
+    payload: dict[str, Any]
+    state: JobState
+    attempt: int
+    cancel_requested: bool
+    fraction: float = Field(description="Done so far, 0 to 1.")
+    sentence: str
+    detail: dict[str, Any]
+    result: dict[str, Any] | None
+    error: str | None
+    traceback: str | None = Field(
+        description="Python's, of a job that failed by an error in Glovecal itself; at most 8,000 characters."
+    )
+    created_at: datetime
+    started_at: datetime | None
+    finished_at: datetime | None
+    updated_at: datetime
+
+
+@router.get("", response_model=list[Job], summary="Jobs, newest first", responses=problems())
+def list_jobs(
+    store: StoreNeeded, response: Response, subject: SubjectFilter = None, only_unfinished: bool = False
+) -> list[JobRecord]:
+    """Damaged rows are left out and named in `Warning` headers."""
+    return without_damaged(
+        response, lambda: store.jobs.list(subject=subject, only_unfinished=only_unfinished)
+    )
+
+
+@router.get("/{id}", response_model=Job, summary="One job", responses=problems())
+def get_job(id: IdInPath, store: StoreNeeded) -> JobRecord:
+    return store.jobs.get(id)
+
+
+@router.post("/{id}/cancel", response_model=Job, summary="Stop a job", responses=change_problems())
+def cancel_job(id: IdInPath, store: StoreNeeded) -> JobRecord:
+    """A finished job stays as it is. What it finished so far is kept for the next try."""
+    return store.jobs.request_cancel(id)
+
+
+def _known_job(id: IdInPath, store: StoreNeeded) -> JobRecord:
+    return store.jobs.get(id)
+
+
+@router.get(
+    "/{id}/events",
+    response_class=EventSourceResponse,
+    summary="A job's progress as it happens",
+    responses=problems(),
+)
+async def job_events(
+    job: Annotated[JobRecord, Depends(_known_job)],
+    store: StoreNeeded,
+    last_event_id: Annotated[int, Header(ge=0, le=2**62, description="Only what came after it.")] = 0,
+) -> AsyncIterator[ServerSentEvent]:
+    """Server-sent events: `progress` for each step from the first on, then `done` with the whole job."""
+    until = time.monotonic() + LONGEST_STREAM_S
+    while time.monotonic() < until:
+        finished = await asyncio.to_thread(_finished, store, job.id)
+        for step in await asyncio.to_thread(store.jobs.events, job.id, last_event_id):
+            last_event_id = step.id
+            yield ServerSentEvent(event="progress", id=str(step.id), data=_step(step))
+        if finished is not None:
+            yield ServerSentEvent(event="done", data=finished)
+            return
+        await asyncio.sleep(LOOK_EVERY_S)
+
+
+def _finished(store: Store, id: str) -> dict[str, Any] | None:
+    record = store.jobs.get(id)
+    if record.state not in FINISHED_JOB_STATES:
+        return None
+    return Job.model_validate(record, from_attributes=True).model_dump(mode="json")
+
+
+def _step(step: JobEvent) -> dict[str, Any]:
+    names = ("attempt", "state", "fraction", "sentence", "detail")
+    return plain({name: getattr(step, name) for name in names})

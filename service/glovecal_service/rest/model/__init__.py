@@ -1,0 +1,1 @@
+"""Calibration models: train, show, predict, compare, check: ``/v1/models``."""

@@ -1,0 +1,237 @@
+"""``models/{id}/compare``, ``where`` and ``report``: a model against measurements, numbers to pictures."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Response
+from pydantic import BaseModel, Field
+
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.comparison.compare import compare
+from glovecal_models.comparison.residuals import residuals
+from glovecal_models.comparison.where_it_fails import where_it_fails
+from glovecal_models.hand.dimensions import HandDimensions
+from glovecal_service.plain import plain
+from glovecal_service.report.reported_model import ReportedModel
+from glovecal_service.rest.http.answers import change_problems
+from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
+from glovecal_service.rest.http.names import Id, ModelInPath, ModelReference
+from glovecal_service.rest.http.strict_body import StrictBody
+from glovecal_service.rest.model.fingertip_view import FingertipsView
+from glovecal_service.rest.model.versions_before import versions_before
+from glovecal_service.store.records import ModelRecord
+from glovecal_service.store.store import Store
+
+router = APIRouter(prefix="/models", tags=["models"])
+
+MOST_TAKES = 1000
+MOST_BESIDE = 7
+
+
+class Against(StrictBody):
+    takes: Annotated[list[Id], Field(min_length=1, max_length=MOST_TAKES)]
+
+
+class AgainstBeside(Against):
+    beside: Annotated[list[ModelReference], Field(max_length=MOST_BESIDE)] = Field(
+        default=[], description="Other models, held against the same takes and shown beside this one."
+    )
+
+
+class Floor(BaseModel):
+    floor_deg: float | None = Field(description="How small an error can get on these measurements.")
+    low_deg: float | None = Field(description="95 % interval, from resampled pieces.")
+    high_deg: float | None
+    prediction_deg: float | None = Field(description="What of it is the prediction's own jitter.")
+    how: str = Field(
+        description="still hand, still joint, repeated poses, spectrum, frame to frame or near readings; the "
+        "best first."
+    )
+    pieces: int = Field(description="Holds, repeats or blocks of time that it was pooled from.")
+    is_lower_bound: bool = Field(description="Noise with a memory is not in it.")
+
+
+class SlowShareView(BaseModel):
+    share: float | None = Field(description="Share of the error's variance below 1 Hz.")
+    low: float | None = Field(description="95 % interval, from resampled blocks of time.")
+    high: float | None
+
+
+class Errors(BaseModel):
+    count: int
+    rmse_deg: float | None
+    mae_deg: float | None
+    bias_deg: float | None
+    percentile_95_deg: float | None
+    coverage: float | None = Field(
+        description="Errors within one claimed standard deviation; 0.68 is truthful."
+    )
+    nlpd: float | None = Field(
+        description="Mean negative log predictive density, nats; a truthful constant standard deviation has "
+        "ln(RMSE) + 1.42. Null where a claimed standard deviation is 0."
+    )
+    baseline_deg: float | None = Field(description="Error of always answering the mean of the measurements.")
+    floor: Floor | None = Field(description="How small the RMSE can get; null: too little was measured.")
+
+
+class PoseErrors(BaseModel):
+    pose: str
+    count: int
+    mean_deg: float | None
+    sd_deg: float | None
+
+
+class ComparisonView(BaseModel):
+    model: str
+    over_all: Errors
+    rotations: dict[str, Errors]
+    poses: list[PoseErrors]
+    not_measured: list[str]
+    not_predicted: list[str]
+    fingertips: FingertipsView | None = Field(
+        description="Null where no finger's chain was predicted and measured."
+    )
+    left_out: dict[str, int] = Field(
+        description="Measured frames, by rotation, that are not compared: faulty sensors, repeated frames."
+    )
+    trained_on: list[str] = Field(description="Takes among those given that the model was trained on.")
+
+
+class DependenceView(BaseModel):
+    covariate: str
+    unit: str
+    phrase: str
+    edges: list[float | None]
+    mean_deg: list[float | None] = Field(description="Mean error in each bin.")
+    count: list[int]
+    chance_deg: list[float | None] = Field(
+        description="How far 95 % of the time shifts take a bin's mean from the mean of all."
+    )
+    explained_deg: float | None
+    probability: float | None = Field(description="Share of time shifts that explain as much.")
+    is_structure: bool = Field(description="No noise, and large enough to matter.")
+
+
+class WearingsView(BaseModel):
+    rotation: str
+    wearings: list[str]
+    mean_deg: list[float | None]
+    takes: list[int]
+    spread_deg: float | None
+    probability: float | None = Field(description="Null: too few takes to say.")
+    sentence: str
+
+
+class Findings(BaseModel):
+    rotation: str
+    rmse_deg: float | None
+    bias_deg: float | None
+    floor: Floor | None
+    other_floors: list[Floor] = Field(description="Less good estimates of the floor.")
+    slow: SlowShareView | None
+    dependences: list[DependenceView]
+    wearings: WearingsView | None
+    sentence: str
+
+
+class StretchView(BaseModel):
+    take: str
+    start_s: float
+    end_s: float
+    rmse_deg: float | None
+    rotation: str
+    rotation_rmse_deg: float | None
+    pose: str
+
+
+class WhereView(BaseModel):
+    model: str
+    rotations: list[Findings] = Field(description="The one farthest above its noise floor first.")
+    stretches: list[StretchView] = Field(description="The worst seconds, worst first.")
+    trained_on: list[str] = Field(description="Takes among those given that the model was trained on.")
+
+
+@router.post(
+    "/{id}/compare",
+    response_model=ComparisonView,
+    summary="The model against measurements",
+    responses=change_problems(409),
+)
+def compare_model(id: ModelInPath, body: Against, parts: PartsNeeded) -> dict[str, Any]:
+    """Errors in degrees, and of fingertips in mm; `trained_on` says which takes it has seen before."""
+    record, model, wanted, seen = _chosen(id, body, parts)
+    takes = [parts.store.takes.load(take) for take in wanted]
+    comparison = compare(model, takes, dimensions=_hand_of(record, parts))
+    return plain(comparison.to_document()) | {"model": record.id, "trained_on": seen}
+
+
+@router.post(
+    "/{id}/where",
+    response_model=WhereView,
+    summary="Where the model fails",
+    responses=change_problems(409),
+)
+def where_model_fails(id: ModelInPath, body: Against, parts: PartsNeeded) -> dict[str, Any]:
+    """Noise floor, what each error depends on (against chance), wearings, and the worst seconds."""
+    record, model, wanted, seen = _chosen(id, body, parts)
+    found = residuals(model, [parts.store.takes.load(take) for take in wanted])
+    document = plain(where_it_fails(found).to_document())
+    return document | {"model": record.id, "trained_on": seen}
+
+
+@router.post(
+    "/{id}/report",
+    response_class=Response,
+    summary="The comparison as a page with pictures",
+    responses=change_problems(409)
+    | {
+        200: {
+            "description": "One HTML file that needs nothing else.",
+            "content": {"text/html": {"schema": {"type": "string"}}},
+        }
+    },
+)
+def report_on_model(id: ModelInPath, body: AgainstBeside, parts: PartsNeeded) -> Response:
+    """Errors, where they are, what they depend on; each picture with a sentence that says what it shows."""
+    from glovecal_service.report.page import report_page  # it draws, and few requests ask for that
+
+    record, model, wanted, seen = _chosen(id, body, parts)
+    takes = [parts.store.takes.load(take) for take in wanted]
+    others = {}
+    for reference in body.beside:
+        other, loaded, _, also_seen = _chosen(reference, body, parts)
+        if other.id != record.id:
+            others[other.id] = ReportedModel(other.id, loaded, also_seen)
+    ancestors, simpler = versions_before(parts, record)
+    page = report_page(
+        ReportedModel(record.id, model, seen),
+        takes,
+        list(others.values()),
+        ancestors=ancestors,
+        simpler=simpler,
+        dimensions=_hand_of(record, parts),
+    )
+    return Response(page, media_type="text/html; charset=utf-8")
+
+
+def _chosen(
+    id: str, body: Against, parts: Parts
+) -> tuple[ModelRecord, CalibrationModel, list[str], list[str]]:
+    """The model, the takes wanted, and those of them it was trained on."""
+    record = parts.store.models.get(id)
+    model, _ = parts.predictors.get(record.id)
+    wanted = list(dict.fromkeys(body.takes))
+    seen = _trained_on(parts.store, model, record)
+    return record, model, wanted, [take for take in wanted if take in seen]
+
+
+def _hand_of(record: ModelRecord, parts: Parts) -> HandDimensions:
+    return parts.store.subjects.get(record.subject).skeleton().dimensions
+
+
+def _trained_on(store: Store, model: CalibrationModel, record: ModelRecord) -> set[str]:
+    """Ids of the takes whose frames the model has seen."""
+    named = {take["id"] if isinstance(take, dict) else take for take in record.facts.get("takes", [])}
+    by_hash = {take.id for take in store.takes.list(subject=record.subject) if take.artifact in model.takes}
+    return named | by_hash

@@ -1,0 +1,1 @@
+"""Guided sampling, and what to record next: ``/v1/sampling``, ``/v1/models/{id}/next-steps``."""

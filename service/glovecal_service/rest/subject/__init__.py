@@ -1,0 +1,1 @@
+"""The people whose hands are calibrated: ``/v1/subjects``."""

@@ -1,0 +1,1 @@
+"""Takes: import, reference angles, clocks, examination, holds: ``/v1/takes``, ``/v1/uploads``."""

@@ -1,0 +1,71 @@
+"""``takes/clocks``: do the clocks of glove and reference agree, and what to do when they do not."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated, Any
+
+from fastapi import APIRouter
+from pydantic import BaseModel, Field
+
+from glovecal_models.takes.clock_scan import clock_offsets
+from glovecal_service.plain import plain
+from glovecal_service.rest.http.answers import change_problems
+from glovecal_service.rest.http.dependencies import StoreNeeded
+from glovecal_service.rest.http.names import Id
+from glovecal_service.rest.http.strict_body import StrictBody
+from glovecal_service.store.takes import CLOCK_OFFSET
+
+router = APIRouter(prefix="/takes/clocks", tags=["takes"])
+
+MOST_TAKES = 500
+
+
+class Wanted(StrictBody):
+    takes: Annotated[list[Id], Field(min_length=1, max_length=MOST_TAKES)]
+
+
+class Examined(Wanted):
+    repair: bool = Field(False, description="Move each reference whose clock is found to be off.")
+
+
+class ClockView(BaseModel):
+    id: str
+    take: str
+    verdict: str = Field(description='"offset", "agrees", "not judgeable" or "range too small".')
+    offset_s: float | None = Field(description="Reference time = frame time + offset; 0 unless found.")
+    low_s: float | None
+    high_s: float | None
+    unexplained_before: float | None = Field(description="Share of the variance that no linear map explains.")
+    unexplained_after: float | None
+    unexplained_reversed: float | None = Field(description="The same by chance: sensors played backwards.")
+    sentence: str
+    repaired: bool
+
+
+@router.post(
+    "", response_model=list[ClockView], summary="Examine reference clocks", responses=change_problems(409)
+)
+def examine_clocks(body: Examined, store: StoreNeeded) -> list[dict[str, Any]]:
+    """Takes of one wearing are judged together. A repair keeps the take's id, and can be undone."""
+    wanted = list(dict.fromkeys(body.takes))
+    found = clock_offsets([store.takes.load(id) for id in wanted])
+    answers = []
+    for id, clock in zip(wanted, found, strict=True):
+        repaired = body.repair and clock.verdict == "offset"
+        if repaired:
+            store.takes.shift_reference(id, -clock.offset_s)
+        answers.append(plain(asdict(clock)) | {"id": id, "repaired": repaired})
+    return answers
+
+
+@router.post("/undo", response_model=list[str], summary="Undo repairs", responses=change_problems(409))
+def undo_repairs(body: Wanted, store: StoreNeeded) -> list[str]:
+    """Move references back to where they were; the ids of takes that changed."""
+    changed = []
+    for id in dict.fromkeys(body.takes):
+        offset = store.takes.get(id).facts.get(CLOCK_OFFSET, 0.0)
+        if offset:
+            store.takes.shift_reference(id, offset)
+            changed.append(id)
+    return changed
