@@ -13,22 +13,20 @@ from glovecal_models.threads import pin_blas_to_one_thread
 from glovecal_service.jobs.dispatcher import Dispatcher
 from glovecal_service.rest.effect import catalogue, changes, diagnosis, improvement
 from glovecal_service.rest.glove import layouts, recordings
-from glovecal_service.rest.http import front, health, metrics_page
-from glovecal_service.rest.http.allowed_methods import AllowedMethods
+from glovecal_service.rest.http import front, health
 from glovecal_service.rest.http.answers import install_openapi
 from glovecal_service.rest.http.body_guard import BodyGuard
-from glovecal_service.rest.http.dependencies import Parts
-from glovecal_service.rest.http.error_handlers import install_error_handlers
+from glovecal_service.rest.http.dependencies import Parts, Predictors
+from glovecal_service.rest.http.error_handlers import AllowedMethods, install_error_handlers
 from glovecal_service.rest.http.metrics import Metrics
 from glovecal_service.rest.http.observation import PREFIX, Observation
-from glovecal_service.rest.http.predictors import Predictors
 from glovecal_service.rest.http.request_guard import RequestGuard, is_loopback
 from glovecal_service.rest.http.upload_folder import UploadFolder
-from glovecal_service.rest.job import jobs, reports
-from glovecal_service.rest.model import comparison, models, predictions, quick_check, training
+from glovecal_service.rest.job import jobs
+from glovecal_service.rest.model import comparison, models, predictions, quick_check, training, where
 from glovecal_service.rest.sampling import next_steps, samplings
 from glovecal_service.rest.subject import subjects
-from glovecal_service.rest.take import clocks, examination, holds, takes, uploads
+from glovecal_service.rest.take import clocks, examination, holds, reference, table_import, takes, uploads
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
 
@@ -36,10 +34,11 @@ JSON_LIMIT_BYTES = 8_000_000
 """Enough for 20,000 frames of 18 sensors to predict."""
 BODY_PATIENCE_S = 30.0
 ROUTERS = (
-    *(subjects, layouts, clocks, holds, examination, takes, uploads, recordings, samplings),
-    *(training, models, predictions, comparison, diagnosis, changes, catalogue, improvement),
+    *(subjects, layouts, recordings, samplings),
+    *(clocks, holds, examination, table_import, takes, reference, uploads),
+    *(training, models, predictions, comparison, where, diagnosis, changes, catalogue, improvement),
     *(quick_check, next_steps),
-    *(jobs, reports, health, metrics_page),
+    *(jobs, health),
 )
 
 

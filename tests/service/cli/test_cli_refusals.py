@@ -18,7 +18,7 @@ from glovecal_models.calibration.training_settings import METHODS
 from glovecal_service.cli.command import app
 from glovecal_service.cli.model import training
 from glovecal_service.cli.terminal import options
-from glovecal_service.rest.http.names import IDENTIFIER, SUBJECT
+from glovecal_service.rest.http.request_types import IDENTIFIER, SUBJECT
 from glovecal_service.rest.model.training import Training
 from glovecal_service.simulated_device import SimulatedDevice
 

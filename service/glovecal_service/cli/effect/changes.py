@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any
 from urllib.parse import quote
 
 import typer
 
-from glovecal_service.cli.effect.own_expression import declaration_text
-from glovecal_service.cli.take.named import find_takes
+from glovecal_service.cli.take.rows import find_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Model
 from glovecal_service.cli.terminal.printing import out, print_json, print_table
@@ -17,6 +17,9 @@ from glovecal_service.cli.terminal.waiting import wait_for_job
 ERRORS = {"rotation": "rotation", "before": "error before (°)", "after": "after (°)"}
 Effect = Annotated[str, typer.Argument(help="The effect's name, as in glovecal effects.")]
 Activate = Annotated[bool, typer.Option("--activate", help="Predict live with the new model.")]
+
+_NAMED = re.compile(r"(?:^|[;\n])\s*name\s*=\s*([^;\n]*)")
+_COLUMNS = re.compile(r"(?:^|[;\n])\s*columns\s*=")
 
 
 def add_effect(
@@ -41,7 +44,7 @@ def add_effect(
 
     The model itself never changes: a child of it is stored, or nothing when the effect was undone.
     """
-    wanted: Any = effect if expression is None else {"declaration": declaration_text(effect, expression)}
+    wanted: Any = effect if expression is None else {"declaration": _declaration_text(effect, expression)}
     with connect() as service:
         rows = find_takes(service.get("/takes"), take or [])
         body: dict[str, Any] = {"effect": wanted, "rotations": rotation or None, "activate": activate}
@@ -82,3 +85,17 @@ def _say_child(result: dict[str, Any]) -> None:
     short = result["model"][:12]
     active = "Active." if result["active"] else f"Not active; glovecal model activate {short} makes it so."
     out.print(f"Model {short}, made from {result['parent'][:12]}. {active}")
+
+
+def _declaration_text(name: str, expression: str) -> str:
+    """``strap`` and ``c.strap_n * own; unit = deg`` make a declaration; a whole one stays as it is.
+
+    Raises typer.BadParameter when the text gives another name.
+    """
+    given = _NAMED.search(expression)
+    if given is not None and given.group(1).strip() != name:
+        raise typer.BadParameter(
+            f"the effect is called {name!r}, but --expression names it {given.group(1).strip()!r}"
+        )
+    text = expression if _COLUMNS.search(expression) else f"columns = {expression}"
+    return text if given is not None else f"name = {name}; {text}"

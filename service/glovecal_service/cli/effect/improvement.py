@@ -9,16 +9,21 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 from typer.core import TyperCommand
 
-from glovecal_service.cli.glove.layout_file import layout_named
+from glovecal_service.cli.glove.layouts import layout_named
 from glovecal_service.cli.take.files import FileSubject
-from glovecal_service.cli.take.named import find_takes
+from glovecal_service.cli.take.rows import find_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, subject_named
 from glovecal_service.cli.terminal.printing import err, out, print_json, print_table
 from glovecal_service.cli.terminal.refusal import Refusal
-from glovecal_service.cli.terminal.report_file import Report, fetch_job_report, write_report
 from glovecal_service.cli.terminal.waiting import wait_for_job
-from glovecal_service.cli.terminal.writing import Overwrite, require_place
+from glovecal_service.cli.terminal.writing import (
+    Overwrite,
+    Report,
+    fetch_job_report,
+    require_place,
+    write_report,
+)
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient

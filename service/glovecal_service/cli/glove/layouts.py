@@ -1,16 +1,22 @@
-"""``glovecal glove``: layouts, and the gloves that were seen."""
+"""``glovecal glove``: layouts, stored or in a file, and the gloves that were seen."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from glovecal_service.cli.glove.layout_file import add_layout_file
+from glovecal_client.errors import ServiceError
+from glovecal_models.errors import BadInput
+from glovecal_models.names import check_identifier
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Glove, identifier, subject_named
 from glovecal_service.cli.terminal.printing import moment, out, print_json, print_table
+from glovecal_service.cli.terminal.refusal import REFUSED, Refusal, exit_code_of, sentence_of
+
+if TYPE_CHECKING:
+    from glovecal_client.rest import RestClient
 
 app = typer.Typer(help="Layouts, and the gloves that were seen.", no_args_is_help=True)
 
@@ -88,3 +94,30 @@ def wear(
     with connect() as service:
         service.put(f"/gloves/{glove}/wearer", {"subject": subject, "wearing": wearing})
     out.print(f"{glove} is worn by {subject or 'nobody'}.")
+
+
+def add_layout_file(service: RestClient, file: Path) -> str:
+    """Store the layout in a TOML or JSON file; its name. Raises Refusal that names the file."""
+    from glovecal_client.rest import layout_name
+
+    try:
+        check_identifier(layout_name(file.read_bytes(), file), "name of the layout")
+        return service.add_layout(file)
+    except (BadInput, ServiceError) as error:
+        if exit_code_of(error) != REFUSED:
+            raise
+        raise Refusal(f"{file}: {sentence_of(error)}") from error
+
+
+def layout_named(service: RestClient, layout: str | None) -> str | None:
+    """The layout's name; a file is stored under the name in it. Raises typer.BadParameter for neither."""
+    if layout is None:
+        return None
+    if Path(layout).is_file():
+        return add_layout_file(service, Path(layout))
+    if Path(layout).suffix in (".toml", ".json") or "/" in layout:
+        raise typer.BadParameter(f"there is no layout file {layout!r}")
+    try:
+        return check_identifier(layout, "layout")
+    except BadInput as error:
+        raise typer.BadParameter(str(error)) from error

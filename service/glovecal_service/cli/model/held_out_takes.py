@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from glovecal_service.cli.take.named import find_takes
+from glovecal_service.cli.take.rows import find_takes
 from glovecal_service.cli.terminal.printing import err
 from glovecal_service.cli.terminal.refusal import Refusal
 

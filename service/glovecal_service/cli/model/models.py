@@ -1,4 +1,4 @@
-"""``glovecal model``: a subject's calibration models."""
+"""``glovecal model``: a subject's calibration models, and the one that predicts live."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from glovecal_service.cli.model.effect_table import EFFECT_COLUMNS, effect_rows
-from glovecal_service.cli.model.kernel_table import KERNEL_COLUMNS, kernel_rows
+from glovecal_service.cli.model.rows import EFFECT_COLUMNS, KERNEL_COLUMNS, effect_rows, kernel_rows
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Model, OnlyLayout, OnlySubject, Subject
 from glovecal_service.cli.terminal.printing import err, moment, out, print_facts, print_json, print_table
@@ -142,3 +141,17 @@ def export(
     with connect() as service:
         write_whole({file: service.download(f"/models/{model}/export")})
     err.print(f"In Python: glovecal_models.calibration.artifact.load(open({str(file)!r}, 'rb').read())")
+
+
+def active_model(service: RestClient, subject: str | None, layout: str | None) -> str:
+    """Its id. Raises BadParameter without a subject, Refusal when there is none or one of each layout."""
+    if subject is None:
+        raise typer.BadParameter("name a model, or a subject with --subject")
+    query = {"subject": subject} | ({"layout": layout} if layout else {})
+    active = [row for row in service.get("/models", query) if row["active"]]
+    if len(active) > 1:
+        layouts = ", ".join(row["layout"] for row in active)
+        raise Refusal(f"subject {subject} has active models of {layouts}; choose one with --layout")
+    if not active:
+        raise Refusal(f"subject {subject} has no active model; train one: glovecal train --subject {subject}")
+    return active[0]["id"]

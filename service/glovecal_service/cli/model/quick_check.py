@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from glovecal_service.cli.model.active_model import active_model
-from glovecal_service.cli.take.named import find_takes
+from glovecal_service.cli.model.models import active_model
+from glovecal_service.cli.take.rows import find_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, OnlySubject, model_id
 from glovecal_service.cli.terminal.printing import out, print_json, print_table

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from glovecal_service.cli.take.named import find_takes
+from glovecal_service.cli.take.rows import find_takes
 from glovecal_service.cli.terminal.connection import connect, is_remote
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, Subject
 from glovecal_service.cli.terminal.printing import err, out, print_json

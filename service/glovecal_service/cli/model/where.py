@@ -10,8 +10,7 @@ from glovecal_service.cli.model.held_out_takes import HeldOutTakes, held_out_tak
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Model
 from glovecal_service.cli.terminal.printing import err, out, print_json, print_table
-from glovecal_service.cli.terminal.report_file import Report, fetch_report, write_report
-from glovecal_service.cli.terminal.writing import Overwrite, require_place
+from glovecal_service.cli.terminal.writing import Overwrite, Report, fetch_report, require_place, write_report
 
 FLOORS = {
     "rotation": "rotation",

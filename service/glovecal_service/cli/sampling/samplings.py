@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier
 from glovecal_models.sampling.catalogue import PROTOCOLS
 from glovecal_models.sampling.state import TRIGGERS
 from glovecal_service.cli.sampling.dialogue import walk
 from glovecal_service.cli.sampling.next_steps import next_steps
-from glovecal_service.cli.sampling.options import pose_angles, sampling_id, widget_angles
 from glovecal_service.cli.terminal.connection import connect
-from glovecal_service.cli.terminal.options import AsJson, identifier, subject_named
+from glovecal_service.cli.terminal.options import JOB_ID, AsJson, identifier, subject_named
 from glovecal_service.cli.terminal.printing import moment, out, print_json, print_table
 from glovecal_service.cli.terminal.refusal import Refusal
 
@@ -23,6 +25,15 @@ if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
 
 app = typer.Typer(help="Guided sampling: takes with known angles.", invoke_without_command=True)
+
+
+def _sampling_id(value: str) -> str:
+    """A typer callback."""
+    if not JOB_ID.match(value):
+        raise typer.BadParameter(
+            f"{value!r} is not a sampling's id: 12 digits of 0-9 and a-f, as glovecal sample list shows them"
+        )
+    return value
 
 
 @app.callback()
@@ -55,8 +66,8 @@ def sample(
             raise typer.BadParameter(f"give --{what}")
     check_identifier(glove, "glove")
     wanted: dict[str, Any] = {"glove": glove, "subject": subject, "protocol": protocol, "trigger": trigger}
-    wanted["widget_deg"] = widget_angles(widget or [])
-    wanted["pose_deg"] = pose_angles(poses)
+    wanted["widget_deg"] = _widget_angles(widget or [])
+    wanted["pose_deg"] = _pose_angles(poses)
     if rod:
         wanted["rod_mm"] = rod
     if wearing is not None:
@@ -102,7 +113,7 @@ app.command("next")(next_steps)
 
 @app.command("resume")
 def resume(
-    sampling: Annotated[str, typer.Argument(help="Sampling id.", callback=sampling_id)],
+    sampling: Annotated[str, typer.Argument(help="Sampling id.", callback=_sampling_id)],
     as_json: AsJson = False,
 ) -> None:
     """Go on with a sampling that was interrupted."""
@@ -144,3 +155,30 @@ def _lead(service: RestClient, view: dict[str, Any], as_json: bool) -> None:
     elif view["takes"]:
         named = " ".join(f"--take {take}" for take in view["takes"])
         out.print(f"Next: glovecal quick-check --subject {view['subject']} {named} --activate")
+
+
+def _widget_angles(told: Sequence[str]) -> dict[str, list[float]]:
+    """``IM_ABD=0,12,20`` as degrees by rotation; nothing after ``=`` leaves the rotation out."""
+    angles = {}
+    for text in told:
+        rotation, equals, numbers = text.partition("=")
+        try:
+            angles[rotation] = [float(number) for number in numbers.split(",") if number.strip()]
+        except ValueError:
+            equals = ""
+        if not equals:
+            raise typer.BadParameter(f"--widget {text!r}: write it like IM_ABD=0,12,20")
+    return angles
+
+
+def _pose_angles(path: Path | None) -> dict[str, Any]:
+    """The content of a JSON file. Raises BadInput, OSError."""
+    if path is None:
+        return {}
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise BadInput(f"{path}: not JSON: {error}") from error
+    if not isinstance(document, dict):
+        raise BadInput(f'{path}: write it like {{"flat": {{"I_MCP": 2.5}}}}')
+    return document

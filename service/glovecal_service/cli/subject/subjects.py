@@ -1,12 +1,16 @@
-"""``glovecal subject``: the people who wear gloves."""
+"""``glovecal subject``: the people who wear gloves, and the sizes of their hands."""
 
 from __future__ import annotations
 
+import tomllib
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from glovecal_service.cli.subject.measured_hand import DimensionsFile, Hand, HandLength, measured_dimensions
+from glovecal_models.errors import BadInput
+from glovecal_models.hand.dimensions import HandDimensions
+from glovecal_models.hand.skeleton import Handedness
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, subject_named
 from glovecal_service.cli.terminal.printing import moment, out, print_facts, print_json, print_table, text
@@ -19,6 +23,24 @@ app = typer.Typer(help="The people who wear gloves.", no_args_is_help=True)
 
 Name = Annotated[str, typer.Argument(help="Short name: a-z, 0-9, _ and -.", callback=subject_named)]
 
+HandLength = Annotated[
+    float | None,
+    typer.Option(
+        "--hand-length-mm", help="From the wrist crease to the tip of the middle finger; the rest follows."
+    ),
+]
+DimensionsFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--dimensions",
+        help="TOML file of what was measured in mm, such as hand_length = 190; glovecal subject skeleton "
+        "NAME lists all names.",
+        exists=True,
+        dir_okay=False,
+    ),
+]
+Hand = Annotated[Handedness | None, typer.Option("--hand", help="right or left.")]
+
 
 @app.command("add")
 def add(
@@ -29,7 +51,7 @@ def add(
     hand: Hand = None,
 ) -> None:
     """Add a subject; with the size of the hand, errors are told in mm too."""
-    measured = measured_dimensions(hand_length_mm, dimensions)
+    measured = _measured_dimensions(hand_length_mm, dimensions)
     body = {"name": name, "title": title, "dimensions": measured, "hand": hand or "right"}
     with connect() as service:
         service.post("/subjects", body)
@@ -46,7 +68,7 @@ def measure(
     """Say how large a subject's hand is; replaces all that was measured before."""
     if hand_length_mm is None and dimensions is None:
         raise typer.BadParameter("give --hand-length-mm or --dimensions")
-    measured = measured_dimensions(hand_length_mm, dimensions)
+    measured = _measured_dimensions(hand_length_mm, dimensions)
     with connect() as service:
         hand = hand or service.get(f"/subjects/{name}")["hand"]
         service.put(f"/subjects/{name}/hand", {"dimensions": measured, "hand": hand})
@@ -137,3 +159,18 @@ def _remove_takes(service: RestClient, subject: str) -> None:
     for row in service.get("/takes", {"subject": subject}):
         service.delete(f"/takes/{row['id']}")
         out.print(f"Removed take {row['name']} ({row['id']}).")
+
+
+def _measured_dimensions(length_mm: float | None, file: Path | None) -> dict[str, float]:
+    """What was measured, in mm; the length given by itself counts. Raises Refusal that names the file."""
+    try:
+        measured = {} if file is None else tomllib.loads(file.read_text(encoding="utf-8"))
+        wrong = [name for name, value in measured.items() if type(value) not in (int, float)]
+        if wrong:
+            raise BadInput(f"{wrong[0]} is {measured[wrong[0]]!r}; give a number of mm")
+        if length_mm is not None:
+            measured["hand_length"] = length_mm
+        HandDimensions.from_measured(measured)
+    except (BadInput, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise Refusal(f"{file}: {error}" if file is not None else str(error)) from error
+    return {name: float(value) for name, value in measured.items()}

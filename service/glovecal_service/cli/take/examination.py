@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from glovecal_service.cli.take.named import find_take, find_takes
+from glovecal_service.cli.take.rows import find_take, find_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, OnlySubject, identifier
 from glovecal_service.cli.terminal.printing import err, out, print_json, print_table
 from glovecal_service.cli.terminal.refusal import Refusal
-from glovecal_service.cli.terminal.report_file import Report, write_report
-from glovecal_service.cli.terminal.writing import Overwrite, require_place
+from glovecal_service.cli.terminal.writing import Overwrite, Report, require_place, write_report
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient

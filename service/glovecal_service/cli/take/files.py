@@ -1,17 +1,16 @@
-"""Takes in files for a verb that works on stored ones: imported under a subject, found again next time."""
+"""Takes in files: their reference tables, the subject they are imported under, warnings over all files."""
 
 from __future__ import annotations
 
 import difflib
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from glovecal_client.errors import ServiceError
-from glovecal_service.cli.take.import_warnings import ImportWarnings
-from glovecal_service.cli.take.two_tables import frames_among, reference_beside
+from glovecal_models.improvement.take_warnings import kind_of
 from glovecal_service.cli.terminal.printing import err
 from glovecal_service.cli.terminal.refusal import Refusal, exit_code_of, sentence_of
 
@@ -102,3 +101,34 @@ def added_subject(service: RestClient, subject: str) -> str:
     near = difflib.get_close_matches(subject, others, n=3)
     similar = f" Similar: {', '.join(near)}." if near else ""
     return f"Added subject {subject}.{similar} To undo: glovecal subject remove {subject} --takes"
+
+
+def reference_beside(frames: Path) -> Path | None:
+    """X.reference.csv for X.frames.csv, when it is there."""
+    stem, mark, rest = frames.name.rpartition(".frames.")
+    partner = frames.with_name(f"{stem}.reference.{rest}")
+    return partner if mark and partner.is_file() else None
+
+
+def frames_among(files: Sequence[Path]) -> list[Path]:
+    """``files`` without those that are the reference table of another one."""
+    return [
+        file
+        for file in dict.fromkeys(files)
+        if not any(reference_beside(other) == file for other in files if other != file)
+    ]
+
+
+class ImportWarnings:
+    def __init__(self) -> None:
+        self._alike: dict[str, list[str]] = {}
+
+    def add(self, file: Path, sentences: Iterable[str]) -> None:
+        for sentence in sentences:
+            self._alike.setdefault(kind_of(sentence), []).append(f"{file}: {sentence}")
+
+    def print(self) -> None:
+        """On standard error: the first of each kind, and how many more files have it."""
+        for first, *more in self._alike.values():
+            files = "file" if len(more) == 1 else "files"
+            err.print(f"{first} The same in {len(more)} more {files}." if more else first, style="yellow")

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from glovecal_service.cli.take.named import find_takes
+from glovecal_service.cli.take.rows import find_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, OnlySubject
 from glovecal_service.cli.terminal.printing import out, print_json, print_table

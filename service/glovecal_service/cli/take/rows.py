@@ -1,11 +1,12 @@
-"""Takes as a table for people."""
+"""Takes as rows of ``GET /takes``: which one somebody means, and a table of them for people."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from glovecal_service.cli.terminal.printing import print_table
+from glovecal_service.cli.terminal.refusal import Refusal
 
 COLUMNS = {
     "id": "take",
@@ -18,9 +19,39 @@ COLUMNS = {
     "state": "state",
     "simulated": "sim",
 }
+MOST_SHOWN = 8
+SHORTEST_BEGINNING = 4
 
 
 def print_takes(rows: Sequence[dict[str, Any]], *, empty: str) -> None:
     """``angles`` is how many rotations have a reference, ``sim`` whether the glove was a simulated one."""
     shown = [{**row, "measured": len(row["rotations"]) or None} for row in rows]
     print_table(shown, COLUMNS, empty=empty, folds="name")
+
+
+def find_take(rows: Sequence[dict[str, Any]], wanted: str) -> dict[str, Any]:
+    """The one row of ``GET /takes`` that is meant. Raises Refusal that lists what could be meant."""
+    for row in rows:
+        if row["id"] == wanted:
+            return row
+    found = [row for row in rows if row["name"] == wanted]
+    if not found and len(wanted) >= SHORTEST_BEGINNING:
+        found = [row for row in rows if row["id"].startswith(wanted)]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise Refusal(f"{len(found)} takes are called {wanted!r}: {_listed(found)}; give the id of one")
+    there = f"there are {_listed(rows)}" if rows else "there are none"
+    raise Refusal(f"there is no take {wanted!r}; {there}")
+
+
+def find_takes(rows: Sequence[dict[str, Any]], wanted: Iterable[str]) -> list[dict[str, Any]]:
+    """Each take that is meant, once."""
+    found = [find_take(rows, name) for name in wanted]
+    return list({row["id"]: row for row in found}.values())
+
+
+def _listed(rows: Sequence[dict[str, Any]]) -> str:
+    shown = ", ".join(f"{row['name']} ({row['id']} of {row['subject']})" for row in rows[:MOST_SHOWN])
+    more = len(rows) - MOST_SHOWN
+    return f"{shown} and {more} more" if more > 0 else shown

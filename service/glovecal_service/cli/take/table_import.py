@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from glovecal_client.errors import ServiceError
-from glovecal_service.cli.glove.layout_file import layout_named
-from glovecal_service.cli.take.files import added_subject
-from glovecal_service.cli.take.import_warnings import ImportWarnings
+from glovecal_service.cli.glove.layouts import layout_named
+from glovecal_service.cli.take.files import ImportWarnings, added_subject, frames_among, reference_beside
 from glovecal_service.cli.take.rows import print_takes
-from glovecal_service.cli.take.two_tables import frames_among, reference_beside
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Subject
 from glovecal_service.cli.terminal.printing import err, print_json

@@ -9,8 +9,7 @@ import typer
 
 from glovecal_client.errors import ServiceError
 from glovecal_service.cli.take import clocks, examination, holds, table_import
-from glovecal_service.cli.take.named import find_take, find_takes
-from glovecal_service.cli.take.rows import print_takes
+from glovecal_service.cli.take.rows import find_take, find_takes, print_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, OnlySubject, Take, identifier
 from glovecal_service.cli.terminal.printing import err, moment, out, print_facts, print_json, print_table

@@ -14,7 +14,7 @@ from glovecal_models.effects.catalogue import GROUP, catalogue, effect
 from glovecal_models.errors import BadInput
 from glovecal_service.plain import plain
 from glovecal_service.rest.http.answers import problems
-from glovecal_service.rest.http.names import ONE_LINE
+from glovecal_service.rest.http.request_types import ONE_LINE
 from glovecal_service.store.errors import NotFound
 
 router = APIRouter(prefix="/effects", tags=["effects"])

@@ -17,10 +17,8 @@ from glovecal_service.rest.effect.catalogue import EffectInPath, can_be_added
 from glovecal_service.rest.effect.declarations import Declared, checked_declaration, declaration_document
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import PartsNeeded
-from glovecal_service.rest.http.names import ONE_LINE, Channel, ModelInPath
-from glovecal_service.rest.http.strict_body import StrictBody
-from glovecal_service.rest.job.jobs import Job
-from glovecal_service.rest.job.new_job import new_job
+from glovecal_service.rest.http.request_types import ONE_LINE, Channel, ModelInPath, StrictBody
+from glovecal_service.rest.job.jobs import Job, new_job
 from glovecal_service.rest.model.model_takes import TakesNamed, model_takes
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import JobRecord, TakeRecord

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from glovecal_models.effects.catalogue import DeclaredEffect, declared_effect
-from glovecal_service.rest.http.strict_body import StrictBody
+from glovecal_service.rest.http.request_types import StrictBody
 from glovecal_service.store.records import TakeRecord
 
 LONGEST_TEXT = 2000

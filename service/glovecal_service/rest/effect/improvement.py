@@ -10,10 +10,8 @@ from pydantic import Field
 from glovecal_models.errors import BadInput
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.names import Identifier, SubjectName
-from glovecal_service.rest.http.strict_body import StrictBody
-from glovecal_service.rest.job.jobs import Job
-from glovecal_service.rest.job.new_job import new_job
+from glovecal_service.rest.http.request_types import Identifier, StrictBody, SubjectName
+from glovecal_service.rest.job.jobs import Job, new_job
 from glovecal_service.rest.model.model_takes import TakesNamed, takes_named
 from glovecal_service.store.records import JobRecord
 

@@ -15,17 +15,17 @@ from glovecal_models.errors import BadLayout
 from glovecal_models.layout import Layout
 from glovecal_service.rest.http.answers import change_problems, problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.names import (
+from glovecal_service.rest.http.problem import Problem
+from glovecal_service.rest.http.request_types import (
     ONE_LINE,
     Channel,
     Identifier,
     NameInPath,
+    StrictBody,
     SubjectName,
     Title,
     WearingName,
 )
-from glovecal_service.rest.http.problem import Problem
-from glovecal_service.rest.http.strict_body import StrictBody
 from glovecal_service.store.errors import NotFound
 from glovecal_service.store.records import GloveRecord, LayoutRecord
 

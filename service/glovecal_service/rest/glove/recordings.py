@@ -11,8 +11,14 @@ from pydantic import BaseModel, Field
 from glovecal_service.rest.http.answers import change_problems, problems
 from glovecal_service.rest.http.damaged_rows import without_damaged
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.names import IDENTIFIER, Identifier, IdInPath, SubjectName, WearingName
-from glovecal_service.rest.http.strict_body import StrictBody
+from glovecal_service.rest.http.request_types import (
+    IDENTIFIER,
+    Identifier,
+    IdInPath,
+    StrictBody,
+    SubjectName,
+    WearingName,
+)
 from glovecal_service.store.recordings import LEAD_IN_S, LONGEST_LEAD_IN_S
 from glovecal_service.store.records import RecordingRecord, RecordingState
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import errno
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from fastapi import FastAPI, Request
+from fastapi import APIRouter, FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.responses import Response
+from starlette.routing import Route, compile_path
 
 from glovecal_models.errors import (
     BadInput,
@@ -22,8 +23,8 @@ from glovecal_models.errors import (
     NotTrainable,
 )
 from glovecal_service.plain import plain_text
-from glovecal_service.rest.http.names import MEANING
 from glovecal_service.rest.http.problem import Problem
+from glovecal_service.rest.http.request_types import MEANING
 from glovecal_service.store.errors import Conflict, NotFound, StorageFull, StoreDamaged, StoreUnavailable
 
 MOST_FIELD_PROBLEMS = 20
@@ -129,3 +130,23 @@ def _bad_input(error: BadInput) -> Problem:
         case NotTrainable():
             return Problem(422, "not-trainable", str(error), title="Cannot be trained")
     return Problem(422, "bad-input", str(error), title="Input cannot be used")
+
+
+class AllowedMethods:
+    """Called with a path, gives the methods of all routes that match it, sorted; each router has its prefix.
+
+    The routes with the fewest parameters are the ones its path means: ``models/train`` is no model's id.
+    """
+
+    def __init__(self, routers: Iterable[tuple[str, APIRouter]]) -> None:
+        self._routes = [
+            (compile_path(prefix + route.path)[0], frozenset(route.methods or ()))
+            for prefix, router in routers
+            for route in router.routes
+            if isinstance(route, Route)
+        ]
+
+    def __call__(self, path: str) -> list[str]:
+        found = [(pattern, methods) for pattern, methods in self._routes if pattern.match(path)]
+        fewest = min((pattern.groups for pattern, _ in found), default=0)
+        return sorted(frozenset().union(*(each for pattern, each in found if pattern.groups == fewest)))

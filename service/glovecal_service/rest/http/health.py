@@ -1,4 +1,4 @@
-"""``health``: whether the process lives, and whether it can do its work."""
+"""``health`` and ``metrics``: whether the process lives and can do its work, and numbers for Prometheus."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from fastapi import APIRouter, Response
+from prometheus_client import CONTENT_TYPE_LATEST
 from pydantic import BaseModel, Field
 
 from glovecal_service.rest.http.answers import problems
@@ -16,7 +17,7 @@ from glovecal_service.rest.http.problem import Problem
 from glovecal_service.store.errors import StoreDamaged, StoreError
 from glovecal_service.store.store import Store
 
-router = APIRouter(prefix="/health", tags=["health"])
+router = APIRouter(tags=["health"])
 
 REALTIME_ALIVE = "realtime.alive"
 """A file in the data folder that the real-time process touches once a second."""
@@ -41,12 +42,12 @@ class Ready(BaseModel):
     )
 
 
-@router.get("/live", summary="The process answers", responses=problems())
+@router.get("/health/live", summary="The process answers", responses=problems())
 def live() -> Live:
     return Live()
 
 
-@router.get("/ready", summary="Database and artifacts work", responses=problems(507))
+@router.get("/health/ready", summary="Database and artifacts work", responses=problems(507))
 def ready(parts: PartsNeeded, response: Response) -> Ready:
     """503 or 507 with a sentence when they do not."""
     response.headers["Cache-Control"] = "no-store"
@@ -59,6 +60,20 @@ def ready(parts: PartsNeeded, response: Response) -> Ready:
         realtime_seen_s_ago=seen,
         problems=_problems(parts.store),
     )
+
+
+@router.get(
+    "/metrics",
+    response_class=Response,
+    summary="Numbers for Prometheus",
+    responses=problems()
+    | {200: {"description": "Text format.", "content": {"text/plain": {"schema": {"type": "string"}}}}},
+)
+def metrics(parts: PartsNeeded) -> Response:
+    counts = parts.store.jobs.unfinished()
+    for state in ("queued", "running"):
+        parts.metrics.jobs.labels(state).set(counts.get(state, 0))
+    return Response(parts.metrics.text(), media_type=CONTENT_TYPE_LATEST)
 
 
 def _check_database(store: Store) -> None:

@@ -1,10 +1,10 @@
-"""``jobs``: long work, its progress, and how to stop it."""
+"""``jobs``: long work, how it begins, its progress, its report, and how to stop it."""
 
 from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from datetime import datetime
 from typing import Annotated, Any
 
@@ -16,13 +16,16 @@ from glovecal_service.plain import plain
 from glovecal_service.rest.http.answers import change_problems, problems
 from glovecal_service.rest.http.damaged_rows import without_damaged
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.names import IdInPath, SubjectFilter
+from glovecal_service.rest.http.request_types import IdInPath, SubjectFilter
+from glovecal_service.store.errors import Conflict
 from glovecal_service.store.records import FINISHED_JOB_STATES, JobEvent, JobRecord, JobState
 from glovecal_service.store.store import Store
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 
 LOOK_EVERY_S = 0.25
+MOST_UNFINISHED_JOBS = 100
+WITH_PAGES = ("diagnose", "improve")
 LONGEST_STREAM_S = 3600.0
 """After this the stream ends without ``done``; listeners connect again with ``Last-Event-ID``."""
 
@@ -108,3 +111,46 @@ def _finished(store: Store, id: str) -> dict[str, Any] | None:
 def _step(step: JobEvent) -> dict[str, Any]:
     names = ("attempt", "state", "fraction", "sentence", "detail")
     return plain({name: getattr(step, name) for name in names})
+
+
+def new_job(
+    store: Store, response: Response, kind: str, payload: Mapping[str, Any], subject: str
+) -> JobRecord:
+    """The job, its address in the answer's ``Location``. Raises Conflict when too many are waiting."""
+    if sum(store.jobs.unfinished().values()) >= MOST_UNFINISHED_JOBS:
+        raise Conflict(f"{MOST_UNFINISHED_JOBS} jobs are waiting already; cancel some or wait")
+    record = store.jobs.create(kind, payload, subject=subject)
+    response.headers["Location"] = f"/v1/jobs/{record.id}"
+    return record
+
+
+@router.get(
+    "/{id}/report",
+    response_class=Response,
+    summary="What a diagnosis or an improvement found, as a page",
+    responses=problems(409)
+    | {
+        200: {
+            "description": "One HTML file that needs nothing else.",
+            "content": {"text/html": {"schema": {"type": "string"}}},
+        }
+    },
+)
+def report_on_job(id: IdInPath, store: StoreNeeded) -> Response:
+    """Each picture has a sentence that says what it shows. 409 until the job is done, and for other kinds."""
+    job = store.jobs.get(id)
+    if job.kind not in WITH_PAGES:
+        raise Conflict(
+            f"job {id} is of kind {job.kind!r}; there are pages of {' and '.join(WITH_PAGES)} jobs"
+        )
+    if job.result is None:
+        raise Conflict(f"job {id} is {job.state}; it has a page once it is done")
+    if job.kind == "diagnose":
+        from glovecal_service.report.diagnosis_page import diagnosis_page  # draws: few requests need it
+
+        page = diagnosis_page(job.result)
+    else:
+        from glovecal_service.report.improvement_page import improvement_page
+
+        page = improvement_page(job.result, job.payload["method"], job.payload["subject"])
+    return Response(page, media_type="text/html; charset=utf-8")

@@ -1,4 +1,4 @@
-"""``models/{id}/compare``, ``where`` and ``report``: a model against measurements, numbers to pictures."""
+"""``models/{id}/compare`` and ``report``: a model against measurements, in numbers and in pictures."""
 
 from __future__ import annotations
 
@@ -8,18 +8,17 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field
 
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.training import train
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.comparison.compare import compare
-from glovecal_models.comparison.residuals import residuals
-from glovecal_models.comparison.where_it_fails import where_it_fails
 from glovecal_models.hand.dimensions import HandDimensions
+from glovecal_service.jobs.model_work import trained_ids
 from glovecal_service.plain import plain
 from glovecal_service.report.reported_model import ReportedModel
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
-from glovecal_service.rest.http.names import Id, ModelInPath, ModelReference
-from glovecal_service.rest.http.strict_body import StrictBody
-from glovecal_service.rest.model.fingertip_view import FingertipsView
-from glovecal_service.rest.model.versions_before import versions_before
+from glovecal_service.rest.http.request_types import Id, ModelInPath, ModelReference, StrictBody
+from glovecal_service.rest.model.fingertips import FingertipsView
 from glovecal_service.store.records import ModelRecord
 from glovecal_service.store.store import Store
 
@@ -50,12 +49,6 @@ class Floor(BaseModel):
     )
     pieces: int = Field(description="Holds, repeats or blocks of time that it was pooled from.")
     is_lower_bound: bool = Field(description="Noise with a memory is not in it.")
-
-
-class SlowShareView(BaseModel):
-    share: float | None = Field(description="Share of the error's variance below 1 Hz.")
-    low: float | None = Field(description="95 % interval, from resampled blocks of time.")
-    high: float | None
 
 
 class Errors(BaseModel):
@@ -98,60 +91,6 @@ class ComparisonView(BaseModel):
     trained_on: list[str] = Field(description="Takes among those given that the model was trained on.")
 
 
-class DependenceView(BaseModel):
-    covariate: str
-    unit: str
-    phrase: str
-    edges: list[float | None]
-    mean_deg: list[float | None] = Field(description="Mean error in each bin.")
-    count: list[int]
-    chance_deg: list[float | None] = Field(
-        description="How far 95 % of the time shifts take a bin's mean from the mean of all."
-    )
-    explained_deg: float | None
-    probability: float | None = Field(description="Share of time shifts that explain as much.")
-    is_structure: bool = Field(description="No noise, and large enough to matter.")
-
-
-class WearingsView(BaseModel):
-    rotation: str
-    wearings: list[str]
-    mean_deg: list[float | None]
-    takes: list[int]
-    spread_deg: float | None
-    probability: float | None = Field(description="Null: too few takes to say.")
-    sentence: str
-
-
-class Findings(BaseModel):
-    rotation: str
-    rmse_deg: float | None
-    bias_deg: float | None
-    floor: Floor | None
-    other_floors: list[Floor] = Field(description="Less good estimates of the floor.")
-    slow: SlowShareView | None
-    dependences: list[DependenceView]
-    wearings: WearingsView | None
-    sentence: str
-
-
-class StretchView(BaseModel):
-    take: str
-    start_s: float
-    end_s: float
-    rmse_deg: float | None
-    rotation: str
-    rotation_rmse_deg: float | None
-    pose: str
-
-
-class WhereView(BaseModel):
-    model: str
-    rotations: list[Findings] = Field(description="The one farthest above its noise floor first.")
-    stretches: list[StretchView] = Field(description="The worst seconds, worst first.")
-    trained_on: list[str] = Field(description="Takes among those given that the model was trained on.")
-
-
 @router.post(
     "/{id}/compare",
     response_model=ComparisonView,
@@ -160,24 +99,10 @@ class WhereView(BaseModel):
 )
 def compare_model(id: ModelInPath, body: Against, parts: PartsNeeded) -> dict[str, Any]:
     """Errors in degrees, and of fingertips in mm; `trained_on` says which takes it has seen before."""
-    record, model, wanted, seen = _chosen(id, body, parts)
+    record, model, wanted, seen = chosen(id, body, parts)
     takes = [parts.store.takes.load(take) for take in wanted]
     comparison = compare(model, takes, dimensions=_hand_of(record, parts))
     return plain(comparison.to_document()) | {"model": record.id, "trained_on": seen}
-
-
-@router.post(
-    "/{id}/where",
-    response_model=WhereView,
-    summary="Where the model fails",
-    responses=change_problems(409),
-)
-def where_model_fails(id: ModelInPath, body: Against, parts: PartsNeeded) -> dict[str, Any]:
-    """Noise floor, what each error depends on (against chance), wearings, and the worst seconds."""
-    record, model, wanted, seen = _chosen(id, body, parts)
-    found = residuals(model, [parts.store.takes.load(take) for take in wanted])
-    document = plain(where_it_fails(found).to_document())
-    return document | {"model": record.id, "trained_on": seen}
 
 
 @router.post(
@@ -196,14 +121,14 @@ def report_on_model(id: ModelInPath, body: AgainstBeside, parts: PartsNeeded) ->
     """Errors, where they are, what they depend on; each picture with a sentence that says what it shows."""
     from glovecal_service.report.page import report_page  # it draws, and few requests ask for that
 
-    record, model, wanted, seen = _chosen(id, body, parts)
+    record, model, wanted, seen = chosen(id, body, parts)
     takes = [parts.store.takes.load(take) for take in wanted]
     others = {}
     for reference in body.beside:
-        other, loaded, _, also_seen = _chosen(reference, body, parts)
+        other, loaded, _, also_seen = chosen(reference, body, parts)
         if other.id != record.id:
             others[other.id] = ReportedModel(other.id, loaded, also_seen)
-    ancestors, simpler = versions_before(parts, record)
+    ancestors, simpler = _versions_before(parts, record)
     page = report_page(
         ReportedModel(record.id, model, seen),
         takes,
@@ -215,7 +140,7 @@ def report_on_model(id: ModelInPath, body: AgainstBeside, parts: PartsNeeded) ->
     return Response(page, media_type="text/html; charset=utf-8")
 
 
-def _chosen(
+def chosen(
     id: str, body: Against, parts: Parts
 ) -> tuple[ModelRecord, CalibrationModel, list[str], list[str]]:
     """The model, the takes wanted, and those of them it was trained on."""
@@ -235,3 +160,25 @@ def _trained_on(store: Store, model: CalibrationModel, record: ModelRecord) -> s
     named = {take["id"] if isinstance(take, dict) else take for take in record.facts.get("takes", [])}
     by_hash = {take.id for take in store.takes.list(subject=record.subject) if take.artifact in model.takes}
     return named | by_hash
+
+
+def _versions_before(
+    parts: Parts, record: ModelRecord
+) -> tuple[list[CalibrationModel], dict[str, CalibrationModel]]:
+    """Ancestors, oldest first, and calibrations by method; both empty for a first version.
+
+    Raises DamagedArtifact, NotFound.
+    """
+    older = parts.store.models.lineage(record.id)[:0:-1]
+    if not older:
+        return [], {}
+    ancestors = [parts.predictors.get(item.id)[0] for item in older]
+    methods = {model.method for model in ancestors}
+    takes = [parts.store.takes.load(id) for id in trained_ids(parts.store, older[0])]
+    layout = ancestors[0].layout
+    simpler = {
+        method: train(takes, layout, record.subject, TrainingSettings(method=method, folds=0))
+        for method in ("raw", "linear")
+        if method not in methods
+    }
+    return ancestors, simpler

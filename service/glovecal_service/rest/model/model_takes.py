@@ -9,7 +9,7 @@ from pydantic import Field
 
 from glovecal_models.errors import LayoutMismatch, NotTrainable
 from glovecal_service.jobs.model_work import trained_ids
-from glovecal_service.rest.http.names import TakeReference
+from glovecal_service.rest.http.request_types import TakeReference
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import ModelRecord, TakeRecord
 from glovecal_service.store.store import Store

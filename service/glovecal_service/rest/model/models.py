@@ -15,10 +15,15 @@ from glovecal_service.plain import plain
 from glovecal_service.rest.http.answers import change_problems, problems
 from glovecal_service.rest.http.damaged_rows import warn, without_damaged
 from glovecal_service.rest.http.dependencies import PartsNeeded, StoreNeeded
-from glovecal_service.rest.http.names import Identifier, LayoutFilter, ModelInPath, SubjectFilter, SubjectName
-from glovecal_service.rest.http.strict_body import StrictBody
-from glovecal_service.rest.model.effect_view import EffectView, effect_view
-from glovecal_service.rest.model.kernel_view import KernelChoiceView, kernel_view
+from glovecal_service.rest.http.request_types import (
+    Identifier,
+    LayoutFilter,
+    ModelInPath,
+    StrictBody,
+    SubjectFilter,
+    SubjectName,
+)
+from glovecal_service.rest.model.views import EffectView, KernelChoiceView, effect_view, kernel_view
 from glovecal_service.store.errors import StoreDamaged
 from glovecal_service.store.records import Activation, ModelRecord
 

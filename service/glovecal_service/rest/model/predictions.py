@@ -14,8 +14,7 @@ from glovecal_models.inverse_kinematics.steadied import steadied
 from glovecal_service.plain import plain
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import PartsNeeded
-from glovecal_service.rest.http.names import Channel, ModelInPath, WearingName
-from glovecal_service.rest.http.strict_body import StrictBody
+from glovecal_service.rest.http.request_types import Channel, ModelInPath, StrictBody, WearingName
 
 router = APIRouter(prefix="/models", tags=["models"])
 

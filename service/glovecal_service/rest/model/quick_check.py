@@ -16,8 +16,7 @@ from glovecal_service.jobs.model_work import trained_ids
 from glovecal_service.plain import plain
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
-from glovecal_service.rest.http.names import ModelInPath
-from glovecal_service.rest.http.strict_body import StrictBody
+from glovecal_service.rest.http.request_types import ModelInPath, StrictBody
 from glovecal_service.rest.model.model_takes import TakesNamed, takes_named
 from glovecal_service.store.errors import NotFound
 from glovecal_service.store.records import ModelRecord, TakeRecord
@@ -33,7 +32,7 @@ class Check(StrictBody):
     activate: bool = Field(False, description="Predict live with the child.")
 
 
-class PoseView(BaseModel):
+class CheckedPoseView(BaseModel):
     pose: str
     seconds: float
     measured: int = Field(description="Rotations whose angle was measured.")
@@ -84,7 +83,7 @@ class QuickCheckView(BaseModel):
     parent: str
     active: bool
     wearing: str
-    poses: list[PoseView]
+    poses: list[CheckedPoseView]
     refused: list[RefusedView] = Field(description="Poses that were not used, and why.")
     expected: Expected
     poses_before_deg: float

@@ -11,10 +11,8 @@ from glovecal_models.calibration.training_settings import Method
 from glovecal_models.errors import LayoutMismatch, NotTrainable
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.names import Id, Identifier, ModelReference, SubjectName
-from glovecal_service.rest.http.strict_body import StrictBody
-from glovecal_service.rest.job.jobs import Job
-from glovecal_service.rest.job.new_job import new_job
+from glovecal_service.rest.http.request_types import Id, Identifier, ModelReference, StrictBody, SubjectName
+from glovecal_service.rest.job.jobs import Job, new_job
 from glovecal_service.store.errors import Conflict
 from glovecal_service.store.records import JobRecord, TakeRecord
 from glovecal_service.store.store import Store

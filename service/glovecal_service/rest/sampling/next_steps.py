@@ -13,7 +13,7 @@ from glovecal_models.sampling.active.from_model import propose_for_model
 from glovecal_service.plain import plain
 from glovecal_service.rest.http.answers import problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.names import ModelInPath
+from glovecal_service.rest.http.request_types import ModelInPath
 from glovecal_service.rest.model.model_takes import model_takes
 from glovecal_service.store.records import ModelRecord, TakeRecord
 from glovecal_service.store.store import Store

@@ -19,15 +19,15 @@ from glovecal_models.sampling.user_events import Event, NotNow
 from glovecal_service.rest.http.answers import change_problems, problems
 from glovecal_service.rest.http.damaged_rows import without_damaged
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.names import (
+from glovecal_service.rest.http.request_types import (
     IDENTIFIER,
     Channel,
     Identifier,
     IdInPath,
+    StrictBody,
     SubjectName,
     WearingName,
 )
-from glovecal_service.rest.http.strict_body import StrictBody
 from glovecal_service.rest.sampling.view import SamplingView, sampling_view
 from glovecal_service.store.errors import Conflict
 from glovecal_service.store.records import GloveRecord, SamplingRecord

@@ -13,8 +13,14 @@ from glovecal_models.hand.skeleton import Handedness
 from glovecal_models.hand.skeleton_document import skeleton_document
 from glovecal_service.rest.http.answers import change_problems, problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.names import Channel, Millimetres, SubjectInPath, SubjectName, Title
-from glovecal_service.rest.http.strict_body import StrictBody
+from glovecal_service.rest.http.request_types import (
+    Channel,
+    Millimetres,
+    StrictBody,
+    SubjectInPath,
+    SubjectName,
+    Title,
+)
 from glovecal_service.store.records import SubjectRecord
 
 router = APIRouter(prefix="/subjects", tags=["subjects"])
@@ -50,7 +56,7 @@ class Subject(BaseModel):
     created_at: datetime
 
 
-class RotationView(BaseModel):
+class SkeletonRotationView(BaseModel):
     name: str
     low: float = Field(description="Limits, degrees.")
     high: float
@@ -86,7 +92,7 @@ class SkeletonView(BaseModel):
     length_unit: str
     angle_unit: str
     dimensions: HandSizes
-    rotations: list[RotationView]
+    rotations: list[SkeletonRotationView]
     joints: list[JointView] = Field(
         description="Parents before children: frame(joint) = frame(parent) . translate(offset) . "
         "orient(orientation) . turn(axis, angle). x along the middle metacarpal to the fingers, z out of the "

@@ -12,8 +12,7 @@ from glovecal_models.takes.clock_scan import clock_offsets
 from glovecal_service.plain import plain
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.names import Id
-from glovecal_service.rest.http.strict_body import StrictBody
+from glovecal_service.rest.http.request_types import Id, StrictBody
 from glovecal_service.store.takes import CLOCK_OFFSET
 
 router = APIRouter(prefix="/takes/clocks", tags=["takes"])
@@ -25,7 +24,7 @@ class Wanted(StrictBody):
     takes: Annotated[list[Id], Field(min_length=1, max_length=MOST_TAKES)]
 
 
-class Examined(Wanted):
+class ClocksRequest(Wanted):
     repair: bool = Field(False, description="Move each reference whose clock is found to be off.")
 
 
@@ -46,7 +45,7 @@ class ClockView(BaseModel):
 @router.post(
     "", response_model=list[ClockView], summary="Examine reference clocks", responses=change_problems(409)
 )
-def examine_clocks(body: Examined, store: StoreNeeded) -> list[dict[str, Any]]:
+def examine_clocks(body: ClocksRequest, store: StoreNeeded) -> list[dict[str, Any]]:
     """Takes of one wearing are judged together. A repair keeps the take's id, and can be undone."""
     wanted = list(dict.fromkeys(body.takes))
     found = clock_offsets([store.takes.load(id) for id in wanted])

@@ -15,8 +15,7 @@ from glovecal_models.takes.take import Take
 from glovecal_service.plain import plain
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.names import Channel, Id, Identifier
-from glovecal_service.rest.http.strict_body import StrictBody
+from glovecal_service.rest.http.request_types import Channel, Id, Identifier, StrictBody
 from glovecal_service.store.records import TakeRecord
 from glovecal_service.store.store import Store
 
@@ -28,7 +27,7 @@ LONGEST_RANGE_S = 600.0
 """Longer takes than this are not read for ranges unasked."""
 
 
-class Examined(StrictBody):
+class ExaminationRequest(StrictBody):
     takes: Annotated[list[Id], Field(min_length=1, max_length=MOST_TAKES)] = Field(
         description="In each one rotation was kept still while others moved."
     )
@@ -68,7 +67,7 @@ class ActiveRangeView(BaseModel):
     angle_deg: float | None
 
 
-class RotationView(BaseModel):
+class ExaminedRotationView(BaseModel):
     rotation: str
     sensor: str
     takes: list[str]
@@ -118,7 +117,7 @@ class ExaminationView(BaseModel):
     rule: RuleView
     sensors: list[str]
     still: dict[str, list[str]]
-    rotations: list[RotationView]
+    rotations: list[ExaminedRotationView]
     one_way: list[OneWayView]
     dead_sensors: list[str]
     worn_side: WornSideView
@@ -135,7 +134,7 @@ class ExaminationView(BaseModel):
     summary="Which sensors stretch which others",
     responses=change_problems(409),
 )
-def examine(body: Examined, store: StoreNeeded) -> dict[str, Any]:
+def examine(body: ExaminationRequest, store: StoreNeeded) -> dict[str, Any]:
     """A joint is kept still, others move: its sensor's deviation in per cent of its active range, and each
     affecting sensor's own share. Nothing is stored."""
     return _document(body, store)
@@ -153,13 +152,13 @@ def examine(body: Examined, store: StoreNeeded) -> dict[str, Any]:
         }
     },
 )
-def report(body: Examined, store: StoreNeeded) -> Response:
+def report(body: ExaminationRequest, store: StoreNeeded) -> Response:
     from glovecal_service.report.examination_page import examination_page  # draws: few requests need it
 
     return Response(examination_page(_document(body, store)), media_type="text/html; charset=utf-8")
 
 
-def _document(body: Examined, store: Store) -> dict[str, Any]:
+def _document(body: ExaminationRequest, store: Store) -> dict[str, Any]:
     rows = [store.takes.get(id) for id in dict.fromkeys(body.takes)]
     layout_name = rows[0].layout
     if body.range_takes is None:

@@ -15,15 +15,14 @@ from glovecal_models.takes.take import Take
 from glovecal_service.plain import plain
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.names import Id
-from glovecal_service.rest.http.strict_body import StrictBody
+from glovecal_service.rest.http.request_types import Id, StrictBody
 
 router = APIRouter(prefix="/takes/holds", tags=["takes"])
 
 MOST_TAKES = 500
 
 
-class Examined(StrictBody):
+class HoldsRequest(StrictBody):
     takes: Annotated[list[Id], Field(min_length=1, max_length=MOST_TAKES)]
 
 
@@ -33,7 +32,7 @@ class SensorDrift(BaseModel):
     same_sign_holds: int
 
 
-class PoseView(BaseModel):
+class HeldPoseView(BaseModel):
     pose: str
     holds: int
     duration_s: float
@@ -59,14 +58,14 @@ class HoldsView(BaseModel):
         description="Speed in poses far away, as a share: warm-up 1, creep about 0 or negative."
     )
     recovery: float | None = Field(description="Share of the drift that is gone when the pose comes back.")
-    poses: list[PoseView]
+    poses: list[HeldPoseView]
     next_take: NextTakeView | None
 
 
 @router.post(
     "", response_model=HoldsView, summary="How readings drift in held poses", responses=change_problems(409)
 )
-def examine_holds(body: Examined, store: StoreNeeded) -> dict[str, Any]:
+def examine_holds(body: HoldsRequest, store: StoreNeeded) -> dict[str, Any]:
     """Poses by their names, else by a reference of 0 and 1, else by still stretches with like readings."""
     wanted = list(dict.fromkeys(body.takes))
     takes = [store.takes.load(id) for id in wanted]

@@ -1,149 +1,113 @@
-"""Importing a take table: all takes of the file, or none."""
+"""``POST takes``: a take table is imported, all takes of the file or none."""
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable
-from contextlib import ExitStack
-from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
-from glovecal_models.calibration.samples import require_layout
-from glovecal_models.errors import BadInput
-from glovecal_models.improvement.take_warnings import take_warnings
-from glovecal_models.layout import Layout
-from glovecal_models.takes.take import Take
-from glovecal_service.store.errors import Conflict, DamagedRows
-from glovecal_service.store.records import TakeRecord
-from glovecal_service.store.store import Store
+import anyio.to_thread
+from fastapi import APIRouter, Query, Request, Response
+from pydantic import BaseModel, Field
 
-MADE_OF_COLUMNS = "auto-"
-"""Begins the names of layouts that an import made."""
+from glovecal_models.takes.table import read_takes
+from glovecal_models.takes.take import Take as TakeArrays
+from glovecal_service.rest.http.answers import change_problems
+from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
+from glovecal_service.rest.http.problem import Problem
+from glovecal_service.rest.http.request_types import IDENTIFIER, SHA256, SubjectName, WearingName
+from glovecal_service.rest.take.import_takes import Import, import_takes
+from glovecal_service.rest.take.takes import Take
+from glovecal_service.rest.take.uploads import TABLE_BODY, FileName, TableFormat, file_name, keep_table
+
+router = APIRouter(prefix="/takes", tags=["takes"])
 
 
-@dataclass(frozen=True)
-class Import:
-    """What became of a file."""
-
+class ImportedTakes(BaseModel):
+    takes: list[Take] = Field(description="All takes of the file, in its order.")
+    imported: list[str] = Field(description="Ids of those that are new.")
+    existing: list[str] = Field(description="Ids of those that the same file had brought before.")
     layout: str
-    takes: list[TakeRecord]
-    """All takes of the file, in its order."""
-    existing: set[str]
-    """Ids of those that this very file had brought before: sending a file twice is harmless."""
-    warnings: list[str]
-    subject_created: bool
-    """Whether the subject was not there before."""
-
-    @property
-    def imported(self) -> list[str]:
-        return [record.id for record in self.takes if record.id not in self.existing]
+    original_sha256: str
+    warnings: list[str] = Field(description="What `check` says of the takes; like sentences once.")
+    subject_created: bool = Field(description="Whether the subject was not there before.")
 
 
-def import_takes(
-    store: Store,
-    read: Callable[[], list[Take]],
-    *,
-    original_sha256: str,
-    subject: str,
-    layout: str | None,
-    create_subject: bool = False,
-) -> Import:
-    """Keep all takes that ``read`` finds. Without ``layout`` the file's columns make one.
+class ImportOptions(BaseModel):
+    """Query parameters of an import."""
 
-    A file that another subject has already is refused: one recording is of one hand. With ``create_subject``
-    a subject that is not there is added with the takes. Raises BadInput (BadTakeTable, LayoutMismatch),
-    NotFound, Conflict, StorageFull; then nothing was imported, and no subject added.
-    """
-    is_new = create_subject and subject not in {record.name for record in store.subjects.list()}
-    if not is_new:
-        store.subjects.get(subject)
-    known = None if layout is None else store.layouts.get(layout)
-    _require_no_other_owner(store, original_sha256, subject)
-    takes = read()
-    if not takes:
-        raise BadInput("the file holds no takes: there is no row below the header")
-    chosen = known or _layout_of_columns(store, takes)
-    for take in takes:
-        _require_fits(take, chosen)
-    stored = {
-        record.name: record
-        for record in store.takes.list(subject=subject, layout=chosen.name)
-        if record.original_sha256 == original_sha256
-    }
-    existing = {take.name: _same(take, stored[take.name]) for take in takes if take.name in stored}
-    new = [take for take in takes if take.name not in stored]
-    with ExitStack() as undo:
-        if is_new:
-            store.subjects.create(subject)
-            undo.callback(store.subjects.remove, subject)
-        added = store.takes.add_all(
-            new, subject=subject, layout=chosen.name, source="import", original_sha256=original_sha256
-        )
-        undo.pop_all()
-    by_name = existing | {record.name: record for record in added}
-    return Import(
-        chosen.name,
-        [by_name[take.name] for take in takes],
-        {record.id for record in existing.values()},
-        take_warnings(takes),
-        is_new,
+    subject: SubjectName
+    create_subject: bool = Field(False, description="Add the subject if it is not there; else 404.")
+    layout: str | None = Field(None, pattern=IDENTIFIER, description="None: made of the file's columns.")
+    format: TableFormat | None = Field(None, description="None: by the file's first bytes and name.")
+    name: WearingName | None = Field(None, description="Name of the take; before the names of several.")
+    wearing: WearingName | None = Field(None, description="The wearing, where the file does not say it.")
+    equal_times: Literal["refuse", "spread"] = Field("refuse", description="Frames stamped in batches.")
+    reference_upload: str | None = Field(
+        None, pattern=SHA256, description="A reference table sent before to `uploads`."
     )
 
 
-def _require_no_other_owner(store: Store, original_sha256: str, subject: str) -> None:
-    try:
-        every = store.takes.list()
-    except DamagedRows as error:  # a damaged row of anyone must not end all imports
-        every = error.sound
-    for record in every:
-        if record.original_sha256 == original_sha256 and record.subject != subject:
-            raise Conflict(
-                f"this file already belongs to {record.subject} (take {record.name}, {record.id}); use "
-                f"subject {record.subject}, or remove its takes there first"
+@router.post(
+    "",
+    status_code=201,
+    response_model=ImportedTakes,
+    summary="Import a take table",
+    responses=change_problems(409, 415)
+    | {200: {"model": ImportedTakes, "description": "Every take of this file was here already."}},
+    openapi_extra=TABLE_BODY,
+)
+async def add_takes(
+    request: Request,
+    response: Response,
+    parts: PartsNeeded,
+    options: Annotated[ImportOptions, Query()],
+    filename: FileName = "upload",
+    reference_filename: FileName = "reference",
+) -> dict[str, Any]:
+    """The body is the file itself (CSV or Parquet), kept as it came before it is read.
+
+    All takes of the file are imported or none. Sending the same file again for the same subject answers
+    200 with the takes there are; for another subject 409. A reference table of its own goes to `uploads`
+    first and is named here by its sha256.
+    """
+    upload = await keep_table(request, parts)
+    files = [(file_name(filename, options.format), upload.path)]
+    if options.reference_upload is not None:
+        found = parts.uploads.find(options.reference_upload)
+        if found is None:
+            raise Problem(404, "not-found", f"there is no upload {options.reference_upload}")
+        files.append((file_name(reference_filename, None), found))
+    result = await anyio.to_thread.run_sync(
+        _import, parts, files, upload.sha256, options, limiter=parts.import_slots
+    )
+    parts.metrics.imported_takes.inc(len(result.imported))
+    response.status_code = 201 if result.imported else 200
+    return {
+        "takes": result.takes,
+        "imported": result.imported,
+        "existing": sorted(result.existing),
+        "layout": result.layout,
+        "original_sha256": upload.sha256,
+        "subject_created": result.subject_created,
+        "warnings": result.warnings,
+    }
+
+
+def _import(
+    parts: Parts, files: list[tuple[str, Path]], original_sha256: str, options: ImportOptions
+) -> Import:
+    with parts.uploads.under_names(*files) as paths:
+
+        def read() -> list[TakeArrays]:
+            return read_takes(
+                *paths, name=options.name, wearing=options.wearing, equal_times=options.equal_times
             )
 
-
-def _require_fits(take: Take, layout: Layout) -> None:
-    """Further rotations are kept, but a take none of whose rotations the layout has is a mistake."""
-    require_layout(take, layout)
-    unknown = [name for name in take.rotations if name not in layout.rotations]
-    if unknown and len(unknown) == len(take.rotations):
-        raise BadInput(
-            f"take {take.name!r} measured {', '.join(unknown)}, none of which layout {layout.name!r} has; "
-            f"its rotations are {', '.join(layout.rotations)}"
+        return import_takes(
+            parts.store,
+            read,
+            original_sha256=original_sha256,
+            subject=options.subject,
+            layout=options.layout,
+            create_subject=options.create_subject,
         )
-
-
-def _same(take: Take, record: TakeRecord) -> TakeRecord:
-    if len(take.reference_time_s) != record.reference_rows:
-        raise Conflict(
-            f"take {take.name!r} of this file is here already ({record.id}) with another reference; "
-            f"attach the new one with PUT /v1/takes/{record.id}/reference"
-        )
-    return record
-
-
-def _layout_of_columns(store: Store, takes: list[Take]) -> Layout:
-    """The layout of a file that nobody named one for, by its columns.
-
-    One that is there already (built in, or made of another file's columns) when it has the same sensors
-    and all the rotations; else a new one: each rotation from the sensor of its name, else from all.
-    """
-    sensors = takes[0].sensors
-    rotations = list(dict.fromkeys(name for take in takes for name in take.rotations))
-    if not rotations and any(take.poses is not None for take in takes):
-        rotations = list(sensors)
-    for record in store.layouts.list():
-        if record.built_in or record.name.startswith(MADE_OF_COLUMNS):
-            layout = Layout.from_document(record.document)
-            if set(layout.sensors) == set(sensors) and set(rotations) <= set(layout.rotations):
-                return layout
-    if not rotations:
-        raise BadInput(
-            "the file has no r.ROTATION columns (reference angles in degrees, which a model is learned from) "
-            f"and no known layout has the sensors {', '.join(sensors)}: name a layout to import it all the "
-            "same"
-        )
-    digest = hashlib.sha256(" ".join([*sensors, "", *rotations]).encode()).hexdigest()
-    layout = Layout.from_columns(MADE_OF_COLUMNS + digest[:8], sensors, rotations)
-    store.layouts.put(layout)
-    return layout

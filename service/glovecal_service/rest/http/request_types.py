@@ -1,11 +1,11 @@
-"""The names and ids a request may hold, as types: what does not match never reaches the store."""
+"""What a request may hold, as types: names, ids and JSON bodies; nothing else reaches the store."""
 
 from __future__ import annotations
 
 from typing import Annotated
 
 from fastapi import Path, Query
-from pydantic import AfterValidator, Field, FiniteFloat, StringConstraints
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, StringConstraints
 
 ID = r"^[0-9a-f]{12}$"
 IDENTIFIER = r"^[a-z0-9][a-z0-9_-]{0,63}$"
@@ -55,3 +55,9 @@ LayoutFilter = Annotated[str | None, Query(pattern=IDENTIFIER, description="Only
 Id = Annotated[str, StringConstraints(pattern=ID)]
 """Of takes, recordings and jobs."""
 Millimetres = Annotated[FiniteFloat, Field(gt=0, lt=1000)]
+
+
+class StrictBody(BaseModel):
+    """Takes exactly the documented fields and types: nothing is coerced, nothing is ignored."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")

@@ -1,4 +1,4 @@
-"""A model's effects as rows of a table: one for each rotation, numbers with their units."""
+"""A model's effects and the kernels that were tried, as rows of tables."""
 
 from __future__ import annotations
 
@@ -13,6 +13,16 @@ EFFECT_COLUMNS = {
     "numbers": "learned",
     "evidence": "when it was added",
 }
+KERNEL_COLUMNS = {
+    "rotation": "rotation",
+    "kernel": "kernel",
+    "chosen": "chosen",
+    "held_out_rmse_deg": "error (°)",
+    "nlml": "NLML (nats)",
+    "evidence_gain": "evidence (nats)",
+}
+SCALE = (("mean angle", "spread_deg"), ("straight line", "straight_line_deg"))
+"""What the candidates' errors are to be read against."""
 
 
 def effect_rows(effects: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
@@ -41,3 +51,15 @@ def _numbers(values: Mapping[str, float | None]) -> str:
     ]
     more = len(values) - len(shown)
     return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
+
+
+def kernel_rows(rotations: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """One row a candidate, after those of the scale."""
+    rows: list[dict[str, Any]] = []
+    for rotation in rotations:
+        found, name = rotation["kernel_choice"], {"rotation": rotation["rotation"]}
+        if found is None:
+            continue
+        rows += [{**name, "kernel": words, "held_out_rmse_deg": found[error]} for words, error in SCALE]
+        rows += [{**item, **name, "chosen": item["chosen"] or None} for item in found["candidates"]]
+    return rows
