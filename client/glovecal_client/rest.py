@@ -6,7 +6,6 @@ its own process). It is an extra, ``pip install 'glovecal-client[rest]'``, impor
 
 from __future__ import annotations
 
-import json
 import re
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -17,6 +16,7 @@ from urllib.parse import quote, urlsplit
 
 from glovecal_client.errors import BadName, ClientError, ServiceError
 from glovecal_client.frames_to_predict import frames_to_predict
+from glovecal_client.layout_file import is_json, layout_name
 
 if TYPE_CHECKING:
     import httpx
@@ -108,7 +108,7 @@ class RestClient:
         """Store the layout in a TOML or .json file, return its name; a file without one gives its own."""
         content = file.read_bytes()
         name = layout_name(content, file)
-        headers = {"Content-Type": "application/json" if _is_json(file) else "application/toml"}
+        headers = {"Content-Type": "application/json" if is_json(file) else "application/toml"}
         return self._json("PUT", f"/gloves/{quote(name, safe='')}", content=content, headers=headers)["name"]
 
     def upload_takes(
@@ -211,32 +211,6 @@ class RestClient:
             if sentence not in self.warnings:
                 self.warnings.append(sentence)
         return response
-
-
-def layout_name(content: bytes, file: Path) -> str:
-    """The ``name`` in a layout file, else the file's own name; the service judges whether it can be one."""
-    if _is_json(file):
-        return _name_in_json(content) or file.stem.lower()
-    for line in content.decode("utf-8", "replace").splitlines():
-        if line.lstrip().startswith("["):
-            break
-        key, equals, value = line.partition("=")
-        if equals and key.strip() == "name":
-            return value.split("#")[0].strip().strip("\"'")
-    return file.stem.lower()
-
-
-def _name_in_json(content: bytes) -> str | None:
-    try:
-        document = json.loads(content)
-    except (ValueError, RecursionError):
-        return None
-    name = document.get("name") if isinstance(document, dict) else None
-    return name if isinstance(name, str) else None
-
-
-def _is_json(file: Path) -> bool:
-    return file.suffix.lower() == ".json"
 
 
 def _refusal(response: httpx.Response) -> ServiceError:

@@ -98,7 +98,7 @@ def wear(
 
 def add_layout_file(service: RestClient, file: Path) -> str:
     """Store the layout in a TOML or JSON file; its name. Raises Refusal that names the file."""
-    from glovecal_client.rest import layout_name
+    from glovecal_client.layout_file import layout_name
 
     try:
         check_identifier(layout_name(file.read_bytes(), file), "name of the layout")
