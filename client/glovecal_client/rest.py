@@ -177,6 +177,26 @@ class RestClient:
             raise ServiceError(409, f"Job {document['state']}", document["error"] or document["sentence"])
         return document
 
+    def finish_recording(self, recording: str, *, patience_s: float = 30.0) -> dict[str, Any]:
+        """Stop a recording; its document once it is complete or being repaired.
+
+        Raises ServiceError when it failed or is not finished within ``patience_s``.
+        """
+        path, until = f"/recordings/{quote(recording, safe='')}", time.monotonic() + patience_s
+        self.post(f"{path}/stop")
+        while (document := self.get(path))["state"] not in ("done", "repairing"):
+            if document["state"] == "failed":
+                sentence = document["facts"].get("sentence", "no reason was given")
+                raise ServiceError(409, "Recording failed", sentence)
+            if time.monotonic() > until:
+                raise ServiceError(
+                    504,
+                    "Recording not finished",
+                    f"recording {recording} is still {document['state']}; is glovecal serve running?",
+                )
+            time.sleep(0.1)
+        return document
+
     def _send_file(
         self, method: str, path: str, file: Path, query: Mapping[str, str | bool] | None = None
     ) -> dict[str, Any]:

@@ -10,7 +10,6 @@ from typing import Any
 
 from glovecal_client.errors import ServiceError
 from glovecal_client.rest import RestClient
-from glovecal_service.cli.glove.recordings import finish_recording
 from glovecal_service.demo.live import PoseMeter, metered_poses
 from glovecal_service.demo.processes import DemoPlace, running_capture
 
@@ -110,7 +109,7 @@ def _record(
             _wait_until_seen(service)
             recording = service.post("/recordings", wanted)
         capture.wait(CAPTURE_PATIENCE_S)
-        finished = finish_recording(service, recording["id"])
+        finished = service.finish_recording(recording["id"])
     take = service.attach_reference(finished["facts"]["take"], reference)
     say(
         f"  take {take['name']}: {take['frames']} frames in {take['duration_s']:.1f} s, "

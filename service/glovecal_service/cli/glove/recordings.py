@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from glovecal_client.errors import ServiceError
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Glove, subject_named
 from glovecal_service.cli.terminal.printing import err, out, print_json
@@ -18,7 +17,6 @@ if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
 
 BEGINS_WITHIN_S = 10.0
-PATIENCE_S = 30.0
 
 
 def record(
@@ -53,7 +51,7 @@ def record(
         except SystemExit:
             service.post(f"/recordings/{started['id']}/stop")
             raise
-        finished = finish_recording(service, started["id"])
+        finished = service.finish_recording(started["id"])
     if as_json:
         print_json(finished)
         return
@@ -84,25 +82,3 @@ def _wait_for_the_recorder(service: RestClient, recording: str, glove: str) -> N
                 f"{BEGINS_WITHIN_S:g} s; is glovecal serve running on this data folder?"
             )
         time.sleep(0.05)
-
-
-def finish_recording(service: RestClient, recording: str) -> dict[str, Any]:
-    """Stop a recording and wait for its account, complete or being repaired.
-
-    Raises ServiceError when it failed or takes too long.
-    """
-    service.post(f"/recordings/{recording}/stop")
-    until = time.monotonic() + PATIENCE_S
-    while (document := service.get(f"/recordings/{recording}"))["state"] not in ("done", "repairing"):
-        if document["state"] == "failed":
-            raise ServiceError(
-                409, "Recording failed", document["facts"].get("sentence", "no reason was given")
-            )
-        if time.monotonic() > until:
-            raise ServiceError(
-                504,
-                "Recording not finished",
-                f"recording {recording} is still {document['state']}; is glovecal serve running?",
-            )
-        time.sleep(0.1)
-    return document
