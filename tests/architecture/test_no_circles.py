@@ -19,7 +19,6 @@ TOPS = [
     ROOT / "service" / "glovecal_service",
 ]
 KNOWN = {
-    ("glovecal_models", "calibration", "quick_check"),  # had_already asks which takes were only checked
     ("glovecal_models", "sampling", "simulation"),  # guided/first_beliefs starts from a typical glove
 }
 """Package, importing child, imported child: circles that are still to be taken apart."""
