@@ -97,7 +97,7 @@ def test_an_effect_of_another_package_is_listed_diagnosed_told_apart_added_serve
     assert listed["strap_tension"]["can_be_added"]
 
     straps = np.random.default_rng(5).permutation(np.linspace(4, 16, 10))
-    write_takes(takes(1, straps, 20 + 0.5 * straps), tmp_path / "first.csv")
+    write_takes(takes(1, straps.tolist(), (20 + 0.5 * straps).tolist()), tmp_path / "first.csv")
     imported = run("take", "import", tmp_path / "first.csv", "-s", "anna")
     assert imported.code == 0, imported.err
     model = run("train", "-s", "anna", *CALIBRATION, "--json").json["result"]["model"]
@@ -107,7 +107,7 @@ def test_an_effect_of_another_package_is_listed_diagnosed_told_apart_added_serve
     assert {"strap_tension", "temperature"} <= set(undecided["named"]["confidence_set"])
     assert undecided["next_take"]["what"] == ADVICE
 
-    write_takes(takes(11, straps, 20 + 0.5 * straps[::-1]), tmp_path / "second.csv")
+    write_takes(takes(11, straps.tolist(), (20 + 0.5 * straps[::-1]).tolist()), tmp_path / "second.csv")
     assert run("take", "import", tmp_path / "second.csv", "-s", "anna").code == 0
     model = run("train", "-s", "anna", *CALIBRATION, "--json").json["result"]["model"]
     named = run("diagnose", model, "--json").json["named"]
