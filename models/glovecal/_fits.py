@@ -54,7 +54,7 @@ def fitted(
 
 
 def _begin(stop: connection.Connection) -> None:
-    from glovecal_models.worker_process import begin_worker
+    from glovecal_models.threads import begin_worker
 
     begin_worker()
     threading.Thread(target=_end_with, args=(stop,), daemon=True).start()

@@ -67,7 +67,7 @@ def simulate(
     calibration explains. ``form``: how the effect is generated; None draws one. ``layout`` simulates a whole
     glove such as ``cyberglove18``, else there is one rotation for each of ``sensors``. Raises BadInput.
     """
-    from glovecal_models.simulation.causes.cause import Cause
+    from glovecal_models.simulation.causes.form import Cause
     from glovecal_models.simulation.session import record_session
     from glovecal_models.simulation.session_plan import SessionPlan
 

@@ -14,10 +14,10 @@ import numpy as np
 from glovecal_client.errors import ClientError
 from glovecal_client.rest import RestClient
 from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.sampling.step import Step
+from glovecal_models.sampling.protocol import Step
 from glovecal_models.simulation.asked_hand import AskedHand
-from glovecal_models.simulation.asked_touch import PreparedTouches, RealTouches
 from glovecal_models.simulation.simulated_hand import DRIVEN, ROTATIONS, SimulatedHand
+from glovecal_models.simulation.touching import PreparedTouches, RealTouches
 
 DEFAULT_SERVICE = "http://127.0.0.1:8600"
 LOOK_EVERY_S = 0.15

@@ -19,10 +19,14 @@ import numpy as np
 
 from glovecal_client.capture.device import Reading, check_options
 from glovecal_client.errors import BadOption, DeviceFinished, DeviceLost
-from glovecal_models.simulation.performance import Performance, duration_s
 from glovecal_models.simulation.protocol import MOTIONS, Segment, free_segment, segments
 from glovecal_models.simulation.simulated_glove import LAYOUTS, SimulatedGlove
-from glovecal_models.simulation.simulated_take import REFERENCE_NOISE_DEG, measured_rotations
+from glovecal_models.simulation.simulated_take import (
+    REFERENCE_NOISE_DEG,
+    Performance,
+    duration_s,
+    measured_rotations,
+)
 from glovecal_service.asked_person import DEFAULT_SERVICE, AskedPerson
 
 FASTEST_HZ = 1000.0

@@ -34,7 +34,7 @@ import numpy as np
 from gaussian_process_data import MISSING_INPUT, OUTPUTS, Joint, one_joint, whole_glove
 from gaussian_process_reference import Trained, exact_nlml
 
-from glovecal_models.regression.standardise import standardise
+from glovecal_models.regression.training_samples import standardise
 from glovecal_models.threads import pin_blas_to_one_thread
 
 PEERS = {

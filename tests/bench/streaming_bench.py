@@ -34,7 +34,7 @@ from glovecal_client.queries import ask_json
 from glovecal_client.session import open_client
 from glovecal_models.calibration.artifact import dump
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
-from glovecal_models.covariance.squared_exponential_ard import SquaredExponentialArd
+from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.threads import pin_blas_to_one_thread

@@ -6,9 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import cho_factor, cho_solve
 
-from glovecal_models.regression.certificate import NystromFit, certify
 from glovecal_models.regression.exact_profiled_likelihood import ExactProfiledLikelihood
-from glovecal_models.regression.low_rank_likelihood import LowRankLikelihood
+from glovecal_models.regression.low_rank_likelihood import LowRankLikelihood, NystromFit, certify
 from glovecal_models.regression.merged_samples import MergedSamples
 from glovecal_models.regression.pivoted_cholesky import pivoted_cholesky
 

@@ -19,7 +19,7 @@ from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.resampled import resampled
 from glovecal_models.effects.delay.offset_to import offset_to
 from glovecal_models.layout import Layout
-from glovecal_models.simulation.causes.cause import Cause
+from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 from glovecal_models.takes.clock_scan import clock_offsets

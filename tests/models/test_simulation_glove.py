@@ -8,12 +8,10 @@ import pytest
 from glovecal_models.errors import BadInput
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.layout import Layout
-from glovecal_models.simulation.postures import POSTURES
-from glovecal_models.simulation.sensor_stages import Cloth
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_hand import DRIVEN, ROTATIONS, SimulatedHand
+from glovecal_models.simulation.simulated_glove import Cloth, SimulatedGlove
+from glovecal_models.simulation.simulated_hand import DRIVEN, POSTURES, ROTATIONS, SimulatedHand
 from glovecal_models.simulation.stretch import TABLE_1, TOGETHER
-from glovecal_models.simulation.typical_glove import raw_angles
+from glovecal_models.typical_counts import raw_angles
 
 LAYOUT = Layout.built_in("cyberglove18")
 FLEXION = [name for name in LAYOUT.sensors if name.endswith(("_MCP", "_PIP", "_IP"))]
@@ -121,7 +119,7 @@ def test_putting_the_glove_on_again_shifts_readings_by_about_a_degree():
 
 
 def _gain(sensor: str) -> float:
-    from glovecal_models.simulation.typical_glove import TYPICAL_COUNTS
+    from glovecal_models.typical_counts import TYPICAL_COUNTS
 
     return TYPICAL_COUNTS[sensor][1]
 
@@ -158,7 +156,7 @@ def test_uncalibrated_angles_undo_a_typical_glove_and_follow_the_rules():
 
 
 def _zero(sensor: str) -> float:
-    from glovecal_models.simulation.typical_glove import TYPICAL_COUNTS
+    from glovecal_models.typical_counts import TYPICAL_COUNTS
 
     return TYPICAL_COUNTS[sensor][0]
 

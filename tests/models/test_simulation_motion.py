@@ -10,8 +10,6 @@ import pytest
 from glovecal_models.errors import BadInput
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.simulation.hand_motion import minimum_jerk
-from glovecal_models.simulation.performance import Performance, duration_s
-from glovecal_models.simulation.postures import KEY_POSES, POSTURES, TABLE_3_POSES
 from glovecal_models.simulation.protocol import (
     GAPS,
     MOTIONS,
@@ -23,8 +21,15 @@ from glovecal_models.simulation.protocol import (
     segments,
 )
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_hand import DRIVEN, ROTATIONS, SimulatedHand
-from glovecal_models.simulation.simulated_take import simulate_take
+from glovecal_models.simulation.simulated_hand import (
+    DRIVEN,
+    KEY_POSES,
+    POSTURES,
+    ROTATIONS,
+    TABLE_3_POSES,
+    SimulatedHand,
+)
+from glovecal_models.simulation.simulated_take import Performance, duration_s, simulate_take
 from glovecal_models.takes.table import read_takes, write_takes
 
 

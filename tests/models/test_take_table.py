@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glovecal_models.errors import BadInput
-from glovecal_models.takes.equal_times import spread_equal_times
+from glovecal_models.takes.frame_times import spread_equal_times
 from glovecal_models.takes.raw_table import LARGEST_ANGLE_DEG, LARGEST_VALUE, LONGEST_TAKE_S
 from glovecal_models.takes.table import read_reference, read_takes, reference_warnings, write_takes
 from glovecal_models.takes.take import Take

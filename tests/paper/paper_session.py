@@ -32,15 +32,15 @@ from glovecal_models.inverse_kinematics.tip_chains import TipChains
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.catalogue import Equipment, make_protocol
 from glovecal_models.sampling.guided.guided_calibration import GuidedSamples, guided_samples
-from glovecal_models.sampling.guided.taught_take import TaughtTake
+from glovecal_models.sampling.guided.taught_samples import TaughtTake
 from glovecal_models.sampling.sampled_takes import sampled_takes
 from glovecal_models.simulation.asked_session import RECORDING, asked_session
-from glovecal_models.simulation.postures import KEY_POSES, POSTURES
 from glovecal_models.simulation.protocol import Segment, cross_couple_segment, evaluation_segment
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
+from glovecal_models.simulation.simulated_hand import KEY_POSES, POSTURES
 from glovecal_models.simulation.simulated_take import SimulatedTake, simulate_take
 from glovecal_models.simulation.touching import touching_segment
-from glovecal_models.simulation.typical_glove import raw_angles
+from glovecal_models.typical_counts import raw_angles
 
 CALIBRATIONS: tuple[Method, ...] = ("raw", "linear", "lmc_gpr", "spgp")
 LAYOUT = Layout.built_in("cyberglove18")

@@ -13,7 +13,7 @@ from typing import Any
 
 from paper_job import PaperJob, PaperResult, run_job
 
-from glovecal_models.worker_process import begin_worker
+from glovecal_models.threads import begin_worker
 
 LOOK_S = 0.5
 LOG_EVERY_S = 20.0

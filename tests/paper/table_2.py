@@ -23,7 +23,8 @@ import numpy as np
 
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
-from glovecal_models.covariance.catalogue import LinearArd, SquaredExponential, SquaredExponentialArd
+from glovecal_models.covariance.linear_ard import LinearArd
+from glovecal_models.covariance.squared_exponential import SquaredExponential, SquaredExponentialArd
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.inverse_kinematics.contact import Touch

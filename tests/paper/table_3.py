@@ -18,7 +18,7 @@ import numpy as np
 from paper_session import CALIBRATIONS, PaperSession, paper_session
 
 from glovecal_models.calibration.training_settings import Method
-from glovecal_models.simulation.postures import TABLE_3_POSES
+from glovecal_models.simulation.simulated_hand import TABLE_3_POSES
 
 PAPER_DEG: dict[str, tuple[tuple[float, float], ...]] = {
     "flat": ((10.2, 11.8), (1.5, 2.0), (0.9, 1.1), (0.9, 1.2)),

@@ -5,7 +5,7 @@ finger touching. Times are CPU seconds of one thread. Of Figure 14 the paper pri
 rotation that is read from one sensor has at most as many pseudo-inputs as this sensor has readings, so from
 M = 300 on only rotations of several sensors grow. All searches start from the exact process, whose training
 counts in each of them, and take at most 100 steps. The noise guard decides for each rotation whether its
-trained pseudo-inputs are kept (``noise_guard``).
+trained pseudo-inputs are kept (``fitc.judge``).
 
     python tests/paper/table_4.py
 """

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from table_1 import table_1
 
-from glovecal_models.simulation.postures import POSTURES
+from glovecal_models.simulation.simulated_hand import POSTURES
 from glovecal_models.simulation.stretch import Stretch, bent_share, deviations, stretches
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from glovecal_models.simulation.causes.cause import Cause
+from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import RecordedSession, record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 from glovecal_models.takes.table import write_takes

@@ -11,7 +11,7 @@ from realtime_support import LAYOUT
 
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.regression.kept_choice import kernel_of
+from glovecal_models.regression.kernel_scores import kernel_of
 from glovecal_models.takes.take import Take
 
 

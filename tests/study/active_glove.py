@@ -16,11 +16,11 @@ from glovecal_models.layout import Layout
 from glovecal_models.sampling.active.candidates import candidate_steps
 from glovecal_models.sampling.active.known_readings import known_from_takes
 from glovecal_models.sampling.active.next_step import NextStep
-from glovecal_models.sampling.active.posterior_mean import assumed_angles
+from glovecal_models.sampling.active.posterior import assumed_angles
 from glovecal_models.sampling.catalogue import make_protocol
 from glovecal_models.sampling.growing import Choose, NextSteps
 from glovecal_models.sampling.guided.guided_calibration import guided_calibration
-from glovecal_models.sampling.guided.taught_take import TaughtTake
+from glovecal_models.sampling.guided.taught_samples import TaughtTake
 from glovecal_models.sampling.protocol import Protocol
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.sampled_takes import sampled_takes

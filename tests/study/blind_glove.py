@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from glovecal_models.layout import Layout
-from glovecal_models.simulation.causes.cause import Cause
+from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import RecordedSession, record_session
 from glovecal_models.simulation.session_plan import FIVE_SENSORS, SessionPlan
 from glovecal_models.takes.take import Take

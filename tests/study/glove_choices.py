@@ -15,8 +15,7 @@ import numpy as np
 from blind_glove import BlindGlove, Bystander, Nuisance
 
 from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES, UNKNOWN_CAUSES, forms
-from glovecal_models.simulation.causes.cause import Cause
-from glovecal_models.simulation.causes.form import Form
+from glovecal_models.simulation.causes.form import Cause, Form
 from glovecal_models.simulation.session_plan import FIVE_SENSORS
 
 FLOOR_DEG = 0.77

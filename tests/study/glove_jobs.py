@@ -12,7 +12,7 @@ from typing import Any
 from blind_glove import BlindGlove
 from finished_gloves import FinishedGloves
 
-from glovecal_models.worker_process import begin_worker
+from glovecal_models.threads import begin_worker
 
 WORKERS = 2
 Job = Callable[[BlindGlove], dict[str, Any]]

@@ -21,7 +21,7 @@ from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.calibration.regressor_kinds import restore_regressor
 from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.layout import Layout
-from glovecal_models.regression.kept_choice import choice_of
+from glovecal_models.regression.kernel_scores import choice_of
 
 FORMAT = "glovecal.model.v1"
 LARGEST_HEADER_BYTES = 8 << 20

@@ -15,7 +15,7 @@ from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training import uncertain_above
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.regression.kept_choice import keeping_choice
+from glovecal_models.regression.kernel_scores import keeping_choice
 
 
 def child_model(

@@ -9,8 +9,8 @@ from glovecal_models.calibration.kernel_choice import try_candidates
 from glovecal_models.calibration.sample_weight import Recorded, fit_weighted
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
 from glovecal_models.errors import BadInput
-from glovecal_models.regression.kept_choice import with_choice
 from glovecal_models.regression.kernel_candidates import CANDIDATE, LMC, candidates_of
+from glovecal_models.regression.kernel_scores import with_choice
 from glovecal_models.regression.process_regressor import ProcessRegressor
 
 LAST_ITERATIONS = 15

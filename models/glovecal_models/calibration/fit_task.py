@@ -20,9 +20,8 @@ from glovecal_models.calibration.sample_weight import Recorded, fit_weighted
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.regression.kernel_candidates import CHOOSING
-from glovecal_models.regression.linear_regressor import fit_linear
+from glovecal_models.regression.linear_regressor import fit_linear, rescale_readings
 from glovecal_models.regression.regressor import Regressor
-from glovecal_models.regression.rescaling import rescale_readings
 from glovecal_models.regression.spgp import fit_spgp
 
 

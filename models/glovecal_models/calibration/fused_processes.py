@@ -12,7 +12,7 @@ from threading import local
 
 import numpy as np
 
-from glovecal_models.covariance.squared_exponential_ard import SquaredExponentialArd
+from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.regression.regressor import Regressor
 

@@ -9,9 +9,9 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.calibration.wanted_effect import WantedEffect
 from glovecal_models.effects.base.signature_effect import SignatureEffect
-from glovecal_models.regression.kept_choice import kernel_of
 from glovecal_models.regression.kernel_candidates import CHOOSING
-from glovecal_models.regression.rule_regressor import RuleRegressor
+from glovecal_models.regression.kernel_scores import kernel_of
+from glovecal_models.regression.regressor import RuleRegressor
 from glovecal_models.takes.take import Take
 
 

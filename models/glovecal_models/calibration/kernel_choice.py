@@ -21,7 +21,7 @@ from glovecal_models.regression.kernel_candidates import KernelCandidate
 from glovecal_models.regression.kernel_scores import CandidateScore, KernelScores
 from glovecal_models.regression.linear_regressor import fit_linear
 from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_models.regression.training_check import check_samples
+from glovecal_models.regression.training_samples import check_samples
 
 TRIED_SAMPLES = 500
 """Enough to tell kernels apart by tens of nats; an exact fit takes a second."""

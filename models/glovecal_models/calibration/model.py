@@ -12,8 +12,7 @@ from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.effect_correction import EffectCorrection, SignalScale
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Correspondence, Layout
-from glovecal_models.regression.regressor import Regressor
-from glovecal_models.regression.rule_regressor import RuleRegressor
+from glovecal_models.regression.regressor import Regressor, RuleRegressor
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from glovecal_models.calibration.fused_processes import FusedProcesses, grouped_
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.errors import BadInput
 from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_models.regression.rule_regressor import RuleRegressor
+from glovecal_models.regression.regressor import RuleRegressor
 
 EXTRAPOLATING, TOO_UNCERTAIN, BY_RULE, FAULTY_SENSOR = 1, 2, 4, 8
 RANGE_MARGIN = 0.05

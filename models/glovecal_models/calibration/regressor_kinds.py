@@ -10,8 +10,7 @@ import numpy as np
 from glovecal_models.errors import DamagedArtifact
 from glovecal_models.regression.linear_regressor import LinearRegressor
 from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_models.regression.regressor import Regressor
-from glovecal_models.regression.rule_regressor import RuleRegressor
+from glovecal_models.regression.regressor import Regressor, RuleRegressor
 
 _KINDS: dict[str, type[Regressor]] = {
     "linear": LinearRegressor,

@@ -22,10 +22,9 @@ from glovecal_models.calibration.folds import folds_over_takes
 from glovecal_models.calibration.independent_share import independent_share
 from glovecal_models.errors import NotTrainable
 from glovecal_models.regression.fast_lmc import finish_search, fit_lmc_gpr
-from glovecal_models.regression.lmc_search import LmcSearch
+from glovecal_models.regression.lmc_search import LmcSearch, fit_roughly
 from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_models.regression.rough_process import fit_roughly
-from glovecal_models.regression.training_check import check_samples
+from glovecal_models.regression.training_samples import check_samples
 
 WEIGHTS = (0.4, 0.2, 0.08, 0.03)
 """Tried in turn until the error on left-out takes rises; the last leaves little more than a plane. Where the

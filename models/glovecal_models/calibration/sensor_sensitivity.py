@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
-from glovecal_models.regression.rule_regressor import RuleRegressor
+from glovecal_models.regression.regressor import RuleRegressor
 
 INNER_SHARE = 0.25
 """Slopes are taken between this share of a sensor's trained range from below and from above."""

@@ -13,7 +13,7 @@ from glovecal_models.calibration.regressor_kinds import restore_regressor
 from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
 from glovecal_models.layout import Correspondence, Layout
-from glovecal_models.regression.rule_regressor import RuleRegressor
+from glovecal_models.regression.regressor import RuleRegressor
 from glovecal_models.takes.take import Take
 
 

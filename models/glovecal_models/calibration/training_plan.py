@@ -16,8 +16,8 @@ from glovecal_models.calibration.samples import Samples, gather_samples
 from glovecal_models.calibration.training_settings import METHODS, TrainingSettings
 from glovecal_models.errors import NotTrainable
 from glovecal_models.layout import Correspondence, Layout
-from glovecal_models.regression.rule_regressor import RuleRegressor
-from glovecal_models.regression.training_check import check_samples
+from glovecal_models.regression.regressor import RuleRegressor
+from glovecal_models.regression.training_samples import check_samples
 from glovecal_models.takes.take import Take
 
 

@@ -13,8 +13,7 @@ import numpy as np
 
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.hand_poses import HandPoses
-from glovecal_models.hand.forward_kinematics import forward_kinematics
-from glovecal_models.hand.jacobian import tip_jacobian
+from glovecal_models.hand.forward_kinematics import forward_kinematics, tip_jacobian
 from glovecal_models.hand.rotations import HAND_ROTATIONS
 from glovecal_models.hand.skeleton import Skeleton
 

@@ -189,7 +189,11 @@ class Sum(Covariance):
 
 def restore_covariance(settings: Any) -> Covariance:
     """The covariance that gave ``settings``; raises DamagedArtifact on an unknown kind."""
-    import glovecal_models.covariance.catalogue  # noqa: F401  registers the built-in kinds
+    from glovecal_models.covariance import (  # noqa: F401  what is imported is registered by its kind
+        linear_ard,
+        polynomial,
+        squared_exponential,
+    )
 
     if not isinstance(settings, Mapping):
         raise DamagedArtifact(f"covariance settings are {settings!r}, expected an object with a kind")

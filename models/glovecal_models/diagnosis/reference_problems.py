@@ -14,7 +14,7 @@ import numpy as np
 
 from glovecal_models.diagnosis.pose_labels import are_pose_labels
 from glovecal_models.layout import Layout
-from glovecal_models.takes.radians import radians_problem
+from glovecal_models.takes.reference_check import radians_problem
 from glovecal_models.takes.take import Take
 
 SURE_CORRELATION = 0.5

@@ -15,7 +15,7 @@ import numpy as np
 
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.independence.smooth_readings import SmoothTake, span
-from glovecal_models.independence.take_names import rotation_in_name
+from glovecal_models.independence.still_rotation import rotation_in_name
 from glovecal_models.layout import Layout
 
 RangeSource = Literal["its own range take", "measured angles", "all that was read", "what the glove can send"]

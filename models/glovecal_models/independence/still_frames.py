@@ -11,7 +11,7 @@ from glovecal_models.independence.active_range import ActiveRange
 from glovecal_models.independence.affecting_shares import TakenApart
 from glovecal_models.independence.pull_columns import BLOCK_S
 from glovecal_models.independence.smooth_readings import SmoothTake, span
-from glovecal_models.independence.take_names import moved_in_name
+from glovecal_models.independence.still_rotation import moved_in_name
 
 START_S = 0.4
 """Pulls are counted from where the joints were in the take's first moments."""

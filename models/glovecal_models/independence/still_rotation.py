@@ -1,7 +1,13 @@
-"""Which rotations were kept still in a take, and whether they were."""
+"""Which rotations were kept still in a take, by its name or by measured angles, and whether they were.
+
+``still-im_abd`` keeps IM_ABD still, ``still-IM_ABD-move-I_MCP`` moves only I_MCP, ``range IM_ABD`` takes
+IM_ABD through its range.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +15,33 @@ import numpy as np
 from glovecal_models.errors import BadInput
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.independence.smooth_readings import SmoothTake, span
-from glovecal_models.independence.take_names import rotation_in_name
 from glovecal_models.layout import Layout
+
+
+def rotation_in_name(name: str, rotations: Sequence[str]) -> str | None:
+    """The longest of ``rotations`` that stands by itself in the name, before any "move"; or None."""
+    found = _found(_words(name).partition("_move_")[0] + "_", rotations)
+    return max(found, key=len, default=None)
+
+
+def moved_in_name(name: str, rotations: Sequence[str]) -> tuple[str, ...]:
+    """The rotations that stand after "move" in the name."""
+    return tuple(_found("_" + _words(name).partition("_move_")[2], rotations))
+
+
+def _words(name: str) -> str:
+    return f"_{re.sub(r'[^0-9a-z]+', '_', name.lower())}_"
+
+
+def _found(words: str, rotations: Sequence[str]) -> list[str]:
+    """Longer names first, so that MCP is not found in I_MCP."""
+    found = []
+    for rotation in sorted(rotations, key=len, reverse=True):
+        if f"_{rotation.lower()}_" in words:
+            found.append(rotation)
+            words = words.replace(f"_{rotation.lower()}_", "_/_")
+    return found
+
 
 STILL_STD_PCT, STILL_SPAN_PCT = 3.0, 10.0
 """Of the joint's active range: what a joint kept still moves all the same."""

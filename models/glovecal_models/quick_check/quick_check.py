@@ -29,8 +29,7 @@ from glovecal_models.quick_check.held_poses import HeldPose, held_poses
 from glovecal_models.quick_check.pose_book import PoseBook, usual_poses
 from glovecal_models.quick_check.pose_errors import pose_errors
 from glovecal_models.quick_check.shift_report import ShiftReport, shift_report
-from glovecal_models.quick_check.shift_scale import scaled_to_poses
-from glovecal_models.quick_check.wearing_shift import WearingShift, prior_shift
+from glovecal_models.quick_check.wearing_shift import WearingShift, prior_shift, scaled_to_poses
 from glovecal_models.takes.take import Take
 
 _SEEN = "wearing {!r} was in the model's training: whole takes tell more of it than a quick check could"

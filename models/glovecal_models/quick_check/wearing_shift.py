@@ -2,16 +2,21 @@
 
 A linear Gaussian model (Rasmussen & Williams 2006, equations A.6 and 2.7 to 2.8): a pose in which the hand
 was held is one witness of each rotation, error = offset + gain x joint + noise, however many frames it has.
-Rotations that read the same sensor shift together, so a rotation that nobody measured learns from those
-that share its sensors.
+Rotations that read the same sensor shift together, so a rotation that nobody measured learns from those that
+share its sensors.
+
+The default prior is of gloves that shift by degrees. One that hardly does would be corrected by what the
+person's poses are off, so the prior's scale is fitted first: the likeliest one for all rotations and poses at
+once (empirical Bayes; Rasmussen & Williams 2006, equation 5.8).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import cho_factor, cho_solve
 
 from glovecal_models.calibration.sensor_sensitivity import SensorSensitivity
 
@@ -142,3 +147,31 @@ def _shared_covariance(sensitivity: SensorSensitivity) -> np.ndarray:
     # A rotation that moves with no sensor still needs a prior that is not zero.
     still = np.diag(shared) <= 0
     return shared + np.diag(np.where(still, 1e-6, 0.0))
+
+
+SCALES = np.geomspace(0.05, 3.0, 42)
+"""Of the default prior's standard deviations."""
+SCALE_SD = 2.0
+"""Of the logarithm of the scale, before any pose: gloves differ a lot."""
+
+
+def scaled_to_poses(prior: WearingShift, poses: Sequence[PoseError]) -> WearingShift:
+    """``prior`` with the scale that makes ``poses`` likeliest; as it is where they tell nothing."""
+    known = [np.flatnonzero(pose.known) for pose in poses]
+    rows = [prior.rows(lanes, pose.joint[lanes]) for lanes, pose in zip(known, poses, strict=True)]
+    error = np.concatenate([pose.error[lanes] for lanes, pose in zip(known, poses, strict=True)] or [[]])
+    if not len(error):
+        return prior
+    noise = np.concatenate([pose.variance[lanes] for lanes, pose in zip(known, poses, strict=True)])
+    onto = np.concatenate(rows)
+    spread = onto @ prior.covariance @ onto.T
+    scale = max(SCALES.tolist(), key=lambda each: _evidence(each, error, spread, noise))
+    return WearingShift(prior.mean, scale**2 * prior.covariance)
+
+
+def _evidence(scale: float, error: np.ndarray, spread: np.ndarray, noise: np.ndarray) -> float:
+    """Log probability of the errors and of the scale, but for constants."""
+    factor = cho_factor(scale**2 * spread + np.diag(noise), lower=True)
+    log_determinant = 2 * float(np.log(np.diag(factor[0])).sum())
+    fit = float(error @ cho_solve(factor, error))
+    return -0.5 * (log_determinant + fit + (np.log(scale) / SCALE_SD) ** 2)

@@ -18,12 +18,11 @@ from scipy.linalg.lapack import get_lapack_funcs
 
 from glovecal_models.covariance.base import Covariance
 from glovecal_models.covariance.linear_ard import LinearArd
-from glovecal_models.covariance.squared_exponential_ard import SquaredExponentialArd
+from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
 from glovecal_models.regression.mean import LinearMean, Mean, profile_coefficients
 from glovecal_models.regression.optimise import Optimum, counted_progress, minimise
 from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_models.regression.standardise import Standardised, standardise
-from glovecal_models.regression.training_check import check_samples
+from glovecal_models.regression.training_samples import Standardised, check_samples, standardise
 
 JITTER = 1e-8
 """Added to the covariance's diagonal, in units of the target's variance; stored with the model."""

@@ -7,7 +7,7 @@ K^-1 already, while log|K + X B X'| can only grow. So the trained model is a pla
 what ``fit_lmc_gpr`` searches, with plane and scale in closed form, and D + 1 parameters left.
 
 Steps: merge equal inputs; several starts on few nodes (``multi_start``); refine the best to 1e-4 nats, by
-exact evaluations where nodes do not suffice (``lmc_search``); bracket the exact NLML (``certificate``); keep
+exact evaluations where nodes do not suffice (``lmc_search``); bracket the exact NLML (``certify``); keep
 as many nodes as the served mean and standard deviation need (``served_nodes``).
 """
 
@@ -19,18 +19,18 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.covariance.squared_exponential_ard import SquaredExponentialArd
+from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
 from glovecal_models.errors import Cancelled
-from glovecal_models.regression.certificate import Certificate, NystromFit, certify
 from glovecal_models.regression.exact_profiled_likelihood import ExactProfiledLikelihood
 from glovecal_models.regression.lmc_search import MOST_EXACT, LmcSearch
+from glovecal_models.regression.low_rank_likelihood import Certificate, NystromFit, certify
 from glovecal_models.regression.merged_samples import MergedSamples
 from glovecal_models.regression.multi_start import FEW, Candidate
 from glovecal_models.regression.pivoted_cholesky import PivotedCholesky, pivoted_cholesky
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.regression.profiled_likelihood import Profile, profile
 from glovecal_models.regression.served_nodes import NodeChooser, Reference, ServedNodes
-from glovecal_models.regression.standardise import Standardised
+from glovecal_models.regression.training_samples import Standardised
 
 LARGEST_FACTOR = 8e6
 """Entries of a low-rank factor: 64 MB."""

@@ -18,8 +18,7 @@ import numpy as np
 
 from glovecal_models.covariance.base import Covariance, restore_covariance
 from glovecal_models.errors import BadInput, DamagedArtifact
-from glovecal_models.regression.regressor import Prediction
-from glovecal_models.regression.stored_number import stored_number
+from glovecal_models.regression.regressor import Prediction, stored_number
 
 METHODS = ("lmc_gpr", "spgp", "polynomial_gpr", "general_gpr", "gpr")
 """``gpr`` is any other exact process."""

@@ -2,6 +2,7 @@
 
 Snelson & Ghahramani (2006), as in Wang & Neff (2013), section 6.2, equations 15 to 19, with a linear mean
 (whose coefficients are solved for at every step) and, unlike equation 19, that mean in the prediction.
+Pseudo-inputs start at the samples the process itself finds hardest to explain.
 """
 
 from __future__ import annotations
@@ -14,18 +15,15 @@ import numpy as np
 from scipy.linalg import eigh, solve_triangular
 
 from glovecal_models.covariance.base import Covariance
-from glovecal_models.covariance.squared_exponential_ard import SquaredExponentialArd
+from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
 from glovecal_models.errors import BadInput
 from glovecal_models.regression.exact import LOG_NOISE_BOUNDS, search_few
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
-from glovecal_models.regression.fitc import FitcLikelihood
+from glovecal_models.regression.fitc import LEAST_NOISE, FitcLikelihood, Verdict, judge
 from glovecal_models.regression.mean import LinearMean, Mean
-from glovecal_models.regression.noise_guard import LEAST_NOISE, Verdict, judge
 from glovecal_models.regression.optimise import Optimum, counted_progress, minimise
 from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_models.regression.pseudo_inputs import choose_pseudo_inputs
-from glovecal_models.regression.standardise import Standardised, standardise
-from glovecal_models.regression.training_check import check_samples
+from glovecal_models.regression.training_samples import Standardised, check_samples, standardise
 
 _SAMPLES_FOR_START = 300
 _START_SHARE = 0.2
@@ -56,7 +54,7 @@ def fit_spgp(
     samples, with pseudo-inputs chosen for these. Without one the start is ``fit_lmc_gpr`` of the same
     samples, or, where mean or covariance are given, an exact process of at most 300 of them. The noise
     may not fall below half the start's, and hyperparameters that the exact likelihood refuses are
-    replaced by the start's (``noise_guard``); ``evidence`` says which happened, its NLML values are in
+    replaced by the start's (``fitc.judge``); ``evidence`` says which happened, its NLML values are in
     standardised units. The mean is linear and the covariance squared exponential with one relevance per
     sensor unless given. Each sample counts ``sample_weight``, at most 1, as in ``fit_lmc_gpr``.
     Raises NotTrainable, Cancelled, and BadInput when ``start`` has another covariance or sensor count.
@@ -200,3 +198,37 @@ def _regressor(
         jitter=likelihood.jitter * scale**2,
         evidence=evidence | {"fitc_nlml": state.value},
     )
+
+
+_EXPLAINED = 1e-9
+"""A sample whose remaining variance is below this part of the largest prior variance needs no node."""
+
+
+def choose_pseudo_inputs(
+    covariance: Covariance, theta: np.ndarray, x: np.ndarray, count: int, generator: np.random.Generator
+) -> np.ndarray:
+    """At most ``count`` different rows of x (N, D): pivoted Cholesky of k(x, x), then random rows.
+
+    The next row is the one the rows so far explain worst. Once all are explained the rest is drawn at
+    random, since training changes the hyperparameters. Fewer come back only if x has fewer different rows.
+    """
+    distinct = np.unique(x, axis=0)
+    count = min(count, len(distinct))
+    factor = np.empty((count, len(distinct)))
+    residual = covariance.diagonal(theta, distinct)
+    tolerance = _EXPLAINED * float(residual.max())
+    chosen: list[int] = []
+    while len(chosen) < count:
+        pivot = int(residual.argmax())
+        if residual[pivot] <= tolerance:
+            break
+        row = covariance(theta, distinct[pivot : pivot + 1], distinct)[0]
+        row -= factor[: len(chosen), pivot] @ factor[: len(chosen)]
+        row /= np.sqrt(residual[pivot])
+        factor[len(chosen)] = row
+        residual = np.maximum(residual - row * row, 0.0)
+        residual[pivot] = 0.0
+        chosen.append(pivot)
+    left = np.setdiff1d(np.arange(len(distinct)), chosen)
+    drawn = generator.permutation(left)[: count - len(chosen)]
+    return distinct[np.concatenate([np.array(chosen, dtype=int), drawn])]

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from glovecal_models.sampling.protocol import Step
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.state import SamplingState
-from glovecal_models.sampling.step import Step
 
 KEPT_OF_RANGE, KEPT_OF_MOTION = 64, 12
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from glovecal_models.quick_check.pose_book import KEY_POSES_DEG
-from glovecal_models.sampling.step import Step
+from glovecal_models.sampling.protocol import Step
 
 KEY_POSES = ("flat", "spread", "fist", "overbend")
 HOLD_S = 1.2

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from glovecal_models.sampling.step import Step
+from glovecal_models.sampling.protocol import Step
 
 
 def asking(step: Step, place: int, count: int | None) -> str:

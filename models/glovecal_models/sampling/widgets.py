@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from glovecal_models.layout import Layout
-from glovecal_models.sampling.step import Step
+from glovecal_models.sampling.protocol import Step
 
 MOVE_S = 4.0
 WIDEST_DEG = 120.0

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.sampling.step import Step
-from glovecal_models.simulation.asked_touch import Touches
+from glovecal_models.sampling.protocol import Step
 from glovecal_models.simulation.hand_motion import (
     HandMotion,
     PostureSequence,
@@ -20,9 +19,9 @@ from glovecal_models.simulation.hand_motion import (
     posture_vector,
     within_range,
 )
-from glovecal_models.simulation.postures import POSTURES
 from glovecal_models.simulation.protocol import REPEAT_SD_DEG
-from glovecal_models.simulation.simulated_hand import DRIVEN, FINGERS
+from glovecal_models.simulation.simulated_hand import DRIVEN, FINGERS, POSTURES
+from glovecal_models.simulation.touching import Touches
 
 MOVE_S = 0.7
 """From one thing to the next."""

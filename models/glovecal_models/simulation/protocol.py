@@ -14,17 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.simulation.free_motion import free_motion
 from glovecal_models.simulation.hand_motion import (
     HandMotion,
     PostureSequence,
     Sweep,
     Unrest,
+    free_motion,
     posture_vector,
     within_range,
 )
-from glovecal_models.simulation.postures import KEY_POSES, POSTURES, TABLE_3_POSES
-from glovecal_models.simulation.simulated_hand import DRIVEN, FINGERS
+from glovecal_models.simulation.simulated_hand import DRIVEN, FINGERS, KEY_POSES, POSTURES, TABLE_3_POSES
 
 WIDGET_DEG = (0.0, 10.0, 20.0, 30.0)
 GAPS = ("IM_ABD", "MR_ABD", "RP_ABD")

@@ -13,12 +13,12 @@ from functools import cached_property
 import numpy as np
 
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
-from glovecal_models.simulation.performance import BRIDGE_S, Performance
 from glovecal_models.simulation.protocol import Segment
 from glovecal_models.simulation.session_motion import joints, rest_segment, take_segment
 from glovecal_models.simulation.session_plan import SessionPlan
 from glovecal_models.simulation.session_schedule import VOLTS_PER_HOUR, Air, TakeStart
 from glovecal_models.simulation.simulated_hand import ROTATIONS, SimulatedHand
+from glovecal_models.simulation.simulated_take import BRIDGE_S, Performance
 from glovecal_models.simulation.stretch import bent_share
 
 BEFORE_S = 61.0

@@ -13,14 +13,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from glovecal_models.simulation.causes.cause import Cause, HiddenCause
-from glovecal_models.simulation.causes.form import Stage
+from glovecal_models.simulation.causes.form import Cause, HiddenCause, Stage
 from glovecal_models.simulation.hidden import Hidden, hide
-from glovecal_models.simulation.resampling import at_times
 from glovecal_models.simulation.scene import Scene, play_scene
 from glovecal_models.simulation.session_glove import SessionGlove
 from glovecal_models.simulation.session_plan import SessionPlan, TakeMotion
 from glovecal_models.simulation.session_schedule import TakeStart, one_more, schedule
+from glovecal_models.simulation.signals import at_times
 from glovecal_models.simulation.simulated_take import NOT_MEASURED
 from glovecal_models.takes.take import Take
 

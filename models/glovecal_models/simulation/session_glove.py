@@ -10,13 +10,13 @@ from __future__ import annotations
 import numpy as np
 
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
-from glovecal_models.simulation.free_motion import random_posture
+from glovecal_models.simulation.hand_motion import random_posture
 from glovecal_models.simulation.scene import Scene
-from glovecal_models.simulation.sensor_stages import Cloth
 from glovecal_models.simulation.session_motion import joints
 from glovecal_models.simulation.session_plan import SessionPlan
+from glovecal_models.simulation.signals import lasting_noise
+from glovecal_models.simulation.simulated_glove import Cloth
 from glovecal_models.simulation.simulated_hand import DRIVEN, ROTATIONS, SimulatedHand
-from glovecal_models.simulation.slow_noise import lasting_noise
 
 SLIP_LASTS_S = 25.0
 POSTURE_NUISANCE_LASTS_S = 40.0

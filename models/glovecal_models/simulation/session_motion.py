@@ -1,6 +1,6 @@
 """How the hand moves in each take of a simulated session, and before it.
 
-Natural motion takes the postures of free_motion.py at the pace of everyday use (near 40 degrees a second
+Natural motion takes the postures of ``free_motion`` at the pace of everyday use (near 40 degrees a second
 RMS, with holds). The others are takes made to tell causes apart: fast oscillation, ramps at two speeds with
 inner loops and holds, one finger at a time, repeated poses, a hand that lies still.
 """
@@ -13,23 +13,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
-from glovecal_models.simulation.free_motion import random_posture
 from glovecal_models.simulation.hand_motion import (
     HandMotion,
     PostureSequence,
     Sweep,
     Unrest,
     posture_vector,
+    random_posture,
     within_range,
 )
-from glovecal_models.simulation.postures import POSTURES, TABLE_3_POSES
 from glovecal_models.simulation.protocol import Segment
 from glovecal_models.simulation.session_plan import TakeMotion
-from glovecal_models.simulation.simulated_hand import DRIVEN, FINGERS, ROTATIONS
+from glovecal_models.simulation.simulated_hand import DRIVEN, FINGERS, POSTURES, ROTATIONS, TABLE_3_POSES
 
 MOVE_S = (0.7, 1.6)
 HOLD_S = (0.0, 0.0, 0.3, 0.8, 1.6)
-"""Free motion (free_motion.py) is made for short lively takes; in long ones hands go slower and wait."""
+"""Free motion (``free_motion``) is made for short lively takes; in long ones hands go slower and wait."""
 FAST_HZ = (2.0, 3.5)
 FAST_DEG = 25.0
 RAMP_SPEED_RATIO = 3.0

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.takes.dead_sensor import dead_sensors
-from glovecal_models.takes.radians import radians_problem
-from glovecal_models.takes.reference_check import frames_with_reference, reference_warnings
+from glovecal_models.takes.frame_times import time_unit_warning
+from glovecal_models.takes.reference_check import frames_with_reference, radians_problem, reference_warnings
 from glovecal_models.takes.take import Take
-from glovecal_models.takes.time_unit import time_unit_warning
 
 GAP_INTERVALS = 2.5
 """An interval longer than this many median ones is a gap: at least one frame in between is missing."""

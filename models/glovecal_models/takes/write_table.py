@@ -11,9 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.takes.columns import parse_header
-from glovecal_models.takes.parquet_table import load_pyarrow
-from glovecal_models.takes.raw_table import unusable_text
+from glovecal_models.takes.raw_table import parse_header, unusable_text
+from glovecal_models.takes.read_table import load_pyarrow
 from glovecal_models.takes.take import Take
 
 SIMULATED_CONTEXT = "simulated"

@@ -13,7 +13,7 @@ import numpy as np
 
 from glovecal_models.errors import BadInput
 from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES, UNKNOWN_CAUSES
-from glovecal_models.simulation.causes.cause import Cause, HiddenCause
+from glovecal_models.simulation.causes.form import Cause, HiddenCause
 from glovecal_models.simulation.session import RecordedSession, RecordedTake, record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 from glovecal_models.takes.table import write_takes

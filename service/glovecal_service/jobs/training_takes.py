@@ -9,7 +9,7 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.guided.guided_calibration import BASELINES, GuidedSamples, guided_samples
-from glovecal_models.sampling.guided.taught_take import TaughtTake
+from glovecal_models.sampling.guided.taught_samples import TaughtTake
 from glovecal_models.takes.take import Take
 from glovecal_service.store import Store
 from glovecal_service.store.records import SubjectRecord, TakeRecord, incomplete_sentences

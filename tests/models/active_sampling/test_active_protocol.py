@@ -13,20 +13,26 @@ from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput, NotTrainable
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.active.candidates import candidate_steps, register_candidates
-from glovecal_models.sampling.active.diagnosed_takes import diagnosed_take
-from glovecal_models.sampling.active.expected_readings import ExpectedReadings
-from glovecal_models.sampling.active.from_model import propose_for_model
-from glovecal_models.sampling.active.known_readings import known_from_state, known_from_takes
-from glovecal_models.sampling.active.next_step import LONGEST_CAPTURE_S, NextStep, still_possible
-from glovecal_models.sampling.active.posterior_mean import assumed_angles
+from glovecal_models.sampling.active.known_readings import (
+    ExpectedReadings,
+    known_from_state,
+    known_from_takes,
+)
+from glovecal_models.sampling.active.next_step import (
+    LONGEST_CAPTURE_S,
+    NextStep,
+    diagnosed_take,
+    propose_for_model,
+    still_possible,
+)
+from glovecal_models.sampling.active.posterior import assumed_angles
 from glovecal_models.sampling.active.proposal import propose
-from glovecal_models.sampling.attempt import Attempt
 from glovecal_models.sampling.catalogue import Equipment, make_protocol
 from glovecal_models.sampling.engine import Sampling, begin_sampling
 from glovecal_models.sampling.growing import NextSteps
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.sampled_takes import sampled_takes
-from glovecal_models.sampling.state import SamplingState
+from glovecal_models.sampling.state import Attempt, SamplingState
 from glovecal_models.sampling.user_events import NotNow
 from glovecal_models.simulation.asked_session import RECORDING, AskedSession, asked_session
 from glovecal_models.simulation.protocol import free_segment

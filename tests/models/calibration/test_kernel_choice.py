@@ -26,8 +26,8 @@ from glovecal_models.comparison.compare import compare
 from glovecal_models.errors import BadInput, Cancelled, DamagedArtifact, NotTrainable
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.layout import Layout
-from glovecal_models.regression.kept_choice import choice_of, kernel_of
 from glovecal_models.regression.kernel_candidates import CANDIDATES, candidates_of
+from glovecal_models.regression.kernel_scores import choice_of, kernel_of
 from glovecal_models.takes.take import Take
 
 AUTO = TrainingSettings(method="auto", folds=0)

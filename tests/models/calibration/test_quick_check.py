@@ -21,7 +21,7 @@ from glovecal_models.layout import Layout
 from glovecal_models.quick_check.held_poses import held_poses
 from glovecal_models.quick_check.pose_book import own_poses
 from glovecal_models.quick_check.quick_check import quick_check
-from glovecal_models.simulation.causes.cause import Cause
+from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 from glovecal_models.takes.take import Take

@@ -5,8 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from glovecal_models.quick_check.shift_scale import SCALE_SD, SCALES, scaled_to_poses
-from glovecal_models.quick_check.wearing_shift import PoseError, WearingShift
+from glovecal_models.quick_check.wearing_shift import (
+    SCALE_SD,
+    SCALES,
+    PoseError,
+    WearingShift,
+    scaled_to_poses,
+)
 
 LANES, POSES = 12, 4
 PRIOR = WearingShift(np.zeros(2 * LANES), np.diag(np.repeat([9.0, 1.0], LANES)))

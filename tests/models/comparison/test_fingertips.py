@@ -16,7 +16,7 @@ from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import HAND_ROTATIONS, completed
 from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.simulation.free_motion import random_posture
+from glovecal_models.simulation.hand_motion import random_posture
 from glovecal_models.simulation.simulated_hand import DRIVEN
 from glovecal_models.takes.take import Take
 

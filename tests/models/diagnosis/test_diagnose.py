@@ -10,7 +10,7 @@ from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.effects.base.assessment import block_starts
 from glovecal_models.errors import BadInput, Cancelled
 from glovecal_models.layout import Layout
-from glovecal_models.simulation.causes.cause import Cause
+from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 from glovecal_models.takes.take import Take

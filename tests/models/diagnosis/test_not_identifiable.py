@@ -13,7 +13,7 @@ from glovecal_models.diagnosis.not_identifiable import Undecidable, undecidable
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.layout import Layout
-from glovecal_models.simulation.causes.cause import Cause
+from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 from glovecal_models.takes.take import Take

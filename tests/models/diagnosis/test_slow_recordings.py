@@ -12,7 +12,7 @@ import pytest
 from glovecal_models.diagnosis.diagnose import SINGLE_POSES, diagnose
 from glovecal_models.diagnosis.resampled import SHORTEST_BRIDGE_S, bridge_s
 from glovecal_models.layout import Layout
-from glovecal_models.simulation.causes.cause import Cause
+from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 from glovecal_models.takes.table import read_takes

@@ -28,7 +28,7 @@ from glovecal_models.sampling.guided.guided_calibration import (
     guided_calibration,
     guided_samples,
 )
-from glovecal_models.sampling.guided.taught_take import TaughtTake
+from glovecal_models.sampling.guided.taught_samples import TaughtTake
 from glovecal_models.sampling.protocol import Protocol
 from glovecal_models.sampling.sampled_takes import sampled_takes
 from glovecal_models.simulation.asked_session import RECORDING, asked_session

@@ -14,8 +14,13 @@ from glovecal_models.hand.rotations import HAND_ROTATIONS
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.inverse_kinematics.contact import Rod, Touch
 from glovecal_models.layout import Layout
-from glovecal_models.sampling.guided.first_beliefs import BOW_LENGTH, BOW_SHARE, first_beliefs
-from glovecal_models.sampling.guided.rotation_belief import Prior, RotationBelief
+from glovecal_models.sampling.guided.rotation_belief import (
+    BOW_LENGTH,
+    BOW_SHARE,
+    Prior,
+    RotationBelief,
+    first_beliefs,
+)
 from glovecal_models.sampling.guided.taught_samples import TaughtSamples
 from glovecal_models.sampling.guided.touch_posterior import TouchFrames, TouchPosterior
 

@@ -11,7 +11,7 @@ from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.sampling.catalogue import make_protocol
 from glovecal_models.sampling.guided.touch_watch import TouchWatch, require_possible_touches
-from glovecal_models.sampling.step import Step
+from glovecal_models.sampling.protocol import Step
 from glovecal_models.simulation.asked_session import asked_session
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from glovecal_models.hand.dimensions import HandDimensions
-from glovecal_models.hand.forward_kinematics import forward_kinematics
-from glovecal_models.hand.jacobian import tip_jacobian
+from glovecal_models.hand.forward_kinematics import forward_kinematics, tip_jacobian
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.hand.skeleton_document import skeleton_document
 

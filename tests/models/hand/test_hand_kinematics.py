@@ -11,13 +11,12 @@ from scipy.optimize import minimize
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
-from glovecal_models.hand.forward_kinematics import HandFrames, forward_kinematics
-from glovecal_models.hand.jacobian import tip_jacobian
+from glovecal_models.hand.forward_kinematics import HandFrames, forward_kinematics, tip_jacobian
 from glovecal_models.hand.limits import LIMITS_DEG, clamped
 from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS, REST_DEG, RULES, completed
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.layout import Layout
-from glovecal_models.simulation.postures import POSTURES
+from glovecal_models.simulation.simulated_hand import POSTURES
 
 RIGHT, LEFT = hand_skeleton(), hand_skeleton(hand="left")
 WILD = arrays(float, (3, len(HAND_ROTATIONS)), elements=st.floats(-1e4, 1e4))

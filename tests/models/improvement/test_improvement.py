@@ -17,7 +17,7 @@ from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.improvement.improve import improve
 from glovecal_models.improvement.remove_effect import remove_effect
 from glovecal_models.layout import Layout
-from glovecal_models.simulation.causes.cause import Cause
+from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import RecordedSession, record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 

@@ -20,7 +20,7 @@ from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.improvement.improve import improve
 from glovecal_models.layout import Layout
-from glovecal_models.simulation.causes.cause import Cause
+from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import RecordedSession, record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 

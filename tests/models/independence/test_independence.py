@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 
 from glovecal_models.errors import BadInput
 from glovecal_models.independence.independence import Independence, examine_independence
-from glovecal_models.independence.independence_document import independence_document
-from glovecal_models.independence.proposal import proposals, proposed_layout
-from glovecal_models.independence.take_names import moved_in_name, rotation_in_name
+from glovecal_models.independence.proposal import independence_document, proposals, proposed_layout
+from glovecal_models.independence.still_rotation import moved_in_name, rotation_in_name
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 

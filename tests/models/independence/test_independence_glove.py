@@ -7,9 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from glovecal_models.independence.independence import Independence, examine_independence
+from glovecal_models.independence.independence import SIDEWAYS, Independence, examine_independence
 from glovecal_models.independence.proposal import proposals
-from glovecal_models.independence.worn_side import SIDEWAYS
 from glovecal_models.simulation.protocol import segments
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.simulation.simulated_take import simulate_take

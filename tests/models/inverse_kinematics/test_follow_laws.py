@@ -13,9 +13,8 @@ from scipy.optimize import minimize
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.inverse_kinematics.clamped_step import LONGEST_PULL_MM, clamped_pull
 from glovecal_models.inverse_kinematics.contact import Rod, TipPlaces, Touch
-from glovecal_models.inverse_kinematics.follow import follow
+from glovecal_models.inverse_kinematics.follow import LONGEST_PULL_MM, clamped_pull, follow
 from glovecal_models.inverse_kinematics.hand_shape import HandShape
 from glovecal_models.inverse_kinematics.tip_chains import TipChains
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.forward_kinematics import forward_kinematics
-from glovecal_models.hand.jacobian import tip_jacobian
+from glovecal_models.hand.forward_kinematics import forward_kinematics, tip_jacobian
 from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS, WRIST
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.inverse_kinematics.tip_chains import TipChains

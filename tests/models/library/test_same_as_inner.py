@@ -21,7 +21,7 @@ from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.improvement.improve import improve
 from glovecal_models.improvement.remove_effect import remove_effect
-from glovecal_models.simulation.causes.cause import Cause
+from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 from glovecal_models.takes.table import read_takes

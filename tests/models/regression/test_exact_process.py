@@ -10,12 +10,9 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from glovecal_models.covariance.base import Covariance
-from glovecal_models.covariance.catalogue import (
-    LinearArd,
-    Polynomial,
-    SquaredExponential,
-    SquaredExponentialArd,
-)
+from glovecal_models.covariance.linear_ard import LinearArd
+from glovecal_models.covariance.polynomial import Polynomial
+from glovecal_models.covariance.squared_exponential import SquaredExponential, SquaredExponentialArd
 from glovecal_models.errors import Cancelled, NotTrainable
 from glovecal_models.regression.exact import ExactLikelihood, fit_exact
 from glovecal_models.regression.mean import LinearMean, Mean, ZeroMean

@@ -6,16 +6,17 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, DotProduct, Kernel, WhiteKernel
 
 from glovecal_models.covariance.base import Covariance
-from glovecal_models.covariance.catalogue import Polynomial, SquaredExponentialArd
+from glovecal_models.covariance.polynomial import Polynomial
+from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
 from glovecal_models.errors import Cancelled, NotTrainable
 from glovecal_models.regression.counted_likelihood import CountedLikelihood
 from glovecal_models.regression.exact import ExactLikelihood
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
-from glovecal_models.regression.kernel_process import fit_process
+from glovecal_models.regression.kernel_candidates import fit_process
 from glovecal_models.regression.mean import LinearMean, ZeroMean
 from glovecal_models.regression.merged_samples import MergedSamples
 from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_models.regression.standardise import standardise
+from glovecal_models.regression.training_samples import standardise
 
 POLYNOMIAL = Polynomial(3)
 GENERAL = SquaredExponentialArd() + SquaredExponentialArd()

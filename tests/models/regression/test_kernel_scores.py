@@ -6,12 +6,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from glovecal_models.covariance.catalogue import Polynomial
+from glovecal_models.covariance.polynomial import Polynomial
 from glovecal_models.errors import DamagedArtifact
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
-from glovecal_models.regression.kept_choice import choice_of, keeping_choice, kernel_of, with_choice
 from glovecal_models.regression.kernel_candidates import CANDIDATE, CANDIDATES, candidates_of
-from glovecal_models.regression.kernel_scores import CandidateScore, KernelScores, kernel_sentences
+from glovecal_models.regression.kernel_scores import (
+    CandidateScore,
+    KernelScores,
+    choice_of,
+    keeping_choice,
+    kernel_of,
+    kernel_sentences,
+    with_choice,
+)
 
 TAKES = (2.0, 1.8, 1.9, 2.1, 1.7)
 

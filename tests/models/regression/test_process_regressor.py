@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import cholesky, solve_triangular
 
-from glovecal_models.covariance.squared_exponential_ard import SquaredExponentialArd
+from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
 from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.regression.process_regressor import ProcessRegressor
 

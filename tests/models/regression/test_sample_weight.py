@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from glovecal_models.covariance.squared_exponential_ard import SquaredExponentialArd
+from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
 from glovecal_models.regression.exact_profiled_likelihood import ExactProfiledLikelihood
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
 from glovecal_models.regression.fitc import FitcLikelihood

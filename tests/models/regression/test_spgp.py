@@ -7,20 +7,16 @@ import numpy as np
 import pytest
 
 from glovecal_models.covariance.base import Covariance
-from glovecal_models.covariance.catalogue import (
-    LinearArd,
-    Polynomial,
-    SquaredExponential,
-    SquaredExponentialArd,
-)
+from glovecal_models.covariance.linear_ard import LinearArd
+from glovecal_models.covariance.polynomial import Polynomial
+from glovecal_models.covariance.squared_exponential import SquaredExponential, SquaredExponentialArd
 from glovecal_models.errors import BadInput, Cancelled, NotTrainable
-from glovecal_models.regression import noise_guard, spgp
+from glovecal_models.regression import fitc, spgp
 from glovecal_models.regression.exact import ExactLikelihood, fit_exact
 from glovecal_models.regression.fitc import FitcLikelihood
 from glovecal_models.regression.mean import LinearMean, Mean, ZeroMean
 from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_models.regression.pseudo_inputs import choose_pseudo_inputs
-from glovecal_models.regression.spgp import fit_spgp
+from glovecal_models.regression.spgp import choose_pseudo_inputs, fit_spgp
 
 MODELS = [
     (ZeroMean(), SquaredExponentialArd()),
@@ -201,7 +197,7 @@ def test_noise_collapse_happens_without_the_guard_and_is_refused_with_it(monkeyp
 
     guarded = fit_all()
     monkeypatch.setattr(spgp, "LEAST_NOISE", 1e-9)
-    monkeypatch.setattr(noise_guard, "TOLERATED_LOSS", np.inf)
+    monkeypatch.setattr(fitc, "TOLERATED_LOSS", np.inf)
     free = fit_all()
     for kept, collapsed in zip(guarded, free, strict=True):
         assert not kept.evidence["guard"]["accepted"]

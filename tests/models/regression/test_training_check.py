@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from glovecal_models.errors import NotTrainable
-from glovecal_models.regression.standardise import standardise
-from glovecal_models.regression.training_check import check_samples
+from glovecal_models.regression.training_samples import check_samples, standardise
 
 
 def samples(count: int = 20) -> tuple[np.ndarray, np.ndarray]:

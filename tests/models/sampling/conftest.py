@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from glovecal_models.sampling.engine import Sampling, begin_sampling
-from glovecal_models.sampling.protocol import Protocol
+from glovecal_models.sampling.protocol import Protocol, Step
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.state import SamplingState
-from glovecal_models.sampling.step import Step
 
 RATE_HZ = 50
 STILL = (100.0, 50.0)

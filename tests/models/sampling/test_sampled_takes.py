@@ -14,11 +14,10 @@ from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 from glovecal_models.quick_check.quick_check import quick_check
 from glovecal_models.sampling.catalogue import PROTOCOLS, Equipment, make_protocol
-from glovecal_models.sampling.protocol import Protocol
+from glovecal_models.sampling.protocol import Protocol, Step
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.sampled_takes import for_other_subject, sampled_takes
 from glovecal_models.sampling.state import SamplingState
-from glovecal_models.sampling.step import Step
 from glovecal_models.simulation.asked_session import RECORDING, AskedSession, asked_session
 from glovecal_models.simulation.protocol import evaluation_segment
 from glovecal_models.simulation.simulated_glove import SimulatedGlove

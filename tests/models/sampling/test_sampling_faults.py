@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from glovecal_models.errors import BadInput
+from glovecal_models.sampling.catalogue import rod_step, touch_steps
+from glovecal_models.sampling.protocol import Step
 from glovecal_models.sampling.quality import faults
-from glovecal_models.sampling.reading import GloveReading
-from glovecal_models.sampling.steadiness import ActiveRanges
-from glovecal_models.sampling.step import Step
-from glovecal_models.sampling.touches import rod_step, touch_steps
-from glovecal_models.sampling.widget_check import inconsistent_widgets
+from glovecal_models.sampling.reading import ActiveRanges, GloveReading
+from glovecal_models.sampling.verdict import inconsistent_widgets
 from glovecal_models.sampling.widgets import widget_step
 
 from .conftest import STEPS, Bench, moving, pose

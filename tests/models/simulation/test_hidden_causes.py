@@ -7,9 +7,7 @@ import pytest
 
 from glovecal_models.errors import BadInput
 from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES, UNKNOWN_CAUSES, forms
-from glovecal_models.simulation.causes.cause import Cause
-from glovecal_models.simulation.causes.draws import Draws
-from glovecal_models.simulation.causes.form import Form
+from glovecal_models.simulation.causes.form import Cause, Draws, Form
 from glovecal_models.simulation.scene import play_scene
 from glovecal_models.simulation.session import RecordedSession, record_session
 from glovecal_models.simulation.session_glove import SessionGlove

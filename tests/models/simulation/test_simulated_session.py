@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from glovecal_models.errors import BadInput
-from glovecal_models.simulation.causes.cause import Cause
+from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.scene import play_scene
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_glove import SessionGlove

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from glovecal_client.rest import Refused, RestClient
-from glovecal_models.simulation.causes.cause import Cause
+from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 from glovecal_models.takes.table import write_takes

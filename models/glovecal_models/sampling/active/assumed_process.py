@@ -14,7 +14,7 @@ import numpy as np
 
 from glovecal_models.covariance.base import Covariance
 from glovecal_models.covariance.linear_ard import LinearArd
-from glovecal_models.covariance.squared_exponential_ard import SquaredExponentialArd
+from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.layout import Correspondence
 from glovecal_models.regression.process_regressor import ProcessRegressor

@@ -13,7 +13,7 @@ import numpy as np
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.catalogue import Equipment, steps_for_layout
 from glovecal_models.sampling.key_poses import HOLD_S, key_pose_steps
-from glovecal_models.sampling.step import Step
+from glovecal_models.sampling.protocol import Step
 from glovecal_models.sampling.widgets import WIDGET_DEG, widget_steps
 
 MOVE_S = 2.0

@@ -1,22 +1,32 @@
-"""Asks for the step that teaches most, again and again, until none is worth its time."""
+"""What to record next: in a running sampling, until no step is worth its time, and for a model.
+
+A model's proposals come from its processes, its takes and other readings of the glove. What a diagnosis asks
+for stands beside them: such takes separate causes, which no variance of a process can.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.samples import require_layout
+from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
+from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.sampling.active.candidates import candidate_steps
-from glovecal_models.sampling.active.known_readings import known_from_state
+from glovecal_models.sampling.active.known_readings import known_from_state, known_from_takes
 from glovecal_models.sampling.active.proposal import Proposal, ProposedStep, gain_sentence, propose
 from glovecal_models.sampling.catalogue import Equipment, steps_for_layout
 from glovecal_models.sampling.growing import NextSteps
 from glovecal_models.sampling.key_poses import verification_steps
+from glovecal_models.sampling.protocol import Step
 from glovecal_models.sampling.state import SamplingState
-from glovecal_models.sampling.step import Step
+from glovecal_models.takes.take import Take
 
 LONGEST_CAPTURE_S = 240.0
 """Not longer than the fixed protocol, whatever is still to be gained."""
@@ -83,3 +93,69 @@ def _named_anew(step: Step, state: SamplingState) -> Step:
 
 def _numbered(name: str, number: int) -> str:
     return name if number == 1 else f"{name}-{number}"
+
+
+def propose_for_model(
+    model: CalibrationModel,
+    takes: Sequence[Take],
+    more_free: Sequence[Take] = (),
+    equipment: Equipment | None = None,
+) -> Proposal:
+    """``takes``: those it was trained on; ``more_free``: others, whose readings show where it is used.
+
+    Raises LayoutMismatch, BadInput (no pose or widget is known for the layout, or hardly any frames).
+    """
+    for take in (*takes, *more_free):
+        require_layout(take, model.layout)
+    known = known_from_takes(takes, model.layout.sensors, more_free)
+    trained = {
+        item.rotation: item.regressor
+        for item in model.rotations
+        if isinstance(item.regressor, ProcessRegressor) and _is_usual(item.regressor)
+    }
+    found = propose(model.layout, known, candidate_steps(model.layout, equipment), trained=trained)
+    return replace(found, sentences=tuple(_sentences(found, [*takes, *more_free])))
+
+
+def _is_usual(regressor: ProcessRegressor) -> bool:
+    """Whether the last term of its covariance is the one that bend and lengthscales are read from."""
+    return regressor.covariance.parts()[-1].kind == SquaredExponentialArd.kind
+
+
+def _sentences(found: Proposal, takes: Sequence[Take]) -> list[str]:
+    told = []
+    assumed = [name for name in found.sd_deg if name not in found.learned]
+    if assumed:
+        told.append(
+            f"Assumed, not learned: how far {', '.join(assumed)} may be from straight "
+            "(as in simulated CyberGloves, and wider)."
+        )
+    wearings = {take.wearing for take in takes}
+    if len(wearings) > 1:
+        told.append(
+            f"These takes are of {len(wearings)} wearings, between which readings shift; "
+            "the figures hold for one of them."
+        )
+    if not any(_has_free_motion(take) for take in takes):
+        told.append("No free motion was recorded: the takes' own readings stand for those of everyday use.")
+    return told
+
+
+def _has_free_motion(take: Take) -> bool:
+    return not take.rotations or bool(np.isnan(take.reference_at_frames(take.rotations)).all(axis=1).any())
+
+
+def diagnosed_take(diagnosis: Mapping[str, Any]) -> dict[str, Any] | None:
+    """What to record by a diagnosis' document, and why in a sentence; None when it asks for nothing."""
+    wanted = diagnosis.get("next_take")
+    if not wanted:
+        return None
+    causes = [name.replace("_", " ") for name in wanted["separates"]]
+    others, last = causes[:-1], causes[-1]
+    rivals = f"{', '.join(others)} {'and' if others else ''} {last}".strip()
+    return {
+        "what": wanted["what"],
+        "seconds": wanted["seconds"],
+        "separates": list(wanted["separates"]),
+        "reason": f"The diagnosis cannot tell {rivals} apart with the takes there are; this one would.",
+    }

@@ -16,16 +16,19 @@ from glovecal_models.sampling.active.assumed_process import (
     assumed_process,
     rotation_range_deg,
 )
-from glovecal_models.sampling.active.expected_readings import ExpectedReadings
 from glovecal_models.sampling.active.known_readings import (
     ALIKE_FRAMES,
+    ExpectedReadings,
     KnownReadings,
     shared_sd_deg,
 )
-from glovecal_models.sampling.active.posterior_variance import PosteriorVariance
-from glovecal_models.sampling.active.sampled_points import SampledPoints, sampled_points, step_errors
-from glovecal_models.sampling.protocol import step_capture_s
-from glovecal_models.sampling.step import Step
+from glovecal_models.sampling.active.posterior import (
+    PosteriorVariance,
+    SampledPoints,
+    sampled_points,
+    step_errors,
+)
+from glovecal_models.sampling.protocol import Step, step_capture_s
 
 ENOUGH_DEG = 0.02
 """A step that lowers the expected error of a frame, noise included, by less is not worth its time."""

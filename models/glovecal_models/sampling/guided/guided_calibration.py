@@ -21,9 +21,8 @@ from glovecal_models.calibration.training_settings import Report, TrainingSettin
 from glovecal_models.errors import Cancelled, NotTrainable
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.layout import Layout
-from glovecal_models.sampling.guided.closing_touches import closing_touches
-from glovecal_models.sampling.guided.first_beliefs import first_beliefs, reading_ranges
 from glovecal_models.sampling.guided.left_out import LeftOut, left_out
+from glovecal_models.sampling.guided.rotation_belief import first_beliefs, reading_ranges
 from glovecal_models.sampling.guided.second_pass import (
     Lesson,
     SampleCount,
@@ -33,10 +32,16 @@ from glovecal_models.sampling.guided.second_pass import (
     touch_lessons,
     with_open_variance,
 )
-from glovecal_models.sampling.guided.seen_touches import RefusedTouch, SeenTouch, seen_touches
-from glovecal_models.sampling.guided.sentences import guided_sentences, hold_sentence, nothing_left
-from glovecal_models.sampling.guided.taught_samples import hold_sd_deg, taught_samples
-from glovecal_models.sampling.guided.taught_take import FK, TaughtTake
+from glovecal_models.sampling.guided.seen_touches import (
+    RefusedTouch,
+    SeenTouch,
+    closing_touches,
+    guided_sentences,
+    hold_sentence,
+    nothing_left,
+    seen_touches,
+)
+from glovecal_models.sampling.guided.taught_samples import FK, TaughtTake, hold_sd_deg, taught_samples
 from glovecal_models.sampling.guided.touch_posterior import TouchPosterior
 from glovecal_models.takes.take import Take
 

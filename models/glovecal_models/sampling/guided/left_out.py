@@ -1,7 +1,7 @@
 """How well a session tells what is left out of it: each widget between others, and each touch, one at a time.
 
 The only true errors that a session without a reference system has. They are those of its calibration as it is
-believed (``first_beliefs.py``, ``touch_posterior.py``); the regressor trained on it follows it closely.
+believed (``rotation_belief.py``, ``touch_posterior.py``); the regressor trained on it follows it closely.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from glovecal_models.errors import Cancelled
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.layout import Layout
-from glovecal_models.sampling.guided.first_beliefs import Ranges, first_beliefs
+from glovecal_models.sampling.guided.rotation_belief import Ranges, first_beliefs
 from glovecal_models.sampling.guided.seen_touches import SeenTouch
 from glovecal_models.sampling.guided.taught_samples import Moved, TaughtSamples
 from glovecal_models.sampling.guided.touch_posterior import TouchPosterior

@@ -21,9 +21,9 @@ from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.regression.linear_regressor import LinearRegressor
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.sampling.guided.seen_touches import SeenTouch
-from glovecal_models.sampling.guided.taught_take import TaughtTake
+from glovecal_models.sampling.guided.taught_samples import TaughtTake
 from glovecal_models.sampling.guided.touch_posterior import TouchPosterior
-from glovecal_models.sampling.step import Kind
+from glovecal_models.sampling.protocol import Kind
 from glovecal_models.takes.take import Take
 
 LOOKED_AT = 40

@@ -1,14 +1,18 @@
-"""Which touches of a sampling can be believed, and in which frames; others are refused with the reason."""
+"""Which touches of a sampling can be believed, and in which frames; others are refused with the reason.
+
+A touch is first looked at by itself, then beside the others: one that the likeliest calibration of the whole
+session leaves open cannot be true.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.rotations import HAND_ROTATIONS
+from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.inverse_kinematics.contact import Rod, Touch
 from glovecal_models.inverse_kinematics.follow import follow
@@ -21,7 +25,8 @@ from glovecal_models.inverse_kinematics.touch_check import (
     require_happened,
     require_possible,
 )
-from glovecal_models.sampling.guided.taught_take import TaughtTake
+from glovecal_models.sampling.guided.rotation_belief import RotationBelief
+from glovecal_models.sampling.guided.taught_samples import TaughtTake
 from glovecal_models.sampling.guided.touch_posterior import TouchFrames, TouchPosterior
 from glovecal_models.takes.take import Take
 
@@ -101,3 +106,81 @@ def _hand(first: TouchPosterior, readings: np.ndarray) -> PredictedHand:
     variance = np.column_stack([first.variance(name, readings) for name in HAND_ROTATIONS])
     new = np.array([first.beliefs[name].prior.frame_sd_deg for name in HAND_ROTATIONS])
     return PredictedHand(mean, np.sqrt(variance + new**2), np.zeros(mean.shape, dtype=bool))
+
+
+FRAMES_A_TOUCH = 100
+"""Of each touch that the search for the likeliest calibration looks at."""
+MOST_LEFT_MM = 8.0
+"""Between tips under the calibration in which all touches close best; a true touch leaves 1 to 2 mm."""
+
+
+def closing_touches(
+    beliefs: Mapping[str, RotationBelief],
+    sensors: Sequence[str],
+    skeleton: Skeleton,
+    seen: Sequence[SeenTouch],
+    cancelled: Callable[[], bool] | None = None,
+) -> tuple[TouchPosterior, list[SeenTouch], list[RefusedTouch]]:
+    """The likeliest calibration, the touches it rests on, and those that contradict. Raises Cancelled."""
+    kept, refused = list(seen), []
+    while True:
+        touches = [touch.some(FRAMES_A_TOUCH) for touch in kept]
+        posterior = TouchPosterior(beliefs, sensors, skeleton, touches, cancelled)
+        left = [float(np.median(posterior.apart_mm(touch, skeleton))) for touch in touches]
+        if not left or max(left) <= MOST_LEFT_MM:
+            return posterior, kept, refused
+        strange = kept.pop(int(np.argmax(left)))
+        reason = (
+            f"with the other touches and poses {max(left):.0f} mm are left between the tips, at most "
+            f"{MOST_LEFT_MM:g} are believed. Repeat the motion with the tips together, or check the hand's "
+            "dimensions"
+        )
+        brief = f"{max(left):.0f} mm are left between the tips with the other touches."
+        refused.append(RefusedTouch(strange.take.name, strange.pose, reason, brief))
+
+
+SHOWN = 4
+
+
+def guided_sentences(
+    seen: Sequence[SeenTouch],
+    refused: Sequence[RefusedTouch],
+    told: Mapping[str, float],
+    posterior: TouchPosterior,
+    skeleton: Skeleton | None,
+) -> list[str]:
+    """Of touches: what each closed, what they told most of, and which were refused."""
+    said = [_closed(touch, posterior, skeleton) for touch in seen if skeleton is not None]
+    if told:
+        most = sorted(told, key=lambda name: -told[name])[:SHOWN]
+        shares = ", ".join(f"{name} {100 * told[name]:.0f} %" for name in most)
+        said.append(f"Of what poses and widgets left open of a joint the touches told most of {shares}.")
+    said += [f"Left out: {each.pose} of take {each.take}: {each.reason}." for each in refused]
+    return said
+
+
+def hold_sentence(holds: int, sd_deg: float) -> str:
+    return (
+        f"{holds} poses were held, {sd_deg:.1f} degrees (standard deviation) from the angles they are said "
+        "to have: each counts as one sample of that accuracy, however many frames it has."
+    )
+
+
+def nothing_left(has_skeleton: bool, touches: int, refused: Sequence[RefusedTouch]) -> str:
+    """Why there is nothing to train on."""
+    if refused:
+        reasons = "; ".join(f"{each.pose}: {each.reason}" for each in refused)
+        return f"no take has known angles, and every touch was refused ({reasons})"
+    if touches and not has_skeleton:
+        return "touches need the subject's hand dimensions, and no other take has known angles"
+    return "no pose, no widget and no touch among these takes"
+
+
+def _closed(touch: SeenTouch, posterior: TouchPosterior, skeleton: Skeleton) -> str:
+    left = float(np.median(posterior.apart_mm(touch.some(60), skeleton)))
+    first, second = (FINGERS[finger] for finger in touch.contact.fingers)
+    what = f"{first} and {second} at the rod" if isinstance(touch.contact, Rod) else f"{first} and {second}"
+    return (
+        f"Tips of {what}: read {touch.apart_mm:.1f} mm off before, {left:.1f} mm with what all touches tell "
+        f"(median of {len(touch.rows)} frames)."
+    )

@@ -11,15 +11,13 @@ from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.inverse_kinematics.tip_chains import TipChains
 from glovecal_models.inverse_kinematics.touch_check import require_possible
 from glovecal_models.layout import Layout
-from glovecal_models.sampling.guided.first_beliefs import first_beliefs
+from glovecal_models.sampling.guided.rotation_belief import first_beliefs
 from glovecal_models.sampling.guided.seen_touches import seen_touches
-from glovecal_models.sampling.guided.taught_samples import taught_samples
-from glovecal_models.sampling.guided.taught_take import FK, TaughtTake, contact_of
+from glovecal_models.sampling.guided.taught_samples import FK, TaughtTake, contact_of, taught_samples
 from glovecal_models.sampling.guided.touch_posterior import TouchPosterior
-from glovecal_models.sampling.protocol import Protocol
+from glovecal_models.sampling.protocol import Protocol, Step
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.state import SamplingState
-from glovecal_models.sampling.step import Step
 from glovecal_models.takes.take import Take
 
 

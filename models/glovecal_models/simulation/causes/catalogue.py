@@ -1,12 +1,142 @@
-"""All causes that can be hidden, by name, and the forms of each."""
+"""All causes that can be hidden, by name, and the forms of each.
+
+Causes outside every catalogue of effects are here too: honest answers to them are "something is left that I
+do not know". They sit on one sensor or on all. Three have nothing recorded that could explain them; one
+follows a context column of an unfamiliar name, in a curve that rises and falls.
+"""
 
 from __future__ import annotations
 
 from importlib import import_module
 
+import numpy as np
+
 from glovecal_models.errors import BadInput
-from glovecal_models.simulation.causes.form import Form
-from glovecal_models.simulation.causes.unknown import FORMS_BY_NAME
+from glovecal_models.simulation.causes.form import Column, Draws, Effect, Form, Stage, Touches
+from glovecal_models.simulation.scene import Scene
+from glovecal_models.simulation.signals import lasting_noise
+
+CONTEXT_COLUMNS = ("strap_tension", "tilt_g", "cuff_bend", "lining_state")
+
+
+def slow_waves(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Slow waves with no clock or column to follow, the same for all sensors."""
+    weight = draws.each("weight", 0.7, 1.3)
+    waves = np.zeros(scene.session_s.shape)
+    for row, start in enumerate(scene.starts):
+        random = draws.stream("waves", start.key)
+        for period_s in random.uniform(12.0, 60.0, 3):
+            waves[row] += np.sin(2 * np.pi * (scene.time_s / period_s + random.random()))
+    return signal + size * weight * waves[:, :, None]
+
+
+def slow_wander(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A common random wander of all sensors, with signs of their own."""
+    lasts_s = draws.one("lasts_s", 8.0, 30.0)
+    return signal + size * draws.signs() * _wander(scene, draws, lasts_s, 1)
+
+
+def channel_wander(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Each affected sensor wanders by itself."""
+    lasts_s = draws.one("lasts_s", 3.0, 20.0)
+    return signal + size * _wander(scene, draws, lasts_s, len(scene.sensors))
+
+
+def grip_pressure(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Pressure that builds as the hand closes, with an effort that changes from grip to grip."""
+    from_share = draws.one("from_share", 0.3, 0.5)
+    weight = draws.each("weight", 0.6, 1.4) * draws.sign()
+    effort = 1 + 0.5 * np.tanh(_wander(scene, draws, draws.one("effort_lasts_s", 4.0, 12.0), 1))
+    grip = np.maximum(scene.closing - from_share, 0.0)[:, :, None] ** draws.one("power", 1.0, 2.0)
+    return signal + size * weight * grip * effort
+
+
+def thumb_across(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A cable that the thumb pulls when it goes under the palm; no sensor of the thumb need be there."""
+    pull = 1 / (1 + np.exp(-10 * (scene.bent("T_TMC") - draws.one("at_share", 0.4, 0.6))))
+    return signal + size * draws.signs() * pull[:, :, None]
+
+
+def context_hump(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A hump over the values of a recorded column of an unfamiliar name."""
+    value = _column_values(scene, draws)[:, :, None]
+    centre, width = draws.one("centre", -0.6, 0.6), draws.one("width", 0.5, 0.9)
+    return signal + size * draws.signs() * np.exp(-(((value - centre) / width) ** 2))
+
+
+def context_wave(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A wave over the values of a recorded column of an unfamiliar name."""
+    value = _column_values(scene, draws)[:, :, None]
+    return signal + size * draws.signs() * np.sin(
+        draws.one("waves", 1.8, 2.8) * value + draws.one("at", 0, 3)
+    )
+
+
+def tilt(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The cuff's weight pulls one way or the other as the forearm turns, which nobody records."""
+    turn = np.pi * np.tanh(_wander(scene, draws, draws.one("lasts_s", 1.5, 6.0), 1))
+    return signal + size * draws.signs() * np.sin(turn + draws.one("mounted_at", -1.5, 1.5))
+
+
+def context_column(scene: Scene, draws: Draws) -> tuple[str, np.ndarray]:
+    """The recorded column: name and values (T, N), about -2 to 2."""
+    name = CONTEXT_COLUMNS[int(draws.stream("column").integers(len(CONTEXT_COLUMNS)))]
+    values = _column_values(scene, draws)
+    return name, np.round(values + 0.01 * draws.stream("column noise").standard_normal(values.shape), 4)
+
+
+def _column_values(scene: Scene, draws: Draws) -> np.ndarray:
+    """Another level in every take and a slow wander around it, shape (T, N)."""
+    level = np.array([draws.stream("level", start.key).uniform(-1, 1) for start in scene.starts])
+    return level[:, None] + 0.6 * _wander(scene, draws, 8.0, 1)[:, :, 0]
+
+
+def _wander(scene: Scene, draws: Draws, lasts_s: float, channels: int) -> np.ndarray:
+    """Shape (T, N, channels), standard deviation 1."""
+    count = len(scene.time_s)
+    return np.stack(
+        [
+            lasting_noise(draws.stream("wander", start.key), count, channels, lasts_s, scene.rate_hz)
+            for start in scene.starts
+        ]
+    )
+
+
+def _unknown(
+    name: str,
+    sentence: str,
+    effect: Effect,
+    touches: Touches = "one_or_all",
+    column: Column | None = None,
+) -> Form:
+    return Form(name, sentence, effect, Stage.WEARING, touches=touches, column=column)
+
+
+FORMS_BY_NAME: dict[str, tuple[Form, ...]] = {
+    "common_swing": (
+        _unknown("slow_waves", "Unrecorded slow waves common to all sensors (ours).", slow_waves, "all"),
+        _unknown(
+            "slow_wander", "An unrecorded slow wander common to all sensors (ours).", slow_wander, "all"
+        ),
+    ),
+    "one_channel_wander": (
+        _unknown("channel_wander", "One sensor wanders, a loose thread (ours).", channel_wander, "one"),
+    ),
+    "posture_locked": (
+        _unknown("grip_pressure", "Unrecorded grip pressure that follows the hand's closing.", grip_pressure),
+        _unknown("thumb_across", "An unrecorded pull by the thumb under the palm (ours).", thumb_across),
+    ),
+    "context": (
+        _unknown(
+            "context_hump", "A hump over a recorded column (ours).", context_hump, column=context_column
+        ),
+        _unknown(
+            "context_wave", "A wave over a recorded column (ours).", context_wave, column=context_column
+        ),
+    ),
+    "tilt": (_unknown("tilt", "The pull of gravity as the forearm turns, unrecorded (ours).", tilt),),
+}
+
 
 KNOWN_CAUSES = (
     "nonlinearity", "cross_coupling", "palm_arch", "hysteresis", "creep", "lag", "clock_offset",

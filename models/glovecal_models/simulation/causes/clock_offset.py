@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.draws import Draws
-from glovecal_models.simulation.causes.form import Form, Stage
-from glovecal_models.simulation.resampling import at_times
+from glovecal_models.simulation.causes.form import Draws, Form, Stage
 from glovecal_models.simulation.scene import Scene
+from glovecal_models.simulation.signals import at_times
 
 SIZES_S = (0.002, 1.2)
 LARGEST_S = 2.4

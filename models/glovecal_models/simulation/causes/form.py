@@ -1,16 +1,58 @@
-"""One way a physical cause may act: its place in the chain, what it does, and how its size is judged."""
+"""A cause to hide in a session: what is asked for, a way it may act, and the record of what was hidden.
+
+A form has its place in the chain, what it does, and how its size is judged. Its random parameters are drawn
+by name, so that every use of a name gives the same value.
+"""
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Literal
 
 import numpy as np
 
-from glovecal_models.simulation.causes.draws import Draws
+from glovecal_models.errors import BadInput
 from glovecal_models.simulation.scene import Scene
+
+
+class Draws:
+    """Parameters of one cause in one glove; what was drawn is kept in ``values`` as plain numbers."""
+
+    def __init__(self, seed: int, label: str, channels: int) -> None:
+        self._key = (seed, 50, zlib.crc32(label.encode()))
+        self._channels = channels
+        self.values: dict[str, float | list[float]] = {}
+
+    def one(self, name: str, low: float, high: float) -> float:
+        """One number for the whole glove, uniform between ``low`` and ``high``."""
+        return self._keep(name, float(self.stream(name).uniform(low, high)))
+
+    def each(self, name: str, low: float, high: float) -> np.ndarray:
+        """One number per sensor, shape (S,), uniform between ``low`` and ``high``."""
+        drawn = self.stream(name).uniform(low, high, self._channels)
+        self.values[name] = [round(float(value), 6) for value in drawn]
+        return drawn
+
+    def sign(self, name: str = "sign") -> float:
+        """-1 or 1 for the whole glove."""
+        return self._keep(name, float(self.stream(name).choice([-1.0, 1.0])))
+
+    def signs(self, name: str = "signs") -> np.ndarray:
+        """-1 or 1 for each sensor, shape (S,)."""
+        drawn = self.stream(name).choice([-1.0, 1.0], self._channels)
+        self.values[name] = [float(value) for value in drawn]
+        return drawn
+
+    def stream(self, name: str, key: int = 0) -> np.random.Generator:
+        """A generator of its own for a name and, say, a take or wearing."""
+        return np.random.default_rng([*self._key, zlib.crc32(name.encode()), key])
+
+    def _keep(self, name: str, value: float) -> float:
+        self.values[name] = round(value, 6)
+        return value
 
 
 class Stage(IntEnum):
@@ -62,3 +104,43 @@ class Form:
     """One size for the whole glove instead of one per sensor."""
     touches: Touches = "all"
     column: Column | None = None
+
+
+@dataclass(frozen=True)
+class Cause:
+    """What to hide: its name, one of its forms and how strong."""
+
+    name: str
+    """An effect's name, or ``unknown:...`` for a cause outside every catalogue."""
+    form: str | None = None
+    """The generator's name; None draws one of those that are not set aside from the session's seed."""
+    strength_deg: float = 2.0
+    """RMS over affected sensors of what a static map of the own angle cannot explain (``hidden.py``)."""
+    channels: tuple[str, ...] | None = None
+    """Sensors concerned; None for all that make sense, drawn where a cause usually sits in one or two.
+    Causes of the whole glove (clock, transport, supply) always concern all."""
+
+    def __post_init__(self) -> None:
+        if not self.strength_deg > 0:
+            raise BadInput(f"strength_deg is {self.strength_deg}; a cause needs a size above 0")
+
+
+@dataclass(frozen=True)
+class HiddenCause:
+    """What was hidden, as plain data."""
+
+    name: str
+    form: str
+    description: str
+    stage: str
+    channels: tuple[str, ...]
+    strength_deg: float
+    """What was asked for."""
+    reached_deg: dict[str, float]
+    """What each affected sensor got; less than asked where the form cannot do more on this motion."""
+    sizes: dict[str, float]
+    """The form's own size parameter for each affected sensor."""
+    parameters: dict[str, float | list[float]] = field(default_factory=dict)
+    """Everything drawn; lists have one entry per sensor of the glove."""
+    column: str | None = None
+    """The context column that records the cause, where there is one."""

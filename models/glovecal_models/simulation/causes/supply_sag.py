@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.draws import Draws
-from glovecal_models.simulation.causes.form import Form, Stage
+from glovecal_models.simulation.causes.form import Draws, Form, Stage
 from glovecal_models.simulation.scene import Scene
 
 FULL_V = 4.1

@@ -7,8 +7,8 @@ from typing import Any
 from pydantic import BaseModel, Field
 
 from glovecal_models.calibration.added_effect import AddedEffect
-from glovecal_models.regression.kept_choice import choice_of
 from glovecal_models.regression.kernel_candidates import CANDIDATE
+from glovecal_models.regression.kernel_scores import choice_of
 from glovecal_models.regression.regressor import Regressor
 from glovecal_service.plain import plain
 

@@ -8,8 +8,7 @@ from fastapi import APIRouter, Query
 from pydantic import BaseModel, Field
 
 from glovecal_models.calibration.artifact import load
-from glovecal_models.sampling.active.diagnosed_takes import diagnosed_take
-from glovecal_models.sampling.active.from_model import propose_for_model
+from glovecal_models.sampling.active.next_step import diagnosed_take, propose_for_model
 from glovecal_service.plain import plain
 from glovecal_service.rest.http.answers import problems
 from glovecal_service.rest.http.dependencies import StoreNeeded

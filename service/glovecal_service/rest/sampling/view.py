@@ -8,10 +8,9 @@ from typing import Any
 
 from pydantic import BaseModel, Field
 
-from glovecal_models.sampling.protocol import COUNTDOWN_S, SETTLE_S
+from glovecal_models.sampling.protocol import COUNTDOWN_S, SETTLE_S, Kind, Motion
+from glovecal_models.sampling.reading import STILL_PERCENT
 from glovecal_models.sampling.state import Phase, SamplingState, Trigger
-from glovecal_models.sampling.steadiness import STILL_PERCENT
-from glovecal_models.sampling.step import Kind, Motion
 from glovecal_service.store.records import SamplingRecord
 
 

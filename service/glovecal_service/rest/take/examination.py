@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field
 
 from glovecal_models.errors import LayoutMismatch
 from glovecal_models.independence.independence import examine_independence
-from glovecal_models.independence.independence_document import independence_document
+from glovecal_models.independence.proposal import independence_document
 from glovecal_models.takes.take import Take
 from glovecal_service.plain import plain
 from glovecal_service.rest.http.answers import change_problems

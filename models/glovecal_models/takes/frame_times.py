@@ -1,6 +1,8 @@
-"""Times that are not seconds, told by the rate they would mean."""
+"""Frame times as recorders write them: in other units than seconds, or stamped in batches."""
 
 from __future__ import annotations
+
+import numpy as np
 
 SLOWEST_STEP_S = 1.5
 """Single poses set by hand come about once a second; a glove of 5 Hz or more in ms is above."""
@@ -28,3 +30,19 @@ def unit_hint(typical_step: float) -> str:
         if SLOWEST_RATE_HZ <= rate_hz <= FASTEST_RATE_HZ:
             return f"; if it is in {unit} ({rate_hz:.4g} Hz), divide by {per_second:.0e}".replace("e+0", "e")
     return ""
+
+
+def spread_equal_times(time: np.ndarray) -> np.ndarray:
+    """Times in which each run of equal values is spread over the interval to the next; the rest unchanged.
+
+    Many gloves reach the computer through a buffer, so that a burst of frames gets one time stamp. The
+    last run has no next time and gets the median interval. Times that run backwards stay as they are.
+    """
+    starts = np.flatnonzero(np.concatenate([[True], np.diff(time) != 0]))
+    lengths = np.diff(np.append(starts, len(time)))
+    steps = np.diff(time[starts])
+    forward = steps[steps > 0]
+    last = float(np.median(forward)) if len(forward) else 1.0
+    until_next = np.append(steps, last)
+    place = np.arange(len(time)) - np.repeat(starts, lengths)
+    return time + place * np.repeat(until_next / lengths, lengths)
