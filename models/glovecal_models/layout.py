@@ -19,8 +19,8 @@ from typing import Any, Literal
 import numpy as np
 
 from glovecal_models.errors import BadLayout
+from glovecal_models.expression import SensorExpression
 from glovecal_models.names import check_channel_name
-from glovecal_models.sensor_expression import SensorExpression
 
 CorrespondenceKind = Literal["1S1R", "MS1R", "0S1R", "MSMR"]
 BUILT_IN = ("cyberglove18", "cyberglove22", "lucidglove")

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Any, get_args
 
 from glovecal_models.effects.base.facts import Decoy, Parameter
-from glovecal_models.effects.declared.expression import FUNCTIONS, Node, check_names, parse_expressions
 from glovecal_models.errors import BadInput
+from glovecal_models.expression import FUNCTIONS, Node, check_names, parse_expressions
 from glovecal_models.names import check_channel_name, check_identifier
 
 LONGEST_TEXT = 2000

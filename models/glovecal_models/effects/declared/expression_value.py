@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from glovecal_models.effects.base.relaxation import relax
-from glovecal_models.effects.declared.expression import Node
+from glovecal_models.expression import Node
 
 
 @dataclass

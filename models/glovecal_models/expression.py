@@ -1,4 +1,4 @@
-"""A small language for effects of one's own: arithmetic on signals, read by hand; nothing is evaluated.
+"""Expressions that users write: columns of an effect of their own, and pseudo-sensors of a layout.
 
     expression = term (("+" | "-") term)*
     term       = factor (("*" | "/") factor)*
@@ -7,17 +7,20 @@
     atom       = NUMBER | NAME | "c." NAME | call | "(" expression ")"
     call       = FUNCTION "(" expression ("," expression)* ")"
 
-Functions: exp log sqrt abs tanh sin cos min max clip(x, low, high) lowpass(x, tau_s) previous(x).
+Functions: exp log sqrt abs tanh sin cos min max clip(x, low, high) lowpass(x, tau_s) previous(x). Nothing is
+evaluated. Python's ``ast`` cannot read this: its ``^`` binds less than ``+``, and ``lambda`` is no name.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NoReturn
 
-from glovecal_models.errors import BadInput
+import numpy as np
+
+from glovecal_models.errors import BadInput, BadLayout
 
 LONGEST_TEXT = 500
 DEEPEST = 30
@@ -63,11 +66,13 @@ class Node:
         return any(node.kind in WITH_MEMORY for node in self.walk())
 
 
-def parse_expressions(text: str, *, source: str = "expression") -> tuple[Node, ...]:
+def parse_expressions(
+    text: str, *, source: str = "expression", functions: Mapping[str, int] = FUNCTIONS
+) -> tuple[Node, ...]:
     """Read expressions separated by commas, such as ``c.strap_n * own, c.strap_n``. Raises BadInput."""
     if len(text) > LONGEST_TEXT:
         raise BadInput(f"{source}: an expression has at most {LONGEST_TEXT} characters, this has {len(text)}")
-    reader = _Reader(text, source)
+    reader = _Reader(text, source, functions)
     found = [reader.expression(0)]
     while reader.take(","):
         found.append(reader.expression(0))
@@ -85,11 +90,67 @@ def check_names(nodes: Collection[Node], known: Collection[str], *, source: str)
                 raise BadInput(f"{source}: no {what} {name!r}; known are {', '.join(known)}")
 
 
+@dataclass(frozen=True)
+class SensorExpression:
+    """The pseudo-sensor of a 0S1R rotation (Wang & Neff 2013, section 3.3): a weighted sum of sensors.
+
+    ``text`` is what the user wrote, such as ``2/3 * I_PIP``.
+    """
+
+    text: str
+    terms: tuple[tuple[str, float], ...]
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        return tuple(name for name, _ in self.terms)
+
+    def weights(self, sensors: Sequence[str]) -> np.ndarray:
+        """The weight of each of ``sensors``, shape (len(sensors),)."""
+        given = dict(self.terms)
+        return np.array([given.get(name, 0.0) for name in sensors])
+
+    def __str__(self) -> str:
+        return self.text
+
+    @classmethod
+    def parse(cls, text: str, *, source: str = "expression") -> SensorExpression:
+        """Read ``2/3 * I_PIP`` or ``0.5 * T_TMC + 0.5 * TI_ABD``. Raises BadLayout."""
+        try:
+            first, *more = parse_expressions(text, source=source, functions={})
+        except BadInput as error:
+            raise BadLayout(str(error)) from None
+        if more:
+            raise BadLayout(f"{source}: {text!r} holds a comma; join terms with +")
+        terms: dict[str, float] = {}
+        for name, weight in _weighted(first, 1.0, f"{source}: {text!r}"):
+            terms[name] = terms.get(name, 0.0) + weight
+        return cls(text, tuple(terms.items()))
+
+
+def _weighted(node: Node, factor: float, what: str) -> Iterator[tuple[str, float]]:
+    """Sensors and their weights in a weighted sum."""
+    if node.kind in ("+", "-"):
+        yield from _weighted(node.parts[0], factor, what)
+        yield from _weighted(node.parts[1], factor if node.kind == "+" else -factor, what)
+        return
+    if node.kind == "name":
+        yield node.text, factor
+        return
+    share = node.parts[0] if node.kind == "*" and node.parts[1].kind == "name" else node
+    numbers = share.parts if share.kind == "/" else (share,)
+    if share is node or any(part.kind != "number" for part in numbers):
+        raise BadLayout(f"{what}: cannot read {node.text!r}; write terms such as 2/3 * I_PIP")
+    top, bottom = (*(part.value for part in numbers), 1.0)[:2]
+    if bottom == 0:
+        raise BadLayout(f"{what} divides by zero")
+    yield node.parts[1].text, factor * top / bottom
+
+
 class _Reader:
     """Recursive descent over the text; ``token`` is what comes next."""
 
-    def __init__(self, text: str, source: str) -> None:
-        self._text, self._source = text, source
+    def __init__(self, text: str, source: str, functions: Mapping[str, int]) -> None:
+        self._text, self._source, self._functions = text, source, functions
         self._end = self._start = self._last_end = self._nodes = 0
         self.kind, self.token = "", ""
         self._advance()
@@ -177,17 +238,19 @@ class _Reader:
             if value in (float("inf"), float("-inf")):
                 raise BadInput(f"{self._source}: {token} is too large a number")
             return self._node("number", start, value=value)
-        if token not in FUNCTIONS:
+        if token not in self._functions:
             if self.kind == "sign" and self.token == "(":
-                raise BadInput(f"{self._source}: no function {token!r}; there are {', '.join(FUNCTIONS)}")
+                raise BadInput(
+                    f"{self._source}: no function {token!r}; there are {', '.join(self._functions) or 'none'}"
+                )
             return self._node("name", start)
         self._need("(")
         arguments = [self.expression(depth)]
         while self.take(","):
             arguments.append(self.expression(depth))
         self._need(")")
-        if len(arguments) != FUNCTIONS[token]:
+        if len(arguments) != self._functions[token]:
             raise BadInput(
-                f"{self._source}: {token} takes {FUNCTIONS[token]} arguments, not {len(arguments)}"
+                f"{self._source}: {token} takes {self._functions[token]} arguments, not {len(arguments)}"
             )
         return self._node(token, start, *arguments)
