@@ -21,6 +21,7 @@ from glovecal_models.covariance.base import Covariance
 from glovecal_models.regression.counted_likelihood import Posterior
 from glovecal_models.regression.lapack_routines import potrf, potrs, trtrs
 from glovecal_models.regression.low_rank_likelihood import NystromFit
+from glovecal_models.regression.pivoted_cholesky import PivotedCholesky, factor_by_rows
 
 SIZES = (4, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 56, 64, 72, 80, 90, 100, 115, 130, 150, 175, 200)
 SIZES_WHEN_NEEDED = (250, 300, 350, 400, 450, 500, 550, 600, 700)
@@ -158,10 +159,12 @@ def few_nodes(
     explained = solve_triangular(posterior.lower, values, lower=True, check_finite=False)
     prior = covariance.diagonal(theta, x)
     exact_sd = np.sqrt(np.maximum(prior - np.einsum("nm,nm->m", explained, explained), 0.0))
+    diagonal = np.diagonal(values)
     for tolerance in (1e-4, 1e-6, 1e-8):
-        rows, pivots = _pivoted(values, tolerance * float(posterior.noise.min()), len(x) // 2)
-        found = _on_pivots(rows, pivots, x, posterior)
-        to_nodes = values[:, pivots]
+        least = max(tolerance * float(posterior.noise.min()), 1e-12 * float(diagonal.max()))
+        factor = factor_by_rows(values.__getitem__, diagonal, least, len(x) // 2)
+        found = _on_pivots(factor, x, posterior)
+        to_nodes = values[:, factor.pivots]
         parts = to_nodes @ found.variance_root
         sd = np.sqrt(np.maximum(prior - np.einsum("mr,mr->m", parts, parts), 0.0))
         errors = (
@@ -174,32 +177,13 @@ def few_nodes(
     return FewNodes(x, cho_solve((posterior.lower, True), posterior.residual), root, 0.0, 0.0)
 
 
-def _pivoted(values: np.ndarray, tolerance: float, most: int) -> tuple[np.ndarray, np.ndarray]:
-    """Rows F (r, m) with values ~ F' F, and the pivots (r,), until no diagonal is left above tolerance."""
-    rows, residual = np.empty((most, len(values))), np.diagonal(values).copy()
-    least = max(tolerance, 1e-12 * float(residual.max()))
-    pivots: list[int] = []
-    while len(pivots) < most:
-        pivot = int(residual.argmax())
-        if residual[pivot] <= least:
-            break
-        rank = len(pivots)
-        row = values[pivot] - rows[:rank, pivot] @ rows[:rank]
-        rows[rank] = row / np.sqrt(residual[pivot])
-        residual = np.maximum(residual - rows[rank] ** 2, 0.0)
-        residual[pivot] = 0.0
-        pivots.append(pivot)
-    return rows[: len(pivots)], np.array(pivots, dtype=np.intp)
-
-
-def _on_pivots(rows: np.ndarray, pivots: np.ndarray, x: np.ndarray, posterior: Posterior) -> FewNodes:
-    whitened = rows / np.sqrt(posterior.noise)
+def _on_pivots(factor: PivotedCholesky, x: np.ndarray, posterior: Posterior) -> FewNodes:
+    whitened = factor.rows / np.sqrt(posterior.noise)
     informed, directions = eigh(whitened @ whitened.T, check_finite=False)
     informed = np.maximum(informed, 0.0)
     right = directions.T @ (whitened @ (posterior.residual / np.sqrt(posterior.noise)))
     features = np.column_stack(
         [directions @ (right / (1 + informed)), directions * np.sqrt(informed / (1 + informed))]
     )
-    corner = np.tril(rows[:, pivots].T)
-    back = solve_triangular(corner, features, lower=True, trans=1, check_finite=False)
-    return FewNodes(x[pivots], back[:, 0], back[:, 1:], np.inf, np.inf)
+    back = solve_triangular(factor.corner(), features, lower=True, trans=1, check_finite=False)
+    return FewNodes(x[factor.pivots], back[:, 0], back[:, 1:], np.inf, np.inf)

@@ -22,6 +22,7 @@ from glovecal_models.regression.fast_lmc import fit_lmc_gpr
 from glovecal_models.regression.fitc import LEAST_NOISE, FitcLikelihood, Verdict, judge
 from glovecal_models.regression.mean import LinearMean, Mean
 from glovecal_models.regression.optimise import Optimum, counted_progress, minimise
+from glovecal_models.regression.pivoted_cholesky import factor_by_rows
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.regression.training_samples import Standardised, check_samples, standardise
 
@@ -214,21 +215,13 @@ def choose_pseudo_inputs(
     """
     distinct = np.unique(x, axis=0)
     count = min(count, len(distinct))
-    factor = np.empty((count, len(distinct)))
-    residual = covariance.diagonal(theta, distinct)
-    tolerance = _EXPLAINED * float(residual.max())
-    chosen: list[int] = []
-    while len(chosen) < count:
-        pivot = int(residual.argmax())
-        if residual[pivot] <= tolerance:
-            break
-        row = covariance(theta, distinct[pivot : pivot + 1], distinct)[0]
-        row -= factor[: len(chosen), pivot] @ factor[: len(chosen)]
-        row /= np.sqrt(residual[pivot])
-        factor[len(chosen)] = row
-        residual = np.maximum(residual - row * row, 0.0)
-        residual[pivot] = 0.0
-        chosen.append(pivot)
+    diagonal = covariance.diagonal(theta, distinct)
+    chosen = factor_by_rows(
+        lambda pivot: covariance(theta, distinct[pivot : pivot + 1], distinct)[0],
+        diagonal,
+        _EXPLAINED * float(diagonal.max()),
+        count,
+    ).pivots
     left = np.setdiff1d(np.arange(len(distinct)), chosen)
     drawn = generator.permutation(left)[: count - len(chosen)]
-    return distinct[np.concatenate([np.array(chosen, dtype=int), drawn])]
+    return distinct[np.concatenate([chosen, drawn])]
