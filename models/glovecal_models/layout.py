@@ -41,6 +41,16 @@ class Correspondence:
         """Names of the regression's input columns (one, ``~ROTATION``, for a pseudo-sensor)."""
         return (f"~{self.rotation}",) if self.simulated else self.sensors
 
+    @property
+    def measuring_sensor(self) -> str | None:
+        """The sensor that is there to measure the rotation: of its name, else the only one it is read from.
+
+        None for a pseudo-sensor, and where several sensors of other names share the rotation.
+        """
+        if self.simulated is None and self.rotation in self.sensors:
+            return self.rotation
+        return self.sensors[0] if self.simulated is None and len(self.sensors) == 1 else None
+
     def input_columns(self, readings: np.ndarray, sensors: Sequence[str]) -> np.ndarray:
         """Regression inputs, shape (N, D), from ``readings`` of shape (N, len(sensors)), raw counts."""
         index = [sensors.index(name) for name in self.sensors]

@@ -26,6 +26,7 @@ from glovecal_models.takes.clock_scan import clock_offsets
 from glovecal_models.takes.table import read_takes, write_takes
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.take_check import check_take
+from glovecal_models.takes.write_table import write_takes
 
 SENSORS = ("I_MCP", "I_PIP")
 LAYOUT = Layout.from_columns("two", SENSORS, SENSORS)

@@ -30,7 +30,8 @@ from glovecal_models.simulation.simulated_hand import (
     SimulatedHand,
 )
 from glovecal_models.simulation.simulated_take import Performance, duration_s, simulate_take
-from glovecal_models.takes.table import read_takes, write_takes
+from glovecal_models.takes.table import read_takes
+from glovecal_models.takes.write_table import write_takes
 
 
 def test_minimum_jerk_is_the_quintic_that_rests_at_both_ends():

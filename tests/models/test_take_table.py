@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.frame_times import spread_equal_times
 from glovecal_models.takes.raw_table import LARGEST_ANGLE_DEG, LARGEST_VALUE, LONGEST_TAKE_S
-from glovecal_models.takes.table import read_reference, read_takes, reference_warnings, write_takes
+from glovecal_models.takes.reference_check import reference_warnings
+from glovecal_models.takes.table import read_reference, read_takes
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.write_table import write_takes
 
 
 def write(path: Path, text: str) -> Path:

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from asked_session import RECORDING, asked_session
 from paper_session import LAYOUT, SKELETON, PaperSession, paper_session
 from table_3 import PAPER_DEG, SETTLED
 
@@ -25,7 +26,6 @@ from glovecal_models.quick_check.pose_book import own_poses
 from glovecal_models.quick_check.quick_check import quick_check
 from glovecal_models.sampling.catalogue import make_protocol
 from glovecal_models.sampling.sampled_takes import sampled_takes
-from glovecal_models.simulation.asked_session import RECORDING, asked_session
 from glovecal_models.takes.take import Take
 
 WEARINGS = (0, 1, 2, 3, 4, 5)

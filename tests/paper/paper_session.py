@@ -18,6 +18,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from asked_session import RECORDING, asked_session
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
@@ -34,7 +35,6 @@ from glovecal_models.sampling.catalogue import Equipment, make_protocol
 from glovecal_models.sampling.guided.guided_calibration import GuidedSamples, guided_samples
 from glovecal_models.sampling.guided.taught_samples import TaughtTake
 from glovecal_models.sampling.sampled_takes import sampled_takes
-from glovecal_models.simulation.asked_session import RECORDING, asked_session
 from glovecal_models.simulation.protocol import Segment, cross_couple_segment, evaluation_segment
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.simulation.simulated_hand import KEY_POSES, POSTURES

@@ -12,10 +12,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from still_take import still_take
+
 from glovecal_models.independence.examination import RotationExamination
 from glovecal_models.independence.independence import Independence, examine_independence
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.still_take import still_take
 from glovecal_models.simulation.stretch import TABLE_1
 
 PAPER_IN_ALL: dict[str, tuple[float, float]] = {

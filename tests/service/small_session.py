@@ -11,7 +11,7 @@ import numpy as np
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import RecordedSession, record_session
 from glovecal_models.simulation.session_plan import SessionPlan
-from glovecal_models.takes.table import write_takes
+from glovecal_models.takes.write_table import write_takes
 
 CAUSE = "hysteresis"
 ROTATIONS = ("I_PIP", "M_PIP")

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from asked_session import RECORDING, asked_session
 from jobs_waiting import result_of
 
 from glovecal_models.calibration.artifact import load
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.sampling.catalogue import make_protocol
 from glovecal_models.sampling.sampled_takes import sampled_takes
-from glovecal_models.simulation.asked_session import RECORDING, asked_session
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_service.store import Store
 

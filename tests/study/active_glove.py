@@ -8,24 +8,22 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from asked_session import RECORDING, AskedSession, asked_session
+from assumed_angles import assumed_angles
 
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.errors import NotTrainable
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.layout import Layout
-from glovecal_models.sampling.active.candidates import candidate_steps
 from glovecal_models.sampling.active.known_readings import known_from_takes
-from glovecal_models.sampling.active.next_step import NextStep
-from glovecal_models.sampling.active.posterior import assumed_angles
+from glovecal_models.sampling.active.next_step import NextStep, candidate_steps
 from glovecal_models.sampling.catalogue import make_protocol
-from glovecal_models.sampling.growing import Choose, NextSteps
 from glovecal_models.sampling.guided.guided_calibration import guided_calibration
 from glovecal_models.sampling.guided.taught_samples import TaughtTake
 from glovecal_models.sampling.protocol import Protocol
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.sampled_takes import sampled_takes
-from glovecal_models.sampling.state import SamplingState
-from glovecal_models.simulation.asked_session import RECORDING, AskedSession, asked_session
+from glovecal_models.sampling.state import Choose, NextSteps, SamplingState
 from glovecal_models.simulation.protocol import evaluation_segment, free_segment
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.simulation.simulated_take import SimulatedTake, simulate_take

@@ -13,6 +13,8 @@ FINGERS = {"T": "thumb", "I": "index", "M": "middle", "R": "ring", "P": "pinky"}
 HAND_ROTATIONS: tuple[str, ...] = tuple(name for name in ACTIVE_RANGE_DEG if name != "PALM_ARCH")
 """The order of angles everywhere in this package. The palm is rigid (Wang & Neff 2013, section 3.2)."""
 WRIST = ("W_ABD", "W_FLEX")
+LIMITS_DEG = np.array([ACTIVE_RANGE_DEG[name] for name in HAND_ROTATIONS])
+"""Lowest and highest angle, shape (R, 2), degrees."""
 
 DIP_SHARE = 2 / 3
 """Of the middle joint's bend that the last joint follows (section 3.3)."""

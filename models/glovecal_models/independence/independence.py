@@ -18,7 +18,7 @@ from glovecal_models.independence.affecting_shares import AffectingShare
 from glovecal_models.independence.examination import RotationExamination, examine_rotation
 from glovecal_models.independence.smooth_readings import SmoothTake, smooth_take
 from glovecal_models.independence.still_frames import KnownPulls
-from glovecal_models.independence.still_rotation import own_sensor, still_rotations
+from glovecal_models.independence.still_rotation import still_rotations
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 from glovecal_models.typical_counts import TYPICAL_COUNTS
@@ -149,7 +149,7 @@ def examine_independence(
         examined = []
         for rotation in layout.rotations:
             held = [item for item in smooth if rotation in still[item.take.name]]
-            sensor = own_sensor(layout, rotation)
+            sensor = layout.correspondence(rotation).measuring_sensor
             if held and sensor is not None:
                 is_dead = sensor in dead
                 examined.append(examine_rotation(rotation, sensor, held, ranges, dead=is_dead, known=known))
@@ -168,11 +168,9 @@ def examine_independence(
 def _known(layout: Layout, examined: Sequence[RotationExamination]) -> KnownPulls:
     """Besides what was examined the layout tells: a sensor of a movement of several rotations (the palm's)
     follows others."""
-    several = [item.rotation for item in layout.correspondences if item.kind == "MSMR"]
-    pulled = frozenset(
-        [item.sensor for item in examined if item.is_coupled]
-        + [name for rotation in several if (name := own_sensor(layout, rotation)) is not None]
-    )
+    palm = [item.measuring_sensor for item in layout.correspondences if item.kind == "MSMR"]
+    coupled = [item.sensor for item in examined if item.is_coupled]
+    pulled = frozenset([*coupled, *filter(None, palm)])
     return KnownPulls(
         pulled,
         {
@@ -184,7 +182,7 @@ def _known(layout: Layout, examined: Sequence[RotationExamination]) -> KnownPull
 
 
 def _held(layout: Layout, rotations: Sequence[str]) -> set[str | None]:
-    return {own_sensor(layout, rotation) for rotation in rotations}
+    return {layout.correspondence(rotation).measuring_sensor for rotation in rotations}
 
 
 def _moves(sensor: str, takes: Sequence[SmoothTake]) -> bool:

@@ -78,21 +78,15 @@ def still_rotations(item: SmoothTake, layout: Layout, named: str | None = None) 
     """
     said = named or rotation_in_name(item.take.name, layout.rotations)
     if said is not None:
-        if own_sensor(layout, said) is None:
+        if layout.correspondence(said).measuring_sensor is None:
             raise BadInput(
                 f"rotation {said} has no sensor of its own in layout {layout.name!r}: there is nothing to "
                 "examine"
             )
         return (said,)
-    found = tuple(
-        rotation
-        for rotation in layout.rotations
-        if own_sensor(layout, rotation) is not None
-        and (how := stillness(item, rotation)) is not None
-        and how.is_still
-    )
+    having = [one.rotation for one in layout.correspondences if one.measuring_sensor is not None]
+    found = tuple(name for name in having if (how := stillness(item, name)) is not None and how.is_still)
     if not found:
-        having = [rotation for rotation in layout.rotations if own_sensor(layout, rotation) is not None]
         if not having:
             raise BadInput(f"no rotation of layout {layout.name!r} has a sensor of its own to examine")
         raise BadInput(
@@ -100,12 +94,3 @@ def still_rotations(item: SmoothTake, layout: Layout, named: str | None = None) 
             f"was; call it like still-{having[0]}, or say which it was"
         )
     return found
-
-
-def own_sensor(layout: Layout, rotation: str) -> str | None:
-    """The sensor that is there to measure a rotation: of its name, else the only one it is read from; None
-    for a rotation without a sensor, or one that several sensors of other names share."""
-    item = layout.correspondence(rotation)
-    if item.simulated is None and rotation in item.sensors:
-        return rotation
-    return item.sensors[0] if item.kind == "1S1R" else None

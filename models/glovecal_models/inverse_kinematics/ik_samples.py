@@ -15,8 +15,7 @@ from glovecal_models.errors import BadInput
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.inverse_kinematics.contact import Rod, Touch
 from glovecal_models.inverse_kinematics.follow import follow
-from glovecal_models.inverse_kinematics.hand_shape import HandShape
-from glovecal_models.inverse_kinematics.predicted_hand import predicted_hand
+from glovecal_models.inverse_kinematics.hand_shape import HandShape, predicted_hand
 from glovecal_models.inverse_kinematics.steadied import steadied
 from glovecal_models.inverse_kinematics.tip_chains import TipChains
 from glovecal_models.inverse_kinematics.touch_check import judged, require_happened, require_possible

@@ -11,8 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.limits import LIMITS_DEG
-from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS, WRIST
+from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS, LIMITS_DEG, WRIST
 from glovecal_models.hand.skeleton import Skeleton
 
 

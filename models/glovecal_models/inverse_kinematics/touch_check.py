@@ -12,8 +12,7 @@ from glovecal_models.hand.rotations import FINGERS
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.inverse_kinematics.contact import Contact, Rod, Touch
 from glovecal_models.inverse_kinematics.follow import TIP_TOLERANCE_MM, FollowedHands, follow
-from glovecal_models.inverse_kinematics.hand_shape import HandShape
-from glovecal_models.inverse_kinematics.predicted_hand import PredictedHand
+from glovecal_models.inverse_kinematics.hand_shape import HandShape, PredictedHand
 from glovecal_models.inverse_kinematics.tip_chains import TipChains
 
 TOUCHING_MM = 0.1

@@ -1,4 +1,4 @@
-"""The poses that were held in a take: where the hand was still, and for how long."""
+"""What a still hand is, and the poses that were held in a take: where the hand was still, and how long."""
 
 from __future__ import annotations
 
@@ -72,6 +72,14 @@ def held_poses(take: Take, ranges: Mapping[str, float]) -> tuple[list[HeldPose],
     return found, missed
 
 
+def block_means(time_s: np.ndarray, readings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Means (B, S) of ``readings`` (N, S) over ``BLOCK_S`` each, and the first row of each block (B,)."""
+    number = ((time_s - time_s[0]) / BLOCK_S).astype(int)
+    starts = np.flatnonzero(np.diff(number, prepend=-1))
+    counts = np.diff(starts, append=len(number))
+    return np.add.reduceat(readings, starts, axis=0) / counts[:, None], starts
+
+
 def _named_runs(poses: tuple[str, ...]) -> list[tuple[str, np.ndarray]]:
     names = np.array(poses, dtype=object)
     edges = np.flatnonzero(names[1:] != names[:-1]) + 1
@@ -109,11 +117,8 @@ def _block_shares(
     sensors = [name for name in take.sensors if ranges.get(name, 0.0) > 0]
     if len(frames) < 2 or not sensors:
         return None, np.empty(0, int)
-    number = ((take.time_s[frames] - take.time_s[frames[0]]) / BLOCK_S).astype(int)
-    starts = np.flatnonzero(np.diff(number, prepend=-1))
     readings = take.readings[frames][:, [take.sensors.index(name) for name in sensors]]
-    counts = np.diff(starts, append=len(frames))[:, None]
-    means = np.add.reduceat(readings, starts, axis=0) / counts
+    means, starts = block_means(take.time_s[frames], readings)
     return means / np.array([ranges[name] for name in sensors]), starts
 
 

@@ -1,10 +1,4 @@
-"""The protocols there are: a new subject (both accuracies or one of them), and a second wearing.
-
-Steps for IK sampling are made here (Wang & Neff 2013, section 5.2.1, and for the rod the second limit in its
-section 9): fingertips are held together, or apart by a rod, through the whole recording while the hand
-changes its shape, so that every frame is a sample; which angles they are is worked out afterwards, by inverse
-kinematics on the subject's own hand.
-"""
+"""The protocols there are: a new subject (both accuracies or one of them), and a second wearing."""
 
 from __future__ import annotations
 
@@ -14,55 +8,19 @@ from typing import Any, Literal, get_args
 
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
-from glovecal_models.sampling.key_poses import (
+from glovecal_models.sampling.protocol import Protocol, Step
+from glovecal_models.sampling.steps import (
     KEY_POSES,
+    WIDEST_DEG,
     PoseAngles,
+    WidgetAngles,
     check_steps,
     key_pose_steps,
+    rod_step,
+    touch_steps,
     verification_steps,
+    widget_steps,
 )
-from glovecal_models.sampling.protocol import Protocol, Step
-from glovecal_models.sampling.widgets import WIDEST_DEG, WidgetAngles, widget_steps
-
-TOUCH_S = 4.0
-_FINGER = {"I": "index", "M": "middle", "R": "ring", "P": "little"}
-
-
-def touch_steps() -> list[Step]:
-    """Thumb to index, middle, ring and little finger."""
-    return [
-        Step(
-            name=f"touch-{finger}",
-            kind="ik",
-            motion="move",
-            ask=f"Thumb and {word} fingertip together; keep them together while you move both.",
-            seconds=TOUCH_S,
-            part="touch",
-            pose=f"touch-{finger}",
-            moves=(f"{finger}_MCP",),
-            touches=("T", finger),
-        )
-        for finger, word in _FINGER.items()
-    ]
-
-
-def rod_step(length_mm: float, finger: str = "I") -> Step:
-    """The ends of a rod of known length between thumb and one fingertip."""
-    rod = f"the rod of {length_mm:g} mm"
-    return Step(
-        name=f"rod-{finger}-{length_mm:g}",
-        kind="ik",
-        motion="move",
-        ask=f"Hold {rod} between the tips of thumb and {_FINGER[finger]} finger, and move both.",
-        seconds=TOUCH_S,
-        part="rod",
-        pose=f"rod-{finger}-{length_mm:g}",
-        moves=(f"{finger}_MCP",),
-        needs=rod,
-        touches=("T", finger),
-        rod_mm=length_mm,
-    )
-
 
 ProtocolName = Literal["new_subject", "fk_only", "ik_only", "second_wearing", "active"]
 PROTOCOLS: tuple[ProtocolName, ...] = get_args(ProtocolName)

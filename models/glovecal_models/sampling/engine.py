@@ -13,10 +13,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from glovecal_models.sampling import speech
-from glovecal_models.sampling.growing import Choose
 from glovecal_models.sampling.protocol import COUNTDOWN_S, SETTLE_S, Protocol
 from glovecal_models.sampling.reading import STILL_PERCENT, ActiveRanges, GloveReading
-from glovecal_models.sampling.state import OVER, RUNNING, Attempt, SamplingState, Trigger
+from glovecal_models.sampling.state import OVER, RUNNING, Attempt, Choose, SamplingState, Trigger
 from glovecal_models.sampling.user_events import NotNow, UserEvents
 from glovecal_models.sampling.verdict import TouchCheck, verdict
 

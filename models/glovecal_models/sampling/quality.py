@@ -12,10 +12,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from glovecal_models.sampling.key_poses import usual_angles
 from glovecal_models.sampling.protocol import Step
 from glovecal_models.sampling.reading import STILL_PERCENT, ActiveRanges, GloveReading, moved_percent
 from glovecal_models.sampling.state import SamplingState
+from glovecal_models.sampling.steps import usual_angles
 
 MOVED_PERCENT = 25.0
 """A sensor that had to move went at least so far."""

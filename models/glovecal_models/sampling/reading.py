@@ -13,6 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from glovecal_models.quick_check import held_poses
+from glovecal_models.quick_check.held_poses import BLOCK_S, STILL_SHARE
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class GloveReading:
@@ -26,9 +29,8 @@ class GloveReading:
     button: bool = False
 
 
-BLOCK_S = 0.1
-STILL_PERCENT = 5.0
-"""Of the active range: what moves less is still. As for poses that are found held in takes."""
+STILL_PERCENT = 100 * STILL_SHARE
+"""Of the active range: what moves less is still."""
 FEW_BLOCKS = 3
 NOISE_SPAN = 3.5
 """From lowest to highest of a dozen means that only noise moves, in their standard deviations."""
@@ -92,10 +94,7 @@ def block_means(readings: Sequence[GloveReading]) -> np.ndarray:
         return np.empty((0, 0))
     time_s = np.array([reading.time_s for reading in readings])
     values = np.array([reading.values for reading in readings], float)
-    number = np.floor((time_s - time_s[0]) / BLOCK_S).astype(int)
-    starts = np.flatnonzero(np.diff(number, prepend=-1))
-    counts = np.diff(starts, append=len(number))
-    return np.add.reduceat(values, starts, axis=0) / counts[:, None]
+    return held_poses.block_means(time_s, values)[0]
 
 
 def moved_percent(readings: Sequence[GloveReading], ranges: ActiveRanges) -> np.ndarray:

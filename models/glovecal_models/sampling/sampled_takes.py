@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.sampling.key_poses import CHECK_PART
 from glovecal_models.sampling.protocol import Kind, Step
 from glovecal_models.sampling.state import Attempt, SamplingState
+from glovecal_models.sampling.steps import CHECK_PART
 from glovecal_models.takes.take import Take
 
 LEAD_IN_S = 60.0

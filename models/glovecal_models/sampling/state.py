@@ -1,8 +1,11 @@
-"""Where a sampling stands: everything that has to outlive a process, as one JSON document."""
+"""Where a sampling stands: everything that has to outlive a process, as one JSON document.
+
+A protocol may grow: somebody tells, from what was recorded so far, which steps come next.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, get_args
 
@@ -144,3 +147,17 @@ class SamplingState:
                 "attempts": [Attempt.from_document(item) for item in document["attempts"]],
             }
         )
+
+
+@dataclass(frozen=True)
+class NextSteps:
+    steps: tuple[Step, ...]
+    are_last: bool
+    """The protocol grows no more; with no steps either it is over."""
+    sentence: str
+    document: dict[str, Any] = field(default_factory=dict)
+    """Why, as data."""
+
+
+Choose = Callable[[SamplingState], NextSteps | None]
+"""None: not known yet, ask again. It may be asked often and must not make the frames wait."""

@@ -11,7 +11,7 @@ from glovecal_models.sampling.protocol import Protocol, Step
 from glovecal_models.sampling.quality import moved_since_start
 from glovecal_models.sampling.reading import ActiveRanges, GloveReading, RecentReadings
 from glovecal_models.sampling.state import OVER, RUNNING, Attempt, Phase, SamplingState
-from glovecal_models.sampling.widgets import WIDEST_DEG
+from glovecal_models.sampling.steps import WIDEST_DEG
 
 
 class Transitions:

@@ -10,11 +10,12 @@ from typing import Protocol
 
 import numpy as np
 
-from glovecal_models.sampling.growing import kept_readings
 from glovecal_models.sampling.protocol import Step
 from glovecal_models.sampling.quality import faults, missing_frames
 from glovecal_models.sampling.reading import ActiveRanges, GloveReading, block_means
 from glovecal_models.sampling.state import Attempt, SamplingState
+
+KEPT_OF_RANGE, KEPT_OF_MOTION = 64, 12
 
 
 class TouchCheck(Protocol):
@@ -170,3 +171,15 @@ def _contradiction(rotation: str, angles: np.ndarray) -> str:
         f"{rotation} at {told} degrees: the sensor neither rises nor falls all the way; one of these widgets "
         "is another one, or its angle was typed wrong."
     )
+
+
+def kept_readings(step: Step, readings: Sequence[GloveReading]) -> list[list[float]]:
+    """What a step leaves in the state for choosing: its mean reading, or some spread over its motion."""
+    values = np.array([reading.values for reading in readings], float)
+    if not len(values):
+        return []
+    if step.motion == "hold":
+        values = values.mean(axis=0)[None]
+    most = KEPT_OF_RANGE if step.kind == "range" else KEPT_OF_MOTION
+    chosen = np.linspace(0, len(values) - 1, min(most, len(values))).round().astype(int)
+    return values[chosen].round(2).tolist()

@@ -17,21 +17,10 @@ import numpy as np
 
 from glovecal_models.errors import BadTakeTable
 from glovecal_models.takes.frame_times import spread_equal_times, unit_hint
-from glovecal_models.takes.pose_names import poses_at_frames
 from glovecal_models.takes.raw_table import LONGEST_TAKE_S, YEAR_S, ColumnKind, RawTable
 from glovecal_models.takes.read_table import MAGIC, read_csv_table, read_parquet_table
-from glovecal_models.takes.reference_check import reference_warnings
-from glovecal_models.takes.take import Take
-from glovecal_models.takes.write_table import SIMULATED_CONTEXT, write_takes
-
-__all__ = [
-    "ReferenceRows",
-    "read_reference",
-    "read_takes",
-    "reference_beside",
-    "reference_warnings",
-    "write_takes",
-]
+from glovecal_models.takes.take import Take, poses_at_frames
+from glovecal_models.takes.write_table import SIMULATED_CONTEXT
 
 EqualTimes = Literal["refuse", "spread"]
 _SUFFIXES = (".csv", ".parquet")

@@ -120,3 +120,16 @@ def _require_increasing(what: str, time: np.ndarray, take: str) -> None:
             f"take {take!r}: {what} must increase, "
             f"but row {row + 1} is {time[row + 1]:g} s after {time[row]:g} s"
         )
+
+
+def poses_at_frames(
+    time_s: np.ndarray, pose_time_s: np.ndarray, poses: Sequence[str]
+) -> tuple[str, ...] | None:
+    """The pose named by the latest reference row at or before each frame, "" before the first.
+
+    ``time_s`` (N,) and ``pose_time_s`` (R,) are seconds of one clock; None when no frame has a pose.
+    """
+    index = np.searchsorted(pose_time_s, time_s, side="right") - 1
+    names = ["", *poses]
+    named = tuple(names[i + 1] for i in index.tolist())
+    return named if any(named) else None

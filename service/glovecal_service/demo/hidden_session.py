@@ -16,8 +16,8 @@ from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES, UNKNOWN_CA
 from glovecal_models.simulation.causes.form import Cause, HiddenCause
 from glovecal_models.simulation.session import RecordedSession, RecordedTake, record_session
 from glovecal_models.simulation.session_plan import SessionPlan
-from glovecal_models.takes.table import write_takes
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.write_table import write_takes
 
 RANDOM_EFFECTS = (
     "hysteresis", "creep", "lag", "clock_offset", "warmup_drift", "temperature", "donning_shift",

@@ -9,7 +9,7 @@ import numpy as np
 from glovecal_client.rest import RestClient
 from glovecal_client.wire.pose import Pose, PoseFlag
 from glovecal_models.simulation.session import RecordedTake
-from glovecal_models.takes.table import write_takes
+from glovecal_models.takes.write_table import write_takes
 from glovecal_service.demo.live import metered_poses
 from glovecal_service.demo.processes import DemoPlace, running_capture
 from glovecal_service.demo.second_act import Findings

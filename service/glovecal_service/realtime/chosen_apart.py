@@ -5,8 +5,7 @@ from __future__ import annotations
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
-from glovecal_models.sampling.growing import Choose, NextSteps
-from glovecal_models.sampling.state import SamplingState
+from glovecal_models.sampling.state import Choose, NextSteps, SamplingState
 
 
 class ChosenApart:

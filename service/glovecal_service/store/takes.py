@@ -14,8 +14,7 @@ from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 from glovecal_models.names import check_identifier
 from glovecal_models.takes.clock_scan import aligned
-from glovecal_models.takes.pose_names import poses_at_frames
-from glovecal_models.takes.take import Take
+from glovecal_models.takes.take import Take, poses_at_frames
 from glovecal_service.store import tables
 from glovecal_service.store.artifacts import Artifacts, check_sha256
 from glovecal_service.store.clock import new_id, now

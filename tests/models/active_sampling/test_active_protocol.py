@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from asked_session import RECORDING, AskedSession, asked_session
+from assumed_angles import assumed_angles
 
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_plan import plan_training
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput, NotTrainable
 from glovecal_models.layout import Layout
-from glovecal_models.sampling.active.candidates import candidate_steps, register_candidates
 from glovecal_models.sampling.active.known_readings import (
     ExpectedReadings,
     known_from_state,
@@ -21,20 +22,19 @@ from glovecal_models.sampling.active.known_readings import (
 from glovecal_models.sampling.active.next_step import (
     LONGEST_CAPTURE_S,
     NextStep,
+    candidate_steps,
     diagnosed_take,
     propose_for_model,
+    register_candidates,
     still_possible,
 )
-from glovecal_models.sampling.active.posterior import assumed_angles
 from glovecal_models.sampling.active.proposal import propose
 from glovecal_models.sampling.catalogue import Equipment, make_protocol
 from glovecal_models.sampling.engine import Sampling, begin_sampling
-from glovecal_models.sampling.growing import NextSteps
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.sampled_takes import sampled_takes
-from glovecal_models.sampling.state import Attempt, SamplingState
+from glovecal_models.sampling.state import Attempt, NextSteps, SamplingState
 from glovecal_models.sampling.user_events import NotNow
-from glovecal_models.simulation.asked_session import RECORDING, AskedSession, asked_session
 from glovecal_models.simulation.protocol import free_segment
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.simulation.simulated_take import simulate_take

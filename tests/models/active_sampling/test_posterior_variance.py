@@ -9,8 +9,13 @@ from hypothesis import strategies as st
 
 from glovecal_models.layout import Layout
 from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_models.sampling.active.assumed_process import AssumedProcess, assumed_process
-from glovecal_models.sampling.active.posterior import PosteriorVariance, SampledPoints, step_errors
+from glovecal_models.sampling.active.assumed_process import (
+    AssumedProcess,
+    PosteriorVariance,
+    SampledPoints,
+    assumed_process,
+    step_errors,
+)
 
 LAYOUT = Layout.built_in("cyberglove18")
 SENSORS = LAYOUT.sensors

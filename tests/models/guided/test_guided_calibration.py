@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from asked_session import RECORDING, asked_session
 
 from glovecal_models.calibration.artifact import dump, load
 from glovecal_models.calibration.model import CalibrationModel
@@ -19,7 +20,7 @@ from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import HAND_ROTATIONS
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.inverse_kinematics.contact import Rod, Touch
-from glovecal_models.inverse_kinematics.predicted_hand import predicted_hand
+from glovecal_models.inverse_kinematics.hand_shape import predicted_hand
 from glovecal_models.inverse_kinematics.tip_chains import TipChains
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.catalogue import make_protocol
@@ -31,7 +32,6 @@ from glovecal_models.sampling.guided.guided_calibration import (
 from glovecal_models.sampling.guided.taught_samples import TaughtTake
 from glovecal_models.sampling.protocol import Protocol
 from glovecal_models.sampling.sampled_takes import sampled_takes
-from glovecal_models.simulation.asked_session import RECORDING, asked_session
 from glovecal_models.simulation.protocol import evaluation_segment
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.simulation.simulated_take import simulate_take

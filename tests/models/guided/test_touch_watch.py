@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from asked_session import asked_session
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
@@ -12,7 +13,6 @@ from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.sampling.catalogue import make_protocol
 from glovecal_models.sampling.guided.touch_watch import TouchWatch, require_possible_touches
 from glovecal_models.sampling.protocol import Step
-from glovecal_models.simulation.asked_session import asked_session
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 
 

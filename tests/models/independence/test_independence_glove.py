@@ -6,13 +6,13 @@ import dataclasses
 
 import numpy as np
 import pytest
+from still_take import still_take
 
 from glovecal_models.independence.independence import SIDEWAYS, Independence, examine_independence
 from glovecal_models.independence.proposal import proposals
 from glovecal_models.simulation.protocol import segments
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.simulation.simulated_take import simulate_take
-from glovecal_models.simulation.still_take import still_take
 from glovecal_models.simulation.stretch import TABLE_1
 from glovecal_models.takes.take import Take
 

@@ -19,8 +19,8 @@ from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.inverse_kinematics.contact import Rod, Touch
 from glovecal_models.inverse_kinematics.follow import follow
+from glovecal_models.inverse_kinematics.hand_shape import RULE_SD_DEG, predicted_hand
 from glovecal_models.inverse_kinematics.ik_samples import IkSamples, ik_samples
-from glovecal_models.inverse_kinematics.predicted_hand import RULE_SD_DEG, predicted_hand
 from glovecal_models.inverse_kinematics.tip_chains import TipChains
 from glovecal_models.simulation.protocol import evaluation_segment, key_pose_segment, sampling_protocol
 from glovecal_models.simulation.simulated_glove import SimulatedGlove

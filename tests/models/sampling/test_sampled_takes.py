@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from asked_session import RECORDING, AskedSession, asked_session
 
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.training import train
@@ -18,7 +19,6 @@ from glovecal_models.sampling.protocol import Protocol, Step
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.sampled_takes import for_other_subject, sampled_takes
 from glovecal_models.sampling.state import SamplingState
-from glovecal_models.simulation.asked_session import RECORDING, AskedSession, asked_session
 from glovecal_models.simulation.protocol import evaluation_segment
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.simulation.simulated_take import simulate_take

@@ -17,8 +17,8 @@ from cli_running import Answer, glovecal
 from glovecal_models.simulation.protocol import segments
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.simulation.simulated_take import simulate_take
-from glovecal_models.takes.table import write_takes
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.write_table import write_takes
 
 Run = Callable[..., Answer]
 

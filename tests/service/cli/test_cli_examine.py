@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from cli_running import Answer
 from conftest import Run, simulated
+from still_take import still_take
 
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.still_take import still_take
-from glovecal_models.takes.table import write_takes
+from glovecal_models.takes.write_table import write_takes
 
 PLAIN = """name = "plain"
 sensors = ["I_MCP", "M_MCP", "IM_ABD", "I_PIP"]

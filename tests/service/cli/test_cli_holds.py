@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from conftest import Run
 
-from glovecal_models.takes.table import write_takes
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.write_table import write_takes
 
 HOLDS, HOLD_S, RATE_HZ = 8, 16.0, 5.0
 VERDICT = "consistent with creep, or the hand relaxing"

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from conftest import simulated
 
-from glovecal_models.takes.table import write_takes
+from glovecal_models.takes.write_table import write_takes
 
 
 def test_a_dead_sensor_is_left_out_or_refused(run, tmp_path):

@@ -11,7 +11,7 @@ from cli_running import glovecal
 from conftest import Run
 from small_session import CAUSE, ROTATIONS, sticky_session, write_sticky
 
-from glovecal_models.takes.table import write_takes
+from glovecal_models.takes.write_table import write_takes
 
 
 @pytest.fixture(scope="module")

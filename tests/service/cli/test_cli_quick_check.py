@@ -12,8 +12,8 @@ from realtime_support import LAYOUT, linear_model
 
 from glovecal_models.calibration.artifact import dump
 from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_models.takes.table import write_takes
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.write_table import write_takes
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 

@@ -16,7 +16,7 @@ from glovecal_models.calibration.artifact import dump
 from glovecal_models.simulation.protocol import free_segment, segments
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.simulation.simulated_take import simulate_take
-from glovecal_models.takes.table import write_takes
+from glovecal_models.takes.write_table import write_takes
 from glovecal_service.rest.in_process import in_process_client
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from conftest import Run
 
-from glovecal_models.takes.table import read_takes, write_takes
+from glovecal_models.takes.table import read_takes
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.write_table import write_takes
 
 
 def same(one: Take, other: Take) -> bool:

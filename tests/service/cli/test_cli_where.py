@@ -10,7 +10,7 @@ import pytest
 from cli_running import glovecal
 from conftest import Run, simulated
 
-from glovecal_models.takes.table import write_takes
+from glovecal_models.takes.write_table import write_takes
 
 
 @pytest.fixture(scope="module")

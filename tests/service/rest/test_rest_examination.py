@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from still_take import still_take
 
 from glovecal_client.errors import ServiceError
 from glovecal_client.rest import RestClient
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.still_take import still_take
-from glovecal_models.takes.table import write_takes
+from glovecal_models.takes.write_table import write_takes
 from glovecal_service.realtime.model_choice import choose
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store

@@ -14,7 +14,7 @@ from glovecal_client.rest import Refused, RestClient
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
-from glovecal_models.takes.table import write_takes
+from glovecal_models.takes.write_table import write_takes
 from glovecal_service.rest.in_process import in_process_client
 from glovecal_service.settings import Settings
 

@@ -14,8 +14,9 @@ import pytest
 
 from glovecal_client.rest import Refused, RestClient
 from glovecal_models.errors import BadInput
-from glovecal_models.takes.table import read_takes, write_takes
+from glovecal_models.takes.table import read_takes
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.write_table import write_takes
 from glovecal_service.rest.in_process import in_process_client
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store

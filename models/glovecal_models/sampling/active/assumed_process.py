@@ -1,16 +1,26 @@
-"""The process that one rotation is taken for, in units that every glove shares: ranges and degrees.
+"""The process that one rotation is taken for, its variance after samples, and how much that falls with more.
 
-The paper's covariance k_LARD + k_seARD (Wang & Neff 2013, equation 8) with a level and slopes that are not
-known beforehand. In the beginning there is nothing to learn the hyperparameters from, so they are assumed:
-those of simulated CyberGloves with dense reference, widened, because a trained process' own may be rougher.
+Units are those that every glove shares: ranges and degrees. The paper's covariance k_LARD + k_seARD (Wang &
+Neff 2013, equation 8) has a level and slopes that are not known beforehand. In the beginning there is nothing
+to learn the hyperparameters from, so they are assumed: those of simulated CyberGloves with dense reference,
+widened, because a trained process' own may be rougher.
+
+With samples at X, whose errors have the covariance N, the variance at u is
+
+    v(u) = k(u, u) - k(u, X) (K + N)^-1 k(X, u)
+
+and further samples at C, of error covariance M, lower it by g (S + M)^-1 g', where g and S are the
+covariances (after X) of u with C and of C with itself (Rasmussen & Williams 2006, equation 2.24; the mean of
+the fall over many u is the criterion of Cohn 1996). No target is needed for it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.linalg import block_diag, cho_factor, cho_solve, solve_triangular
 
 from glovecal_models.covariance.base import Covariance
 from glovecal_models.covariance.linear_ard import LinearArd
@@ -18,6 +28,7 @@ from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.layout import Correspondence
 from glovecal_models.regression.process_regressor import ProcessRegressor
+from glovecal_models.sampling.active.known_readings import KnownBlock
 
 USUAL_RANGE_DEG = 90.0
 LEVEL, SLOPE = 1.0, 2.0
@@ -114,11 +125,68 @@ def _usual_bend(correspondence: Correspondence, range_deg: float) -> tuple[float
         bend = BEND_ALONE * range_deg
     bend, own, other = TYPICAL.get(correspondence.rotation, (bend, OWN_LENGTH, OTHER_LENGTH))
     lengths = np.full(len(correspondence.inputs), other)
-    lengths[_own(correspondence)] = own
+    measuring = correspondence.measuring_sensor
+    lengths[correspondence.inputs.index(measuring) if measuring else 0] = own
     return 2 * float(np.log(bend)), -2 * np.log(lengths)
 
 
-def _own(correspondence: Correspondence) -> int:
-    """Place of the measuring sensor among the inputs; the first where none has the rotation's name."""
-    inputs = correspondence.inputs
-    return inputs.index(correspondence.rotation) if correspondence.rotation in inputs else 0
+@dataclass(frozen=True)
+class SampledPoints:
+    """Of one step."""
+
+    points: np.ndarray
+    """Inputs in the process' units, shape (m, D + 1)."""
+    errors: np.ndarray
+    """Covariance of the errors, shape (m, m), degrees squared."""
+    target: np.ndarray = field(default_factory=lambda: np.empty(0))
+    """Degrees, shape (m,); empty for a step that was not recorded yet."""
+
+
+def step_errors(rows: int, samples: float, noise_sd_deg: float, shared_sd_deg: float) -> np.ndarray:
+    """Error covariance (m, m) of ``rows`` that stand for ``samples`` and have one error in common."""
+    own = noise_sd_deg**2 * rows / max(samples, 1.0)
+    return own * np.eye(rows) + shared_sd_deg**2
+
+
+def sampled_points(
+    block: KnownBlock, item: Correspondence, process: AssumedProcess, sensors: tuple[str, ...]
+) -> SampledPoints:
+    """What ``block`` knows of the rotation; no points where it was not measured."""
+    angle = block.angles.get(item.rotation, np.full(len(block.readings), np.nan))
+    rows = np.isfinite(angle)
+    points = process.unit(item.input_columns(block.readings[rows], sensors))
+    samples = block.samples * rows.mean()
+    errors = step_errors(len(points), samples, process.noise_sd_deg, block.shared_sd_deg)
+    return SampledPoints(points, errors, angle[rows])
+
+
+class PosteriorVariance:
+    """Of one rotation, at the points ``u`` (U, D + 1) where it will be used."""
+
+    def __init__(self, process: AssumedProcess, u: np.ndarray, sampled: Sequence[SampledPoints]) -> None:
+        self._process, self._u = process, u
+        self._points = np.concatenate([np.empty((0, u.shape[1])), *(each.points for each in sampled)])
+        self._lower = self._root([each.errors for each in sampled])
+        self._white = self._whitened(u)
+        self.variance = np.maximum(process.alone(u) - (self._white**2).sum(axis=0), 0.0)
+        """At u, shape (U,), degrees squared, without the noise of a frame."""
+
+    def fall(self, more: SampledPoints) -> np.ndarray:
+        """By how much the variance at u falls, shape (U,), with ``more`` samples."""
+        white = self._whitened(more.points)
+        between = self._process.between(self._u, more.points) - self._white.T @ white
+        inside = self._process.between(more.points, more.points) - white.T @ white + more.errors
+        return np.einsum("um,mu->u", between, cho_solve(cho_factor(inside, lower=True), between.T))
+
+    def _root(self, errors: Sequence[np.ndarray]) -> np.ndarray:
+        """Lower root of K + N."""
+        if not len(self._points):
+            return np.empty((0, 0))
+        matrix = self._process.between(self._points, self._points) + block_diag(*errors)
+        return np.linalg.cholesky(matrix)
+
+    def _whitened(self, points: np.ndarray) -> np.ndarray:
+        if not len(self._points):
+            return np.empty((0, len(points)))
+        to_points = self._process.between(self._points, points)
+        return solve_triangular(self._lower, to_points, lower=True, check_finite=False)

@@ -13,20 +13,18 @@ from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.sampling.active.assumed_process import (
     AssumedProcess,
+    PosteriorVariance,
+    SampledPoints,
     assumed_process,
     rotation_range_deg,
+    sampled_points,
+    step_errors,
 )
 from glovecal_models.sampling.active.known_readings import (
     ALIKE_FRAMES,
     ExpectedReadings,
     KnownReadings,
     shared_sd_deg,
-)
-from glovecal_models.sampling.active.posterior import (
-    PosteriorVariance,
-    SampledPoints,
-    sampled_points,
-    step_errors,
 )
 from glovecal_models.sampling.protocol import Step, step_capture_s
 

@@ -16,7 +16,7 @@ from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.inverse_kinematics.contact import Rod, Touch
 from glovecal_models.inverse_kinematics.follow import follow
-from glovecal_models.inverse_kinematics.predicted_hand import PredictedHand
+from glovecal_models.inverse_kinematics.hand_shape import PredictedHand
 from glovecal_models.inverse_kinematics.steadied import steadied
 from glovecal_models.inverse_kinematics.tip_chains import TipChains
 from glovecal_models.inverse_kinematics.touch_check import (

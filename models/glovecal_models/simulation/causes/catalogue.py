@@ -12,13 +12,21 @@ from importlib import import_module
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.simulation.causes.form import Column, Draws, Effect, Form, Stage, Touches
+from glovecal_models.simulation.causes.form import Draws, Form, Stage, form
 from glovecal_models.simulation.scene import Scene
 from glovecal_models.simulation.signals import lasting_noise
 
 CONTEXT_COLUMNS = ("strap_tension", "tilt_g", "cuff_bend", "lining_state")
 
 
+def context_column(scene: Scene, draws: Draws) -> tuple[str, np.ndarray]:
+    """The recorded column: name and values (T, N), about -2 to 2."""
+    name = CONTEXT_COLUMNS[int(draws.stream("column").integers(len(CONTEXT_COLUMNS)))]
+    values = _column_values(scene, draws)
+    return name, np.round(values + 0.01 * draws.stream("column noise").standard_normal(values.shape), 4)
+
+
+@form(Stage.WEARING, "Unrecorded slow waves common to all sensors (ours).", touches="all")
 def slow_waves(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Slow waves with no clock or column to follow, the same for all sensors."""
     weight = draws.each("weight", 0.7, 1.3)
@@ -30,18 +38,21 @@ def slow_waves(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws)
     return signal + size * weight * waves[:, :, None]
 
 
+@form(Stage.WEARING, "An unrecorded slow wander common to all sensors (ours).", touches="all")
 def slow_wander(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A common random wander of all sensors, with signs of their own."""
     lasts_s = draws.one("lasts_s", 8.0, 30.0)
     return signal + size * draws.signs() * _wander(scene, draws, lasts_s, 1)
 
 
+@form(Stage.WEARING, "One sensor wanders, a loose thread (ours).", touches="one")
 def channel_wander(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Each affected sensor wanders by itself."""
     lasts_s = draws.one("lasts_s", 3.0, 20.0)
     return signal + size * _wander(scene, draws, lasts_s, len(scene.sensors))
 
 
+@form(Stage.WEARING, "Unrecorded grip pressure that follows the hand's closing.", touches="one_or_all")
 def grip_pressure(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Pressure that builds as the hand closes, with an effort that changes from grip to grip."""
     from_share = draws.one("from_share", 0.3, 0.5)
@@ -51,12 +62,14 @@ def grip_pressure(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Dra
     return signal + size * weight * grip * effort
 
 
+@form(Stage.WEARING, "An unrecorded pull by the thumb under the palm (ours).", touches="one_or_all")
 def thumb_across(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A cable that the thumb pulls when it goes under the palm; no sensor of the thumb need be there."""
     pull = 1 / (1 + np.exp(-10 * (scene.bent("T_TMC") - draws.one("at_share", 0.4, 0.6))))
     return signal + size * draws.signs() * pull[:, :, None]
 
 
+@form(Stage.WEARING, "A hump over a recorded column (ours).", touches="one_or_all", column=context_column)
 def context_hump(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A hump over the values of a recorded column of an unfamiliar name."""
     value = _column_values(scene, draws)[:, :, None]
@@ -64,6 +77,7 @@ def context_hump(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draw
     return signal + size * draws.signs() * np.exp(-(((value - centre) / width) ** 2))
 
 
+@form(Stage.WEARING, "A wave over a recorded column (ours).", touches="one_or_all", column=context_column)
 def context_wave(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A wave over the values of a recorded column of an unfamiliar name."""
     value = _column_values(scene, draws)[:, :, None]
@@ -72,17 +86,11 @@ def context_wave(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draw
     )
 
 
+@form(Stage.WEARING, "The pull of gravity as the forearm turns, unrecorded (ours).", touches="one_or_all")
 def tilt(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The cuff's weight pulls one way or the other as the forearm turns, which nobody records."""
     turn = np.pi * np.tanh(_wander(scene, draws, draws.one("lasts_s", 1.5, 6.0), 1))
     return signal + size * draws.signs() * np.sin(turn + draws.one("mounted_at", -1.5, 1.5))
-
-
-def context_column(scene: Scene, draws: Draws) -> tuple[str, np.ndarray]:
-    """The recorded column: name and values (T, N), about -2 to 2."""
-    name = CONTEXT_COLUMNS[int(draws.stream("column").integers(len(CONTEXT_COLUMNS)))]
-    values = _column_values(scene, draws)
-    return name, np.round(values + 0.01 * draws.stream("column noise").standard_normal(values.shape), 4)
 
 
 def _column_values(scene: Scene, draws: Draws) -> np.ndarray:
@@ -102,39 +110,12 @@ def _wander(scene: Scene, draws: Draws, lasts_s: float, channels: int) -> np.nda
     )
 
 
-def _unknown(
-    name: str,
-    sentence: str,
-    effect: Effect,
-    touches: Touches = "one_or_all",
-    column: Column | None = None,
-) -> Form:
-    return Form(name, sentence, effect, Stage.WEARING, touches=touches, column=column)
-
-
 FORMS_BY_NAME: dict[str, tuple[Form, ...]] = {
-    "common_swing": (
-        _unknown("slow_waves", "Unrecorded slow waves common to all sensors (ours).", slow_waves, "all"),
-        _unknown(
-            "slow_wander", "An unrecorded slow wander common to all sensors (ours).", slow_wander, "all"
-        ),
-    ),
-    "one_channel_wander": (
-        _unknown("channel_wander", "One sensor wanders, a loose thread (ours).", channel_wander, "one"),
-    ),
-    "posture_locked": (
-        _unknown("grip_pressure", "Unrecorded grip pressure that follows the hand's closing.", grip_pressure),
-        _unknown("thumb_across", "An unrecorded pull by the thumb under the palm (ours).", thumb_across),
-    ),
-    "context": (
-        _unknown(
-            "context_hump", "A hump over a recorded column (ours).", context_hump, column=context_column
-        ),
-        _unknown(
-            "context_wave", "A wave over a recorded column (ours).", context_wave, column=context_column
-        ),
-    ),
-    "tilt": (_unknown("tilt", "The pull of gravity as the forearm turns, unrecorded (ours).", tilt),),
+    "common_swing": (slow_waves, slow_wander),
+    "one_channel_wander": (channel_wander,),
+    "posture_locked": (grip_pressure, thumb_across),
+    "context": (context_hump, context_wave),
+    "tilt": (tilt,),
 }
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.form import Draws, Form, Stage
+from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 from glovecal_models.simulation.signals import at_times
 
@@ -17,11 +17,23 @@ SIZES_S = (0.002, 1.2)
 LARGEST_S = 2.4
 
 
+@form(
+    Stage.CLOCK,
+    "One time difference for the whole session (latency of an optical system; Santos, NIME 2021).",
+    sizes=SIZES_S,
+    shared=True,
+)
 def constant(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """One offset of ``size`` seconds for the whole session."""
     return _late(signal, scene, np.full(scene.session_s.shape, draws.sign() * size[0]))
 
 
+@form(
+    Stage.CLOCK,
+    "Another time difference in every take (recordings started one after the other by hand).",
+    sizes=SIZES_S,
+    shared=True,
+)
 def per_take(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Another offset in every take, around a common one."""
     common = draws.sign() * draws.one("common_share", 0.3, 1.0)
@@ -30,6 +42,13 @@ def per_take(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -
     return _late(signal, scene, np.broadcast_to(offset[:, None], scene.session_s.shape))
 
 
+@form(
+    Stage.CLOCK,
+    "A time difference that grows over the session (crystals that differ by parts per million).",
+    set_aside=True,
+    sizes=SIZES_S,
+    shared=True,
+)
 def constant_and_drift(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """An offset that grows as one crystal runs faster than the other (20 to 100 parts per million)."""
     share = draws.sign() * draws.one("share_at_start", 0.2, 0.8)
@@ -47,30 +66,4 @@ def _late(signal: np.ndarray, scene: Scene, offset_s: np.ndarray) -> np.ndarray:
     )
 
 
-FORMS = (
-    Form(
-        "constant",
-        "One time difference for the whole session (latency of an optical system; Santos, NIME 2021).",
-        constant,
-        Stage.CLOCK,
-        sizes=SIZES_S,
-        shared=True,
-    ),
-    Form(
-        "per_take",
-        "Another time difference in every take (recordings started one after the other by hand).",
-        per_take,
-        Stage.CLOCK,
-        sizes=SIZES_S,
-        shared=True,
-    ),
-    Form(
-        "constant_and_drift",
-        "A time difference that grows over the session (crystals that differ by parts per million).",
-        constant_and_drift,
-        Stage.CLOCK,
-        set_aside=True,
-        sizes=SIZES_S,
-        shared=True,
-    ),
-)
+FORMS = (constant, per_take, constant_and_drift)

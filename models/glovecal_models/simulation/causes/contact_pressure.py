@@ -9,27 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.form import Draws, Form, Stage
+from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 RISE_S = 0.12
-
-
-def additive(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """So many degrees per newton."""
-    return signal + size * draws.sign() * draws.each("per_n", 0.5, 1.5) * _pressure(scene, draws)
-
-
-def times_bend(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """More, the more the joint is bent: the cloth is tight there."""
-    bent = draws.each("unbent_share", 0.1, 0.4) + (signal - scene.low) / scene.span
-    return signal + size * draws.sign() * bent * _pressure(scene, draws)
-
-
-def levels_off(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """The first newtons count most: the padding is soon pressed flat."""
-    flat_n = draws.each("flat_n", 2.0, 5.0)
-    return signal - size * draws.signs() * np.expm1(-_pressure(scene, draws) / flat_n)
 
 
 def contact_column(scene: Scene, draws: Draws) -> tuple[str, np.ndarray]:
@@ -59,27 +42,35 @@ def _pressure(scene: Scene, draws: Draws) -> np.ndarray:
     return np.stack(rows)[:, :, None]
 
 
-FORMS = (
-    Form(
-        "additive",
-        "Degrees per newton, whatever the bend (normal force on a film).",
-        additive,
-        Stage.MECHANICAL,
-        column=contact_column,
-    ),
-    Form(
-        "times_bend",
-        "Degrees per newton that grow with the bend (tight cloth presses harder).",
-        times_bend,
-        Stage.MECHANICAL,
-        column=contact_column,
-    ),
-    Form(
-        "levels_off",
-        "The first newtons count most, then it levels off (padding pressed flat).",
-        levels_off,
-        Stage.MECHANICAL,
-        set_aside=True,
-        column=contact_column,
-    ),
+@form(
+    Stage.MECHANICAL, "Degrees per newton, whatever the bend (normal force on a film).", column=contact_column
 )
+def additive(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """So many degrees per newton."""
+    return signal + size * draws.sign() * draws.each("per_n", 0.5, 1.5) * _pressure(scene, draws)
+
+
+@form(
+    Stage.MECHANICAL,
+    "Degrees per newton that grow with the bend (tight cloth presses harder).",
+    column=contact_column,
+)
+def times_bend(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """More, the more the joint is bent: the cloth is tight there."""
+    bent = draws.each("unbent_share", 0.1, 0.4) + (signal - scene.low) / scene.span
+    return signal + size * draws.sign() * bent * _pressure(scene, draws)
+
+
+@form(
+    Stage.MECHANICAL,
+    "The first newtons count most, then it levels off (padding pressed flat).",
+    set_aside=True,
+    column=contact_column,
+)
+def levels_off(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The first newtons count most: the padding is soon pressed flat."""
+    flat_n = draws.each("flat_n", 2.0, 5.0)
+    return signal - size * draws.signs() * np.expm1(-_pressure(scene, draws) / flat_n)
+
+
+FORMS = (additive, times_bend, levels_off)

@@ -10,18 +10,22 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import fftconvolve, lfilter
 
-from glovecal_models.simulation.causes.form import Draws, Form, Stage
+from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 SETTLED_S = 1.5
 
 
+@form(Stage.MECHANICAL, "One relaxation time (standard linear solid; Springer 10.1007/978-3-030-25261-8_34).")
 def one_exponential(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """One Maxwell element: the bend of the last ``time_s`` seconds is added."""
     followed = _followed(signal, draws.each("time_s", 3.0, 25.0), scene)
     return signal + size * draws.sign() * (followed - _usual(scene))
 
 
+@form(
+    Stage.MECHANICAL, "A fast and a slow relaxation together (generalised Maxwell; BYU, Sensors 22(14) 5239)."
+)
 def two_exponentials(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A fast and a slow Maxwell element."""
     share = draws.each("fast_share", 0.3, 0.7)
@@ -30,12 +34,20 @@ def two_exponentials(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: 
     return signal + size * draws.sign() * (share * fast + (1 - share) * slow - _usual(scene))
 
 
+@form(
+    Stage.MECHANICAL, "Growth with the logarithm of the time since each bend (logarithmic creep of polymers)."
+)
 def logarithm(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Every step of bend grows with the logarithm of the time since it."""
     start = draws.one("start_s", 0.2, 1.5)
     return signal + size * draws.sign() * _since_steps(signal, scene, np.log1p(_ages(scene) / start))
 
 
+@form(
+    Stage.MECHANICAL,
+    "Growth with a small power of the time since each bend (Nutting 1921; fractional Kelvin-Voigt).",
+    set_aside=True,
+)
 def power_law(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Every step of bend grows with a small power of the time since it."""
     power = draws.one("power", 0.15, 0.45)
@@ -73,30 +85,4 @@ def _ages(scene: Scene) -> np.ndarray:
     return np.arange(len(scene.time_s)) / scene.rate_hz
 
 
-FORMS = (
-    Form(
-        "two_exponentials",
-        "A fast and a slow relaxation together (generalised Maxwell; BYU, Sensors 22(14) 5239).",
-        two_exponentials,
-        Stage.MECHANICAL,
-    ),
-    Form(
-        "one_exponential",
-        "One relaxation time (standard linear solid; Springer 10.1007/978-3-030-25261-8_34).",
-        one_exponential,
-        Stage.MECHANICAL,
-    ),
-    Form(
-        "logarithm",
-        "Growth with the logarithm of the time since each bend (logarithmic creep of polymers).",
-        logarithm,
-        Stage.MECHANICAL,
-    ),
-    Form(
-        "power_law",
-        "Growth with a small power of the time since each bend (Nutting 1921; fractional Kelvin-Voigt).",
-        power_law,
-        Stage.MECHANICAL,
-        set_aside=True,
-    ),
-)
+FORMS = (two_exponentials, one_exponential, logarithm, power_law)

@@ -8,18 +8,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.form import Draws, Form, Stage
+from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 USUAL_BEND = 0.4
 """Pulls count from here, so that they need not push a reading out of the converter's range."""
 
 
+@form(
+    Stage.MECHANICAL,
+    "Two neighbours pull in proportion to their bend (Wang & Neff 2013, Table 1).",
+    touches="two",
+)
 def linear_neighbours(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Two other joints pull in proportion to their bend."""
     return signal + size * ((_bent(scene) - USUAL_BEND) @ _pulls(scene, draws))
 
 
+@form(
+    Stage.MECHANICAL,
+    "Neighbours pull more the more the own joint is bent (a nonlinear coupling; the shape is ours).",
+    touches="two",
+)
 def bilinear(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The pull of the others grows as the sensor's own joint bends."""
     own = _bent(scene)
@@ -28,6 +38,12 @@ def bilinear(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -
     )
 
 
+@form(
+    Stage.MECHANICAL,
+    "Neighbours pull only once the cloth's slack is used up (ours).",
+    set_aside=True,
+    touches="two",
+)
 def one_sided(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The cloth is slack at first: others pull only beyond a part of their range."""
     slack = draws.each("slack_share", 0.3, 0.55)
@@ -52,27 +68,4 @@ def _pulls(scene: Scene, draws: Draws) -> np.ndarray:
     return pulls
 
 
-FORMS = (
-    Form(
-        "linear_neighbours",
-        "Two neighbours pull in proportion to their bend (Wang & Neff 2013, Table 1).",
-        linear_neighbours,
-        Stage.MECHANICAL,
-        touches="two",
-    ),
-    Form(
-        "bilinear",
-        "Neighbours pull more the more the own joint is bent (a nonlinear coupling; the shape is ours).",
-        bilinear,
-        Stage.MECHANICAL,
-        touches="two",
-    ),
-    Form(
-        "one_sided",
-        "Neighbours pull only once the cloth's slack is used up (ours).",
-        one_sided,
-        Stage.MECHANICAL,
-        set_aside=True,
-        touches="two",
-    ),
-)
+FORMS = (linear_neighbours, bilinear, one_sided)

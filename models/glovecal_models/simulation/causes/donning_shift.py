@@ -8,15 +8,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.form import Draws, Form, Stage
+from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 
+@form(Stage.WEARING, "Each sensor shifted by some degrees per wearing (Gracia-Ibanez et al. 2016).")
 def offset(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Each sensor is shifted by some degrees in each wearing."""
     return signal + size * _per_wearing("offset", scene, draws)
 
 
+@form(
+    Stage.WEARING,
+    "Each sensor shifted and stretched per wearing (a sensor further along the finger bends more).",
+)
 def offset_and_gain(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Shifted, and stretched more or less."""
     bent = (signal - scene.low) / scene.span - 0.4
@@ -24,6 +29,11 @@ def offset_and_gain(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: D
     return signal + size * (_per_wearing("offset", scene, draws) + stretch * bent)
 
 
+@form(
+    Stage.WEARING,
+    "Each sensor off its joint's axis per wearing, so that the shift changes along the bend.",
+    set_aside=True,
+)
 def posture_dependent(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A sensor that sits off the joint's axis: the shift grows along the bend, in another curve each time."""
     bent = np.clip((signal - scene.low) / scene.span, -0.2, 1.2)
@@ -40,24 +50,4 @@ def _per_wearing(name: str, scene: Scene, draws: Draws) -> np.ndarray:
     return np.clip(np.array(drawn), -2.2, 2.2)[:, None, :]
 
 
-FORMS = (
-    Form(
-        "offset",
-        "Each sensor shifted by some degrees per wearing (Gracia-Ibanez et al. 2016).",
-        offset,
-        Stage.WEARING,
-    ),
-    Form(
-        "offset_and_gain",
-        "Each sensor shifted and stretched per wearing (a sensor further along the finger bends more).",
-        offset_and_gain,
-        Stage.WEARING,
-    ),
-    Form(
-        "posture_dependent",
-        "Each sensor off its joint's axis per wearing, so that the shift changes along the bend.",
-        posture_dependent,
-        Stage.WEARING,
-        set_aside=True,
-    ),
-)
+FORMS = (offset, offset_and_gain, posture_dependent)

@@ -10,7 +10,7 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -104,6 +104,11 @@ class Form:
     """One size for the whole glove instead of one per sensor."""
     touches: Touches = "all"
     column: Column | None = None
+
+
+def form(stage: Stage, description: str, **choices: Any) -> Callable[[Effect], Form]:
+    """Make a form of the function below, with its name; ``choices`` are further fields of ``Form``."""
+    return lambda effect: Form(effect.__name__, description, effect, stage, **choices)
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.form import Draws, Form, Stage
+from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 LONGEST_WORN_S = 7200
 
 
+@form(Stage.WEARING, "Small shifts at every moment that add up (random walk; ours).")
 def random_walk(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Steps to and fro at every moment: the way grows with the square root of the time worn."""
     slipped = np.empty_like(signal)
@@ -25,6 +26,7 @@ def random_walk(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws
     return signal + size * slipped
 
 
+@form(Stage.WEARING, "Jumps when a joint moves fast, rest in between (stick and slip of cloth on skin).")
 def steps_when_fast(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The cloth sticks, and jumps now and then when a joint moves fast."""
     speed = np.abs(np.diff(scene.own, axis=1, prepend=scene.own[:, :1])) * scene.rate_hz
@@ -39,6 +41,11 @@ def steps_when_fast(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: D
     return signal + size * slipped
 
 
+@form(
+    Stage.WEARING,
+    "A shift that always goes one way and settles within minutes of donning (a cuff working down).",
+    set_aside=True,
+)
 def to_one_side(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The cuff works its way down the wrist: fast after donning, ever more slowly, always one way."""
     worn = np.maximum(scene.since_donned_s, 0.0)
@@ -52,24 +59,4 @@ def to_one_side(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws
     return signal + size * draws.signs() * way[:, :, None]
 
 
-FORMS = (
-    Form(
-        "random_walk",
-        "Small shifts at every moment that add up (random walk; ours).",
-        random_walk,
-        Stage.WEARING,
-    ),
-    Form(
-        "steps_when_fast",
-        "Jumps when a joint moves fast, rest in between (stick and slip of cloth on skin).",
-        steps_when_fast,
-        Stage.WEARING,
-    ),
-    Form(
-        "to_one_side",
-        "A shift that always goes one way and settles within minutes of donning (a cuff working down).",
-        to_one_side,
-        Stage.WEARING,
-        set_aside=True,
-    ),
-)
+FORMS = (random_walk, steps_when_fast, to_one_side)

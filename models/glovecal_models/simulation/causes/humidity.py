@@ -8,15 +8,20 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import lfilter
 
-from glovecal_models.simulation.causes.form import Draws, Form, Stage
+from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 
+@form(Stage.ELECTRICAL, "Zero points move in proportion to the humidity (leakage of resistive films).")
 def offset(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """So many degrees per per cent, all at once."""
     return signal + size * draws.each("per_pct", 0.5, 1.5) * draws.sign() * _damper(scene)[:, :, None]
 
 
+@form(
+    Stage.ELECTRICAL,
+    "Zero points and gains follow the air's humidity minutes later (cloth takes it up slowly).",
+)
 def absorbed(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Cloth takes minutes to take up what the air has; zero point and gain follow it."""
     time_s = draws.one("absorbed_in_s", 60.0, 300.0)
@@ -29,6 +34,9 @@ def absorbed(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -
     return signal + size * draws.signs() * taken_up * (1 + draws.each("gain", -0.5, 0.5) * bent)
 
 
+@form(
+    Stage.ELECTRICAL, "Zero points move only above a humidity (sweat that no longer dries).", set_aside=True
+)
 def sweat(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Nothing until it condenses; beyond that every per cent counts."""
     wet = np.maximum(_damper(scene) - draws.one("above_usual_pct", -2.0, 1.0), 0.0)
@@ -39,24 +47,4 @@ def _damper(scene: Scene) -> np.ndarray:
     return scene.humidity_pct - scene.usual_air[1]
 
 
-FORMS = (
-    Form(
-        "offset",
-        "Zero points move in proportion to the humidity (leakage of resistive films).",
-        offset,
-        Stage.ELECTRICAL,
-    ),
-    Form(
-        "absorbed",
-        "Zero points and gains follow the air's humidity minutes later (cloth takes it up slowly).",
-        absorbed,
-        Stage.ELECTRICAL,
-    ),
-    Form(
-        "sweat",
-        "Zero points move only above a humidity (sweat that no longer dries).",
-        sweat,
-        Stage.ELECTRICAL,
-        set_aside=True,
-    ),
-)
+FORMS = (offset, absorbed, sweat)

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.form import Draws, Form, Stage
+from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 RELAYS = 90
 
 
+@form(
+    Stage.MECHANICAL, "A force that follows every change of direction and levels off (Bouc 1967, Wen 1976)."
+)
 def bouc_wen(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A restoring force that follows the movement and levels off within ``width`` degrees."""
     width = draws.each("width_deg", 4.0, 14.0)
@@ -30,12 +33,20 @@ def bouc_wen(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -
     return signal + size * width * force
 
 
+@form(
+    Stage.MECHANICAL,
+    "One slack that has to be taken up before the sensor follows (backlash; Krasnoselskii & Pokrovskii).",
+)
 def single_play(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Cloth that moves along only after its slack is taken up."""
     radius = draws.each("radius_deg", 2.5, 9.0)
     return signal + size * (_play(signal, radius) - signal)
 
 
+@form(
+    Stage.MECHANICAL,
+    "Five slacks of different width in parallel (Prandtl-Ishlinskii, as in Rakotondrabe 2012).",
+)
 def several_plays(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A chain of slacks of different width: loops within loops."""
     result = signal.copy()
@@ -50,6 +61,11 @@ def several_plays(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Dra
     return result
 
 
+@form(
+    Stage.MECHANICAL,
+    "Ninety switches with their own closing and opening angles (Preisach 1935).",
+    set_aside=True,
+)
 def relays(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Many small switches, each closing at one angle and opening at a lower one (Preisach)."""
     random = draws.stream("relays")
@@ -80,30 +96,4 @@ def _play(signal: np.ndarray, radius: np.ndarray) -> np.ndarray:
     return follower
 
 
-FORMS = (
-    Form(
-        "bouc_wen",
-        "A force that follows every change of direction and levels off (Bouc 1967, Wen 1976).",
-        bouc_wen,
-        Stage.MECHANICAL,
-    ),
-    Form(
-        "single_play",
-        "One slack that has to be taken up before the sensor follows (backlash; Krasnoselskii & Pokrovskii).",
-        single_play,
-        Stage.MECHANICAL,
-    ),
-    Form(
-        "several_plays",
-        "Five slacks of different width in parallel (Prandtl-Ishlinskii, as in Rakotondrabe 2012).",
-        several_plays,
-        Stage.MECHANICAL,
-    ),
-    Form(
-        "relays",
-        "Ninety switches with their own closing and opening angles (Preisach 1935).",
-        relays,
-        Stage.MECHANICAL,
-        set_aside=True,
-    ),
-)
+FORMS = (bouc_wen, single_play, several_plays, relays)

@@ -9,23 +9,37 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import lfilter
 
-from glovecal_models.simulation.causes.form import Draws, Form, Stage
+from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 SIZES_S = (0.002, 0.8)
 
 
+@form(
+    Stage.ELECTRICAL,
+    "A first-order low-pass with its own time per sensor (resistor and capacitor).",
+    sizes=SIZES_S,
+)
 def one_pole(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A resistor and a capacitor; the size is their time in seconds."""
     return _smoothed(signal, size, scene)
 
 
+@form(
+    Stage.ELECTRICAL, "Two first-order low-passes in a row (anti-alias filter and amplifier).", sizes=SIZES_S
+)
 def two_poles(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Two of them in a row, the second faster; the size is the sum of their times."""
     share = draws.each("second_share", 0.2, 0.5)
     return _smoothed(_smoothed(signal, size * (1 - share), scene), size * share, scene)
 
 
+@form(
+    Stage.ELECTRICAL,
+    "The mean of a window of past readings (firmware of data-acquisition boards).",
+    set_aside=True,
+    sizes=SIZES_S,
+)
 def moving_average(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The mean of the last ``size`` seconds, as firmware takes it."""
     start = signal[:, :1]
@@ -63,27 +77,4 @@ def _smoothed(signal: np.ndarray, time_s: np.ndarray, scene: Scene) -> np.ndarra
     return result
 
 
-FORMS = (
-    Form(
-        "one_pole",
-        "A first-order low-pass with its own time per sensor (resistor and capacitor).",
-        one_pole,
-        Stage.ELECTRICAL,
-        sizes=SIZES_S,
-    ),
-    Form(
-        "two_poles",
-        "Two first-order low-passes in a row (anti-alias filter and amplifier).",
-        two_poles,
-        Stage.ELECTRICAL,
-        sizes=SIZES_S,
-    ),
-    Form(
-        "moving_average",
-        "The mean of a window of past readings (firmware of data-acquisition boards).",
-        moving_average,
-        Stage.ELECTRICAL,
-        set_aside=True,
-        sizes=SIZES_S,
-    ),
-)
+FORMS = (one_pole, two_poles, moving_average)

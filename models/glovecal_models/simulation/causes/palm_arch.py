@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.form import Draws, Form, Stage
+from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 LITTLE_SHARE = 0.75
@@ -18,17 +18,33 @@ LITTLE_SHARE = 0.75
 _SIDE = {"P_MCP": LITTLE_SHARE, "RP_ABD": -0.3, "R_MCP": 0.4, "T_TMC": -0.5, "TI_ABD": -0.6}
 
 
+@form(
+    Stage.MECHANICAL,
+    "In proportion to the arch: little finger 0.75, thumb the other way (Krnoul 2016, (2), (3), (5)).",
+    touches="palm",
+)
 def linear(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The arch's angle, weighed by how far each bone turns with it."""
     return signal + size * _weights(scene, draws) * _arch(scene)
 
 
+@form(
+    Stage.MECHANICAL,
+    "One minus the cosine of the arch: bones on a cylinder, little effect while the palm is flat.",
+    touches="palm",
+)
 def cylinder(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Bones on a bent cylinder: cloth shortens with one minus the cosine of the arch, little at first."""
     turned = np.deg2rad(_arch(scene) * draws.one("turn_per_arch", 1.5, 3.0))
     return signal + size * _weights(scene, draws) * (1 - np.cos(turned))
 
 
+@form(
+    Stage.MECHANICAL,
+    "The product of arch and thumb opposition (Krnoul 2016: for thumb and little finger to touch).",
+    set_aside=True,
+    touches="palm",
+)
 def with_opposition(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The arch pulls only as far as the thumb stands across the palm: a product of the two."""
     opposed = draws.one("unopposed_share", 0.05, 0.2) + scene.bent("T_TMC")[:, :, None]
@@ -45,27 +61,4 @@ def _weights(scene: Scene, draws: Draws) -> np.ndarray:
     return own * draws.each("weight", 0.7, 1.3)
 
 
-FORMS = (
-    Form(
-        "linear",
-        "In proportion to the arch: little finger 0.75, thumb the other way (Krnoul 2016, (2), (3), (5)).",
-        linear,
-        Stage.MECHANICAL,
-        touches="palm",
-    ),
-    Form(
-        "cylinder",
-        "One minus the cosine of the arch: bones on a cylinder, little effect while the palm is flat.",
-        cylinder,
-        Stage.MECHANICAL,
-        touches="palm",
-    ),
-    Form(
-        "with_opposition",
-        "The product of arch and thumb opposition (Krnoul 2016: for thumb and little finger to touch).",
-        with_opposition,
-        Stage.MECHANICAL,
-        set_aside=True,
-        touches="palm",
-    ),
-)
+FORMS = (linear, cylinder, with_opposition)

@@ -8,17 +8,29 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.form import Draws, Form, Stage
+from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 BURSTS_PER_S = (0.2, 0.8)
 
 
+@form(
+    Stage.TRANSPORT,
+    "Frames missing at random are filled with the one before (Manus in Motive, docs.optitrack.com).",
+    sizes=(0.005, 0.97),
+    shared=True,
+)
 def padded_at_random(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Every frame is missing with the same chance; the size is that chance."""
     return _held(signal, _chances(scene, draws) < size[0])
 
 
+@form(
+    Stage.TRANSPORT,
+    "The glove is slower than the stream that carries it, so that frames repeat in a beat.",
+    sizes=(1.02, 40.0),
+    shared=True,
+)
 def periodic(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A glove slower than its stream: the size is the number of frames between fresh ones."""
     frames = np.arange(len(scene.time_s)) + draws.one("phase", 0.0, 1.0)
@@ -26,6 +38,13 @@ def periodic(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -
     return _held(signal, np.broadcast_to(~fresh, scene.session_s.shape))
 
 
+@form(
+    Stage.TRANSPORT,
+    "The stream stands still for a while now and then (radio retransmission).",
+    set_aside=True,
+    sizes=(0.02, 3.0),
+    shared=True,
+)
 def bursts(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The stream stands still for a while and goes on; the size is how long, seconds, in the mean."""
     begins = _chances(scene, draws) < draws.one("per_s", *BURSTS_PER_S) / scene.rate_hz
@@ -52,30 +71,4 @@ def _held(signal: np.ndarray, missing: np.ndarray) -> np.ndarray:
     return np.take_along_axis(signal, last[:, :, None], axis=1)
 
 
-FORMS = (
-    Form(
-        "padded_at_random",
-        "Frames missing at random are filled with the one before (Manus in Motive, docs.optitrack.com).",
-        padded_at_random,
-        Stage.TRANSPORT,
-        sizes=(0.005, 0.97),
-        shared=True,
-    ),
-    Form(
-        "periodic",
-        "The glove is slower than the stream that carries it, so that frames repeat in a beat.",
-        periodic,
-        Stage.TRANSPORT,
-        sizes=(1.02, 40.0),
-        shared=True,
-    ),
-    Form(
-        "bursts",
-        "The stream stands still for a while now and then (radio retransmission).",
-        bursts,
-        Stage.TRANSPORT,
-        set_aside=True,
-        sizes=(0.02, 3.0),
-        shared=True,
-    ),
-)
+FORMS = (padded_at_random, periodic, bursts)

@@ -10,13 +10,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.form import Draws, Form, Stage
+from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 SIZES = (0.02, 1.6)
 BEYOND = 0.5
 
 
+@form(
+    Stage.CONVERTER,
+    "Readings stop at one end (an amplifier at its supply).",
+    judged_by="lost_angle",
+    sizes=SIZES,
+    touches="two",
+)
 def hard_clip(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """An end of the converter's range is reached: readings stay at it."""
     at_high_end = draws.signs("end") > 0
@@ -25,6 +32,13 @@ def hard_clip(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) 
     return np.clip(signal, lowest, highest)
 
 
+@form(
+    Stage.COUNTS,
+    "Readings flatten towards the high end (a resistive film that is stretched out).",
+    judged_by="lost_angle",
+    sizes=SIZES,
+    touches="two",
+)
 def soft_tanh(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Readings flatten towards the high end."""
     knee = 1 + BEYOND - size
@@ -34,6 +48,14 @@ def soft_tanh(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) 
     return scene.low + scene.span * np.where(bent > knee, flattened, bent)
 
 
+@form(
+    Stage.COUNTS,
+    "Readings begin to change only after some bend (a sensor loose in its pocket; ours).",
+    set_aside=True,
+    judged_by="lost_angle",
+    sizes=SIZES,
+    touches="two",
+)
 def dead_zone(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Nothing happens before the sensor touches the finger, and little at first."""
     bent = (signal - scene.low) / scene.span
@@ -44,33 +66,4 @@ def dead_zone(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) 
     return scene.low + scene.span * (begins + touched)
 
 
-FORMS = (
-    Form(
-        "hard_clip",
-        "Readings stop at one end (an amplifier at its supply).",
-        hard_clip,
-        Stage.CONVERTER,
-        judged_by="lost_angle",
-        sizes=SIZES,
-        touches="two",
-    ),
-    Form(
-        "soft_tanh",
-        "Readings flatten towards the high end (a resistive film that is stretched out).",
-        soft_tanh,
-        Stage.COUNTS,
-        judged_by="lost_angle",
-        sizes=SIZES,
-        touches="two",
-    ),
-    Form(
-        "dead_zone",
-        "Readings begin to change only after some bend (a sensor loose in its pocket; ours).",
-        dead_zone,
-        Stage.COUNTS,
-        set_aside=True,
-        judged_by="lost_angle",
-        sizes=SIZES,
-        touches="two",
-    ),
-)
+FORMS = (hard_clip, soft_tanh, dead_zone)

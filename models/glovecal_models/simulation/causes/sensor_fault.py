@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.form import Draws, Form, Stage
+from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 STUCK_PER_S = (0.02, 0.06)
@@ -16,6 +16,12 @@ DROPPED_S = 0.1
 SPIKES_PER_S = (0.4, 2.0)
 
 
+@form(
+    Stage.CONVERTER,
+    "The reading stands still for stretches (firmware that stops sampling a channel).",
+    sizes=(0.03, 20.0),
+    touches="one",
+)
 def stuck(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The reading stands still for a while and jumps back; the size is how long, seconds, in the mean."""
     faulty = _stretches(scene, draws, STUCK_PER_S, size)
@@ -24,6 +30,7 @@ def stuck(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> n
     return np.take_along_axis(signal, last, axis=1)
 
 
+@form(Stage.CONVERTER, "Single frames far off (a bad contact, interference).", touches="one")
 def spikes(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Single frames far off, either way."""
     chance = draws.one("per_s", *SPIKES_PER_S) / scene.rate_hz
@@ -37,6 +44,11 @@ def spikes(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> 
     return signal + size * height
 
 
+@form(
+    Stage.CONVERTER,
+    "The reading falls towards one end for tenths of a second (a plug that loses contact).",
+    touches="one",
+)
 def dropouts(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Contact is bad for some frames and the reading falls towards one end; size 1 is all the way."""
     end = scene.low - 0.05 * scene.span
@@ -44,6 +56,12 @@ def dropouts(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -
     return signal + size * lost * (end - signal)
 
 
+@form(
+    Stage.CONVERTER,
+    "From one moment on the sensor answers differently (a cracked film).",
+    set_aside=True,
+    touches="one",
+)
 def gain_jump(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """From one moment in the middle of the session on the sensor answers more or less, for good."""
     at_s = draws.one("at_session_s", 500.0, 1300.0)
@@ -67,35 +85,4 @@ def _stretches(
     return faulty
 
 
-FORMS = (
-    Form(
-        "stuck",
-        "The reading stands still for stretches (firmware that stops sampling a channel).",
-        stuck,
-        Stage.CONVERTER,
-        sizes=(0.03, 20.0),
-        touches="one",
-    ),
-    Form(
-        "spikes",
-        "Single frames far off (a bad contact, interference).",
-        spikes,
-        Stage.CONVERTER,
-        touches="one",
-    ),
-    Form(
-        "dropouts",
-        "The reading falls towards one end for tenths of a second (a plug that loses contact).",
-        dropouts,
-        Stage.CONVERTER,
-        touches="one",
-    ),
-    Form(
-        "gain_jump",
-        "From one moment on the sensor answers differently (a cracked film).",
-        gain_jump,
-        Stage.CONVERTER,
-        set_aside=True,
-        touches="one",
-    ),
-)
+FORMS = (stuck, spikes, dropouts, gain_jump)

@@ -9,15 +9,20 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import lfilter
 
-from glovecal_models.simulation.causes.form import Draws, Form, Stage
+from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 
+@form(
+    Stage.ELECTRICAL,
+    "Zero points move in proportion to the temperature (temperature coefficient of resistance).",
+)
 def offset(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """So many degrees per kelvin, all at once."""
     return signal + size * draws.each("per_kelvin", 0.5, 1.5) * draws.sign() * _warmer(scene)
 
 
+@form(Stage.ELECTRICAL, "Zero points and gains move with the temperature (film and its polymer carrier).")
 def offset_and_gain(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Zero point and gain both change with the warmth."""
     bent = (signal - scene.low) / scene.span
@@ -25,12 +30,21 @@ def offset_and_gain(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: D
     return signal + size * slope * _warmer(scene)
 
 
+@form(
+    Stage.ELECTRICAL,
+    "Right at one temperature, off above and below (a bridge compensated at room temperature).",
+)
 def quadratic(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A compensated bridge: right at one temperature, off on both sides of it."""
     off = _warmer(scene) - draws.one("right_at", -1.0, 1.5)
     return signal + size * draws.signs() * off**2
 
 
+@form(
+    Stage.ELECTRICAL,
+    "Zero points follow the thermometer one to four minutes later (cloth warms slowly).",
+    set_aside=True,
+)
 def late(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The sensor in the cloth follows the thermometer in the cuff minutes later."""
     time_s = draws.one("late_s", 60.0, 240.0)
@@ -46,30 +60,4 @@ def _warmer(scene: Scene) -> np.ndarray:
     return (scene.temperature_c - scene.usual_air[0])[:, :, None]
 
 
-FORMS = (
-    Form(
-        "offset",
-        "Zero points move in proportion to the temperature (temperature coefficient of resistance).",
-        offset,
-        Stage.ELECTRICAL,
-    ),
-    Form(
-        "offset_and_gain",
-        "Zero points and gains move with the temperature (film and its polymer carrier).",
-        offset_and_gain,
-        Stage.ELECTRICAL,
-    ),
-    Form(
-        "quadratic",
-        "Right at one temperature, off above and below (a bridge compensated at room temperature).",
-        quadratic,
-        Stage.ELECTRICAL,
-    ),
-    Form(
-        "late",
-        "Zero points follow the thermometer one to four minutes later (cloth warms slowly).",
-        late,
-        Stage.ELECTRICAL,
-        set_aside=True,
-    ),
-)
+FORMS = (offset, offset_and_gain, quadratic, late)

@@ -7,16 +7,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.form import Draws, Form, Stage
+from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 
+@form(
+    Stage.ELECTRICAL,
+    "Zero points settle with one time after power-on (first-order thermal model of an amplifier).",
+)
 def one_exponential(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Zero points move towards their end with one time."""
     time_s = draws.one("time_s", 60.0, 400.0)
     return signal - size * draws.signs() * np.exp(-_on(scene) / time_s)[:, :, None]
 
 
+@form(
+    Stage.ELECTRICAL,
+    "Zero points and gains settle with a fast and a slow time (chip and housing warm separately).",
+)
 def offset_and_gain(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Zero points and gains move, with a fast and a slow time."""
     fast = np.exp(-_on(scene) / draws.one("fast_s", 40.0, 120.0))[:, :, None]
@@ -27,6 +35,11 @@ def offset_and_gain(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: D
     return signal - size * draws.signs() * cold * (1 + gain)
 
 
+@form(
+    Stage.ELECTRICAL,
+    "Zero points move with the logarithm of the time since power-on (no time of its own; ours).",
+    set_aside=True,
+)
 def logarithm(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Zero points move with the logarithm of the time since power-on and never quite end."""
     start_s = draws.one("start_s", 15.0, 90.0)
@@ -37,24 +50,4 @@ def _on(scene: Scene) -> np.ndarray:
     return np.maximum(scene.power_on_s, 0.0)
 
 
-FORMS = (
-    Form(
-        "one_exponential",
-        "Zero points settle with one time after power-on (first-order thermal model of an amplifier).",
-        one_exponential,
-        Stage.ELECTRICAL,
-    ),
-    Form(
-        "offset_and_gain",
-        "Zero points and gains settle with a fast and a slow time (chip and housing warm separately).",
-        offset_and_gain,
-        Stage.ELECTRICAL,
-    ),
-    Form(
-        "logarithm",
-        "Zero points move with the logarithm of the time since power-on (no time of its own; ours).",
-        logarithm,
-        Stage.ELECTRICAL,
-        set_aside=True,
-    ),
-)
+FORMS = (one_exponential, offset_and_gain, logarithm)

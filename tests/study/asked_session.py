@@ -10,10 +10,9 @@ import numpy as np
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.sampling.engine import Sampling, begin_sampling
-from glovecal_models.sampling.growing import Choose
 from glovecal_models.sampling.protocol import Protocol, Step
 from glovecal_models.sampling.reading import GloveReading
-from glovecal_models.sampling.state import OVER, SamplingState
+from glovecal_models.sampling.state import OVER, Choose, SamplingState
 from glovecal_models.sampling.verdict import TouchCheck
 from glovecal_models.simulation.asked_hand import AskedHand
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
