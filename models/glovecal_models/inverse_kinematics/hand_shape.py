@@ -49,12 +49,12 @@ class HandShape:
         return len(self.centre_deg)
 
     @classmethod
-    def at_rest(cls, rotations: Sequence[str], frames: int = 1) -> HandShape:
+    def at_rest(cls, rotations: Sequence[str]) -> HandShape:
         """A relaxed hand: what is left to say without a calibration."""
         rest = completed((), np.empty((1, 0)))[0]
         columns = [HAND_ROTATIONS.index(name) for name in rotations]
         firmness = [THUMB_SD_DEG if name.startswith("T") else FINGER_SD_DEG for name in rotations]
-        return cls(tuple(rotations), np.tile(rest[columns], (frames, 1)), np.tile(firmness, (frames, 1)))
+        return cls(tuple(rotations), rest[columns][None], np.array(firmness)[None])
 
     def misfit(self, angles_deg: np.ndarray) -> np.ndarray:
         """How far hands (N, K) are from this shape, in standard deviations of the whole, (N,)."""

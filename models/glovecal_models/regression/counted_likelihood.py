@@ -18,8 +18,7 @@ from glovecal_models.regression.exact import JITTER
 from glovecal_models.regression.lapack_routines import potrf, potri
 from glovecal_models.regression.mean import Mean, profile_coefficients
 from glovecal_models.regression.merged_samples import MergedSamples
-
-_LOG_2PI = float(np.log(2 * np.pi))
+from glovecal_models.regression.profiled_likelihood import LOG_2_PI
 
 
 @dataclass(frozen=True)
@@ -53,8 +52,8 @@ class CountedLikelihood:
         values, pullback = self.covariance.with_pullback(parameters[:-1], x, x)
         found = self._posterior(values, noise)
         log_determinant = 2 * float(np.log(np.diagonal(found.lower)).sum())
-        value = 0.5 * (float(found.residual @ found.weights) + log_determinant + len(x) * _LOG_2PI)
-        value += 0.5 * float(((counts - 1) * (_LOG_2PI + np.log(noise)) + np.log(counts)).sum())
+        value = 0.5 * (float(found.residual @ found.weights) + log_determinant + len(x) * LOG_2_PI)
+        value += 0.5 * float(((counts - 1) * (LOG_2_PI + np.log(noise)) + np.log(counts)).sum())
         value += 0.5 * self.samples.scatter / noise
         weights = 0.5 * (_inverse(found.lower) - np.outer(found.weights, found.weights))
         by_noise = noise * float(np.diagonal(weights) @ (1 / counts))

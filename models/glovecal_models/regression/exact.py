@@ -8,20 +8,20 @@ the reference.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
-from scipy.linalg.blas import get_blas_funcs
-from scipy.linalg.lapack import get_lapack_funcs
 
 from glovecal_models.covariance.base import Covariance
 from glovecal_models.covariance.linear_ard import LinearArd
 from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
+from glovecal_models.regression.lapack_routines import ger, potrf, potri
 from glovecal_models.regression.mean import LinearMean, Mean, profile_coefficients
 from glovecal_models.regression.optimise import Optimum, counted_progress, minimise
 from glovecal_models.regression.process_regressor import ProcessRegressor
+from glovecal_models.regression.profiled_likelihood import LOG_2_PI
 from glovecal_models.regression.training_samples import Standardised, check_samples, standardise
 
 JITTER = 1e-8
@@ -29,10 +29,6 @@ JITTER = 1e-8
 
 LOG_NOISE_BOUNDS = (np.log(1e-6), np.log(10.0))
 """Range of the noise variance, in units of the target's variance."""
-
-_LOG_2PI = float(np.log(2 * np.pi))
-_potrf, _potri = get_lapack_funcs(("potrf", "potri"), dtype=np.float64)
-(_ger,) = get_blas_funcs(("ger",), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -56,7 +52,7 @@ class ExactLikelihood:
         log_determinant = 2 * float(np.log(np.diagonal(lower)).sum())
         _, residual = self.fit_mean(lower)
         alpha = cho_solve((lower, True), residual, check_finite=False)
-        value = 0.5 * (float(residual @ alpha) + log_determinant + len(self.y) * _LOG_2PI)
+        value = 0.5 * (float(residual @ alpha) + log_determinant + len(self.y) * LOG_2_PI)
         weights = _likelihood_weights(lower, alpha)
         by_theta, _ = pullback(weights)
         return value, np.concatenate([by_theta, [noise * float(np.trace(weights))]])
@@ -67,13 +63,13 @@ class ExactLikelihood:
         _, residual = self.fit_mean(lower)
         white = solve_triangular(lower, residual, lower=True, check_finite=False)
         log_determinant = 2 * float(np.log(np.diagonal(lower)).sum())
-        return 0.5 * (float(white @ white) + log_determinant + len(self.y) * _LOG_2PI)
+        return 0.5 * (float(white @ white) + log_determinant + len(self.y) * LOG_2_PI)
 
     def cholesky(self, values: np.ndarray, noise: float) -> np.ndarray:
         """Lower root of values + (noise + jitter) I, column-major, zeros above; values stay unchanged."""
         matrix = values.T.copy(order="F")
         matrix.ravel(order="K")[:: len(matrix) + 1] += noise + self.jitter
-        lower, failed = _potrf(matrix, lower=1, clean=1, overwrite_a=1)
+        lower, failed = potrf(matrix, lower=1, clean=1, overwrite_a=1)
         if failed:
             raise np.linalg.LinAlgError("the covariance matrix is not positive definite")
         return lower
@@ -93,11 +89,11 @@ def _likelihood_weights(lower: np.ndarray, alpha: np.ndarray) -> np.ndarray:
     G = (K^-1 - alpha alpha^T) / 2, but with K^-1 as its lower triangle, doubled: the factorisation gives
     just that triangle, and filling the other would only move memory.
     """
-    inverse, failed = _potri(lower, lower=1, overwrite_c=1)
+    inverse, failed = potri(lower, lower=1, overwrite_c=1)
     if failed:
         raise np.linalg.LinAlgError("the covariance matrix is not positive definite")
     inverse.ravel(order="K")[:: len(inverse) + 1] *= 0.5
-    return _ger(-0.5, alpha, alpha, a=inverse, overwrite_a=1).T
+    return ger(-0.5, alpha, alpha, a=inverse, overwrite_a=1).T
 
 
 def search_bounds(covariance: Covariance, dimensions: int) -> list[tuple[float, float]]:
@@ -139,9 +135,6 @@ def fit_exact(
     covariance: Covariance,
     *,
     starts: int = 4,
-    iterations: int = 200,
-    seed: int = 0,
-    sensor_names: Sequence[str] | None = None,
     cancelled: Callable[[], bool] | None = None,
     report: Callable[[str, float], None] | None = None,
 ) -> ProcessRegressor:
@@ -151,14 +144,14 @@ def fit_exact(
     for samples that cannot carry a model, Cancelled when ``cancelled`` says so. ``evidence`` holds the
     NLML in standardised units (add N log target_scale_deg for degrees), and what each start reached.
     """
-    working = standardise(*check_samples(inputs, target, sensor_names))
+    working = standardise(*check_samples(inputs, target))
     search = search_few(
         working.x,
         working.y,
         mean,
         covariance,
         starts=starts,
-        generator=np.random.default_rng(seed),
+        generator=np.random.default_rng(0),
         cancelled=cancelled,
         on_evaluation=counted_progress(report, f"searching from {starts} starts", 0.0, 0.2),
     )
@@ -167,7 +160,6 @@ def fit_exact(
         likelihood,
         [search.parameters],
         search_bounds(covariance, working.x.shape[1]),
-        iterations=iterations,
         cancelled=cancelled,
         on_evaluation=counted_progress(report, f"fitting {len(target)} samples", 0.2, 1.0),
     )

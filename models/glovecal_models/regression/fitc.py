@@ -19,20 +19,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg.blas import get_blas_funcs
-from scipy.linalg.lapack import get_lapack_funcs
 
 from glovecal_models.covariance.base import Covariance
 from glovecal_models.regression.exact import ExactLikelihood
+from glovecal_models.regression.lapack_routines import ger, potrf, potri, syrk, trsm
 from glovecal_models.regression.mean import Mean, profile_coefficients_from_products
+from glovecal_models.regression.profiled_likelihood import LOG_2_PI
 
 JITTER = 1e-6
 """Added to the diagonal of k(z, z), in units of the target's variance; it moves the likelihood, so it is
 stored with the model."""
-
-_LOG_2PI = float(np.log(2 * np.pi))
-_trsm, _syrk, _ger = get_blas_funcs(("trsm", "syrk", "ger"), dtype=np.float64)
-_potrf, _potri = get_lapack_funcs(("potrf", "potri"), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -123,20 +119,20 @@ class FitcLikelihood:
         np.copyto(scaled, cross)
         # A row-major (M, N) matrix is a column-major (N, M) one to BLAS, where solving from the right is
         # both in place and the faster of the two.
-        _trsm(1.0, root, scaled.T, side=1, lower=1, trans_a=1, overwrite_b=1)
+        trsm(1.0, root, scaled.T, side=1, lower=1, trans_a=1, overwrite_b=1)
         variances = self.covariance.diagonal(theta, self.x) - np.einsum("mn,mn->n", scaled, scaled)
         deviations = np.sqrt((np.maximum(variances, 0.0) + noise) / self.sample_weight)
         scaled *= 1.0 / deviations
-        product = _syrk(1.0, scaled.T, trans=1, lower=1) + np.eye(len(root))
+        product = syrk(1.0, scaled.T, trans=1, lower=1) + np.eye(len(root))
         inner_root = _lower_root(product)
         np.copyto(solved, scaled)
-        _trsm(1.0, inner_root, solved.T, side=1, lower=1, trans_a=1, overwrite_b=1)
-        _trsm(1.0, inner_root, solved.T, side=1, lower=1, overwrite_b=1)
+        trsm(1.0, inner_root, solved.T, side=1, lower=1, trans_a=1, overwrite_b=1)
+        trsm(1.0, inner_root, solved.T, side=1, lower=1, overwrite_b=1)
         coefficients, residual = self._fit_mean(scaled, solved, deviations)
         projected = solved @ residual
         alpha = (residual - projected @ scaled) / deviations
         log_determinant = 2 * float(np.log(deviations).sum() + np.log(np.diagonal(inner_root)).sum())
-        value = 0.5 * (float((residual * deviations) @ alpha) + log_determinant + len(self.y) * _LOG_2PI)
+        value = 0.5 * (float((residual * deviations) @ alpha) + log_determinant + len(self.y) * LOG_2_PI)
         value -= self._log_normaliser(deviations)
         return FitcState(
             root, scaled, product, inner_root, solved, deviations, coefficients, projected, alpha, value
@@ -145,7 +141,7 @@ class FitcLikelihood:
     def _log_normaliser(self, deviations: np.ndarray) -> float:
         """Log of what the powers of the samples' Gaussians leave beside Gaussians; 0 for whole samples."""
         weight = self.sample_weight
-        logs = _LOG_2PI + 2 * np.log(deviations) + np.log(weight)
+        logs = LOG_2_PI + 2 * np.log(deviations) + np.log(weight)
         return float(0.5 * ((1 - weight) * logs.sum() - len(self.y) * np.log(weight)))
 
     def _fit_mean(
@@ -174,26 +170,26 @@ def _weights(
 
     solved *= 1.0 / state.deviations
     solved -= np.multiply(scaled, (1.0 - surprise) / state.deviations, out=spare)
-    _ger(-1.0, alpha, state.projected, a=solved.T, overwrite_a=1)
-    _trsm(1.0, state.root, solved.T, side=1, lower=1, overwrite_b=1)
+    ger(-1.0, alpha, state.projected, a=solved.T, overwrite_a=1)
+    trsm(1.0, state.root, solved.T, side=1, lower=1, overwrite_b=1)
     return solved, by_inner, by_diagonal
 
 
 def _inner_weights(state: FitcState, surprising: np.ndarray) -> np.ndarray:
     """-1/2 L^-T (2 I - A - A^-1 - b b^T + surprising surprising^T) L^-1."""
-    inverse, failed = _potri(state.inner_root, lower=1)
+    inverse, failed = potri(state.inner_root, lower=1)
     if failed:
         raise np.linalg.LinAlgError("the sparse covariance matrix is not positive definite")
-    lower = np.tril(_syrk(1.0, surprising.T, trans=1, lower=1) - inverse - state.inner)
+    lower = np.tril(syrk(1.0, surprising.T, trans=1, lower=1) - inverse - state.inner)
     middle = lower + np.tril(lower, -1).T + 2.0 * np.eye(len(lower))
     middle -= np.outer(state.projected, state.projected)
-    middle = _trsm(-0.5, state.root, np.asfortranarray(middle), side=1, lower=1, overwrite_b=1)
-    return _trsm(1.0, state.root, middle, side=0, lower=1, trans_a=1, overwrite_b=1)
+    middle = trsm(-0.5, state.root, np.asfortranarray(middle), side=1, lower=1, overwrite_b=1)
+    return trsm(1.0, state.root, middle, side=0, lower=1, trans_a=1, overwrite_b=1)
 
 
 def _lower_root(matrix: np.ndarray) -> np.ndarray:
     """Column-major lower Cholesky root from the lower triangle."""
-    lower, failed = _potrf(matrix, lower=1, clean=1)
+    lower, failed = potrf(matrix, lower=1, clean=1)
     if failed:
         raise np.linalg.LinAlgError("the sparse covariance matrix is not positive definite")
     return lower

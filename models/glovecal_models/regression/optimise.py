@@ -125,8 +125,6 @@ class SearchResult:
     parameters: np.ndarray
     nlml: float
     evaluations: int
-    expected_fall: float
-    """Nats that one more step promises."""
 
 
 def newton_search(
@@ -147,7 +145,7 @@ def newton_search(
     current = evaluate(point)
     if current is None:
         return None
-    used, damping, expected = 1, 1e-2, np.inf
+    used, damping = 1, 1e-2
     gradient, information = current.derivatives()
     secants: list[tuple[np.ndarray, np.ndarray]] = []
     while used < evaluations:
@@ -170,7 +168,7 @@ def newton_search(
             damping = max(damping * 8.0, 1e-1)
             if damping > 1e8:
                 break
-    return SearchResult(point, current.nlml, used, float(expected))
+    return SearchResult(point, current.nlml, used)
 
 
 def _corrected(information: np.ndarray, secants: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:

@@ -7,7 +7,7 @@ Pseudo-inputs start at the samples the process itself finds hardest to explain.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -26,6 +26,8 @@ from glovecal_models.regression.pivoted_cholesky import factor_by_rows
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.regression.training_samples import Standardised, check_samples, standardise
 
+LEAST_GAIN = 1e-4
+"""Nats of an iteration, below which the search ends."""
 _SAMPLES_FOR_START = 300
 _START_SHARE = 0.2
 _REACH = 1.0
@@ -38,20 +40,18 @@ def fit_spgp(
     *,
     pseudo_inputs: int = 100,
     iterations: int = 200,
-    least_gain: float = 1e-4,
     mean: Mean | None = None,
     covariance: Covariance | None = None,
     start: ProcessRegressor | None = None,
     sample_weight: float = 1.0,
     seed: int = 0,
-    sensor_names: Sequence[str] | None = None,
     cancelled: Callable[[], bool] | None = None,
     report: Callable[[str, float], None] | None = None,
 ) -> ProcessRegressor:
     """Train on raw inputs (N, D), counts, and target (N,), degrees.
 
     The search takes at most ``iterations`` iterations and ends earlier when one gains less than
-    ``least_gain`` nats. It starts at the hyperparameters of ``start``, a process trained on the same
+    ``LEAST_GAIN``. It starts at the hyperparameters of ``start``, a process trained on the same
     samples, with pseudo-inputs chosen for these. Without one the start is ``fit_lmc_gpr`` of the same
     samples, or, where mean or covariance are given, an exact process of at most 300 of them. The noise
     may not fall below half the start's, and hyperparameters that the exact likelihood refuses are
@@ -60,7 +60,7 @@ def fit_spgp(
     sensor unless given. Each sample counts ``sample_weight``, at most 1, as in ``fit_lmc_gpr``.
     Raises NotTrainable, Cancelled, and BadInput when ``start`` has another covariance or sensor count.
     """
-    inputs, target = check_samples(inputs, target, sensor_names)
+    inputs, target = check_samples(inputs, target)
     if pseudo_inputs < 1:
         raise BadInput(f"pseudo_inputs is {pseudo_inputs}, expected at least 1")
     if start is None and mean is None and covariance is None:
@@ -95,7 +95,7 @@ def fit_spgp(
         [first],
         _bounds(covariance, noise, working.x, len(first)),
         iterations=iterations,
-        least_gain=least_gain,
+        least_gain=LEAST_GAIN,
         cancelled=cancelled,
         on_evaluation=on_evaluation,
     )

@@ -19,6 +19,7 @@ from glovecal_models.simulation.session_glove import SessionGlove
 
 STRENGTH_LOG_SD = 0.35
 """Sensors of one glove differ in how much a cause moves them."""
+SIZE_ROUNDS = 16
 LEAST_REACHED_DEG = 1e-4
 """A form of size 1 that moves a sensor less than this is not seen on this motion, and is left out."""
 PALM_NEIGHBOURS = ("P_MCP", "R_MCP", "T_TMC", "TI_ABD", "RP_ABD")
@@ -198,7 +199,6 @@ def sizes_for(
     bounds: tuple[float, float],
     *,
     shared: bool,
-    rounds: int = 16,
 ) -> np.ndarray:
     """Sizes, shape (S,), at which ``measure`` (growing in each sensor's own size) gives ``targets`` (S,).
 
@@ -207,7 +207,7 @@ def sizes_for(
     """
     low, high = (np.full(len(targets), bound) for bound in bounds)
     size = np.sqrt(low * high)
-    for _ in range(rounds):
+    for _ in range(SIZE_ROUNDS):
         reached = measure(size)
         wanted = targets
         if shared:

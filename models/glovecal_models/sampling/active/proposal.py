@@ -117,7 +117,6 @@ def propose(
     candidates: Sequence[Step],
     *,
     trained: Mapping[str, ProcessRegressor] | None = None,
-    rate_hz: float = USUAL_RATE_HZ,
 ) -> Proposal:
     """Rank ``candidates`` by the expected fall of the error per second.
 
@@ -138,7 +137,7 @@ def propose(
         after = dict(now)
         for item in wanted:
             if item.rotation in step.angles:
-                fall = _fall(step, item, *states[item.rotation], expected, rate_hz)
+                fall = _fall(step, item, *states[item.rotation], expected)
                 after[item.rotation] = max(now[item.rotation] - fall, 0.0)
         ranked.append(_proposed(step, now, after, noise))
     ranked.sort(key=lambda each: -each.fall_per_s)
@@ -161,11 +160,10 @@ def _fall(
     process: AssumedProcess,
     state: PosteriorVariance,
     expected: ExpectedReadings,
-    rate_hz: float,
 ) -> float:
     """Of the rotation's mean variance, degrees squared."""
     points = process.unit(expected.of(step, item))
-    samples = step.seconds * rate_hz / ALIKE_FRAMES
+    samples = step.seconds * USUAL_RATE_HZ / ALIKE_FRAMES
     errors = step_errors(len(points), samples, process.noise_sd_deg, shared_sd_deg(step))
     return float(state.fall(SampledPoints(points, errors)).mean())
 
