@@ -76,7 +76,7 @@ def write_takes(takes: Take | Iterable[Take], path: str | PathLike[str]) -> list
     There are two where the reference has a clock of its own. Reading them gives back exactly what was
     written. Raises BadInput for takes that cannot share a file.
     """
-    from glovecal_models.takes.table import write_takes as write
+    from glovecal_models.takes.write_table import write_takes as write
 
     return write(takes_in(takes), Path(path))
 

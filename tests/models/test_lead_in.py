@@ -23,7 +23,7 @@ from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 from glovecal_models.takes.clock_scan import clock_offsets
-from glovecal_models.takes.table import read_takes, write_takes
+from glovecal_models.takes.table import read_takes
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.take_check import check_take
 from glovecal_models.takes.write_table import write_takes

@@ -13,8 +13,8 @@ import pytest
 from cli_running import glovecal, start
 from realtime_support import eventually, free_endpoint
 
-from glovecal_models.takes.table import write_takes
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.write_table import write_takes
 
 ADVICE = "Loosen and tighten the strap while the room stays as warm as it is."
 PACKAGE = f'''

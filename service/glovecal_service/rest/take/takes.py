@@ -13,9 +13,9 @@ from fastapi.responses import FileResponse
 from pydantic import BaseModel, Field
 from starlette.background import BackgroundTask
 
-from glovecal_models.takes.table import write_takes
 from glovecal_models.takes.take import Take as TakeArrays
 from glovecal_models.takes.take_check import check_take
+from glovecal_models.takes.write_table import write_takes
 from glovecal_service.plain import plain
 from glovecal_service.rest.http.answers import change_problems, problems
 from glovecal_service.rest.http.damaged_rows import without_damaged
