@@ -106,7 +106,7 @@ def add_effect(
     rotation is unknown, or when the takes cannot carry it; Cancelled.
     """
     from glovecal_models.calibration.declared_effects import declared_in
-    from glovecal_models.effects.declared.known_by_name import known_by_name
+    from glovecal_models.effects.catalogue import known_by_name
     from glovecal_models.improvement.add_effect import add_effect as add_inner
 
     inner, takes = inner_model(model), takes_in(takes)
@@ -144,7 +144,7 @@ def remove_effect(
     ``samples`` and ``seed`` as for ``train``. Raises BadInput when it has no such effect; Cancelled.
     """
     from glovecal_models.calibration.declared_effects import declared_in
-    from glovecal_models.effects.declared.known_by_name import known_by_name
+    from glovecal_models.effects.catalogue import known_by_name
     from glovecal_models.improvement.remove_effect import remove_effect as remove_inner
 
     inner = inner_model(model)

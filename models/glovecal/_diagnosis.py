@@ -120,7 +120,7 @@ def diagnose(
     from glovecal_models.comparison.rotation_noise import rotation_noise
     from glovecal_models.diagnosis.diagnose import diagnose as diagnose_inner
     from glovecal_models.diagnosis.known_effect import known_effects
-    from glovecal_models.effects.declared.known_by_name import known_by_name
+    from glovecal_models.effects.catalogue import known_by_name
 
     inner, takes = inner_model(model), takes_in(takes)
     own = declared(also)

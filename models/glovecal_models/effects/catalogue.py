@@ -5,7 +5,9 @@ A package of one's own adds an effect by an entry point that names its class; no
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import entry_points
 from typing import Any
@@ -19,6 +21,7 @@ from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
 
 GROUP = "glovecal.effects"
+_ONE_CALL = threading.RLock()
 DeclaredEffect = ExpressionEffect
 """A user's own effect, declared in one line of text."""
 
@@ -87,3 +90,23 @@ def stored_effect(name: str, settings: Settings) -> Effect:
     if "declaration" in settings:
         return ExpressionEffect.from_document(settings["declaration"])
     return effect(name)
+
+
+@contextmanager
+def known_by_name(effects: Sequence[Effect]) -> Iterator[None]:
+    """Within the block ``effects`` answer to their names; for one caller of this process at a time.
+
+    A declared effect belongs to the models that hold it: two models may each have a ``strap`` of their own.
+    """
+    with _ONE_CALL:
+        known = catalogue()
+        before = {item.name: known.get(item.name) for item in effects}
+        known.update({item.name: item for item in effects})
+        try:
+            yield
+        finally:
+            for name, earlier in before.items():
+                if earlier is None:
+                    del known[name]
+                else:
+                    known[name] = earlier

@@ -12,8 +12,7 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.comparison.rotation_noise import rotation_noise
 from glovecal_models.diagnosis.known_effect import known_effects
-from glovecal_models.effects.catalogue import effect_of_declaration
-from glovecal_models.effects.declared.known_by_name import known_by_name
+from glovecal_models.effects.catalogue import effect_of_declaration, known_by_name
 from glovecal_models.takes.take import Take
 from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult
 from glovecal_service.jobs.model_work import ModelWork, takes_of, text_in

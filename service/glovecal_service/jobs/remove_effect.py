@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from glovecal_models.calibration.declared_effects import declared_in
-from glovecal_models.effects.declared.known_by_name import known_by_name
+from glovecal_models.effects.catalogue import known_by_name
 from glovecal_models.improvement.remove_effect import remove_effect
 from glovecal_service.jobs.child_record import artifact_array, keep_child
 from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult

@@ -1,0 +1,74 @@
+"""A data folder of the version of 2026-11-22 is used as it stands: models, predictions, jobs and their pages.
+
+It was made by that version's command line from simulated takes: LMC-GPR with hysteresis and with a donning
+shift, a linear calibration with a declared effect, a diagnosis and a whole improvement.
+"""
+
+from __future__ import annotations
+
+import json
+import tarfile
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cli_running import glovecal
+
+from glovecal_models.calibration import artifact
+from glovecal_models.calibration.predictor import GlovePredictor
+from glovecal_models.takes.table import read_takes
+
+STORED = Path(__file__).parents[1] / "stored_example"
+EXPECTED = json.loads((STORED / "expected.json").read_text(encoding="utf-8"))
+EVERY_SO_MANY = 40
+"""Frames between those whose poses are kept."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    into = tmp_path_factory.mktemp("stored")
+    with tarfile.open(STORED / "data-2026-11-22.tar.xz") as packed:
+        packed.extractall(into, filter="data")
+    return into / "data"
+
+
+@pytest.fixture(scope="module")
+def run(folder: Path):
+    return partial(glovecal, {"GLOVECAL_DATA": str(folder)})
+
+
+def test_its_models_are_there_and_say_what_they_hold(run):
+    found = {item["id"]: item for item in run("model", "list", "--json").json}
+    assert {name: [item["effects"], item["active"]] for name, item in found.items()} == {
+        name: [item["effects"], item["active"]] for name, item in EXPECTED["models"].items()
+    }
+    for name, item in EXPECTED["models"].items():
+        shown = run("model", "show", name)
+        assert shown.code == 0, shown.err
+        assert all(effect in shown.out for effect in item["effects"])
+
+
+@pytest.mark.parametrize("name", EXPECTED["models"])
+def test_each_model_predicts_what_it_predicted(folder: Path, name: str):
+    model = artifact.load((folder / "artifacts" / name).read_bytes())
+    [take] = read_takes(folder / "unseen.csv")
+    readings = take.readings[:, [take.sensors.index(sensor) for sensor in model.layout.sensors]]
+    angles = GlovePredictor(model).predict_take(take.time_s, readings, take.context, take.wearing)
+    for part in ("mean", "sd"):
+        values = np.array(getattr(angles, part)[::EVERY_SO_MANY])
+        np.testing.assert_allclose(values, EXPECTED["predicted"][name][f"{part}_deg"], atol=1e-7)
+
+
+@pytest.mark.parametrize("job", EXPECTED["jobs"])
+def test_each_job_is_shown(run, job: str):
+    shown = run("job", "show", job)
+    assert shown.code == 0, shown.err
+    assert run("job", "show", job, "--json").json["state"] == "done"
+
+
+def test_it_goes_on_from_there(run, folder: Path):
+    assert run("take", "import", folder / "unseen.csv", "-s", "anna").code == 0
+    compared = run("compare", EXPECTED["active"])
+    assert compared.code == 0, compared.err
+    assert run("remove-effect", EXPECTED["active"], "hysteresis").code == 0
