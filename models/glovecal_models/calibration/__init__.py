@@ -1,1 +1,1 @@
-"""Whole-glove calibration models: training, prediction, artifact, comparison with measurements."""
+"""Calibration models of a whole glove: training, with effects or without, artifact, prediction."""

@@ -1,1 +1,1 @@
-"""Which physical effect is missing: ranked evidence on takes left out of each fit."""
+"""Which physical effect is missing: ranked evidence on held-out takes, beside a control."""

@@ -1,1 +1,1 @@
-"""Adding an effect to a calibration: learned with the rest, verified on held-out takes, or undone."""
+"""The loop: an effect is added, verified on held-out takes, or undone, until nothing more helps."""
