@@ -19,7 +19,7 @@ def stop_if(cancelled: Cancel | None, what: str) -> None:
 
 
 def part(report: Report | None, low: float, high: float, what: str = "") -> Report | None:
-    """A report for work that is the piece from ``low`` to ``high`` of a whole; ``what`` begins its sentences."""
+    """For work that is the piece from ``low`` to ``high`` of a whole; ``what`` begins its sentences."""
     if report is None:
         return None
     before = f"{what}: " if what else ""

@@ -17,6 +17,7 @@ from scipy.linalg import cho_solve, solve_triangular
 from glovecal_models.covariance.base import Covariance
 from glovecal_models.covariance.linear_ard import LinearArd
 from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
+from glovecal_models.progress import Cancel, Report
 from glovecal_models.regression.lapack_routines import ger, potrf, potri
 from glovecal_models.regression.mean import LinearMean, Mean, profile_coefficients
 from glovecal_models.regression.optimise import Optimum, counted_progress, minimise
@@ -111,7 +112,7 @@ def search_few(
     generator: np.random.Generator,
     samples: int = 400,
     iterations: int = 200,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
     on_evaluation: Callable[[int], None] | None = None,
 ) -> Optimum:
     """The best [theta, log noise variance] of several searches on at most ``samples`` random samples."""
@@ -135,8 +136,8 @@ def fit_exact(
     covariance: Covariance,
     *,
     starts: int = 4,
-    cancelled: Callable[[], bool] | None = None,
-    report: Callable[[str, float], None] | None = None,
+    cancelled: Cancel | None = None,
+    report: Report | None = None,
 ) -> ProcessRegressor:
     """Train on raw inputs (N, D), counts, and target (N,), degrees.
 

@@ -13,14 +13,13 @@ as many nodes as the served mean and standard deviation need (``served_nodes``).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
-from glovecal_models.errors import Cancelled
+from glovecal_models.progress import Cancel, Report, stop_if
 from glovecal_models.regression.exact_profiled_likelihood import ExactProfiledLikelihood
 from glovecal_models.regression.lmc_search import MOST_EXACT, LmcSearch
 from glovecal_models.regression.low_rank_likelihood import Certificate, NystromFit, certify
@@ -62,8 +61,8 @@ def fit_lmc_gpr(
     *,
     sample_weight: float = 1.0,
     seed: int = 0,
-    cancelled: Callable[[], bool] | None = None,
-    report: Callable[[str, float], None] | None = None,
+    cancelled: Cancel | None = None,
+    report: Report | None = None,
 ) -> ProcessRegressor:
     """Train on ``inputs`` (N, D), raw counts, and ``target`` (N,), degrees; same seed, same result.
 
@@ -84,16 +83,16 @@ def fit_lmc_gpr(
 def finish_search(
     search: LmcSearch,
     *,
-    cancelled: Callable[[], bool] | None = None,
-    report: Callable[[str, float], None] | None = None,
+    cancelled: Cancel | None = None,
+    report: Report | None = None,
 ) -> ProcessRegressor:
     """What ``fit_lmc_gpr`` returns, from a search that has begun. Raises Cancelled."""
     say = report or (lambda sentence, fraction: None)
     samples, standard = search.samples, search.standard
-    _stop_if(cancelled)
+    stop_if(cancelled, "training")
     say("refining the best optimum", 0.4)
     refined = search.optimum(cancelled)
-    _stop_if(cancelled)
+    stop_if(cancelled, "training")
     say("bounding the likelihood and choosing nodes", 0.8)
     trained = _examine(samples, refined)
     scale_deg = standard.target_scale
@@ -202,8 +201,3 @@ def _nlml_of_plane(samples: MergedSamples) -> float:
     basis, target = samples.columns[:, :-1], samples.columns[:, -1]
     left = float(target @ target) - float(np.sum((basis.T @ target) ** 2)) + samples.scatter
     return profile(np.array([[1.0, 0.0], [0.0, max(left, 0.0)]]), 0.0, samples.total).nlml
-
-
-def _stop_if(cancelled: Callable[[], bool] | None) -> None:
-    if cancelled is not None and cancelled():
-        raise Cancelled("training was cancelled")

@@ -9,7 +9,7 @@ served on few nodes. ``fit_exact`` stays the reference that does none of this.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +19,7 @@ from glovecal_models.covariance.base import Covariance
 from glovecal_models.covariance.polynomial import Polynomial
 from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
 from glovecal_models.errors import NotTrainable
+from glovecal_models.progress import Cancel
 from glovecal_models.regression.counted_likelihood import CountedLikelihood
 from glovecal_models.regression.exact import JITTER, search_bounds
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
@@ -48,7 +49,7 @@ def fit_process(
     starts: int = 3,
     iterations: int = 60,
     seed: int = 0,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
 ) -> ProcessRegressor:
     """Train on raw inputs (N, D), counts, and target (N,), degrees; each sample counts ``sample_weight``.
 
@@ -84,7 +85,7 @@ def _searched(
     sample_weight: float,
     starts: int,
     seed: int,
-    cancelled: Callable[[], bool] | None,
+    cancelled: Cancel | None,
 ) -> Optimum:
     """The best of several short searches on some of the samples; each start is fixed by the seed."""
     generator = np.random.default_rng(seed)
@@ -173,7 +174,7 @@ class KernelCandidate:
         *,
         sample_weight: float = 1.0,
         seed: int = 0,
-        cancelled: Callable[[], bool] | None = None,
+        cancelled: Cancel | None = None,
         **search: Any,
     ) -> ProcessRegressor:
         """Train on inputs (N, D), counts, and target (N,), degrees; ``search`` goes to ``fit_process``.

@@ -7,14 +7,15 @@ reading become the ends of the range a healthy joint has.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from scipy.linalg import cholesky, lstsq, solve_triangular
 
-from glovecal_models.errors import BadInput, Cancelled, DamagedArtifact
+from glovecal_models.errors import BadInput, DamagedArtifact
+from glovecal_models.progress import Cancel, Report, stop_if
 from glovecal_models.regression.regressor import Prediction, stored_number
 from glovecal_models.regression.training_samples import check_samples, standardise
 
@@ -95,8 +96,8 @@ def fit_linear(
     target: np.ndarray,
     *,
     sensor_names: Sequence[str] | None = None,
-    cancelled: Callable[[], bool] | None = None,
-    report: Callable[[str, float], None] | None = None,
+    cancelled: Cancel | None = None,
+    report: Report | None = None,
 ) -> LinearRegressor:
     """Least squares, of least norm where collinear sensors leave it open; inputs (N, D), target (N,) degrees.
 
@@ -104,8 +105,7 @@ def fit_linear(
     only shows in directions the samples never moved in: there the plane is unknown, and says so.
     Raises NotTrainable (at least D + 2 samples), Cancelled.
     """
-    if cancelled is not None and cancelled():
-        raise Cancelled("training was stopped before the linear fit")
+    stop_if(cancelled, "training")
     dimensions = np.shape(inputs)[1] if np.ndim(inputs) == 2 else 1
     working = standardise(*check_samples(inputs, target, sensor_names, least=dimensions + 2))
     basis = np.column_stack([working.x, np.ones(len(working.y))])

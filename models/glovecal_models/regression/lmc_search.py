@@ -10,14 +10,14 @@ samples. No nodes are chosen and nothing is certified: it is never served.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
-from glovecal_models.errors import Cancelled, NotTrainable
+from glovecal_models.errors import NotTrainable
+from glovecal_models.progress import Cancel, stop_if
 from glovecal_models.regression.exact_profiled_likelihood import ExactProfiledLikelihood, TrainingProcess
 from glovecal_models.regression.merged_samples import MergedSamples
 from glovecal_models.regression.multi_start import (
@@ -35,7 +35,6 @@ from glovecal_models.regression.training_samples import Standardised, check_samp
 
 MOST_EXACT = 4000
 """Distinct inputs up to which an N x N matrix is formed; 128 MB each at this size."""
-Cancel = Callable[[], bool] | None
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ class LmcSearch:
         *,
         sample_weight: float = 1.0,
         seed: int = 0,
-        cancelled: Cancel = None,
+        cancelled: Cancel | None = None,
     ) -> LmcSearch:
         """From ``inputs`` (N, D), counts, and ``target`` (N,), degrees. Raises NotTrainable, Cancelled."""
         standard = standardise(*check_samples(inputs, target))
@@ -79,12 +78,11 @@ class LmcSearch:
         """Whether what is left takes exact evaluations with many samples."""
         return self.on_nodes is None and len(self.samples.inputs) > 2 * SCREENED
 
-    def optimum(self, cancelled: Cancel = None) -> Candidate:
+    def optimum(self, cancelled: Cancel | None = None) -> Candidate:
         """Refine the most promising optimum; others too while that is cheap, which exact searches are not."""
         best = self.on_nodes or self._refined_exactly(cancelled)
         for candidate in self.found[1:3] if len(self.samples.inputs) <= MOST_EXACT or best.low_rank else ():
-            if cancelled is not None and cancelled():
-                raise Cancelled("training was cancelled")
+            stop_if(cancelled, "training")
             if np.abs(candidate.parameters - best.parameters).max() < SAME_OPTIMUM:
                 continue
             nodes = min(MOST_NODES, len(self.samples.inputs))
@@ -95,7 +93,7 @@ class LmcSearch:
                 best = rival
         return best
 
-    def _refined_exactly(self, cancelled: Cancel) -> Candidate:
+    def _refined_exactly(self, cancelled: Cancel | None) -> Candidate:
         """By exact evaluations, to 1e-6 nats of few samples and 1e-3 of many; from some of very many.
 
         They start from the optimum of a subset, where an evaluation costs a fifteenth.
@@ -151,7 +149,7 @@ def fit_roughly(
     start: np.ndarray,
     sample_weight: float = 1.0,
     seed: int = 0,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
 ) -> RoughProcess:
     """Of ``inputs`` (N, D), raw counts, and ``target`` (N,), degrees, each sample counting ``sample_weight``.
 

@@ -8,11 +8,12 @@ lead.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from glovecal_models.progress import Cancel
 from glovecal_models.regression.exact_profiled_likelihood import ExactProfiledLikelihood
 from glovecal_models.regression.low_rank_likelihood import LowRankLikelihood
 from glovecal_models.regression.merged_samples import MergedSamples
@@ -76,7 +77,7 @@ def descend(
     *,
     fine: bool,
     most_nodes: int = MOST_NODES,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
 ) -> Candidate | None:
     """Search on nodes, choosing them anew whenever lengthscales or noise leave the range they serve.
 
@@ -119,7 +120,7 @@ def search_exactly(
     start: np.ndarray,
     *,
     tolerance: float,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
 ) -> Candidate | None:
     """Search the exact likelihood of ``samples``."""
     found = newton_search(
@@ -139,7 +140,7 @@ def screen(
     x: np.ndarray,
     y: np.ndarray,
     generator: np.random.Generator,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
     weight: float = 1.0,
 ) -> tuple[list[Candidate], list[dict[str, object]]]:
     """Distinct optima over all starts, best first, roughly located; and a JSON-able account of every start.
@@ -185,7 +186,7 @@ def some_samples(
 
 
 def _short_optimum(
-    subset: MergedSamples, rivals: list[Candidate], cancelled: Callable[[], bool] | None
+    subset: MergedSamples, rivals: list[Candidate], cancelled: Cancel | None
 ) -> Candidate | None:
     """The optimum reached from short lengthscales, if it beats the best rival on ``subset``."""
     start = short_start(subset.inputs.shape[1])

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from glovecal_models.errors import Cancelled
+from glovecal_models.progress import Cancel, Report, stop_if
 from glovecal_models.regression.profiled_likelihood import Evaluation
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def minimise(
     *,
     iterations: int = 200,
     least_gain: float = 1e-6,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
     on_evaluation: Callable[[int], None] | None = None,
 ) -> Optimum:
     """L-BFGS-B from every start: ``iterations`` iterations, fewer once one gains less than ``least_gain``.
@@ -101,7 +102,7 @@ def minimise(
 
 
 def counted_progress(
-    report: Callable[[str, float], None] | None, sentence: str, low: float, high: float
+    report: Report | None, sentence: str, low: float, high: float
 ) -> Callable[[int], None] | None:
     """``on_evaluation`` for a ``report``: from ``low`` towards ``high``, halfway after 30 evaluations.
 
@@ -135,7 +136,7 @@ def newton_search(
     *,
     tolerance: float,
     evaluations: int,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
 ) -> SearchResult | None:
     """Search from ``start`` until less than ``tolerance`` nats are expected or ``evaluations`` are used up.
 
@@ -149,8 +150,7 @@ def newton_search(
     gradient, information = current.derivatives()
     secants: list[tuple[np.ndarray, np.ndarray]] = []
     while used < evaluations:
-        if cancelled is not None and cancelled():
-            raise Cancelled("training was cancelled")
+        stop_if(cancelled, "training")
         step, expected = _step(point, gradient, _corrected(information, secants), damping, lower, upper)
         if expected < tolerance:
             break

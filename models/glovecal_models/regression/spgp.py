@@ -7,7 +7,6 @@ Pseudo-inputs start at the samples the process itself finds hardest to explain.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -17,6 +16,7 @@ from scipy.linalg import eigh, solve_triangular
 from glovecal_models.covariance.base import Covariance
 from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
 from glovecal_models.errors import BadInput
+from glovecal_models.progress import Cancel, Report
 from glovecal_models.regression.exact import LOG_NOISE_BOUNDS, search_few
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
 from glovecal_models.regression.fitc import LEAST_NOISE, FitcLikelihood, Verdict, judge
@@ -45,8 +45,8 @@ def fit_spgp(
     start: ProcessRegressor | None = None,
     sample_weight: float = 1.0,
     seed: int = 0,
-    cancelled: Callable[[], bool] | None = None,
-    report: Callable[[str, float], None] | None = None,
+    cancelled: Cancel | None = None,
+    report: Report | None = None,
 ) -> ProcessRegressor:
     """Train on raw inputs (N, D), counts, and target (N,), degrees.
 
@@ -111,7 +111,7 @@ def _search_start(
     mean: Mean,
     covariance: Covariance,
     generator: np.random.Generator,
-    cancelled: Callable[[], bool] | None,
+    cancelled: Cancel | None,
 ) -> tuple[np.ndarray, float]:
     """Theta and noise variance of an exact process of some samples."""
     search = search_few(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from glovecal_models.effects.base.context_slope import SlopeState, slopes
 from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.slow_context_effect import SlopeState, slopes
 from glovecal_models.effects.catalogue import catalogue
 
 TIME = np.arange(0, 60, 0.04)

@@ -15,7 +15,7 @@ import numpy as np
 
 from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
-from glovecal_models.effects.base.reading_track import ReadingTrack
+from glovecal_models.effects.sensor_fault.reading_track import ReadingTrack
 
 LONGEST_JUMP_S = 0.5
 MOVING_SHARE = 0.5
