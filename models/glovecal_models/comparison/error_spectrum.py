@@ -16,13 +16,13 @@ import numpy as np
 from scipy.fft import dct, idct
 
 from glovecal_models.comparison.floor_estimate import RESAMPLES, NoiseFloor, pooled
+from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 
 SLOW_HZ = 1.0
 BLOCK_S = 4.0
 SHORTEST_BLOCK = 32
 """Frames; with fewer the plateau cannot be told from the rest."""
-FEWEST_BLOCKS = 4
 GAP = 3.0
 """Times the usual time between frames: what is longer is a gap."""
 
@@ -45,12 +45,17 @@ class ErrorSpectrum:
     """The same as a height in ``density``."""
 
 
-def error_spectrum(found: Residuals, rotation: str, generator: np.random.Generator) -> ErrorSpectrum | None:
-    """None when fewer than ``FEWEST_BLOCKS`` blocks were measured without a gap."""
+def error_spectrum(
+    found: Residuals,
+    rotation: str,
+    generator: np.random.Generator,
+    limits: ComparisonLimits = COMPARISON_LIMITS,
+) -> ErrorSpectrum | None:
+    """None when fewer than ``fewest_blocks`` blocks were measured without a gap."""
     column = found.column(rotation)
     mean = float(np.nanmean(found.stacked("error")[:, column]))
     blocks = [block for item in found.takes for block in _blocks(item, column, mean)]
-    if len(blocks) < FEWEST_BLOCKS:
+    if len(blocks) < limits.fewest_blocks:
         return None
     shares = np.array([(np.mean(block.slow**2), np.mean(block.error**2)) for block in blocks])
     slow, low, high = _share(shares, generator)

@@ -6,16 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
 from glovecal_models.comparison.residuals import TakeResiduals
-
-STILL_DEG_PER_S = 6.0
-"""A joint that moves less than this over a hold is still."""
-STILL_SHARE = 0.1
-"""A sensor that changes by less than this share of its standard deviation is still."""
-SHORTEST_HOLD_S = 0.5
-SETTLED_S = 0.2
-"""The beginning of a hold is left out: lag and creep are no noise."""
-FEWEST_FRAMES = 5
 
 
 @dataclass(frozen=True)
@@ -40,7 +32,7 @@ class Hold:
         return float(np.sum((values - slope * time) ** 2))
 
 
-def holds(item: TakeResiduals, column: int) -> list[Hold]:
+def holds(item: TakeResiduals, column: int, limits: ComparisonLimits = COMPARISON_LIMITS) -> list[Hold]:
     """Where the joint of ``column`` is still, in the order of time."""
     frames = np.flatnonzero(np.isfinite(item.measured[:, column]) & np.isfinite(item.error[:, column]))
     time, angle, error = item.take.time_s[frames], item.measured[frames, column], item.error[frames, column]
@@ -49,12 +41,12 @@ def holds(item: TakeResiduals, column: int) -> list[Hold]:
     found = []
     start = 0
     while start < len(time):
-        end = _end_of_hold(time, angle, start)
-        if time[end - 1] - time[start] >= SHORTEST_HOLD_S:
-            settled = int(np.searchsorted(time, time[start] + SETTLED_S))
-            if end - settled >= FEWEST_FRAMES:
+        end = _end_of_hold(time, angle, start, limits.still_deg_per_s)
+        if time[end - 1] - time[start] >= limits.shortest_hold_s:
+            settled = int(np.searchsorted(time, time[start] + limits.settled_s))
+            if end - settled >= limits.fewest_hold_frames:
                 rows = slice(settled, end)
-                still = _is_still(readings[rows], spread)
+                still = _is_still(readings[rows], limits.still_share * spread)
                 found.append(Hold(frames[rows], time[rows], error[rows], predicted[rows], still))
             start = end
         else:
@@ -62,14 +54,14 @@ def holds(item: TakeResiduals, column: int) -> list[Hold]:
     return found
 
 
-def _is_still(readings: np.ndarray, spread: np.ndarray) -> bool:
-    """Whether no sensor changes over a hold by more than a small share of what it does in the take."""
+def _is_still(readings: np.ndarray, allowed: np.ndarray) -> bool:
+    """Whether no sensor changes over a hold by more than is ``allowed`` (S,)."""
     thirds = np.array_split(readings, 3)
     moved = np.ptp([part.mean(axis=0) for part in thirds], axis=0)
-    return bool((moved <= STILL_SHARE * spread).all())
+    return bool((moved <= allowed).all())
 
 
-def _end_of_hold(time: np.ndarray, angle: np.ndarray, start: int) -> int:
+def _end_of_hold(time: np.ndarray, angle: np.ndarray, start: int, still_deg_per_s: float) -> int:
     """One past the last frame up to which the angle stays on a slope too small for motion.
 
     Judged on means of neighbouring frames, so that the reference's own noise is not taken for motion.
@@ -80,7 +72,7 @@ def _end_of_hold(time: np.ndarray, angle: np.ndarray, start: int) -> int:
     while end < len(time):
         following = min(end + step, len(time))
         after = angle[end:following].mean()
-        if abs(after - before) > STILL_DEG_PER_S * 0.1 or time[following - 1] - time[end - 1] > 0.5:
+        if abs(after - before) > still_deg_per_s * 0.1 or time[following - 1] - time[end - 1] > 0.5:
             break
         end, before = following, after
     return end

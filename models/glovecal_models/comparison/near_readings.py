@@ -13,16 +13,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from glovecal_models.comparison.floor_estimate import NoiseFloor, pooled
+from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
 from glovecal_models.comparison.residuals import TakeResiduals
 
-FEWEST_PAIRS = 10
 MOST_FRAMES = 1500
 
 
 def from_near_readings(
-    takes: Sequence[TakeResiduals], column: int, generator: np.random.Generator
+    takes: Sequence[TakeResiduals],
+    column: int,
+    generator: np.random.Generator,
+    limits: ComparisonLimits = COMPARISON_LIMITS,
 ) -> NoiseFloor | None:
-    """From pairs of frames of any take; None with fewer than ``FEWEST_PAIRS``."""
+    """From pairs of frames of any take; None with fewer than ``fewest_pairs``."""
     error = np.concatenate([item.error[:, column] for item in takes])
     predicted = np.concatenate([item.predicted[:, column] for item in takes])
     names = takes[0].take.sensors
@@ -35,7 +38,7 @@ def from_near_readings(
     if len(rows) > MOST_FRAMES:
         rows = np.sort(generator.choice(rows, MOST_FRAMES, replace=False))
     first, second = _nearest_pairs(readings[rows])
-    if len(first) < FEWEST_PAIRS:
+    if len(first) < limits.fewest_pairs:
         return None
     first, second = rows[first], rows[second]
     jitter = float(np.sqrt(np.mean((predicted[first] - predicted[second]) ** 2) / 2))

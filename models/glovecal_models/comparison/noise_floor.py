@@ -27,13 +27,11 @@ import numpy as np
 from glovecal_models.comparison.error_spectrum import ErrorSpectrum, error_spectrum
 from glovecal_models.comparison.floor_estimate import How, NoiseFloor, pooled
 from glovecal_models.comparison.holds import Hold, holds
+from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
 from glovecal_models.comparison.near_readings import from_near_readings
 from glovecal_models.comparison.repeated_poses import from_repeated_poses
 from glovecal_models.comparison.residuals import Residuals
 
-FEWEST_HOLDS = 4
-NEIGHBOURS_S = 0.25
-"""Frames further apart than this are no neighbours: the hand may be anywhere else."""
 CHI_SQUARED_MEDIAN = 0.4549
 """With one degree of freedom."""
 
@@ -48,29 +46,32 @@ def noise_floors(
     rotation: str,
     generator: np.random.Generator,
     spectrum: ErrorSpectrum | None = None,
+    limits: ComparisonLimits = COMPARISON_LIMITS,
 ) -> tuple[NoiseFloor, ...]:
     """Every estimate that the takes allow, the best first. ``spectrum`` spares its computation."""
     column = found.column(rotation)
-    held = [holds(item, column) for item in found.takes]
+    held = [holds(item, column, limits) for item in found.takes]
     every = [hold for of_take in held for hold in of_take]
     still = [hold for hold in every if hold.hand_is_still]
-    spectrum = spectrum or error_spectrum(found, rotation, generator)
+    spectrum = spectrum or error_spectrum(found, rotation, generator, limits)
     estimates = (
-        _from_holds(still, "still hand", generator),
-        _from_holds(every, "still joint", generator),
-        from_repeated_poses(found.takes, column, held, generator),
+        _from_holds(still, "still hand", generator, limits),
+        _from_holds(every, "still joint", generator, limits),
+        from_repeated_poses(found.takes, column, held, generator, limits),
         spectrum.plateau if spectrum is not None else None,
-        _from_differences(found, column, generator),
+        _from_differences(found, column, generator, limits),
     )
     some = tuple(one for one in estimates if one is not None)
-    if some or any(_has_neighbours(item.take.time_s) for item in found.takes):
+    if some or any(_has_neighbours(item.take.time_s, limits) for item in found.takes):
         return some
-    single = from_near_readings(found.takes, column, generator)
+    single = from_near_readings(found.takes, column, generator, limits)
     return () if single is None else (single,)
 
 
-def _from_holds(held: Sequence[Hold], how: How, generator: np.random.Generator) -> NoiseFloor | None:
-    if len(held) < FEWEST_HOLDS:
+def _from_holds(
+    held: Sequence[Hold], how: How, generator: np.random.Generator, limits: ComparisonLimits
+) -> NoiseFloor | None:
+    if len(held) < limits.fewest_holds:
         return None
     squares = np.array([hold.square(hold.error) for hold in held])
     freedom = np.array([hold.freedom for hold in held])
@@ -78,9 +79,11 @@ def _from_holds(held: Sequence[Hold], how: How, generator: np.random.Generator) 
     return pooled(squares, freedom, jitter, how, generator)
 
 
-def _from_differences(found: Residuals, column: int, generator: np.random.Generator) -> NoiseFloor | None:
+def _from_differences(
+    found: Residuals, column: int, generator: np.random.Generator, limits: ComparisonLimits
+) -> NoiseFloor | None:
     """From second differences, which motion hardly enters; their variance is six times that of the noise."""
-    takes = [item for item in found.takes if _has_neighbours(item.take.time_s)]
+    takes = [item for item in found.takes if _has_neighbours(item.take.time_s, limits)]
     variances = _white_variances([np.diff(item.error[:, column], 2) for item in takes])
     if not len(variances):
         return None
@@ -88,8 +91,8 @@ def _from_differences(found: Residuals, column: int, generator: np.random.Genera
     return pooled(variances, np.ones(len(variances)), float(np.sqrt(jitter)), "frame to frame", generator)
 
 
-def _has_neighbours(time: np.ndarray) -> bool:
-    return len(time) > 2 and float(np.median(np.diff(time))) <= NEIGHBOURS_S
+def _has_neighbours(time: np.ndarray, limits: ComparisonLimits) -> bool:
+    return len(time) > 2 and float(np.median(np.diff(time))) <= limits.neighbours_s
 
 
 def _white_variances(second: Sequence[np.ndarray]) -> np.ndarray:

@@ -18,11 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.comparison.floor_estimate import NoiseFloor, pooled
-from glovecal_models.comparison.holds import SHORTEST_HOLD_S, Hold
+from glovecal_models.comparison.holds import Hold
+from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
 from glovecal_models.comparison.residuals import TakeResiduals
-
-FEWEST_STEPS = 4
-"""Repeats beyond the first of their pose; with fewer the spread is a guess."""
 
 
 @dataclass(frozen=True)
@@ -42,17 +40,18 @@ def from_repeated_poses(
     column: int,
     held: Sequence[Sequence[Hold]],
     generator: np.random.Generator,
+    limits: ComparisonLimits = COMPARISON_LIMITS,
 ) -> NoiseFloor | None:
-    """``held``: the joint's holds in each take. None with fewer than ``FEWEST_STEPS`` repeats to compare."""
+    """``held``: the joint's holds in each take. None with fewer than ``fewest_repeats`` repeats to compare."""
     stays: dict[tuple[str, str], list[_Repeat]] = defaultdict(list)
     for item, of_take in zip(takes, held, strict=True):
-        for pose, rows in _stays(item, column, of_take):
+        for pose, rows in _stays(item, column, of_take, limits.shortest_hold_s):
             error, predicted = item.error[rows, column], item.predicted[rows, column]
             stays[item.take.wearing, pose].append(
                 _Repeat(float(error.mean()), float(error.var()), float(predicted.var()))
             )
     squares = [value for repeats in stays.values() for value in _steps(repeats)]
-    if len(squares) < FEWEST_STEPS:
+    if len(squares) < limits.fewest_repeats:
         return None
     jitter = np.sqrt(np.mean([one.jitter for repeats in stays.values() for one in repeats]))
     return pooled(np.array(squares), np.ones(len(squares)), float(jitter), "repeated poses", generator)
@@ -68,7 +67,9 @@ def _steps(repeats: Sequence[_Repeat]) -> list[float]:
     return found
 
 
-def _stays(item: TakeResiduals, column: int, held: Sequence[Hold]) -> list[tuple[str, np.ndarray]]:
+def _stays(
+    item: TakeResiduals, column: int, held: Sequence[Hold], shortest_s: float
+) -> list[tuple[str, np.ndarray]]:
     """Pose and frames of each stay in a pose.
 
     Of a stay the frames in which the joint is held; of one too short to tell, such as a single frame, all.
@@ -79,10 +80,10 @@ def _stays(item: TakeResiduals, column: int, held: Sequence[Hold]) -> list[tuple
     for hold in held:
         is_held[hold.frames] = True
     time, poses = item.take.time_s, np.array(item.take.poses, dtype=object)
-    changes = np.flatnonzero((poses[1:] != poses[:-1]) | (np.diff(time) > SHORTEST_HOLD_S)) + 1
+    changes = np.flatnonzero((poses[1:] != poses[:-1]) | (np.diff(time) > shortest_s)) + 1
     found = []
     for rows in np.split(np.arange(len(poses)), changes):
-        is_short = time[rows[-1]] - time[rows[0]] < SHORTEST_HOLD_S
+        is_short = time[rows[-1]] - time[rows[0]] < shortest_s
         still = rows[(is_held[rows] | is_short) & np.isfinite(item.error[rows, column])]
         if poses[rows[0]] and len(still):
             found.append((str(poses[rows[0]]), still))

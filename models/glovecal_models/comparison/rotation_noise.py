@@ -8,6 +8,7 @@ import numpy as np
 
 from glovecal_models.comparison.error_spectrum import ErrorSpectrum, error_spectrum
 from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
 from glovecal_models.comparison.noise_floor import noise_floors
 from glovecal_models.comparison.residuals import Residuals
 
@@ -24,11 +25,14 @@ class RotationNoise:
         return self.floors[0] if self.floors else None
 
 
-def rotation_noise(found: Residuals, *, seed: int = 0) -> dict[str, RotationNoise]:
+def rotation_noise(
+    found: Residuals, *, seed: int = 0, limits: ComparisonLimits = COMPARISON_LIMITS
+) -> dict[str, RotationNoise]:
     """Of every measured rotation. A rotation's intervals do not depend on which others were measured."""
     result = {}
     for rotation in found.measured_rotations:
         generator = np.random.default_rng([seed, *rotation.encode()])
-        spectrum = error_spectrum(found, rotation, generator)
-        result[rotation] = RotationNoise(noise_floors(found, rotation, generator, spectrum), spectrum)
+        spectrum = error_spectrum(found, rotation, generator, limits)
+        floors = noise_floors(found, rotation, generator, spectrum, limits)
+        result[rotation] = RotationNoise(floors, spectrum)
     return result

@@ -18,7 +18,7 @@ BINS = 8
 SHIFTS = 999
 SHORTEST_SHIFT = 0.05
 """Share of a take below which a shift leaves nearly the same pairing."""
-FEWEST_STEPS = 16
+FEWEST_STEPS_TO_SHIFT = 16
 """A shorter take has too few different shifts; it is left out of the test."""
 STEPS_AT_MOST = 4000
 
@@ -80,7 +80,7 @@ def explained_when_shifted(
         return None
     centre = float(np.concatenate([e for e, _ in pairs]).mean())
     series = [_thinned(e - centre, _bin(v, edges), steps_at_most) for e, v in pairs]
-    tested = [(number, item) for number, item in enumerate(series) if len(item[0]) >= FEWEST_STEPS]
+    tested = [(number, item) for number, item in enumerate(series) if len(item[0]) >= FEWEST_STEPS_TO_SHIFT]
     if not tested:
         return None
     shifts = [_least_shift(len(e)) + (shares[:, n] * _shift_span(len(e))).astype(int) for n, (e, _) in tested]
@@ -119,7 +119,7 @@ def _against_shifts(
     series: list[tuple[np.ndarray, np.ndarray]], bins: int, generator: np.random.Generator
 ) -> tuple[np.ndarray, float]:
     """What the shifts make of each bin's mean, and the share of them that spread the means as widely."""
-    tested = [item for item in series if len(item[0]) >= FEWEST_STEPS]
+    tested = [item for item in series if len(item[0]) >= FEWEST_STEPS_TO_SHIFT]
     if not tested:
         return np.full(bins, np.nan), 1.0
     shifts = [_random_shifts(len(error), generator) for error, _ in tested]

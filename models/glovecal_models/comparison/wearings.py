@@ -8,13 +8,10 @@ from math import comb
 
 import numpy as np
 
+from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
 from glovecal_models.comparison.residuals import Residuals
 
 MOST_PARTITIONS = 2000
-FEWEST_PARTITIONS = 20
-"""With fewer ways to share out the takes no answer can be better than one in twenty."""
-
-SELDOM = 0.05
 
 
 @dataclass(frozen=True)
@@ -30,14 +27,20 @@ class WearingErrors:
     probability: float | None
     """Share of other ways to deal the takes to wearings that spread as widely; None: too few takes to say."""
     sentence: str
+    limits: ComparisonLimits = COMPARISON_LIMITS
 
     @property
     def is_no_noise(self) -> bool:
         """Whether the error changes with the wearing by more than from take to take."""
-        return self.probability is not None and self.probability <= SELDOM
+        return self.probability is not None and self.probability <= self.limits.wearing_p_value
 
 
-def wearing_errors(found: Residuals, rotation: str, generator: np.random.Generator) -> WearingErrors | None:
+def wearing_errors(
+    found: Residuals,
+    rotation: str,
+    generator: np.random.Generator,
+    limits: ComparisonLimits = COMPARISON_LIMITS,
+) -> WearingErrors | None:
     """None with fewer than two wearings in which the rotation was measured."""
     column = found.column(rotation)
     means, labels = [], []
@@ -52,28 +55,33 @@ def wearing_errors(found: Residuals, rotation: str, generator: np.random.Generat
     values, owners = np.array(means), np.array([names.index(label) for label in labels])
     each = tuple(float(values[owners == i].mean()) for i in range(len(names)))
     counts = tuple(int((owners == i).sum()) for i in range(len(names)))
-    probability = _probability(values, owners, counts, generator)
+    probability = _probability(values, owners, counts, generator, limits.wearing_fewest_deals)
     spread = float(np.std(each))
-    return WearingErrors(
-        rotation, names, each, counts, spread, probability, _sentence(names, each, probability)
-    )
+    sentence = _sentence(names, each, probability, limits.wearing_p_value)
+    return WearingErrors(rotation, names, each, counts, spread, probability, sentence, limits)
 
 
-def _sentence(names: tuple[str, ...], each: tuple[float, ...], probability: float | None) -> str:
+def _sentence(
+    names: tuple[str, ...], each: tuple[float, ...], probability: float | None, seldom: float
+) -> str:
     low, high = int(np.argmin(each)), int(np.argmax(each))
     ends = f"from {each[low]:+.1f} degrees in wearing {names[low]} to {each[high]:+.1f} in {names[high]}"
     if probability is None:
         return f"The mean error goes {ends}; these are too few takes to say whether that is the wearing."
-    if probability <= SELDOM:
+    if probability <= seldom:
         return f"The mean error changes with the wearing, {ends}."
     return f"The mean error goes {ends}, no more than it changes from take to take."
 
 
 def _probability(
-    values: np.ndarray, owners: np.ndarray, counts: tuple[int, ...], generator: np.random.Generator
+    values: np.ndarray,
+    owners: np.ndarray,
+    counts: tuple[int, ...],
+    generator: np.random.Generator,
+    fewest: int,
 ) -> float | None:
     """Over distinct ways to deal the takes, the true one left out: random draws would repeat it."""
-    if _partitions(counts) < FEWEST_PARTITIONS or min(counts) < 2:
+    if _partitions(counts) < fewest or min(counts) < 2:
         return None
     true = _spread(values, owners)
     others = [_spread(values, dealt) for dealt in _deals(owners, counts, generator)]

@@ -8,24 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from glovecal_models.comparison.at_floor import is_at_floor
 from glovecal_models.comparison.covariates import covariates
 from glovecal_models.comparison.error_spectrum import ErrorSpectrum
 from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
 from glovecal_models.comparison.residuals import Residuals
 from glovecal_models.comparison.rotation_noise import RotationNoise, rotation_noise
 from glovecal_models.comparison.stretches import Stretch, worst_stretches
 from glovecal_models.comparison.structure import Dependence, dependence
 from glovecal_models.comparison.wearings import WearingErrors, wearing_errors
-
-STRUCTURE_PROBABILITY = 0.005
-STRUCTURE_SHARE = 0.04
-"""Share of the mean squared error a column must explain to be worth a user's time."""
-MOSTLY = 0.6
-"""A mean error of this share of the RMSE is worth saying."""
-RESTLESS = 1.5
-"""A prediction that jitters by so many times the reference's noise is restless."""
-AT_FLOOR = 1.15
-"""An error up to this many times the floor has nothing left to gain."""
 
 
 @dataclass(frozen=True)
@@ -53,16 +45,22 @@ class RotationFindings:
     """Every column tested, the one that explains most first."""
     wearings: WearingErrors | None
     sentence: str
+    limits: ComparisonLimits = COMPARISON_LIMITS
 
     @property
     def is_at_floor(self) -> bool:
         """Nothing is left to gain: noise is all there is, and it is not the prediction's own."""
-        return _is_near(self.rmse_deg, self.floor) and not _is_restless(self.floor)
+        near = is_at_floor(self.rmse_deg, self.floor, self.limits)
+        return near and not _is_restless(self.floor, self.limits)
+
+    def is_structure(self, item: Dependence) -> bool:
+        """Whether one of them is no noise, and large enough to matter."""
+        return is_structure(item, self.rmse_deg, self.limits)
 
     @property
     def structure(self) -> tuple[Dependence, ...]:
         """Dependences that are no noise, the largest first."""
-        return tuple(item for item in self.dependences if is_structure(item, self.rmse_deg))
+        return tuple(item for item in self.dependences if self.is_structure(item))
 
 
 @dataclass(frozen=True)
@@ -77,35 +75,45 @@ class WhereItFails:
         rotations = []
         for item in self.rotations:
             document = asdict(item)
+            for part in (document, document["wearings"] or {}):
+                part.pop("limits", None)  # the same for all; nothing that was measured
             for name in ("dependences", "other_floors"):
                 document[name] = list(document[name])
             for held, given in zip(document["dependences"], item.dependences, strict=True):
-                held["is_structure"] = is_structure(given, item.rmse_deg)
+                held["is_structure"] = item.is_structure(given)
                 for name in ("edges", "mean_deg", "count", "chance_deg"):
                     held[name] = getattr(given, name).tolist()
             rotations.append(document)
         return {"rotations": rotations, "stretches": [asdict(item) for item in self.stretches]}
 
 
-def is_structure(item: Dependence, rmse_deg: float) -> bool:
+def is_structure(item: Dependence, rmse_deg: float, limits: ComparisonLimits = COMPARISON_LIMITS) -> bool:
     """Whether a dependence is no noise, and large enough to matter."""
-    matters = item.explained_deg**2 >= STRUCTURE_SHARE * rmse_deg**2
-    return item.probability <= STRUCTURE_PROBABILITY and matters
+    matters = item.explained_deg**2 >= limits.structure_share * rmse_deg**2
+    return item.probability <= limits.structure_p_value and matters
 
 
 def where_it_fails(
-    found: Residuals, *, seed: int = 0, noise: Mapping[str, RotationNoise] | None = None
+    found: Residuals,
+    *,
+    seed: int = 0,
+    noise: Mapping[str, RotationNoise] | None = None,
+    limits: ComparisonLimits = COMPARISON_LIMITS,
 ) -> WhereItFails:
     """Every measured rotation against every column; same seed, same answer. ``noise`` spares its time."""
     generator = np.random.default_rng(seed)
-    noise = rotation_noise(found, seed=seed) if noise is None else noise
-    findings = [_findings(found, name, noise[name], generator) for name in found.measured_rotations]
+    noise = rotation_noise(found, seed=seed, limits=limits) if noise is None else noise
+    findings = [_findings(found, name, noise[name], generator, limits) for name in found.measured_rotations]
     findings.sort(key=lambda item: -_above_floor(item))
     return WhereItFails(tuple(findings), worst_stretches(found))
 
 
 def _findings(
-    found: Residuals, rotation: str, noise: RotationNoise, generator: np.random.Generator
+    found: Residuals,
+    rotation: str,
+    noise: RotationNoise,
+    generator: np.random.Generator,
+    limits: ComparisonLimits,
 ) -> RotationFindings:
     column = found.column(rotation)
     errors = tuple(item.error[:, column] for item in found.takes)
@@ -114,10 +122,10 @@ def _findings(
     every = np.concatenate(errors)
     rmse, bias = float(np.sqrt(np.nanmean(every**2))), float(np.nanmean(every))
     floor, slow = noise.floor, _slow_share(noise.spectrum)
-    wearings = wearing_errors(found, rotation, generator)
-    sentence = _sentence(rotation, rmse, bias, floor, ranked, slow)
+    wearings = wearing_errors(found, rotation, generator, limits)
+    sentence = _sentence(rotation, rmse, bias, floor, ranked, slow, limits)
     return RotationFindings(
-        rotation, rmse, bias, floor, noise.floors[1:], slow, tuple(ranked), wearings, sentence
+        rotation, rmse, bias, floor, noise.floors[1:], slow, tuple(ranked), wearings, sentence, limits
     )
 
 
@@ -139,15 +147,16 @@ def _sentence(
     floor: NoiseFloor | None,
     ranked: list[Dependence],
     slow: SlowShare | None,
+    limits: ComparisonLimits,
 ) -> str:
-    structure = [item for item in ranked if is_structure(item, rmse)]
+    structure = [item for item in ranked if is_structure(item, rmse, limits)]
     start = f"{rotation} is off by {rmse:.1f} degrees"
     if floor is not None:
         least = "at least " if floor.is_lower_bound else ""
         start += f" (noise floor {least}{floor.floor_deg:.1f})"
-        if _is_near(rmse, floor):
-            return f"{start}: {_at_floor(floor)}."
-    if abs(bias) >= MOSTLY * rmse:
+        if is_at_floor(rmse, floor, limits):
+            return f"{start}: {_at_floor(floor, limits)}."
+    if abs(bias) >= limits.mostly_bias_share * rmse:
         start += f", mostly by a constant {bias:+.1f}"
     if not structure:
         slowly = "" if slow is None else f", and {100 * slow.share:.0f} % of its variance is slower than 1 Hz"
@@ -162,20 +171,16 @@ def _sentence(
     )
 
 
-def _is_near(rmse: float, floor: NoiseFloor | None) -> bool:
-    return floor is not None and not floor.is_lower_bound and rmse <= AT_FLOOR * floor.high_deg
-
-
-def _is_restless(floor: NoiseFloor | None) -> bool:
+def _is_restless(floor: NoiseFloor | None, limits: ComparisonLimits) -> bool:
     """Whether the prediction jitters by more than the reference's noise accounts for."""
     if floor is None:
         return False
     reference = np.sqrt(max(floor.floor_deg**2 - floor.prediction_deg**2, 0.0))
-    return bool(floor.prediction_deg > RESTLESS * reference)
+    return bool(floor.prediction_deg > limits.restless_times * reference)
 
 
-def _at_floor(floor: NoiseFloor) -> str:
-    if _is_restless(floor):
+def _at_floor(floor: NoiseFloor, limits: ComparisonLimits) -> str:
+    if _is_restless(floor, limits):
         return (
             f"no more than the prediction's own jitter of {floor.prediction_deg:.1f} while the hand is "
             "still; the model follows its sensors too closely"

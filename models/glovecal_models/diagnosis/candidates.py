@@ -12,7 +12,6 @@ from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.not_identifiable import NotJudgeable, undecidable
 from glovecal_models.diagnosis.session_chance import session_probability
 from glovecal_models.effects.base.assessment import (
-    LEAST_SESSION_CONTRAST,
     Assessment,
     JointErrors,
     block_starts,
@@ -75,13 +74,14 @@ def _assessed(
         None,
         tuple(f"{item.name}_{item.unit}" for item in effect.parameters),
         effect.certainty,
+        design.limits,
     )
     if not effect.changes_between_takes:
         return found
-    few = undecidable(design.signals, effect)
+    few = undecidable(design.signals, effect, design.limits)
     if few is not None:
         return NotJudgeable(effect.name, few.why, few.record, found)
-    some = any(item.contrast >= LEAST_SESSION_CONTRAST for item in errors)
+    some = any(item.contrast >= design.limits.least_session_share for item in errors)
     return replace(found, probability=session_probability(design, effect, generator) if some else 1.0)
 
 

@@ -13,6 +13,7 @@ from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.hold_drift import hold_drift
 from glovecal_models.diagnosis.hold_drift_document import hold_next_take
 from glovecal_models.diagnosis.known_effect import KnownEffect
+from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.naming import Naming, named
 from glovecal_models.diagnosis.next_take import next_take
 from glovecal_models.diagnosis.not_identifiable import NotJudgeable, as_known, deciding, likelier
@@ -41,10 +42,14 @@ def diagnose(
     signatures: bool = True,
     noise_floor_deg: Mapping[str, float] | None = None,
     seed: int = 0,
+    limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
     cancelled: Callable[[], bool] | None = None,
     report: Callable[[str, float], None] | None = None,
 ) -> Diagnosis:
-    """``known``: effects the model has already; they are part of the base. Raises BadInput, Cancelled."""
+    """``known``: effects the model has already; they are part of the base. ``limits`` decide what is told.
+
+    Raises BadInput, Cancelled.
+    """
 
     def said(text: str, share: float) -> None:
         if cancelled and cancelled():
@@ -53,19 +58,19 @@ def diagnose(
             report(text, share)
 
     said("looking at the reference", 0.0)
-    problem = DiagnosisProblem.of(takes, layout, linear, known)
-    problems = reference_problems(takes, layout)
+    problem = DiagnosisProblem.of(takes, layout, linear, known, limits)
+    problems = reference_problems(takes, layout, limits)
     design = problem.design()
     every = candidates(design.signals)
     tried = every if effects is None else list(effects)
     by_name = {item.name: item for item in (*every, *tried)}
     if are_pose_labels(takes):
-        return _of_pose_labels(takes, layout, design, tried, problems, seed)
+        return _of_pose_labels(takes, layout, design, tried, problems, seed, limits)
     has = _has(known)
     waiting = [item for item in tried if problem.is_sparse and item.needs_movement]
     judged = [item for item in tried if item not in waiting]
     found, impossible = assessed(design, judged, np.random.default_rng(seed), has, said)
-    naming, beside, screened = named(found), problem, design
+    naming, beside, screened = named(found, limits), problem, design
     undecided = likelier(impossible, naming)
     if undecided:
         # What may well be there is not to get another's name: the others are judged beside it.
@@ -73,7 +78,7 @@ def diagnose(
         others = [item for item in judged if item.name not in {each.effect for each in impossible}]
         screened = beside.design()
         found, _ = assessed(screened, others, np.random.default_rng(seed), has, said)
-        naming = named(found)
+        naming = named(found, limits)
     impossible += [NotJudgeable(item.name, SINGLE_POSES) for item in waiting]
     naming = _alikes_told_apart(naming, beside, screened, by_name)
     lacking = [item for item in every if item.name not in has]
@@ -100,6 +105,7 @@ def diagnose(
         left=left,
         next_take=next_take(naming.confidence_set, by_name) or deciding(impossible, left),
         effects=by_name,
+        limits=limits,
     )
 
 
@@ -150,9 +156,10 @@ def _of_pose_labels(
     tried: Sequence[Effect],
     problems: tuple[str, ...],
     seed: int,
+    limits: DiagnosisLimits,
 ) -> Diagnosis:
     """No effect can be judged by the names of poses; what readings do while one is held can."""
-    drift = hold_drift(takes, layout.sensors, seed=seed)
+    drift = hold_drift(takes, layout.sensors, seed=seed, limits=limits)
     return Diagnosis(
         joints=design.rotations,
         rmse_deg=_held_out_errors(design),
@@ -168,4 +175,5 @@ def _of_pose_labels(
         next_take=hold_next_take(drift),
         effects={item.name: item for item in tried},
         hold_drift=drift,
+        limits=limits,
     )

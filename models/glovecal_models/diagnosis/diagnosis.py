@@ -8,6 +8,7 @@ from typing import Any
 
 from glovecal_models.diagnosis.diagnosis_document import document
 from glovecal_models.diagnosis.hold_drift import HoldDrift
+from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.naming import Naming
 from glovecal_models.diagnosis.next_take import NextTake
 from glovecal_models.diagnosis.not_identifiable import NotJudgeable
@@ -39,6 +40,7 @@ class Diagnosis:
     """Those asked for, by name."""
     hold_drift: HoldDrift | None = None
     """Where the reference only names poses: what the readings do while one is held."""
+    limits: DiagnosisLimits = DIAGNOSIS_LIMITS
 
     @property
     def signature(self) -> tuple[Finding, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 from glovecal_models.diagnosis.hold_drift_document import hold_document, hold_named, hold_sentence
 from glovecal_models.diagnosis.not_identifiable import NotJudgeable
 from glovecal_models.diagnosis.pose_labels import UNITS
-from glovecal_models.effects.base.assessment import FEWEST_BLOCKS, Assessment
+from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.signature_effect import Finding
 
 if TYPE_CHECKING:
@@ -92,8 +92,9 @@ def not_judgeable_sentences(items: Sequence[NotJudgeable]) -> list[str]:
 def nothing_named_sentence(diagnosis: Diagnosis) -> str:
     """Because nothing beats its decoy, or because too little was recorded to tell."""
     blocks = max((len(e.base) for item in diagnosis.assessments for e in item.errors), default=0)
-    if blocks < FEWEST_BLOCKS:
-        needed = f"{blocks} pieces of 5 s, {FEWEST_BLOCKS} are needed"
+    fewest = diagnosis.limits.fewest_blocks
+    if blocks < fewest:
+        needed = f"{blocks} pieces of 5 s, {fewest} are needed"
         return f"Too little was recorded to judge any effect: {needed}."
     return "No known effect explains more of the error than its decoy does."
 

@@ -16,6 +16,7 @@ from glovecal_models.calibration.base_features import BaseFeatures
 from glovecal_models.calibration.held_out import BaseProducts, Rows
 from glovecal_models.calibration.left_out import are_short, first_measured, pieces
 from glovecal_models.diagnosis.known_effect import KnownEffect
+from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.resampled import ResampledTake
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.layout import Correspondence, Layout
@@ -39,6 +40,7 @@ class ForwardDesign:
     """For each joint and unit: indices of its take's rows that are fitted."""
     products: tuple[BaseProducts, ...]
     """For each joint."""
+    limits: DiagnosisLimits = DIAGNOSIS_LIMITS
 
     kept: dict[str, Any] = field(default_factory=dict, compare=False)
     """What effects worked out together."""
@@ -65,6 +67,7 @@ def forward(
     *,
     linear: bool,
     known: Sequence[KnownEffect] = (),
+    limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
 ) -> ForwardDesign:
     """Own sensor, scaled to degrees, from the measured angles; ``known`` effects belong to the base."""
     names = list(rotations)
@@ -118,7 +121,9 @@ def forward(
         read.append(frozenset({rotation, *neighbours, *item.sensors}))
         used.append(tuple(index))
         products.append(BaseProducts(units))
-    return ForwardDesign(tuple(rotations), signals, tuple(read), unit_take, tuple(used), tuple(products))
+    return ForwardDesign(
+        tuple(rotations), signals, tuple(read), unit_take, tuple(used), tuple(products), limits
+    )
 
 
 def _read_beside(item: Correspondence, names: Sequence[str], layout: Layout) -> list[str]:

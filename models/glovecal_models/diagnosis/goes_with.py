@@ -18,6 +18,7 @@ from glovecal_models.comparison.covariates import Covariate, covariates
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 from glovecal_models.comparison.structure import explained_when_shifted
 from glovecal_models.diagnosis.forward_design import ForwardDesign
+from glovecal_models.diagnosis.limits import DiagnosisLimits
 from glovecal_models.diagnosis.resampled import ResampledTake
 from glovecal_models.diagnosis.slow_error import SecondMeans
 from glovecal_models.layout import Layout
@@ -26,12 +27,6 @@ from glovecal_models.takes.take import Take
 DRAWS = 999
 STEPS_AT_MOST = 1000
 """Of a take; what lasts for seconds needs no more."""
-LEAST_WEIGHT = 0.3
-"""Where the base guesses, its error says nothing of a column."""
-SELDOM = 0.02
-"""Probability, all columns counted, above which nothing is listed."""
-LEAST_SHARE = 0.04
-"""Of the mean squared error that a column must explain."""
 MOST = 5
 MOSTLY_WITHIN = 0.5
 """Share of a column's variance inside takes above which takes need not be dealt to test it."""
@@ -86,8 +81,8 @@ def goes_with(
             if found is not None:
                 tried.append(_Tried(design.rotations[joint], column, square, is_dealt, found))
     listed = [
-        *_listed([each for each in tried if each.is_dealt]),
-        *_listed([each for each in tried if not each.is_dealt]),
+        *_listed([each for each in tried if each.is_dealt], design.limits),
+        *_listed([each for each in tried if not each.is_dealt], design.limits),
     ]
     return tuple(sorted(listed, key=lambda item: -item.size_deg)[:MOST])
 
@@ -110,12 +105,13 @@ class _Tried:
         return float(np.sqrt(max(self.explained[0] ** 2 - np.mean(self.explained[1:] ** 2), 0.0)))
 
 
-def _listed(tried: Sequence[_Tried]) -> Iterator[GoesWith]:
+def _listed(tried: Sequence[_Tried], limits: DiagnosisLimits) -> Iterator[GoesWith]:
     if not tried:
         return
     corrected = _corrected(np.array([item.explained for item in tried]))
     for item, probability in zip(tried, np.minimum(KINDS * corrected, 1.0), strict=True):
-        if probability <= SELDOM and item.size_deg**2 >= LEAST_SHARE * item.square:
+        matters = item.size_deg**2 >= limits.association_share * item.square
+        if probability <= limits.association_p_value and matters:
             yield GoesWith(
                 item.rotation, item.column.name, _phrase(item.column), item.size_deg, float(probability)
             )
@@ -176,7 +172,7 @@ def _errors(design: ForwardDesign, joint: int, means: Sequence[SecondMeans]) -> 
         found[take][rows] = residual
     for values, take, seconds in zip(found, design.signals, means, strict=True):
         at = np.minimum((take.time_s - take.time_s[:1]).astype(int), len(seconds.weight))
-        values[np.append(seconds.weight, 0.0)[at] < LEAST_WEIGHT] = np.nan
+        values[np.append(seconds.weight, 0.0)[at] < design.limits.association_least_weight] = np.nan
     return tuple(found)
 
 

@@ -14,22 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from glovecal_models.diagnosis.hold_fit import HoldFit, PoseDrift, probability_of
+from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.posed_holds import posed_holds
 from glovecal_models.effects.base.facts import HoldDrift as HoldDriftKind
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.takes.take import Take
 
-FEWEST_HOLDS = 4
-"""With fewer, turning whole holds around cannot bring chance far below 1 in 20."""
-FEWEST_OF_A_POSE = 3
-SURE = 0.05
-LEAST_SHARE = 0.01
-"""Of a sensor's span; a smaller drift is not worth a name."""
-HALF = 0.5
-DECIDED = 2.0
-"""Standard errors from one half."""
-FAR_SHARE = 0.4
-"""Of the spans, mean over the sensors: poses so far apart are reached from opposite sides."""
 HAND = "hand_relaxing"
 """No effect of the glove: the wearer's hand gives way."""
 RIGID = "rigid"
@@ -42,7 +32,7 @@ class HoldDrift:
 
     sensors: tuple[str, ...]
     poses: tuple[PoseDrift, ...]
-    """Those held at least ``FEWEST_OF_A_POSE`` times, the one that drifts most first."""
+    """Those held at least ``hold_fewest_of_a_pose`` times, the one that drifts most first."""
     holds: int
     probability: float
     """That holds whose drift has either sign drift so much alike."""
@@ -60,6 +50,7 @@ class HoldDrift:
     """Why it cannot be judged."""
     deg_of_span: Mapping[str, float] | None = None
     """Degrees that a sensor's span stands for, where angles are known."""
+    limits: DiagnosisLimits = DIAGNOSIS_LIMITS
 
     @property
     def is_drifting(self) -> bool:
@@ -72,16 +63,18 @@ def hold_drift(
     *,
     deg_of_span: Mapping[str, float] | None = None,
     seed: int = 0,
+    limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
 ) -> HoldDrift:
     """Judge the drift of ``sensors`` within the poses held in ``takes``."""
-    every = posed_holds(takes, sensors)
+    every = posed_holds(takes, sensors, limits)
     names = list(dict.fromkeys(hold.pose for hold in every))
     by_pose = {name: [hold for hold in every if hold.pose == name] for name in names}
-    repeated = {name: held for name, held in by_pose.items() if len(held) >= FEWEST_OF_A_POSE}
+    fewest = limits.hold_fewest_of_a_pose
+    repeated = {name: held for name, held in by_pose.items() if len(held) >= fewest}
     count = sum(len(held) for held in repeated.values())
-    why_not = _why_not(len(every), len(names), count, takes)
+    why_not = _why_not(len(every), len(names), count, takes, limits)
     if why_not is not None:
-        return HoldDrift(tuple(sensors), (), count, 1.0, None, (), None, why_not=why_not)
+        return HoldDrift(tuple(sensors), (), count, 1.0, None, (), None, why_not=why_not, limits=limits)
     fits = [HoldFit.of(held) for held in repeated.values()]
     poses = sorted((fit.in_common() for fit in fits), key=lambda item: -float(np.abs(item.share).mean()))
     drift = HoldDrift(
@@ -89,24 +82,26 @@ def hold_drift(
         tuple(poses),
         count,
         probability_of(fits, np.random.default_rng(seed)),
-        _elsewhere(fits),
-        tuple(fit.held[0].pose for fit in _far(fits)),
-        _recovery(fits),
+        _elsewhere(fits, limits),
+        tuple(fit.held[0].pose for fit in _far(fits, limits.hold_far_share)),
+        _recovery(fits, limits),
         deg_of_span=deg_of_span,
+        limits=limits,
     )
-    return replace(drift, confidence_set=_decided(_causes(drift), fits, seed))
+    return replace(drift, confidence_set=_decided(_causes(drift), fits, seed, limits))
 
 
-def _why_not(holds: int, poses: int, repeated: int, takes: Sequence[Take]) -> str | None:
+def _why_not(
+    holds: int, poses: int, repeated: int, takes: Sequence[Take], limits: DiagnosisLimits
+) -> str | None:
     if not holds:
-        return "no pose is held still for 8 s"
+        return f"no pose is held still for {limits.hold_shortest_s:g} s"
     moves = any(take.poses is not None and "" in take.poses for take in takes)
     if poses < 2 and not moves and all(take.poses is not None for take in takes):
         return "only one pose was recorded, so the sensors' span is unknown"
-    if repeated < FEWEST_HOLDS:
-        return (
-            f"{repeated} holds are of poses held at least {FEWEST_OF_A_POSE} times; {FEWEST_HOLDS} are needed"
-        )
+    if repeated < limits.hold_fewest:
+        times = limits.hold_fewest_of_a_pose
+        return f"{repeated} holds are of poses held at least {times} times; {limits.hold_fewest} are needed"
     return None
 
 
@@ -115,15 +110,15 @@ def _first(fits: Sequence[HoldFit]) -> PoseDrift:
     return max((fit.in_common() for fit in fits), key=lambda item: float(np.abs(item.share).mean()))
 
 
-def _far(fits: Sequence[HoldFit]) -> list[HoldFit]:
+def _far(fits: Sequence[HoldFit], far_share: float) -> list[HoldFit]:
     """Poses far from that which drifts most."""
     level = _first(fits).level
-    return [fit for fit in fits if np.abs(fit.in_common().level - level).mean() > FAR_SHARE]
+    return [fit for fit in fits if np.abs(fit.in_common().level - level).mean() > far_share]
 
 
-def _elsewhere(fits: Sequence[HoldFit]) -> float | None:
+def _elsewhere(fits: Sequence[HoldFit], limits: DiagnosisLimits) -> float | None:
     """See ``HoldDrift.elsewhere``; each hold of a far pose is one witness."""
-    first, far = _first(fits), _far(fits)
+    first, far = _first(fits), _far(fits, limits.hold_far_share)
     if not far:
         return None
     rate = first.share / first.duration_s
@@ -132,10 +127,11 @@ def _elsewhere(fits: Sequence[HoldFit]) -> float | None:
     ]
     found = np.array([change @ rate for change in changes]) / max(rate @ rate, 1e-24)
     error = float(found.std(ddof=1)) / np.sqrt(len(found))
-    return float(found.mean()) if abs(found.mean() - HALF) > DECIDED * error else None
+    away = abs(found.mean() - limits.hold_half)
+    return float(found.mean()) if away > limits.hold_decided_se * error else None
 
 
-def _recovery(fits: Sequence[HoldFit]) -> float | None:
+def _recovery(fits: Sequence[HoldFit], limits: DiagnosisLimits) -> float | None:
     """From pairs of holds of a pose that follow each other in one take; None when they do not decide.
 
     A hand never takes a pose twice alike: what the levels differ by for that reason shows in how far the
@@ -151,24 +147,25 @@ def _recovery(fits: Sequence[HoldFit]) -> float | None:
             if held.take == following.take
         ]
     )
-    if len(pairs) < FEWEST_OF_A_POSE:
+    if len(pairs) < limits.hold_fewest_of_a_pose:
         return None
     gone, whole = pairs.sum(axis=0)
     found = gone / max(whole, 1e-24)
     others = (gone - pairs[:, 0]) / np.maximum(whole - pairs[:, 1], 1e-24)
     error = np.sqrt((len(pairs) - 1) * np.mean((others - others.mean()) ** 2))
-    return float(found) if abs(found - HALF) > DECIDED * error else None
+    return float(found) if abs(found - limits.hold_half) > limits.hold_decided_se * error else None
 
 
 def _causes(drift: HoldDrift) -> tuple[str, ...]:
     """What could bring the drift about; nothing when there is none beyond chance."""
     largest = max(float(np.abs(item.share).max()) for item in drift.poses)
-    if drift.probability > SURE or largest < LEAST_SHARE:
+    limits, half = drift.limits, drift.limits.hold_half
+    if drift.probability > limits.hold_p_value or largest < limits.hold_least_share:
         return ()
-    goes_on = drift.elsewhere is None or drift.elsewhere >= HALF
-    if drift.recovery is not None and drift.recovery < HALF and goes_on:
+    goes_on = drift.elsewhere is None or drift.elsewhere >= half
+    if drift.recovery is not None and drift.recovery < half and goes_on:
         return _over_time()
-    if (drift.recovery is not None and drift.recovery >= HALF) or not goes_on:
+    if (drift.recovery is not None and drift.recovery >= half) or not goes_on:
         return _with_the_hold()
     slows = sum(item.is_slowing for item in drift.poses) > drift.holds / 2
     if drift.elsewhere is not None and (not slows or drift.poses[0].tau_is_long):
@@ -189,14 +186,18 @@ def _over_time() -> tuple[str, ...]:
     return (*drifting("slows down"), *drifting("goes on"))
 
 
-def _decided(causes: tuple[str, ...], fits: Sequence[HoldFit], seed: int) -> tuple[str, ...]:
+def _decided(
+    causes: tuple[str, ...], fits: Sequence[HoldFit], seed: int, limits: DiagnosisLimits
+) -> tuple[str, ...]:
     """Holds around a rigid form decide: there the hand cannot relax."""
     rigid = [fit for fit in fits if fit.held[0].pose.startswith(RIGID)]
     free = [fit for fit in fits if fit not in rigid]
-    if not set(_with_the_hold()) <= set(causes) or sum(len(fit.held) for fit in rigid) < FEWEST_HOLDS:
+    count = sum(len(fit.held) for fit in rigid)
+    if not set(_with_the_hold()) <= set(causes) or count < limits.hold_fewest:
         return causes
     size = max(float(np.abs(fit.changes.mean(axis=0)).mean()) for fit in rigid)
-    if size >= LEAST_SHARE and probability_of(rigid, np.random.default_rng(seed)) <= SURE:
+    chance = probability_of(rigid, np.random.default_rng(seed))
+    if size >= limits.hold_least_share and chance <= limits.hold_p_value:
         return drifting("begins anew with each hold")
     others = max((float(np.abs(fit.changes.mean(axis=0)).mean()) for fit in free), default=0.0)
-    return (HAND,) if size < HALF * others else causes
+    return (HAND,) if size < limits.hold_half * others else causes

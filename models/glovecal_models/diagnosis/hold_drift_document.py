@@ -6,13 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.diagnosis.hold_drift import HAND, LEAST_SHARE, HoldDrift, PoseDrift, drifting
+from glovecal_models.diagnosis.hold_drift import HAND, HoldDrift, PoseDrift, drifting
 from glovecal_models.diagnosis.next_take import NextTake
 from glovecal_models.effects.catalogue import effect
 
 MOST_SENSORS = 3
-MOSTLY = 0.8
-"""Of the holds; a sensor that drifts one way in fewer is not told of."""
 
 
 def hold_sentence(drift: HoldDrift) -> str:
@@ -125,7 +123,9 @@ def _told(drift: HoldDrift) -> list[PoseDrift]:
 
 def _largest(drift: HoldDrift, pose: PoseDrift) -> list[tuple[str, float]]:
     """Sensors that drift one way in most holds, the largest first."""
-    sure = (np.abs(pose.share) >= LEAST_SHARE) & (pose.same_sign >= MOSTLY * pose.holds)
+    limits = drift.limits
+    is_large = np.abs(pose.share) >= limits.hold_least_share
+    sure = is_large & (pose.same_sign >= limits.hold_one_way_share * pose.holds)
     order = [i for i in np.argsort(-np.abs(pose.share)) if sure[i]]
     return [(drift.sensors[i], float(pose.share[i])) for i in order]
 

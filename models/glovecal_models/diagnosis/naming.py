@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.effects.base.assessment import Assessment, over_joints
-
-BEATEN = 2.5
-"""Standard errors by which a rival must be worse to leave the confidence set."""
 
 
 @dataclass(frozen=True)
@@ -23,17 +21,17 @@ class Naming:
     """The first, and all that these takes cannot tell from it."""
 
 
-def named(assessments: Sequence[Assessment]) -> Naming:
+def named(assessments: Sequence[Assessment], limits: DiagnosisLimits = DIAGNOSIS_LIMITS) -> Naming:
     """Rank what passed its decoy and chance."""
     passing = sorted((item for item in assessments if item.touched), key=lambda item: -item.saved_square)
     if not passing:
         return Naming((), ())
     best = passing[0]
-    rivals = [item.effect for item in passing[1:] if not _beaten(item, best)]
+    rivals = [item.effect for item in passing[1:] if not _beaten(item, best, limits.rival_worse_se)]
     return Naming(tuple(passing), (best.effect, *rivals))
 
 
-def _beaten(item: Assessment, best: Assessment) -> bool:
+def _beaten(item: Assessment, best: Assessment, standard_errors: float) -> bool:
     """Whether ``item`` leaves clearly more error than ``best`` on the joints that either touches.
 
     Causes that change from take to take are judged take by take: blocks of one take are no independent
@@ -48,4 +46,4 @@ def _beaten(item: Assessment, best: Assessment) -> bool:
     worse = over_joints(worse, takes, by_take=by_take)
     if len(worse) < 2:
         return False
-    return bool(worse.mean() > BEATEN * worse.std(ddof=1) / np.sqrt(len(worse)))
+    return bool(worse.mean() > standard_errors * worse.std(ddof=1) / np.sqrt(len(worse)))

@@ -14,18 +14,15 @@ from math import ceil, factorial, prod
 import numpy as np
 
 from glovecal_models.diagnosis.known_effect import KnownEffect
+from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.naming import Naming
 from glovecal_models.diagnosis.next_take import MORE_TAKES, MORE_WEARINGS, NextTake
 from glovecal_models.diagnosis.session_chance import wearing_deals
 from glovecal_models.diagnosis.something_left import Left
-from glovecal_models.effects.base.assessment import LEAST_SESSION_CONTRAST, Assessment
+from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.signals import Signals
 
-ALIKE = 0.02
-"""Share of a context column's range within which takes count as alike."""
-FEWEST_TAKES_OF_A_WEARING = 3
-"""Three wearings of two takes each can be dealt in 15 ways only."""
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 
@@ -46,8 +43,8 @@ class NotJudgeable:
         """Joints on which it saves as much as a session effect must."""
         if self.would_save is None:
             return ()
-        errors = self.would_save.errors
-        return tuple(i for i, item in enumerate(errors) if item.saved >= LEAST_SESSION_CONTRAST)
+        errors, least = self.would_save.errors, self.would_save.limits.least_session_share
+        return tuple(i for i, item in enumerate(errors) if item.saved >= least)
 
     @property
     def saves_much(self) -> bool:
@@ -96,21 +93,23 @@ def deciding(impossible: Sequence[NotJudgeable], left: Left) -> NextTake | None:
     return next((item.record for item in (*likely, *wearing)), None)
 
 
-def undecidable(takes: Sequence[Signals], effect: Effect) -> Undecidable | None:
+def undecidable(
+    takes: Sequence[Signals], effect: Effect, limits: DiagnosisLimits = DIAGNOSIS_LIMITS
+) -> Undecidable | None:
     """None when enough deals are possible for the effect to be told from chance."""
     if effect.decoy == "dealt wearings":
-        return _few_wearings(takes, effect)
-    return _few_takes(takes, effect) if effect.context else None
+        return _few_wearings(takes, effect, limits)
+    return _few_takes(takes, effect, limits) if effect.context else None
 
 
-def _few_wearings(takes: Sequence[Signals], effect: Effect) -> Undecidable | None:
+def _few_wearings(takes: Sequence[Signals], effect: Effect, limits: DiagnosisLimits) -> Undecidable | None:
     ways = 1 + len(wearing_deals(takes, np.random.default_rng(0)))
     needed = ceil(1 / effect.certainty.clear)
     if ways >= needed:
         return None
     names = [take.wearing for take in takes]
     wearings = list(dict.fromkeys(names))
-    each = max(FEWEST_TAKES_OF_A_WEARING, max(names.count(name) for name in wearings))
+    each = max(limits.fewest_takes_of_a_wearing, max(names.count(name) for name in wearings))
     following = ORDINALS[len(wearings)] if len(wearings) < len(ORDINALS) else f"{len(wearings) + 1}th"
     many = NUMBERS[len(wearings)] if len(wearings) < len(NUMBERS) else str(len(wearings))
     why = (
@@ -125,9 +124,10 @@ def _few_wearings(takes: Sequence[Signals], effect: Effect) -> Undecidable | Non
     return Undecidable(why, NextTake(MORE_WEARINGS, what, _seconds(takes, each), (effect.name, "chance")))
 
 
-def _few_takes(takes: Sequence[Signals], effect: Effect) -> Undecidable | None:
-    column = max(effect.context, key=lambda name: _arrangements(_levels(takes, name)))
-    levels = _levels(takes, column)
+def _few_takes(takes: Sequence[Signals], effect: Effect, limits: DiagnosisLimits) -> Undecidable | None:
+    alike = limits.alike_context_share
+    column = max(effect.context, key=lambda name: _arrangements(_levels(takes, name, alike)))
+    levels = _levels(takes, column, alike)
     ways, needed = _arrangements(levels), ceil(1 / effect.certainty.clear)
     if ways >= needed:
         return None
@@ -147,11 +147,11 @@ def _few_takes(takes: Sequence[Signals], effect: Effect) -> Undecidable | None:
     return Undecidable(why, NextTake(MORE_TAKES, what, _seconds(takes, more), (effect.name, "chance")))
 
 
-def _levels(takes: Sequence[Signals], column: str) -> list[int]:
-    """How many takes are alike in the column's mean, for each value of it."""
+def _levels(takes: Sequence[Signals], column: str, alike: float) -> list[int]:
+    """How many takes are alike in the column's mean, for each value of it; ``alike``: share of its range."""
     means = [float(np.nanmean(take.context[column])) for take in takes if _is_known(take, column)]
     every = np.concatenate([take.context[column] for take in takes if _is_known(take, column)])
-    width = max(ALIKE * float(np.nanmax(every) - np.nanmin(every)), 1e-12)
+    width = max(alike * float(np.nanmax(every) - np.nanmin(every)), 1e-12)
     steps = np.cumsum(np.append(0, np.diff(np.sort(means)) > width))
     return np.bincount(steps).tolist()
 

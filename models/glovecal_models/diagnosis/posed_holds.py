@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.pose_labels import are_pose_labels, labels_at_frames
 from glovecal_models.diagnosis.signatures import own_sensors
 from glovecal_models.layout import Layout
@@ -15,13 +16,7 @@ from glovecal_models.takes.take import Take
 
 OUTERMOST_PCT = (2, 98)
 BIN_S = 0.25
-SHORTEST_HOLD_S = 8.0
-"""A shorter one does not show whether a drift slows down."""
-MOVED_SHARE = 0.05
-"""A sensor that changes by more of its span from one second to the next moves; creep begins more slowly."""
 LONGEST_GAP_S = 1.0
-SAME_POSE_SHARE = 0.2
-"""Holds without a name are of one pose when no sensor differs by more of its span."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +57,9 @@ def degrees_of_spans(takes: Sequence[Take], layout: Layout) -> dict[str, float]:
     return found
 
 
-def posed_holds(takes: Sequence[Take], sensors: Sequence[str]) -> list[PosedHold]:
+def posed_holds(
+    takes: Sequence[Take], sensors: Sequence[str], limits: DiagnosisLimits = DIAGNOSIS_LIMITS
+) -> list[PosedHold]:
     """The first still stretch of each stay in a pose, in the order of the takes.
 
     Takes without pose names are searched for still stretches; those with like readings share a name.
@@ -75,21 +72,22 @@ def posed_holds(takes: Sequence[Take], sensors: Sequence[str]) -> list[PosedHold
         stays = [(np.arange(len(take.time_s)), "")] if labels is None else _stays(labels)
         for rows, label in stays:
             if label:
-                parts = list(_still_parts(take, scaled, rows))[:1]
+                parts = list(_still_parts(take, scaled, rows, limits))[:1]
             elif labels is None:
-                parts = _begun_anew(scaled, list(_still_parts(take, scaled, rows)))
+                still = list(_still_parts(take, scaled, rows, limits))
+                parts = _begun_anew(scaled, still, limits.hold_same_pose_share)
             else:
                 parts = []
             found.extend(_held(take, label, scaled, part) for part in parts)
-    return _named(found)
+    return _named(found, limits.hold_same_pose_share)
 
 
-def _begun_anew(scaled: np.ndarray, parts: Sequence[np.ndarray]) -> list[np.ndarray]:
+def _begun_anew(scaled: np.ndarray, parts: Sequence[np.ndarray], same_pose: float) -> list[np.ndarray]:
     """Without those that go on after a small move: before a hold the hand comes from elsewhere."""
     kept = list(parts[:1])
     for before, part in itertools.pairwise(parts):
         away = np.abs(scaled[before[-1] : part[0] + 1] - scaled[part].mean(axis=0)).max(initial=0.0)
-        if away > SAME_POSE_SHARE:
+        if away > same_pose:
             kept.append(part)
     return kept
 
@@ -105,17 +103,19 @@ def _stays(labels: Sequence[str]) -> Iterator[tuple[np.ndarray, str]]:
         yield rows, str(values[rows[0]])
 
 
-def _still_parts(take: Take, scaled: np.ndarray, rows: np.ndarray) -> Iterator[np.ndarray]:
+def _still_parts(
+    take: Take, scaled: np.ndarray, rows: np.ndarray, limits: DiagnosisLimits
+) -> Iterator[np.ndarray]:
     """The pieces of ``rows`` without a gap in which no sensor moves, long enough to be judged."""
     time = take.time_s[rows]
     for piece in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(time) > LONGEST_GAP_S) + 1):
         second = np.floor(time[piece] - time[piece[0]]).astype(int)
         means = _binned(scaled[rows[piece]], second)
         numbers = np.unique(second)
-        moves = (np.abs(np.diff(means, axis=0)) > MOVED_SHARE).any(axis=1)
+        moves = (np.abs(np.diff(means, axis=0)) > limits.hold_moved_share).any(axis=1)
         for part in np.split(np.arange(len(numbers)), np.flatnonzero(moves) + 1):
             inside = piece[np.isin(second, numbers[part])]
-            if time[inside[-1]] - time[inside[0]] >= SHORTEST_HOLD_S:
+            if time[inside[-1]] - time[inside[0]] >= limits.hold_shortest_s:
                 yield rows[inside]
 
 
@@ -133,14 +133,14 @@ def _binned(values: np.ndarray, number: np.ndarray) -> np.ndarray:
     return np.add.reduceat(values, starts, axis=0) / counts[:, None]
 
 
-def _named(found: Sequence[PosedHold]) -> list[PosedHold]:
+def _named(found: Sequence[PosedHold], same_pose: float) -> list[PosedHold]:
     """Holds without a name get that of the first with like readings."""
     levels: list[np.ndarray] = []
     result = []
     for hold in found:
         if not hold.pose:
             level = np.median(hold.readings, axis=0)
-            near = [i for i, other in enumerate(levels) if np.abs(other - level).max() <= SAME_POSE_SHARE]
+            near = [i for i, other in enumerate(levels) if np.abs(other - level).max() <= same_pose]
             if not near:
                 levels.append(level)
             hold = replace(hold, pose=f"pose {near[0] + 1 if near else len(levels)}")

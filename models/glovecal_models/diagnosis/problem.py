@@ -9,6 +9,7 @@ import numpy as np
 
 from glovecal_models.diagnosis.forward_design import EVERY, ForwardDesign, forward
 from glovecal_models.diagnosis.known_effect import KnownEffect
+from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.naming import Naming
 from glovecal_models.diagnosis.resampled import (
     RATE_HZ,
@@ -34,10 +35,16 @@ class DiagnosisProblem:
     joints: tuple[str, ...]
     linear: bool
     known: tuple[KnownEffect, ...]
+    limits: DiagnosisLimits = DIAGNOSIS_LIMITS
 
     @classmethod
     def of(
-        cls, takes: Sequence[Take], layout: Layout, linear: bool, known: Sequence[KnownEffect]
+        cls,
+        takes: Sequence[Take],
+        layout: Layout,
+        linear: bool,
+        known: Sequence[KnownEffect],
+        limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
     ) -> DiagnosisProblem:
         """Raises BadInput when no take measured a joint of the layout."""
         joints = measured_joints(takes, layout)
@@ -53,7 +60,7 @@ class DiagnosisProblem:
             )
         even = tuple(replace(take, reference=take.reference[:, fitted]) for take in even)
         joints = tuple(name for name, is_fitted in zip(joints, fitted, strict=True) if is_fitted)
-        return cls(even, layout, joints, linear, tuple(known))
+        return cls(even, layout, joints, linear, tuple(known), limits)
 
     @property
     def is_sparse(self) -> bool:
@@ -63,7 +70,9 @@ class DiagnosisProblem:
     def design(self, smoothing: int = SMOOTHING) -> ForwardDesign:
         """Readings from angles, on signals smoothed over so many rows."""
         even = [smoothed(take, smoothing) for take in self.even]
-        return forward(even, self.layout, self.joints, linear=self.linear, known=self.known)
+        return forward(
+            even, self.layout, self.joints, linear=self.linear, known=self.known, limits=self.limits
+        )
 
     def beside(self, *effects: KnownEffect) -> DiagnosisProblem:
         """The same with further effects in the base."""

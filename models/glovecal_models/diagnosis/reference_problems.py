@@ -12,20 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.pose_labels import are_pose_labels
 from glovecal_models.layout import Layout
 from glovecal_models.takes.reference_check import radians_problem
 from glovecal_models.takes.take import Take
 
-SURE_CORRELATION = 0.5
-CLEAR_CORRELATION = 0.8
-"""A neighbour that moves along may turn a weaker one around."""
 RADIAN_DEG = 180.0 / np.pi
-RADIANS_WITHIN = 1.4
-"""Factor around it: gains differ between wearings."""
-LEAST_APART_DEG = 12.0
-TIMES_APART = 4.0
-"""The difference over what either line leaves."""
 
 
 @dataclass(frozen=True)
@@ -44,18 +37,21 @@ class _Line:
 
 
 def contradictions(
-    rotation: str, measured: Sequence[tuple[Take, np.ndarray]], inputs: Sequence[np.ndarray]
+    rotation: str,
+    measured: Sequence[tuple[Take, np.ndarray]],
+    inputs: Sequence[np.ndarray],
+    limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
 ) -> list[str]:
     """Sentences; ``measured``: takes and angles at their frames, ``inputs``: the own sensor's readings."""
     lines = [
         _line(take, own[np.isfinite(values)], values[np.isfinite(values)])
         for (take, values), own in zip(measured, inputs, strict=True)
     ]
-    sure = [item for item in lines if abs(item.correlation) > SURE_CORRELATION]
-    radians = _in_radians(rotation, sure)
-    clear = [item for item in lines if abs(item.correlation) > CLEAR_CORRELATION]
+    sure = [item for item in lines if abs(item.correlation) > limits.reference_sure_correlation]
+    radians = _in_radians(rotation, sure, limits.reference_radians_within)
+    clear = [item for item in lines if abs(item.correlation) > limits.reference_clear_correlation]
     signs = [] if radians else _against_each_other(rotation, clear)
-    return radians or signs or _apart(rotation, _of_one_sign(sure))
+    return radians or signs or _apart(rotation, _of_one_sign(sure), limits)
 
 
 def _line(take: Take, reading: np.ndarray, angle: np.ndarray) -> _Line:
@@ -68,13 +64,13 @@ def _line(take: Take, reading: np.ndarray, angle: np.ndarray) -> _Line:
     return _Line(take, slope, correlation, float(reading.mean()), float(angle.mean()), left)
 
 
-def _in_radians(rotation: str, lines: Sequence[_Line]) -> list[str]:
+def _in_radians(rotation: str, lines: Sequence[_Line], within: float) -> list[str]:
     """Takes whose angles are 57 times smaller than the others' for the same readings."""
     if len(lines) < 2:
         return []
     steepest = max(abs(item.slope) for item in lines)
-    found = [item for item in lines if abs(item.slope) * RADIAN_DEG < RADIANS_WITHIN * steepest]
-    found = [item for item in found if abs(item.slope) * RADIAN_DEG > steepest / RADIANS_WITHIN]
+    found = [item for item in lines if abs(item.slope) * RADIAN_DEG < within * steepest]
+    found = [item for item in found if abs(item.slope) * RADIAN_DEG > steepest / within]
     return [
         f"{rotation} in take {item.take.name}: the reference moves {steepest / abs(item.slope):.0f} times"
         " less than in another take for the same readings. Is it in radians? Degrees are wanted: multiply by"
@@ -101,14 +97,15 @@ def _of_one_sign(lines: Sequence[_Line]) -> list[_Line]:
     return [item for item in lines if np.sign(item.correlation) == most]
 
 
-def _apart(rotation: str, lines: Sequence[_Line]) -> list[str]:
+def _apart(rotation: str, lines: Sequence[_Line], limits: DiagnosisLimits) -> list[str]:
     """Takes of one wearing whose angles differ where their readings are the same."""
     found = []
     for number, one in enumerate(lines):
         for other in lines[number + 1 :]:
             between = 0.5 * (one.mean_reading + other.mean_reading)
             apart = abs(one.at(between) - other.at(between))
-            limit = max(LEAST_APART_DEG, TIMES_APART * max(one.left_deg, other.left_deg))
+            lines_leave = max(one.left_deg, other.left_deg)
+            limit = max(limits.reference_least_apart_deg, limits.reference_times_apart * lines_leave)
             if one.take.wearing == other.take.wearing and apart > limit:
                 found.append((apart, one, other))
     if not found:
@@ -124,29 +121,26 @@ def _some(names: Sequence[str]) -> str:
     return f"take {names[0]}" if len(names) == 1 else f"takes {', '.join(names[:4])}"
 
 
-STILL_DEG = 0.5
-JUMP_DEG = 25.0
-"""Between two frames, while the joint's sensor hardly moves."""
-FEWEST_ROWS = 30
-
-
-def reference_problems(takes: Sequence[Take], layout: Layout) -> tuple[str, ...]:
+def reference_problems(
+    takes: Sequence[Take], layout: Layout, limits: DiagnosisLimits = DIAGNOSIS_LIMITS
+) -> tuple[str, ...]:
     """Sentences; none when the reference looks right, or names poses and measures no angle."""
     if are_pose_labels(takes):
         return ()
     problems: list[str] = []
+    fewest = limits.reference_fewest_rows
     for rotation in layout.rotations:
         measured = [(take, take.reference_at_frames([rotation])[:, 0]) for take in takes]
-        measured = [(take, values) for take, values in measured if np.isfinite(values).sum() >= FEWEST_ROWS]
+        measured = [(take, values) for take, values in measured if np.isfinite(values).sum() >= fewest]
         if measured:
             own = layout.correspondence(rotation)
             has_own = own.simulated is None and (rotation in own.sensors or len(own.sensors) == 1)
             inputs = [
                 own.input_columns(_in_order(take, layout), layout.sensors)[:, 0] for take, _ in measured
             ]
-            problems.extend(_of_rotation(rotation, measured, inputs, has_own))
+            problems.extend(_of_rotation(rotation, measured, inputs, has_own, limits))
             if has_own:
-                problems.extend(contradictions(rotation, measured, inputs))
+                problems.extend(contradictions(rotation, measured, inputs, limits))
     radians = radians_problem(takes)
     return tuple(problems) if radians is None else (radians[0].upper() + radians[1:], *problems)
 
@@ -156,32 +150,34 @@ def _in_order(take: Take, layout: Layout) -> np.ndarray:
 
 
 def _of_rotation(
-    rotation: str, measured: Sequence[tuple[Take, np.ndarray]], inputs: Sequence[np.ndarray], has_own: bool
+    rotation: str,
+    measured: Sequence[tuple[Take, np.ndarray]],
+    inputs: Sequence[np.ndarray],
+    has_own: bool,
+    limits: DiagnosisLimits,
 ) -> list[str]:
     problems, correlations = [], []
+    moving = limits.reference_moving_share * max(np.ptp(part) for part in inputs)
     for (take, values), own in zip(measured, inputs, strict=True):
         known = np.isfinite(values)
         angle, reading = values[known], own[known]
         moves = float(np.std(reading)) > 0 and float(np.std(angle)) > 0
         correlations.append(float(np.corrcoef(reading, angle)[0, 1]) if moves else 0.0)
-        if (
-            has_own
-            and np.ptp(angle) < STILL_DEG
-            and np.ptp(reading) > 0.3 * max(np.ptp(part) for part in inputs)
-        ):
+        if has_own and np.ptp(angle) < limits.reference_still_deg and np.ptp(reading) > moving:
             problems.append(
                 f"{rotation} in take {take.name}: the reference stays within {np.ptp(angle):.2g} degrees"
                 " while its sensor moves. Was the tracker frozen?"
             )
-        jumps = _jumps(angle, reading) if has_own else 0
+        jumps = _jumps(angle, reading, limits) if has_own else 0
         if jumps:
             problems.append(
-                f"{rotation} in take {take.name}: the reference jumps by more than {JUMP_DEG:g} degrees"
-                f" {jumps} time{'s' if jumps > 1 else ''} while its sensor stands. Did a marker swap?"
+                f"{rotation} in take {take.name}: the reference jumps by more than"
+                f" {limits.reference_jump_deg:g} degrees {jumps} time{'s' if jumps > 1 else ''} while its sensor"
+                " stands. Did a marker swap?"
             )
     sign = np.sign(np.median(correlations))
     for (take, _), correlation in zip(measured, correlations, strict=True):
-        if has_own and len(measured) > 2 and sign * correlation < -SURE_CORRELATION:
+        if has_own and len(measured) > 2 and sign * correlation < -limits.reference_sure_correlation:
             problems.append(
                 f"{rotation} in take {take.name}: the reference runs against its sensor, unlike in the other"
                 " takes. Is its sign flipped?"
@@ -189,7 +185,8 @@ def _of_rotation(
     return problems
 
 
-def _jumps(angle: np.ndarray, reading: np.ndarray) -> int:
+def _jumps(angle: np.ndarray, reading: np.ndarray, limits: DiagnosisLimits) -> int:
     steps, moved = np.abs(np.diff(angle)), np.abs(np.diff(reading))
     span = max(float(np.ptp(reading)), 1e-9)
-    return int(((steps > JUMP_DEG) & (moved < 0.1 * span)).sum())
+    stands = moved < limits.reference_standing_share * span
+    return int(((steps > limits.reference_jump_deg) & stands).sum())

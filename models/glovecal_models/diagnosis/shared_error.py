@@ -11,11 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.slow_error import SecondMeans
 
 SHIFTS = 199
-SHORTEST_S = 8
-"""Shorter takes have too few different shifts."""
 
 
 @dataclass(frozen=True)
@@ -31,9 +30,14 @@ class SharedError:
 NOTHING_SHARED = SharedError(0.0, 1.0)
 
 
-def shared_error(joints: Sequence[Sequence[SecondMeans]], generator: np.random.Generator) -> SharedError:
+def shared_error(
+    joints: Sequence[Sequence[SecondMeans]],
+    generator: np.random.Generator,
+    limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
+) -> SharedError:
     """``joints``: for each joint its takes."""
-    takes = [_together(take) for take in zip(*joints, strict=True) if len(take[0].weight) >= SHORTEST_S]
+    long = [take for take in zip(*joints, strict=True) if len(take[0].weight) >= limits.shared_shortest_s]
+    takes = [_together(take) for take in long]
     if len(joints) < 2 or not takes:
         return NOTHING_SHARED
     pairs = np.triu_indices(len(joints), 1)

@@ -9,7 +9,7 @@ import numpy as np
 
 from glovecal_models.calibration.left_out import held_levels
 from glovecal_models.diagnosis.naming import Naming
-from glovecal_models.effects.base.assessment import LEAST_SESSION_CONTRAST, Assessment
+from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Stage
 from glovecal_models.effects.base.signature_effect import Finding, SignatureEffect
@@ -93,7 +93,11 @@ def _with_plausible_context(
 ) -> list[Take]:
     """Without the context columns that save too little: takes are few, and each column uses one up."""
     context = {item.name: item.context for item in effects}
-    saving = [item for item in assessments if max(e.contrast for e in item.errors) >= LEAST_SESSION_CONTRAST]
+    saving = [
+        item
+        for item in assessments
+        if max(e.contrast for e in item.errors) >= item.limits.least_session_share
+    ]
     kept = {name for item in saving for name in context.get(item.effect, ())}
     return [
         replace(take, context={name: values for name, values in take.context.items() if name in kept})

@@ -19,6 +19,7 @@ from scipy.stats import chi2, t
 
 from glovecal_models.calibration.held_out import ALIKE_ROWS, BaseProducts
 from glovecal_models.diagnosis.forward_design import ForwardDesign
+from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 
 EVERY = 5
 """Neighbouring rows are about equally unfamiliar."""
@@ -87,12 +88,6 @@ def _unfamiliar(products: BaseProducts, unit: int) -> np.ndarray:
 
 
 STRETCH_S = 10
-SHORTEST_S = 4
-"""A shorter take says nothing of what lasts."""
-FEWEST_STRETCHES = 5
-CONFIDENCE = 0.95
-LEAST_FREEDOM = 1.0
-"""With fewer degrees of freedom the square itself is all but unknown: nothing is bounded."""
 
 
 @dataclass(frozen=True)
@@ -107,19 +102,17 @@ class SlowError:
     """From row to row."""
     stretches: int
 
-    @property
-    def is_judgeable(self) -> bool:
-        return self.stretches >= FEWEST_STRETCHES
 
-
-def slow_error(takes: Sequence[SecondMeans], residual: Sequence[np.ndarray]) -> SlowError:
+def slow_error(
+    takes: Sequence[SecondMeans], residual: Sequence[np.ndarray], limits: DiagnosisLimits = DIAGNOSIS_LIMITS
+) -> SlowError:
     """``residual``: the same joint's error row by row, for its noise."""
     products, weights, squares = [], [], 0.0
     for take in takes:
         both = take.weight[1:] * take.weight[:-1] > 0
         weight = np.sqrt(take.weight[1:] * take.weight[:-1])[both]
         product = (take.mean_deg[1:] * take.mean_deg[:-1])[both] * weight
-        if len(weight) < SHORTEST_S - 1:
+        if len(weight) < limits.slow_shortest_s - 1:
             continue
         square = 0.5 * (take.mean_deg[1:] ** 2 + take.mean_deg[:-1] ** 2)[both]
         squares += float(weight @ square)
@@ -134,11 +127,11 @@ def slow_error(takes: Sequence[SecondMeans], residual: Sequence[np.ndarray]) -> 
     differing = np.array(products) - square * np.array(weights)
     variance = count / max(count - 1, 1) * float(np.sum(differing**2)) / total**2
     forgotten = max(squares / total - square, 0.0)
-    lower = _lower(square, variance, forgotten**2 / total, count)
+    lower = _lower(square, variance, forgotten**2 / total, count, limits)
     return SlowError(_root(square), _root(lower), noise, count)
 
 
-def _lower(square: float, variance: float, of_noise: float, count: int) -> float:
+def _lower(square: float, variance: float, of_noise: float, count: int, limits: DiagnosisLimits) -> float:
     """Of a mean square from ``count`` stretches, whose estimate varies by ``variance``.
 
     ``of_noise`` of that is products of noise, as much below zero as above: Student's t. The rest varies with
@@ -149,14 +142,15 @@ def _lower(square: float, variance: float, of_noise: float, count: int) -> float
     """
     if square <= 0 or count < 2:
         return 0.0
+    confidence = limits.slow_confidence
     of_noise = min(of_noise, variance)
     lasting = variance - of_noise
     most = count - 1.0
     freedom = min(2 * square**2 / lasting, most) if lasting > 2 * square**2 / most else most
-    if freedom < LEAST_FREEDOM:
+    if freedom < limits.slow_least_freedom:
         return 0.0
-    of_lasting = square * (1.0 - min(freedom / float(chi2.ppf(CONFIDENCE, freedom)), 1.0))
-    distance = float(np.hypot(t.ppf(CONFIDENCE, count - 1) * np.sqrt(of_noise), of_lasting))
+    of_lasting = square * (1.0 - min(freedom / float(chi2.ppf(confidence, freedom)), 1.0))
+    distance = float(np.hypot(t.ppf(confidence, count - 1) * np.sqrt(of_noise), of_lasting))
     return max(square - distance, 0.0)
 
 

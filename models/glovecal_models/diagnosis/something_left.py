@@ -13,11 +13,10 @@ import numpy as np
 
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.goes_with import GoesWith, goes_with
+from glovecal_models.diagnosis.limits import DiagnosisLimits
 from glovecal_models.diagnosis.resampled import ResampledTake
 from glovecal_models.diagnosis.shared_error import NOTHING_SHARED, SharedError, shared_error
 from glovecal_models.diagnosis.slow_error import (
-    FEWEST_STRETCHES,
-    SHORTEST_S,
     SecondMeans,
     SlowError,
     second_means,
@@ -26,19 +25,9 @@ from glovecal_models.diagnosis.slow_error import (
 )
 from glovecal_models.layout import Layout
 
-HEALTHY_DEG, HEALTHY_WITHIN_DEG = 0.52, 0.38
-"""What the slip of a healthy glove (0.4 degrees, forgotten in 25 to 40 s) and its calibration leave at most:
-in all, and within a take once its mean and straight line are taken out. Lower bounds of 150 simulated gloves
-without a cause: 0.09 to 0.53 and 0.06 to 0.34; with an unknown cause of 1 degree 0.43 and 0.30 upwards."""
-HEALTHY_NOISES, HEALTHY_WITHIN_NOISES = 3.0, 2.5
-"""The same in what changes from row to row: with a coarse reference more is allowed."""
-HEALTHY_SHARED_DEG = 0.35
-SHARED_PROBABILITY = 0.01
 MOST_JOINTS = 6
 """So many of the worst are held against every column."""
 MOST_SAID = 3
-ENOUGH_STRETCHES = 20
-"""With so many a bound that is low is no lack of data."""
 
 
 @dataclass(frozen=True)
@@ -75,58 +64,64 @@ def something_left(
     ``even``: its takes, for their readings. ``may_be``: effects that save much and that these takes cannot
     decide; they are not in the base.
     """
-    generator = np.random.default_rng(seed)
+    generator, limits = np.random.default_rng(seed), design.limits
     means = [second_means(design, joint) for joint in range(len(design.rotations))]
     found = _lasting(design, means)
     wandering = _lasting(design, [[without_drift(take) for take in takes] for takes in means])
-    judged = [item for item in found if item.is_judgeable]
+    judged = [item for item in found if item.stretches >= limits.slow_fewest_stretches]
     if not judged:
-        return not_told(_too_little(found))
+        return not_told(_too_little(found, limits))
     left = Left(
         False,
         "",
         dict(zip(design.rotations, found, strict=True)),
         dict(zip(design.rotations, wandering, strict=True)),
-        shared_error(means, generator),
+        shared_error(means, generator, limits),
     )
-    excess = [_excess(*items) for items in zip(found, wandering, strict=True)]
+    excess = [_excess(*items, limits) for items in zip(found, wandering, strict=True)]
     lasts = sorted((i for i, item in enumerate(excess) if item > 1), key=lambda i: -excess[i])
-    is_shared = _is_shared(left.shared, judged)
+    is_shared = _is_shared(left.shared, judged, limits)
     if not lasts and not is_shared:
-        unsure = _unsure(judged)
+        unsure = _unsure(judged, limits)
         sentence = f"Something may be left: {unsure}." if unsure else _noise_sentence(judged)
         return replace(left, sentence=sentence, not_judgeable=unsure)
     chosen = (lasts or list(range(len(found))))[:MOST_JOINTS]
     columns = goes_with(design, even, layout, chosen, means, generator)
     worst = design.rotations[lasts[0]] if lasts else None
-    return replace(
-        left, is_left=True, goes_with=columns, sentence=_sentence(left, worst, is_shared, columns, may_be)
-    )
+    sentence = _sentence(left, worst, is_shared, columns, may_be, limits)
+    return replace(left, is_left=True, goes_with=columns, sentence=sentence)
 
 
 def _lasting(design: ForwardDesign, means: Sequence[Sequence[SecondMeans]]) -> list[SlowError]:
     return [
-        slow_error(takes, products.residual) for takes, products in zip(means, design.products, strict=True)
+        slow_error(takes, products.residual, design.limits)
+        for takes, products in zip(means, design.products, strict=True)
     ]
 
 
-def _too_little(found: Sequence[SlowError]) -> str:
+def _too_little(found: Sequence[SlowError], limits: DiagnosisLimits) -> str:
     most = max((item.stretches for item in found), default=0)
-    return f"{most} stretches of {SHORTEST_S} s or more were measured, {FEWEST_STRETCHES} are needed"
+    needed = limits.slow_fewest_stretches
+    return f"{most} stretches of {limits.slow_shortest_s} s or more were measured, {needed} are needed"
 
 
-def _is_shared(shared: SharedError, judged: Sequence[SlowError]) -> bool:
+def _is_shared(shared: SharedError, judged: Sequence[SlowError], limits: DiagnosisLimits) -> bool:
     noise = float(np.median([item.noise_deg for item in judged]))
-    allowed = max(HEALTHY_SHARED_DEG, HEALTHY_WITHIN_NOISES * noise)
-    return shared.probability <= SHARED_PROBABILITY and shared.size_deg > allowed
+    allowed = max(limits.healthy_shared_deg, limits.healthy_within_noises * noise)
+    return shared.probability <= limits.shared_p_value and shared.size_deg > allowed
 
 
 def _sentence(
-    left: Left, worst: str | None, is_shared: bool, columns: Sequence[GoesWith], may_be: Sequence[str]
+    left: Left,
+    worst: str | None,
+    is_shared: bool,
+    columns: Sequence[GoesWith],
+    may_be: Sequence[str],
+    limits: DiagnosisLimits,
 ) -> str:
     why = []
     if worst is not None:
-        why.append(_lasts_sentence(worst, left.lasting[worst], left.within_takes[worst]))
+        why.append(_lasts_sentence(worst, left.lasting[worst], left.within_takes[worst], limits))
     if is_shared:
         why.append(
             f"the errors of several joints rise and fall together by {left.shared.size_deg:.1f} degrees"
@@ -136,26 +131,28 @@ def _sentence(
     return f"{sentence} It may be {' or '.join(may_be)}." if may_be else sentence
 
 
-def _excess(item: SlowError, within: SlowError) -> float:
+def _excess(item: SlowError, within: SlowError, limits: DiagnosisLimits) -> float:
     """How many times more lasts than in a healthy glove, at the lower bound; 0 where it cannot be judged."""
-    if not item.is_judgeable:
+    if item.stretches < limits.slow_fewest_stretches:
         return 0.0
-    return max(item.at_least_deg / _allowed(item), within.at_least_deg / _allowed_within(within))
+    return max(
+        item.at_least_deg / _allowed(item, limits), within.at_least_deg / _allowed_within(within, limits)
+    )
 
 
-def _allowed(item: SlowError) -> float:
-    return max(HEALTHY_DEG, HEALTHY_NOISES * item.noise_deg)
+def _allowed(item: SlowError, limits: DiagnosisLimits) -> float:
+    return max(limits.healthy_deg, limits.healthy_noises * item.noise_deg)
 
 
-def _allowed_within(item: SlowError) -> float:
-    return max(HEALTHY_WITHIN_DEG, HEALTHY_WITHIN_NOISES * item.noise_deg)
+def _allowed_within(item: SlowError, limits: DiagnosisLimits) -> float:
+    return max(limits.healthy_within_deg, limits.healthy_within_noises * item.noise_deg)
 
 
-def _lasts_sentence(joint: str, item: SlowError, within: SlowError) -> str:
-    if item.at_least_deg > _allowed(item):
-        said, allowed, where = item, _allowed(item), "for seconds"
+def _lasts_sentence(joint: str, item: SlowError, within: SlowError, limits: DiagnosisLimits) -> str:
+    if item.at_least_deg > _allowed(item, limits):
+        said, allowed, where = item, _allowed(item, limits), "for seconds"
     else:
-        said, allowed, where = within, _allowed_within(within), "for seconds, within takes"
+        said, allowed, where = within, _allowed_within(within, limits), "for seconds, within takes"
     return (
         f"an error of {joint} lasts {where} ({said.size_deg:.2f} degrees, surely more than"
         f" {said.at_least_deg:.2f}; of a healthy glove at most {allowed:.2f})"
@@ -167,14 +164,15 @@ def _noise_sentence(judged: Sequence[SlowError]) -> str:
     return f"What is left looks like noise: errors that last for seconds come to {worst:.1f} degrees."
 
 
-def _unsure(judged: Sequence[SlowError]) -> str | None:
+def _unsure(judged: Sequence[SlowError], limits: DiagnosisLimits) -> str | None:
     """Why a large error may yet be a healthy glove's; None when it is small or there is enough of it."""
     worst = max(judged, key=lambda item: item.size_deg)
-    if worst.size_deg <= _allowed(worst) or worst.stretches >= ENOUGH_STRETCHES:
+    allowed = _allowed(worst, limits)
+    if worst.size_deg <= allowed or worst.stretches >= limits.enough_stretches:
         return None
     return (
         f"errors that last for seconds come to {worst.size_deg:.1f} degrees, but {worst.stretches} stretches"
-        f" of time cannot tell them surely from the {_allowed(worst):.1f} of a healthy glove; record longer"
+        f" of time cannot tell them surely from the {allowed:.1f} of a healthy glove; record longer"
         " takes"
     )
 

@@ -32,11 +32,9 @@ from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_interval import add_interval
 from glovecal_models.improvement.addition import Addition, total_rmse_deg
 from glovecal_models.improvement.control_share import share_left_by_decoy
+from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 from glovecal_models.improvement.proposals import proposed
 from glovecal_models.takes.take import Take
-
-LEAST_GAIN = 0.05
-"""Of the held-out RMSE of the touched rotations; with less an effect is undone."""
 
 
 def add_effect(
@@ -49,10 +47,11 @@ def add_effect(
     settings: TrainingSettings | None = None,
     before: HeldOutErrors | None = None,
     judged: Sequence[str] | None = None,
-    least_gain: float = LEAST_GAIN,
+    least_gain: float | None = None,
     decoy_share: float | None = None,
     parent_id: str | None = None,
     take_hashes: Sequence[str] = (),
+    limits: ImprovementLimits = IMPROVEMENT_LIMITS,
     cancelled: Callable[[], bool] | None = None,
     report: Report | None = None,
 ) -> Addition:
@@ -62,14 +61,16 @@ def add_effect(
     clocks' offsets (default: as they are found in the takes). ``before`` saves measuring the parent,
     ``decoy_share`` (of the error, that is left with the effect's decoy instead) screening it. Undone, with
     the reason, unless the held-out RMSE of the ``judged`` rotations (default: all chosen) falls by
-    ``least_gain``; an effect that widens the interval is judged by its claim (``add_interval``). Raises
-    BadInput for an unknown effect or rotation, or when the takes cannot carry it; Cancelled.
+    ``least_gain`` (default: of ``limits``); an effect that widens the interval is judged by its claim
+    (``add_interval``). Raises BadInput for an unknown effect or rotation, or when the takes cannot carry it;
+    Cancelled.
     """
     effect = known_effect(name)
     settings = settings_of(model, settings)
+    least_gain = limits.least_gain if least_gain is None else least_gain
     has = wanted_of(model)
     if constants is None and isinstance(effect, SignatureEffect):
-        proposal = proposed(model, takes, effect, rotations, cancelled)
+        proposal = proposed(model, takes, effect, rotations, cancelled, limits.diagnosis)
         constants, rotations = proposal.constants, proposal.rotations or rotations
     chosen = _chosen(model, effect, rotations)
     fresh, live = WantedEffect(name, chosen, dict(constants or {})), None
@@ -80,7 +81,7 @@ def add_effect(
     if isinstance(effect, IntervalEffect):
         return add_interval(
             model, effect, fresh, has, prepared, settings, parent_id=parent_id, take_hashes=take_hashes,
-            cancelled=cancelled,
+            limits=limits, cancelled=cancelled,
         )  # fmt: skip
     if fresh.has_columns:
         _require_judgeable(prepared, effect.missing(_all_signals(prepared)), name)
@@ -101,7 +102,9 @@ def add_effect(
         report(f"learning {name} from all takes", 0.85)
     fit = fit_with_effects(prepared, chosen, wanted, settings, cancelled=cancelled)
     if decoy_share is None and fresh.has_columns:
-        decoy_share = share_left_by_decoy(model, repaired_takes(takes, has), effect, chosen, cancelled)
+        decoy_share = share_left_by_decoy(
+            model, repaired_takes(takes, has), effect, chosen, cancelled, limits.diagnosis
+        )
     evidence = _evidence(before, after, chosen, decoy_share) | dict(live.evidence if live else {})
     effects = [*kept_lanes(model.effects, chosen), *fit.effects, *columnless_effects(wanted, model.effects)]
     effects = [replace(item, evidence=evidence) if item.name == name else item for item in effects]

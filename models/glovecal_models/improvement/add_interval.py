@@ -15,8 +15,9 @@ from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.calibration.wanted_effect import WantedEffect
 from glovecal_models.effects.base.interval_effect import IntervalEffect, LeftOutErrors
 from glovecal_models.improvement.addition import Addition, total_rmse_deg
-from glovecal_models.improvement.claim_check import LEAST_FALL, ClaimCheck, check_claim
+from glovecal_models.improvement.claim_check import ClaimCheck, check_claim
 from glovecal_models.improvement.left_out_errors import left_out_errors
+from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 
 
 def add_interval(
@@ -29,6 +30,7 @@ def add_interval(
     *,
     parent_id: str | None = None,
     take_hashes: Sequence[str] = (),
+    limits: ImprovementLimits = IMPROVEMENT_LIMITS,
     cancelled: Callable[[], bool] | None = None,
 ) -> Addition:
     """``model`` with ``fresh``, if the NLPD on takes left out falls with it; its regressors stay as they are.
@@ -39,9 +41,9 @@ def add_interval(
     others = [item for item in has if item.name != fresh.name]
     earlier = next((item for item in has if item.name == fresh.name), None)
     found = dict(earlier.settings if earlier else {}) | fresh.settings
-    left_out = left_out_errors(takes, fresh.rotations, others, settings, cancelled=cancelled)
+    left_out = left_out_errors(takes, fresh.rotations, others, settings, limits=limits, cancelled=cancelled)
     errors = _errors(left_out)
-    claim = check_claim(effect, left_out, found)
+    claim = check_claim(effect, left_out, found, limits)
     learned = effect.learned(left_out, found)
     shows_later = effect.shows_later and claim.is_no_worse and effect.widens(learned, fresh.rotations)
     if not claim.is_truer and not shows_later:
@@ -92,6 +94,6 @@ def _told(claim: ClaimCheck, errors: HeldOutErrors, fresh: WantedEffect) -> str:
 def _undone(fresh: WantedEffect, claim: ClaimCheck) -> str:
     return (
         f"{_where(fresh)} was undone: it brings the claimed standard deviation no nearer to the truth (NLPD "
-        f"on takes left out {claim.before.nlpd:.3f} to {claim.after.nlpd:.3f} nats; {LEAST_FALL} less is "
-        "asked for)."
+        f"on takes left out {claim.before.nlpd:.3f} to {claim.after.nlpd:.3f} nats; "
+        f"{claim.limits.claim_least_fall_nats} less is asked for)."
     )

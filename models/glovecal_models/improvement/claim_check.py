@@ -9,10 +9,9 @@ import numpy as np
 
 from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.interval_effect import IntervalEffect, LeftOutErrors
+from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 
 PARTS = 3
-LEAST_FALL, MOST_RISE = 0.005, 0.01
-"""Nats by which the NLPD must fall, or may rise: a claim that is half of what it should be costs 0.8."""
 
 
 @dataclass(frozen=True)
@@ -33,14 +32,15 @@ class ClaimCheck:
 
     before: Claim
     after: Claim
+    limits: ImprovementLimits = IMPROVEMENT_LIMITS
 
     @property
     def is_truer(self) -> bool:
-        return self.before.nlpd - self.after.nlpd >= LEAST_FALL
+        return self.before.nlpd - self.after.nlpd >= self.limits.claim_least_fall_nats
 
     @property
     def is_no_worse(self) -> bool:
-        return self.after.nlpd - self.before.nlpd <= MOST_RISE
+        return self.after.nlpd - self.before.nlpd <= self.limits.claim_most_rise_nats
 
     def to_document(self) -> dict[str, float]:
         """Plain JSON-able data."""
@@ -51,7 +51,12 @@ class ClaimCheck:
         }
 
 
-def check_claim(effect: IntervalEffect, left_out: Sequence[LeftOutErrors], found: Settings) -> ClaimCheck:
+def check_claim(
+    effect: IntervalEffect,
+    left_out: Sequence[LeftOutErrors],
+    found: Settings,
+    limits: ImprovementLimits = IMPROVEMENT_LIMITS,
+) -> ClaimCheck:
     """Learn from two thirds of the takes, judge on the rest, in turns."""
     names = list(dict.fromkeys(item.take for item in left_out))
     error, before, after = [], [], []
@@ -64,7 +69,8 @@ def check_claim(effect: IntervalEffect, left_out: Sequence[LeftOutErrors], found
             before.append(item.variance)
             after.append(item.variance + _added(effect, settings, item))
     errors = np.concatenate(error)
-    return ClaimCheck(_claim(errors, np.concatenate(before)), _claim(errors, np.concatenate(after)))
+    claims = [_claim(errors, np.concatenate(each)) for each in (before, after)]
+    return ClaimCheck(claims[0], claims[1], limits)
 
 
 def _added(effect: IntervalEffect, settings: Settings, item: LeftOutErrors) -> np.ndarray:

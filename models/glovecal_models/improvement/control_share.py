@@ -11,6 +11,7 @@ from glovecal_models.diagnosis.candidates import assessed
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.forward_design import forward
 from glovecal_models.diagnosis.known_effect import known_effects
+from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.problem import measured_joints
 from glovecal_models.diagnosis.resampled import SMOOTHING, bridge_s, resampled, smoothed
 from glovecal_models.effects.base.assessment import Assessment
@@ -25,6 +26,7 @@ def share_left_by_decoy(
     effect: Effect,
     rotations: Sequence[str],
     cancelled: Callable[[], bool] | None = None,
+    limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
 ) -> float | None:
     """Of the RMSE of ``rotations`` on takes left out, at most 1; None when the takes cannot judge it.
 
@@ -42,7 +44,7 @@ def share_left_by_decoy(
     even = [smoothed(resampled(take, model.layout.sensors, joints, bridge), SMOOTHING) for take in takes]
     known = [item for item in known_effects(model) if item.effect.name != effect.name]
     linear = model.method in ("raw", "linear")
-    direction = forward(even, model.layout, joints, linear=linear, known=known)
+    direction = forward(even, model.layout, joints, linear=linear, known=known, limits=limits)
     found, _ = assessed(direction, [effect], np.random.default_rng(0), set(), said)
     judged = next((item for item in found if item.effect == effect.name), None)
     return None if judged is None else decoy_share(judged, rotations)

@@ -27,6 +27,7 @@ from glovecal_models.improvement.addition import Addition
 from glovecal_models.improvement.baselines import baselines
 from glovecal_models.improvement.control_share import share_in
 from glovecal_models.improvement.improvement import Improvement, Step, added_document
+from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 from glovecal_models.improvement.proposals import Proposed, repairs, widenings
 from glovecal_models.improvement.pruning import pruned
 from glovecal_models.improvement.step_errors import step_errors
@@ -34,11 +35,6 @@ from glovecal_models.improvement.take_warnings import only_take_sentence, take_w
 from glovecal_models.improvement.walk_ending import closing_sentences, why_stopped
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
-
-FIRST_GAIN, LATER_GAIN = 0.05, 0.10
-"""Of the held-out RMSE of the touched rotations; a second effect must earn more."""
-MOST_UNDONE = 2
-"""After so many that did not help the walk ends."""
 
 
 def improve(
@@ -51,6 +47,7 @@ def improve(
     max_steps: int = 6,
     seed: int = 0,
     take_hashes: Sequence[str] = (),
+    limits: ImprovementLimits = IMPROVEMENT_LIMITS,
     cancelled: Callable[[], bool] | None = None,
     report: Report | None = None,
 ) -> Improvement:
@@ -60,7 +57,16 @@ def improve(
     """
     settings = settings or TrainingSettings()
     walk = _Walk(
-        takes, layout, subject, settings, tuple(holdout), seed, tuple(take_hashes), cancelled, report
+        takes,
+        layout,
+        subject,
+        settings,
+        tuple(holdout),
+        seed,
+        tuple(take_hashes),
+        limits,
+        cancelled,
+        report,
     )
     walk.start()
     while len(walk.steps) <= max_steps and walk.go_on():
@@ -80,6 +86,7 @@ class _Walk:
         holdout: tuple[Take, ...],
         seed: int,
         hashes: tuple[str, ...],
+        limits: ImprovementLimits,
         cancelled: Callable[[], bool] | None,
         report: Report | None,
     ) -> None:
@@ -87,7 +94,7 @@ class _Walk:
         living = living_sensors(layout, takes)
         self.layout = living.layout
         self.holdout, self.seed, self.hashes = holdout, seed, hashes
-        self.cancelled, self.report = cancelled, report
+        self.limits, self.cancelled, self.report = limits, cancelled, report
         self.steps: list[Step] = []
         self.undone: list[Addition] = []
         alone = only_take_sentence(self.takes)
@@ -114,7 +121,7 @@ class _Walk:
         self.errors = self._held_out(model)
         self._step(model, None)
         found = residuals(model, self.takes)
-        noise = rotation_noise(found, seed=self.seed)
+        noise = rotation_noise(found, seed=self.seed, limits=self.limits.comparison)
         self.floors = {name: item.floor for name, item in noise.items() if item.floor is not None}
 
     def go_on(self) -> bool:
@@ -130,7 +137,8 @@ class _Walk:
         floors = {name: floor.floor_deg for name, floor in self.floors.items()}
         self.diagnosis = diagnose(
             takes, self.layout, linear=self.settings.method in ("raw", "linear"), known=known_effects(model),
-            noise_floor_deg=floors, seed=self.seed, cancelled=self.cancelled,
+            noise_floor_deg=floors, seed=self.seed, limits=self.limits.diagnosis,
+            cancelled=self.cancelled,
         )  # fmt: skip
         tried = self._tried
         for item in self.diagnosis.naming.ranked:
@@ -145,7 +153,7 @@ class _Walk:
                 return True
             self.stopped = "not_better"
             tried.add(item.effect)
-            if len(tried) > MOST_UNDONE:
+            if len(tried) > self.limits.most_undone:
                 return False
         if tried:
             return self._add_widenings()
@@ -154,7 +162,9 @@ class _Walk:
 
     def finished(self) -> Improvement:
         """Sum up."""
-        self.stopped = why_stopped(self.stopped, self.steps, self.floors, self.diagnosis)
+        self.stopped = why_stopped(
+            self.stopped, self.steps, self.floors, self.diagnosis, self.limits.comparison
+        )
         if self.diagnosis is not None:
             self.sentences[:0] = self.diagnosis.reference_problems
             self.sentences += closing_sentences(self.diagnosis, self.steps[-1], self.floors)
@@ -183,12 +193,13 @@ class _Walk:
         concerned = set((constants or {}).get("where", chosen))
         judged = [item for item in chosen if item in concerned]
         self._say(f"adding {name}", 0.2 + 0.12 * len(self.steps))
-        least = LATER_GAIN if any(step.added for step in self.steps) else FIRST_GAIN
+        is_later = any(step.added for step in self.steps)
+        least = self.limits.later_gain if is_later else self.limits.least_gain
         addition = add_effect(
             model, self.takes, name, rotations=chosen, constants=constants, settings=self.settings,
             before=self.errors.of(chosen), judged=judged, least_gain=least,
             decoy_share=share_in(diagnosis, name, chosen), take_hashes=self.hashes,
-            cancelled=self.cancelled,
+            limits=self.limits, cancelled=self.cancelled,
         )  # fmt: skip
         self.sentences.append(addition.sentence)
         if not addition.added:
@@ -196,7 +207,7 @@ class _Walk:
             return False
         self.errors = self.errors.with_those_of(addition.after)
         model, self.errors, told = pruned(
-            addition, self.takes, self.errors, self.settings, self.hashes, self.cancelled
+            addition, self.takes, self.errors, self.settings, self.hashes, self.cancelled, self.limits
         )
         self.sentences += told
         self._step(model, added_document(addition, constants, diagnosis), diagnosis)

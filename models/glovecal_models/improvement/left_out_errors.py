@@ -16,8 +16,7 @@ from glovecal_models.calibration.wanted_effect import WantedEffect
 from glovecal_models.calibration.widening import Widening
 from glovecal_models.effects.base.interval_effect import LeftOutErrors
 from glovecal_models.errors import BadInput
-
-FEWEST_TAKES = 3
+from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 
 
 def left_out_errors(
@@ -26,13 +25,15 @@ def left_out_errors(
     wanted: Sequence[WantedEffect],
     settings: TrainingSettings,
     *,
+    limits: ImprovementLimits = IMPROVEMENT_LIMITS,
     cancelled: Callable[[], bool] | None = None,
 ) -> tuple[LeftOutErrors, ...]:
-    """One for each rotation and take. Raises BadInput for fewer than three takes, NotTrainable, Cancelled."""
-    if len(takes.takes) < FEWEST_TAKES:
+    """One for each rotation and take. Raises BadInput for too few takes, NotTrainable, Cancelled."""
+    fewest = limits.claim_fewest_takes
+    if len(takes.takes) < fewest:
         raise BadInput(
             f"how far the claimed interval is wrong shows on takes left out; {len(takes.takes)} were given, "
-            f"{FEWEST_TAKES} are needed"
+            f"{fewest} are needed"
         )
     found: list[LeftOutErrors] = []
     for fold in folds_over_takes(np.arange(len(takes.takes)), max(settings.folds, 2)):

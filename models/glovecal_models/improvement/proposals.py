@@ -10,6 +10,7 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.known_effect import known_effects
+from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.pose_labels import are_pose_labels
 from glovecal_models.diagnosis.signatures import are_held_levels, own_sensors, static_errors
 from glovecal_models.effects.base.signature_effect import Proposal, Recorded, SignatureEffect
@@ -55,6 +56,7 @@ def proposed(
     effect: SignatureEffect,
     rotations: Sequence[str] | None,
     cancelled: Callable[[], bool] | None = None,
+    limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
 ) -> Proposal:
     """What is found of ``effect`` in ``takes``, as it would be added on ``rotations`` (None: where it is
     found). Raises BadInput when nothing is found, Cancelled."""
@@ -64,7 +66,7 @@ def proposed(
     repaired = repaired_takes(takes, others)
     found = effect.proposed(recorded(model, repaired))
     if found is None and effect.stage == "compared":
-        found = _by_comparison(model, repaired, effect, cancelled)
+        found = _by_comparison(model, repaired, effect, cancelled, limits)
     if found is None:
         raise BadInput(f"effect {effect.name!r}: nothing of it is found in these {len(takes)} takes")
     return found
@@ -95,6 +97,7 @@ def _by_comparison(
     takes: Sequence[Take],
     effect: SignatureEffect,
     cancelled: Callable[[], bool] | None,
+    limits: DiagnosisLimits,
 ) -> Proposal | None:
     found = diagnose(
         takes,
@@ -103,6 +106,7 @@ def _by_comparison(
         known=[item for item in known_effects(model) if item.effect.name not in (effect.name, *effect.alike)],
         effects=[effect],
         signatures=False,
+        limits=limits,
         cancelled=cancelled,
     )
     assessed = next((item for item in found.assessments if item.effect == effect.name), None)

@@ -13,10 +13,8 @@ from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.relearned import columnless_effects
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput
+from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 from glovecal_models.takes.take import Take
-
-NEEDLESS = 1.02
-"""An effect without which the held-out error rises by no more than this factor is not needed."""
 
 
 def unneeded(
@@ -26,13 +24,14 @@ def unneeded(
     now: HeldOutErrors,
     settings: TrainingSettings | None = None,
     cancelled: Callable[[], bool] | None = None,
+    limits: ImprovementLimits = IMPROVEMENT_LIMITS,
 ) -> HeldOutErrors | None:
     """The errors without effect ``name`` where it is not needed on the rotations of ``now``, else None."""
     settings = settings_of(model, settings)
     wanted = [item for item in wanted_of(model) if item.name != name]
     prepared = PreparedTakes.of(repaired_takes(takes, wanted), model.layout)
     without = held_out_errors(prepared, tuple(now.square), wanted, settings, cancelled=cancelled)
-    return without if without.over_all_deg <= NEEDLESS * now.over_all_deg else None
+    return without if without.over_all_deg <= limits.needless_times * now.over_all_deg else None
 
 
 def remove_effect(

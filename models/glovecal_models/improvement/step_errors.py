@@ -8,11 +8,11 @@ import numpy as np
 
 from glovecal_models.calibration.held_out_check import HeldOutErrors
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.comparison.at_floor import is_at_floor as is_one_at_floor
 from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.takes.take import Take
-
-AT_FLOOR = 1.15
 
 
 def step_errors(
@@ -30,9 +30,11 @@ def step_errors(
     return each, float(np.sqrt(np.nanmean(error**2)))
 
 
-def is_at_floor(rmse_deg: Mapping[str, float], floors: Mapping[str, NoiseFloor]) -> bool:
+def is_at_floor(
+    rmse_deg: Mapping[str, float],
+    floors: Mapping[str, NoiseFloor],
+    limits: ComparisonLimits = COMPARISON_LIMITS,
+) -> bool:
     """Whether every rotation whose floor is known is at it; False when none is."""
     pairs = [(rmse_deg[name], floor) for name, floor in floors.items() if name in rmse_deg]
-    return bool(pairs) and all(
-        not floor.is_lower_bound and error <= AT_FLOOR * floor.high_deg for error, floor in pairs
-    )
+    return bool(pairs) and all(is_one_at_floor(error, floor, limits) for error, floor in pairs)

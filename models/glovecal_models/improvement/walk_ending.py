@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.diagnosis_document import not_judgeable_sentences, nothing_named_sentence
 from glovecal_models.diagnosis.hold_drift_document import hold_sentence
@@ -15,7 +16,11 @@ from glovecal_models.improvement.what_stays import repeats_sentence, what_stays
 
 
 def why_stopped(
-    stopped: str, steps: Sequence[Step], floors: Mapping[str, NoiseFloor], diagnosis: Diagnosis | None
+    stopped: str,
+    steps: Sequence[Step],
+    floors: Mapping[str, NoiseFloor],
+    diagnosis: Diagnosis | None,
+    limits: ComparisonLimits = COMPARISON_LIMITS,
 ) -> str:
     """``stopped`` so far ("nothing_named" or "not_better"), or what says more about the end."""
     held = diagnosis.hold_drift if diagnosis else None
@@ -23,7 +28,7 @@ def why_stopped(
         return "ambiguous" if len(held.confidence_set) > 1 else "nothing_named"
     # Errors against a wrong reference, and their floor, mean nothing.
     doubtful = diagnosis is not None and bool(diagnosis.reference_problems)
-    if not doubtful and is_at_floor(steps[-1].per_rotation, floors):
+    if not doubtful and is_at_floor(steps[-1].per_rotation, floors, limits):
         return "noise_floor"
     added = [step.added for step in steps if step.added is not None]
     undecided = diagnosis is not None and len(diagnosis.naming.confidence_set) > 1

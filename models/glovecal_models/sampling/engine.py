@@ -13,20 +13,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from glovecal_models.sampling import speech
+from glovecal_models.sampling.limits import SAMPLING_LIMITS, SamplingLimits
 from glovecal_models.sampling.protocol import COUNTDOWN_S, SETTLE_S, Protocol
-from glovecal_models.sampling.reading import STILL_PERCENT, ActiveRanges, GloveReading
+from glovecal_models.sampling.reading import ActiveRanges, GloveReading
 from glovecal_models.sampling.state import OVER, RUNNING, Attempt, Choose, SamplingState, Trigger
 from glovecal_models.sampling.user_events import NotNow, UserEvents
 from glovecal_models.sampling.verdict import TouchCheck, verdict
 
-LOST_AFTER_S = 1.0
-BACK_AFTER_S = 0.3
-SETTLE_PATIENCE_S = 8.0
 TIMER_S = 3.0
 GESTURE_STILL_S = 1.0
 SHOWN_S = 0.6
 """A good verdict is shown for so long."""
-MOVING_PERCENT = 3 * STILL_PERCENT
 
 
 def begin_sampling(
@@ -54,8 +51,9 @@ class Sampling(UserEvents):
         *,
         touch_check: TouchCheck | None = None,
         choose: Choose | None = None,
+        limits: SamplingLimits = SAMPLING_LIMITS,
     ) -> None:
-        super().__init__(state)
+        super().__init__(state, limits)
         self._touch_check = touch_check
         self._choose = choose
         self._heard_since_s: float | None = None
@@ -78,14 +76,14 @@ class Sampling(UserEvents):
 
     @property
     def steadiness_percent(self) -> float | None:
-        """How far the hand moved in the last half second; still is ``STILL_PERCENT`` or less."""
+        """How far the hand moved in the last half second; still is ``still_percent`` or less."""
         return self._recent.percent(SETTLE_S, self._ranges)
 
     def frame(self, now_s: float, reading: GloveReading) -> None:
         """One frame, in the order they came; ones of another length are left out."""
         if self.state.phase in OVER or len(reading.values) != len(self.state.sensors):
             return
-        silent = self._heard_s is None or now_s - self._heard_s > BACK_AFTER_S
+        silent = self._heard_s is None or now_s - self._heard_s > self.limits.back_after_s
         self._heard_since_s = now_s if silent else self._heard_since_s
         self._heard_s = now_s
         pressed, self._button = reading.button and not self._button, reading.button
@@ -130,25 +128,26 @@ class Sampling(UserEvents):
 
     def _is_lost(self, now_s: float) -> bool:
         since = self.state.since_s if self._heard_s is None else max(self._heard_s, 0.0)
-        return now_s - since > LOST_AFTER_S
+        return now_s - since > self.limits.lost_after_s
 
     def _wait_for_glove(self, now_s: float) -> None:
         heard, since = self._heard_s, self._heard_since_s
-        if heard is None or since is None or now_s - heard > BACK_AFTER_S:
+        if heard is None or since is None or now_s - heard > self.limits.back_after_s:
             return
-        if heard - since >= BACK_AFTER_S:
+        if heard - since >= self.limits.back_after_s:
             self._ask(now_s, speech.BACK)
 
     def _maybe_begin(self, now_s: float, waited: float) -> None:
         percent = self._recent.percent(SETTLE_S, self._ranges)
-        self._recent.moved |= percent is not None and percent > MOVING_PERCENT
+        moving = self.limits.moving_times_still * self.limits.still_percent
+        self._recent.moved |= percent is not None and percent > moving
         step, trigger = self.state.now(), self.state.trigger
         if trigger == "timer" and waited >= TIMER_S:
             self._enter("countdown", now_s, speech.COUNTDOWN)
         by_hand = trigger == "still" and step.motion == "hold" and not step.needs
         if by_hand and self._recent.moved and self.recording is not None:
             still = self._recent.percent(GESTURE_STILL_S, self._ranges)
-            if still is not None and still <= STILL_PERCENT:
+            if still is not None and still <= self.limits.still_percent:
                 self._record(now_s)
 
     def _after_countdown(self, now_s: float) -> None:
@@ -160,10 +159,10 @@ class Sampling(UserEvents):
 
     def _maybe_settled(self, now_s: float, waited: float) -> None:
         percent = self.steadiness_percent if waited >= SETTLE_S else None
-        if percent is not None and percent <= STILL_PERCENT:
+        if percent is not None and percent <= self.limits.still_percent:
             self._leave(now_s)
             self._record(now_s)
-        elif waited > SETTLE_PATIENCE_S:
+        elif waited > self.limits.settle_timeout_s:
             self._leave(now_s)
             moving = "no frames to judge by" if percent is None else f"{percent:.0f} % of a sensor's range"
             self._judged(now_s, Attempt(
@@ -185,9 +184,11 @@ class Sampling(UserEvents):
     def _maybe_recorded(self, now_s: float) -> None:
         over = now_s - self.state.since_s >= self.state.now().seconds
         # A glove that fell silent may be lost: that verdict comes first.
-        if over and self._heard_s is not None and now_s - self._heard_s <= BACK_AFTER_S:
+        if over and self._heard_s is not None and now_s - self._heard_s <= self.limits.back_after_s:
             readings = self._leave(now_s)
-            attempt = verdict(self.state, readings, self._ranges, self.recording or "", self._touch_check)
+            attempt = verdict(
+                self.state, readings, self._ranges, self.recording or "", self._touch_check, self.limits
+            )
             self.state.ranges = self._ranges.to_document()
             self._judged(now_s, attempt)
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from glovecal_models.quick_check import held_poses
-from glovecal_models.quick_check.held_poses import BLOCK_S, STILL_SHARE
+from glovecal_models.quick_check.held_poses import BLOCK_S
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -29,8 +29,6 @@ class GloveReading:
     button: bool = False
 
 
-STILL_PERCENT = 100 * STILL_SHARE
-"""Of the active range: what moves less is still."""
 FEW_BLOCKS = 3
 NOISE_SPAN = 3.5
 """From lowest to highest of a dozen means that only noise moves, in their standard deviations."""

@@ -7,6 +7,7 @@ from typing import Literal, get_args
 
 from glovecal_models.errors import BadInput
 from glovecal_models.sampling import speech
+from glovecal_models.sampling.limits import SAMPLING_LIMITS, SamplingLimits
 from glovecal_models.sampling.protocol import Protocol, Step
 from glovecal_models.sampling.quality import moved_since_start
 from glovecal_models.sampling.reading import ActiveRanges, GloveReading, RecentReadings
@@ -17,8 +18,8 @@ from glovecal_models.sampling.steps import WIDEST_DEG
 class Transitions:
     """What happens to one ``state``. Times are seconds of one clock that does not go back."""
 
-    def __init__(self, state: SamplingState) -> None:
-        self.state = state
+    def __init__(self, state: SamplingState, limits: SamplingLimits = SAMPLING_LIMITS) -> None:
+        self.state, self.limits = state, limits
         self.recording: str | None = ""
         """Name of the recording that the frames are written to; marked in each attempt. None: nobody writes
         them now, and no step is recorded until somebody does."""
@@ -55,7 +56,7 @@ class Transitions:
         self._enter("waiting", now_s, f"{said} {asked}".strip())
 
     def _end(self, phase: Phase, now_s: float, said: str) -> None:
-        self.state.sentences = moved_since_start(self.state, self._ranges)
+        self.state.sentences = moved_since_start(self.state, self._ranges, self.limits)
         self._recent.forget()
         self._enter(phase, now_s, said)
 

@@ -10,6 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
+from glovecal_models.sampling.limits import SAMPLING_LIMITS, SamplingLimits
 from glovecal_models.sampling.protocol import Step
 from glovecal_models.sampling.quality import faults, missing_frames
 from glovecal_models.sampling.reading import ActiveRanges, GloveReading, block_means
@@ -36,6 +37,7 @@ def verdict(
     ranges: ActiveRanges,
     recording: str,
     touch_check: TouchCheck | None = None,
+    limits: SamplingLimits = SAMPLING_LIMITS,
 ) -> Attempt:
     """The attempt at the step that ``state`` stands at. ``ranges`` learn from good frames."""
     step = state.now()
@@ -47,7 +49,7 @@ def verdict(
         attempt.means = dict(zip(state.sensors, means.tolist(), strict=True))
     if step.kind == "range":
         _widen(ranges, readings)
-    attempt.reasons = faults(step, readings, state.sensors, ranges, _flat(state))
+    attempt.reasons = faults(step, readings, state.sensors, ranges, _flat(state), limits)
     if readings:
         percent = 100 * np.ptp([reading.values for reading in readings], axis=0) / ranges.span
         attempt.moved_percent = float(percent.max())
@@ -55,7 +57,7 @@ def verdict(
         attempt.kept = kept_readings(step, readings)
     if not attempt.reasons:
         _widen(ranges, readings)
-        attempt.reasons = _contradictions(state, readings, ranges, attempt, touch_check)
+        attempt.reasons = _contradictions(state, readings, ranges, attempt, touch_check, limits)
     attempt.outcome = "bad" if attempt.reasons else "good"
     if touch_check is not None and attempt.outcome == "good":
         touch_check.learn(state, step, readings)
@@ -72,13 +74,14 @@ def _contradictions(
     ranges: ActiveRanges,
     attempt: Attempt,
     touch_check: TouchCheck | None,
+    limits: SamplingLimits,
 ) -> tuple[str, ...]:
     """What only the other steps, or inverse kinematics, can tell."""
     step, sentence = state.now(), None
     if step.kind == "fk_cross_couple":
         attempt.response = response(step, readings, state.sensors, ranges)
         (rotation,) = step.angles
-        sentence = inconsistent_widgets(rotation, _responses(state, rotation, attempt))
+        sentence = inconsistent_widgets(rotation, _responses(state, rotation, attempt), limits)
     elif step.touches and touch_check is not None:
         sentence = touch_check.why_not(state, step, readings)
     return (sentence,) if sentence else ()
@@ -104,12 +107,6 @@ def _flat(state: SamplingState) -> dict[str, float] | None:
     return None
 
 
-FEWEST = 3
-"""Two angles always agree."""
-ALLOWED_STEP = 0.7
-"""Of the smallest step between widgets: no sensor is quite straight."""
-
-
 def response(
     step: Step, readings: Sequence[GloveReading], sensors: Sequence[str], ranges: ActiveRanges
 ) -> float | None:
@@ -129,23 +126,25 @@ def response(
     return float(np.linalg.solve(design.T @ design + ridge, design.T @ means[:, own])[0])
 
 
-def inconsistent_widgets(rotation: str, responses: Mapping[float, float]) -> str | None:
+def inconsistent_widgets(
+    rotation: str, responses: Mapping[float, float], limits: SamplingLimits = SAMPLING_LIMITS
+) -> str | None:
     """A sentence when the readings by angle (degrees) contradict each other, else None.
 
     With four widgets the one that is wrong can be named: without it the others lie on a line.
     """
-    if len(responses) < FEWEST:
+    if len(responses) < limits.widget_fewest:
         return None
     angles = np.array(sorted(responses))
     reading = np.array([responses[angle] for angle in angles.tolist()])
     rises = np.diff(reading)
     monotone = bool((rises > 0).all() or (rises < 0).all())
-    if len(angles) == FEWEST:
+    if len(angles) == limits.widget_fewest:
         return None if monotone else _contradiction(rotation, angles)
     told = [_told_by_others(angles, reading, place) for place in range(len(angles))]
     place = min(range(len(angles)), key=lambda at: told[at][1])
     says = told[place][0]
-    if monotone and abs(says - angles[place]) <= ALLOWED_STEP * float(np.diff(angles).min()):
+    if monotone and abs(says - angles[place]) <= limits.widget_step_share * float(np.diff(angles).min()):
         return None
     if not np.isfinite(says):
         return _contradiction(rotation, angles)

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 
+from glovecal_models.comparison.at_floor import reaches_floor
 from glovecal_service.report.drawing import DECOY, FLOOR, MODEL, QUIET, svg
 
-AT_FLOOR = 1.15
-"""An error of up to so many times the floor's upper end is at the floor."""
 WIDE_RANGE = 15.0
 """From this ratio of the largest to the smallest error the axis is logarithmic."""
 
@@ -103,7 +102,7 @@ def fall_sentence(falls: Sequence[Fall], band: FloorBand | None) -> str:
             told += f"; the last effect's decoy would leave {last.decoy_rmse_deg:.2f}"
     if band is None:
         return f"{told}. How small it can get on these takes is not known."
-    reached = last.rmse_deg <= AT_FLOOR * band.high_deg
+    reached = reaches_floor(last.rmse_deg, band.high_deg)
     rest = "it is reached" if reached else f"{last.rmse_deg - band.floor_deg:.2f} degrees are left above it"
     return f"{told}. The noise floor is {band.floor_deg:.2f}: {rest}."
 

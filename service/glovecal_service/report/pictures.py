@@ -10,10 +10,8 @@ from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 from glovecal_models.comparison.stretches import windows
 from glovecal_models.comparison.structure import Dependence
 from glovecal_models.comparison.where_it_fails import (
-    STRUCTURE_PROBABILITY,
     RotationFindings,
     WhereItFails,
-    is_structure,
 )
 from glovecal_service.report.drawing import FLOOR, MEASURED, MODEL, QUIET, figure_svg, svg
 
@@ -78,7 +76,7 @@ def _place(name: str) -> tuple[int, bool]:
 
 def _cells(item: RotationFindings) -> dict[str, tuple[float, bool]]:
     """For each column of the heat map: degrees explained, and whether that is no noise."""
-    cells = {one.covariate: (one.explained_deg, is_structure(one, item.rmse_deg)) for one in item.dependences}
+    cells = {one.covariate: (one.explained_deg, item.is_structure(one)) for one in item.dependences}
     if item.wearings is not None:
         cells["wearing"] = (item.wearings.spread_deg, item.wearings.is_no_noise)
     return cells
@@ -136,9 +134,9 @@ def error_against(item: RotationFindings, one: Dependence) -> tuple[str, str]:
 
 
 def _verdict(item: RotationFindings, one: Dependence) -> str:
-    if is_structure(one, item.rmse_deg):
+    if item.is_structure(one):
         return "this is structure"
-    if one.probability <= STRUCTURE_PROBABILITY:
+    if one.probability <= item.limits.structure_p_value:
         return f"structure, but little of {item.rmse_deg:.1f} degrees"
     return "it may be noise"
 

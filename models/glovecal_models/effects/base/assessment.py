@@ -10,18 +10,7 @@ from typing import Any
 import numpy as np
 
 from glovecal_models.effects.base.facts import BETWEEN_TAKES, Certainty
-
-LEAST_CONTRAST = 0.04
-"""Share of the squared error a cause must save beyond its decoy."""
-LEAST_SESSION_CONTRAST = 0.12
-"""The same for causes that change from take to take: there are few takes."""
-JOINT_PROBABILITY = 0.002
-POOLED_PROBABILITY = 0.001
-FEWEST_BLOCKS = 9
-CLEAR_CONTRAST = 0.25
-"""Causes that change from take to take save 0.46 and more at 1.3 noise floors, donnings of real ankles 0.26;
-healthy gloves 0.21 at most."""
-
+from glovecal_models.effects.base.limits import SIGNIFICANCE_LIMITS, SignificanceLimits
 
 BLOCK_ROWS = 125
 """5 s of the rows that are fitted."""
@@ -83,6 +72,7 @@ class Assessment:
     """Names of the shape's numbers, units included."""
     certainty: Certainty = BETWEEN_TAKES
     """Asked of ``probability``."""
+    limits: SignificanceLimits = SIGNIFICANCE_LIMITS
 
     def shape_described(self, joint: int) -> dict[str, float]:
         """The shape of one joint by its numbers' names."""
@@ -93,24 +83,29 @@ class Assessment:
         """Joints on which the effect saves error beyond chance."""
         if self.probability is not None:
             return self._touched_by_session(self.probability)
+        limits = self.limits
+        fewest, least = limits.fewest_blocks, limits.least_share
         some = {
             i
             for i, item in enumerate(self.errors)
-            if item.contrast >= LEAST_CONTRAST
-            and signed_rank(item.beyond_decoy) <= JOINT_PROBABILITY / max(1, len(self.errors) / 5)
+            if item.contrast >= least
+            and signed_rank(item.beyond_decoy, fewest) <= limits.joint_p_value / max(1, len(self.errors) / 5)
         }
-        together = [i for i, item in enumerate(self.errors) if item.contrast >= 0.5 * LEAST_CONTRAST]
+        together = [i for i, item in enumerate(self.errors) if item.contrast >= 0.5 * least]
         if len(together) > 1:
             pooled = pooled_errors(self.errors)
-            if pooled.contrast >= LEAST_CONTRAST and signed_rank(pooled.beyond_decoy) <= POOLED_PROBABILITY:
+            chance = signed_rank(pooled.beyond_decoy, fewest)
+            if pooled.contrast >= least and chance <= limits.pooled_p_value:
                 some.update(together)
         return tuple(sorted(some))
 
     def _touched_by_session(self, probability: float) -> tuple[int, ...]:
         largest = max((item.contrast for item in self.errors), default=0.0)
-        if probability > (self.certainty.clear if largest >= CLEAR_CONTRAST else self.certainty.faint):
+        is_clear = largest >= self.limits.clear_share
+        if probability > (self.certainty.clear if is_clear else self.certainty.faint):
             return ()
-        return tuple(i for i, item in enumerate(self.errors) if item.contrast >= LEAST_SESSION_CONTRAST)
+        least = self.limits.least_session_share
+        return tuple(i for i, item in enumerate(self.errors) if item.contrast >= least)
 
     @property
     def saved_square(self) -> float:
@@ -139,9 +134,10 @@ def squared_in_blocks(residual: Sequence[np.ndarray], starts: np.ndarray) -> np.
     return np.add.reduceat(np.concatenate(residual) ** 2, starts)
 
 
-def signed_rank(values: np.ndarray) -> float:
-    """One-sided Wilcoxon: the probability that values symmetric about zero are so positive."""
-    if len(values) < FEWEST_BLOCKS or not np.any(values):
+def signed_rank(values: np.ndarray, fewest: int = SIGNIFICANCE_LIMITS.fewest_blocks) -> float:
+    """One-sided Wilcoxon: the probability that values symmetric about zero are so positive; 1 for fewer than
+    ``fewest``."""
+    if len(values) < fewest or not np.any(values):
         return 1.0
     from scipy.stats import wilcoxon  # takes a second to load, and every effect imports this file
 

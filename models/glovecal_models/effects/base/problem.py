@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from glovecal_models.effects.base.limits import SignificanceLimits
 from glovecal_models.effects.base.signals import Signals
 
 
@@ -31,6 +32,11 @@ class Problem(Protocol):
         """Each joint's static map of the measured angles: ``units`` (with ``base`` (N, P) and ``target``
         (N,), the joint's own sensor in degrees, of each unit), ``whole`` (P,) coefficients of all units,
         ``residual`` (N,) of each unit when it is held out, ``count`` (U,) rows of each unit."""
+        ...
+
+    @property
+    def limits(self) -> SignificanceLimits:
+        """What assessments of it are held against."""
         ...
 
     def units(self, joint: int) -> Iterator[tuple[int, np.ndarray]]:

@@ -86,10 +86,12 @@ class ClockOffsetEffect(SignatureEffect):
     def assess(self, problem: Problem) -> Assessment:
         """One offset for all joints and, where that pays, one for each take."""
         grids = delay_errors(problem)
-        clock = clock_choice(grids)
+        clock = clock_choice(grids, problem.limits)
         errors = held_out_beside(problem, *clock.errors(grids))
         offsets, nothing = tuple(clock.offset_s for _ in grids), tuple(np.empty(0) for _ in grids)
-        return Assessment(self.name, problem.rotations, errors, offsets, nothing, None, ("offset_s",))
+        return Assessment(
+            self.name, problem.rotations, errors, offsets, nothing, None, ("offset_s",), limits=problem.limits
+        )
 
     def told_from_alikes(self, problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]]:
         return first_delay(problem)

@@ -14,17 +14,12 @@ from typing import Literal
 import numpy as np
 
 from glovecal_models.effects.base.assessment import over_joints
+from glovecal_models.effects.base.limits import SIGNIFICANCE_LIMITS, SignificanceLimits
 from glovecal_models.effects.base.problem import Problem
 from glovecal_models.effects.delay.delay_grid import DelayErrors, delay_errors
 
 SMOOTHING, SHAPE_SMOOTHING = 13, 25
 """Even times. With 13 a low pass still gains by taking noise from the reference: 4 standard errors."""
-CLEAR = 3.0
-"""Standard errors of a decision."""
-MIDDLE = 1.5
-"""On simulated gloves with 25 ms: clock offsets reach -3 to 2, lags 0 to 10."""
-PER_TAKE_GAIN = 0.02
-"""Share of the error without any offset that offsets of each take must save beyond a common one."""
 
 LAG, CLOCK = "lag", "clock_offset"
 DelayKind = Literal["lag", "clock_offset", "either"]
@@ -54,7 +49,9 @@ class ClockChoice:
         return true, mirrored
 
 
-def clock_choice(grids: Sequence[DelayErrors]) -> ClockChoice:
+def clock_choice(
+    grids: Sequence[DelayErrors], limits: SignificanceLimits = SIGNIFICANCE_LIMITS
+) -> ClockChoice:
     """One offset for all takes, unless their own save clearly more (each judged on other blocks)."""
     clock, takes = grids[0].clock, int(max(grid.take.max() for grid in grids)) + 1
     share = [grid.blocks[:, clock] / grid.whole for grid in grids]
@@ -68,7 +65,7 @@ def clock_choice(grids: Sequence[DelayErrors]) -> ClockChoice:
     own = np.array([int(np.argmin(row)) if row.any() else common for row in each])
     gain = each.sum(axis=0)[common] - _judged_on_other_blocks(share, grids, takes, common)
     delays = grids[0].cells[clock, 0]
-    if takes > 1 and gain > PER_TAKE_GAIN * len(grids):
+    if takes > 1 and gain > limits.per_take_offset_share * len(grids):
         return ClockChoice(delays[own], own)
     return ClockChoice(delays[[common]], np.full(takes, common))
 
@@ -91,35 +88,40 @@ def _judged_on_other_blocks(
 
 def first_delay(problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]]:
     """The delay to be named first, and all that remain possible; ``problem`` by the rows smoothed over."""
-    kind, score = delay_kind(delay_errors(problem(SMOOTHING)), delay_errors(problem(SHAPE_SMOOTHING)))
+    usual, strongly = problem(SMOOTHING), problem(SHAPE_SMOOTHING)
+    limits = usual.limits
+    kind, score = delay_kind(delay_errors(usual), delay_errors(strongly), limits)
     if kind != "either":
         return kind, (kind,)
-    return (LAG, (LAG, CLOCK)) if score > MIDDLE else (CLOCK, (CLOCK, LAG))
+    return (LAG, (LAG, CLOCK)) if score > limits.delay_middle_se else (CLOCK, (CLOCK, LAG))
 
 
 def delay_kind(
-    grids: Sequence[DelayErrors], strongly_smoothed: Sequence[DelayErrors]
+    grids: Sequence[DelayErrors],
+    strongly_smoothed: Sequence[DelayErrors],
+    limits: SignificanceLimits = SIGNIFICANCE_LIMITS,
 ) -> tuple[DelayKind, float]:
-    """The kind, and a score in standard errors: above ``MIDDLE`` speaks for lag.
+    """The kind, and a score in standard errors: above ``delay_middle_se`` speaks for lag.
 
     ``grids`` are those of ``SMOOTHING``, the others of ``SHAPE_SMOOTHING``.
     """
-    clock = clock_choice(grids)
+    clear = limits.delay_clear_se
+    clock = clock_choice(grids, limits)
     if np.median(clock.offset_s) <= 0:
         return "clock_offset", -np.inf
     if clock.is_per_take:
-        return "clock_offset", -CLEAR
+        return "clock_offset", -clear
     cells = grids[0].clock
     takes = [grid.take for grid in grids]
     own = [grid.blocks[:, cells[np.argmin(grid.blocks[:, cells].sum(axis=0))]] / grid.whole for grid in grids]
     shared = [grid.blocks[:, cells[clock.cell[0]]] / grid.whole for grid in grids]
     differ = _score(over_joints(shared, takes), over_joints(own, takes))
     shape = _shape_score(strongly_smoothed)
-    if differ > 2 * CLEAR and shape > -CLEAR:
+    if differ > 2 * clear and shape > -clear:
         return "lag", differ
-    if shape > CLEAR:
+    if shape > clear:
         return "lag", shape
-    if shape < -CLEAR + MIDDLE:
+    if shape < -clear + limits.delay_middle_se:
         return "clock_offset", shape
     return "either", shape
 

@@ -60,7 +60,9 @@ class Lag(ArrayStateEffect):
         errors = held_out_beside(problem, right, control)
         taus = tuple(np.array([grid.cells[cell, 1]]) for grid, cell in zip(grids, lags, strict=True))
         nothing = tuple(np.empty(0) for _ in grids)
-        return Assessment(self.name, problem.rotations, errors, taus, nothing, None, ("tau_s",))
+        return Assessment(
+            self.name, problem.rotations, errors, taus, nothing, None, ("tau_s",), limits=problem.limits
+        )
 
     def told_from_alikes(self, problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]]:
         return first_delay(problem)

@@ -24,6 +24,7 @@ from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.sampling.active.known_readings import known_from_state, known_from_takes
 from glovecal_models.sampling.active.proposal import Proposal, ProposedStep, gain_sentence, propose
 from glovecal_models.sampling.catalogue import Equipment, steps_for_layout
+from glovecal_models.sampling.limits import SAMPLING_LIMITS, SamplingLimits
 from glovecal_models.sampling.protocol import Step
 from glovecal_models.sampling.state import NextSteps, SamplingState
 from glovecal_models.sampling.steps import (
@@ -108,8 +109,6 @@ def _widgets(layout: Layout, own: Equipment) -> list[Step]:
     return [replace(step, seconds=CANDIDATE_MOVE_S) for step in steps]
 
 
-LONGEST_CAPTURE_S = 240.0
-"""Not longer than the fixed protocol, whatever is still to be gained."""
 MOST_SKIPPED = 2
 """Steps of one part that were left out: the person has no such widget, or cannot do it."""
 
@@ -117,16 +116,16 @@ MOST_SKIPPED = 2
 class NextStep:
     """Chooses for a sampling from its state and nothing else, so that one state has one answer."""
 
-    def __init__(self, layout: Layout) -> None:
-        self._layout = layout
+    def __init__(self, layout: Layout, limits: SamplingLimits = SAMPLING_LIMITS) -> None:
+        self._layout, self._limits = layout, limits
 
     def __call__(self, state: SamplingState) -> NextSteps:
         equipment = Equipment.from_document(state.protocol.equipment)
         left = still_possible(candidate_steps(self._layout, equipment), state)
-        if state.capture_s >= LONGEST_CAPTURE_S:
+        if state.capture_s >= self._limits.longest_capture_s:
             return self._ending(f"{state.capture_s:.0f} s of capture are the most that is asked for.")
         try:
-            found = propose(self._layout, known_from_state(state), left)
+            found = propose(self._layout, known_from_state(state), left, limits=self._limits)
         except (BadInput, np.linalg.LinAlgError) as error:
             return self._ending(f"Nothing can be proposed: {error}")
         if found.is_enough:

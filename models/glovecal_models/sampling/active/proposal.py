@@ -26,10 +26,9 @@ from glovecal_models.sampling.active.known_readings import (
     KnownReadings,
     shared_sd_deg,
 )
+from glovecal_models.sampling.limits import SAMPLING_LIMITS, SamplingLimits
 from glovecal_models.sampling.protocol import Step, step_capture_s
 
-ENOUGH_DEG = 0.02
-"""A step that lowers the expected error of a frame, noise included, by less is not worth its time."""
 USUAL_RATE_HZ = 60.0
 
 
@@ -60,6 +59,7 @@ class Proposal:
     learned: tuple[str, ...]
     """Rotations whose process comes from a trained model; the others' is assumed."""
     sentences: tuple[str, ...] = field(default=())
+    limits: SamplingLimits = SAMPLING_LIMITS
 
     @property
     def rms_deg(self) -> float:
@@ -67,7 +67,7 @@ class Proposal:
 
     @property
     def is_enough(self) -> bool:
-        return not self.ranked or max(each.error_fall_deg for each in self.ranked) < ENOUGH_DEG
+        return not self.ranked or max(each.error_fall_deg for each in self.ranked) < self.limits.enough_deg
 
     def to_document(self, most: int = 10) -> dict[str, Any]:
         return {
@@ -87,7 +87,7 @@ class Proposal:
         if self.is_enough:
             return (
                 f"Enough: the next step, {best.step.name}, would lower the expected error by less than "
-                f"{ENOUGH_DEG:g} degrees. {self._left()}"
+                f"{self.limits.enough_deg:g} degrees. {self._left()}"
             )
         return f"Next: {best.step.name}. {gain_sentence(best, self)}"
 
@@ -117,6 +117,7 @@ def propose(
     candidates: Sequence[Step],
     *,
     trained: Mapping[str, ProcessRegressor] | None = None,
+    limits: SamplingLimits = SAMPLING_LIMITS,
 ) -> Proposal:
     """Rank ``candidates`` by the expected fall of the error per second.
 
@@ -142,7 +143,7 @@ def propose(
         ranked.append(_proposed(step, now, after, noise))
     ranked.sort(key=lambda each: -each.fall_per_s)
     learned = tuple(name for name, (process, _) in states.items() if process.learned)
-    return Proposal(tuple(ranked), _told_sd_deg(now), noise, learned)
+    return Proposal(tuple(ranked), _told_sd_deg(now), noise, learned, limits=limits)
 
 
 def _state(

@@ -28,6 +28,7 @@ from glovecal_models.inverse_kinematics.touch_check import (
 from glovecal_models.sampling.guided.rotation_belief import RotationBelief
 from glovecal_models.sampling.guided.taught_samples import TaughtTake
 from glovecal_models.sampling.guided.touch_posterior import TouchFrames, TouchPosterior
+from glovecal_models.sampling.limits import SAMPLING_LIMITS, SamplingLimits
 from glovecal_models.takes.take import Take
 
 LOOKED_AT = 60
@@ -110,8 +111,6 @@ def _hand(first: TouchPosterior, readings: np.ndarray) -> PredictedHand:
 
 FRAMES_A_TOUCH = 100
 """Of each touch that the search for the likeliest calibration looks at."""
-MOST_LEFT_MM = 8.0
-"""Between tips under the calibration in which all touches close best; a true touch leaves 1 to 2 mm."""
 
 
 def closing_touches(
@@ -120,19 +119,21 @@ def closing_touches(
     skeleton: Skeleton,
     seen: Sequence[SeenTouch],
     cancelled: Callable[[], bool] | None = None,
+    limits: SamplingLimits = SAMPLING_LIMITS,
 ) -> tuple[TouchPosterior, list[SeenTouch], list[RefusedTouch]]:
     """The likeliest calibration, the touches it rests on, and those that contradict. Raises Cancelled."""
     kept, refused = list(seen), []
+    most = limits.touch_most_left_mm
     while True:
         touches = [touch.some(FRAMES_A_TOUCH) for touch in kept]
         posterior = TouchPosterior(beliefs, sensors, skeleton, touches, cancelled)
         left = [float(np.median(posterior.apart_mm(touch, skeleton))) for touch in touches]
-        if not left or max(left) <= MOST_LEFT_MM:
+        if not left or max(left) <= most:
             return posterior, kept, refused
         strange = kept.pop(int(np.argmax(left)))
         reason = (
             f"with the other touches and poses {max(left):.0f} mm are left between the tips, at most "
-            f"{MOST_LEFT_MM:g} are believed. Repeat the motion with the tips together, or check the hand's "
+            f"{most:g} are believed. Repeat the motion with the tips together, or check the hand's "
             "dimensions"
         )
         brief = f"{max(left):.0f} mm are left between the tips with the other touches."

@@ -8,8 +8,8 @@ from typing import Any
 
 from pydantic import BaseModel, Field
 
+from glovecal_models.sampling.limits import SAMPLING_LIMITS
 from glovecal_models.sampling.protocol import COUNTDOWN_S, SETTLE_S, Kind, Motion
-from glovecal_models.sampling.reading import STILL_PERCENT
 from glovecal_models.sampling.state import Phase, SamplingState, Trigger
 from glovecal_service.store.records import SamplingRecord
 
@@ -54,7 +54,7 @@ class SamplingView(BaseModel):
     steadiness_percent: float | None = Field(
         description="How far the hand moved in the last half second, percent of a sensor's active range."
     )
-    still_percent: float = Field(STILL_PERCENT, description="What is still.")
+    still_percent: float = Field(SAMPLING_LIMITS.still_percent, description="What is still.")
     capture_s: float = Field(description="Spent in countdowns, settling and recording so far.")
     capture_of_s: float = Field(description="What the whole takes of somebody who does every step at once.")
     expected: dict[str, Any] = Field(
@@ -87,7 +87,7 @@ def sampling_view(record: SamplingRecord) -> SamplingView:
         say=state.said,
         say_number=state.said_number,
         steadiness_percent=record.live.get("steadiness_percent"),
-        still_percent=STILL_PERCENT,
+        still_percent=SAMPLING_LIMITS.still_percent,
         capture_s=round(state.capture_s, 2),
         capture_of_s=round(state.protocol.capture_s, 2),
         expected=state.expected,

@@ -1,0 +1,86 @@
+"""When a noise floor is known, when it is reached, and when an error depends on something."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from glovecal_models.limit import limit
+
+_CHOSEN = "Not tuned; chosen."
+
+
+@dataclass(frozen=True)
+class ComparisonLimits:
+    """Of noise floors and of what is said where a model fails."""
+
+    at_floor_times: float = limit(
+        1.15,
+        "times the upper end of the floor's interval",
+        "An error up to this is at the noise floor: nothing is left to gain.",
+        "Not tuned; chosen with the first version (2026-11-21).",
+    )
+    restless_times: float = limit(
+        1.5,
+        "times the reference's noise",
+        "A prediction that jitters by more follows its sensors too closely.",
+        _CHOSEN,
+    )
+    structure_p_value: float = limit(
+        0.005, "p value", "That errors shifted in time depend on a column as much.", _CHOSEN
+    )
+    structure_share: float = limit(
+        0.04,
+        "share of the mean squared error",
+        "A column must explain so much to be worth a user's time.",
+        _CHOSEN,
+    )
+    mostly_bias_share: float = limit(
+        0.6, "share of the RMSE", "A constant error of so much is said to be most of it.", _CHOSEN
+    )
+    wearing_p_value: float = limit(
+        0.05, "p value", "That takes dealt to wearings in other ways differ as much.", "The usual level."
+    )
+    wearing_fewest_deals: int = limit(
+        20,
+        "ways to deal the takes",
+        "With fewer nothing is said of wearings.",
+        "No answer could be better than one in twenty.",
+    )
+
+    still_deg_per_s: float = limit(6.0, "degrees/s", "A joint that moves less over a hold is still.", _CHOSEN)
+    still_share: float = limit(
+        0.1,
+        "share of the sensor's standard deviation",
+        "A sensor that changes by less over a hold is still; the hand is when all are.",
+        _CHOSEN,
+    )
+    shortest_hold_s: float = limit(0.5, "s", "A shorter rest is no hold.", _CHOSEN)
+    settled_s: float = limit(
+        0.2,
+        "s",
+        "The beginning of a hold that is left out.",
+        "Lag and creep are no noise; the value is chosen, not tuned.",
+    )
+    fewest_hold_frames: int = limit(5, "frames", "A hold with fewer is not used.", _CHOSEN)
+    fewest_holds: int = limit(4, "holds", "With fewer there is no floor from holds.", _CHOSEN)
+    fewest_repeats: int = limit(
+        4,
+        "repeats beyond the first of their pose",
+        "With fewer there is no floor from repeated poses.",
+        "The spread would be a guess; the value is chosen, not tuned.",
+    )
+    fewest_blocks: int = limit(
+        4, "blocks of 4 s without a gap", "With fewer there is no floor from the spectrum.", _CHOSEN
+    )
+    fewest_pairs: int = limit(
+        10, "pairs of frames", "With fewer there is no floor from near readings.", _CHOSEN
+    )
+    neighbours_s: float = limit(
+        0.25,
+        "s",
+        "Frames further apart are no neighbours.",
+        "The hand may be anywhere else; the value is chosen, not tuned.",
+    )
+
+
+COMPARISON_LIMITS = ComparisonLimits()

@@ -1,0 +1,203 @@
+"""When a diagnosis names, keeps silent, or says that takes cannot tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from glovecal_models.effects.base.limits import CHOSEN, SignificanceLimits
+from glovecal_models.limit import limit
+
+_CLEAN = "Lower bounds of 150 simulated gloves without a cause"
+_HOLDS = "Not tuned; chosen with the judgement of held poses (2026-11-21)."
+_REFERENCE = "Not tuned; chosen when contradictions between takes were first told (2026-11-21)."
+
+
+@dataclass(frozen=True)
+class DiagnosisLimits(SignificanceLimits):
+    """All limits of a diagnosis, those of its effects included."""
+
+    rival_worse_se: float = limit(
+        2.5,
+        "standard errors",
+        "A rival that leaves so much more error than the first leaves the confidence set.",
+        "Not tuned; chosen with the first version of the diagnosis (2026-11-21).",
+    )
+
+    alike_context_share: float = limit(
+        0.02,
+        "share of the column's range",
+        "Takes whose means of a context column differ by no more count as alike.",
+        CHOSEN,
+    )
+    fewest_takes_of_a_wearing: int = limit(
+        3,
+        "takes",
+        "At least so many are asked for in a further wearing.",
+        "Three wearings of two takes each can be dealt in 15 ways only; a clear p value of 0.04 needs 25.",
+    )
+
+    slow_fewest_stretches: int = limit(
+        5, "stretches of 10 s", "With fewer a slow error is not judged.", CHOSEN
+    )
+    slow_shortest_s: int = limit(4, "s", "A shorter take says nothing of a slow error.", CHOSEN)
+    slow_confidence: float = limit(
+        0.95, "probability", "Of the one-sided lower bound of a slow error.", "The usual level."
+    )
+    slow_least_freedom: float = limit(
+        1.0,
+        "degrees of freedom",
+        "With fewer the mean square itself is all but unknown: nothing is bounded.",
+        "Trials with noise alone (2026-11-22): chi squared with far less than one degree of freedom gave"
+        " bounds that were wrong in up to 50 %; with this limit and distances added in squares in 2 to 5 %.",
+    )
+
+    healthy_deg: float = limit(
+        0.52,
+        "degrees",
+        "A slow error whose lower bound is above this is no healthy glove's.",
+        f"{_CLEAN}: 0.09 to 0.53; with an unknown cause of 1 degree 0.43 and more (2026-11-21). A healthy"
+        " glove slips by 0.4 degrees, forgotten in 25 to 40 s.",
+    )
+    healthy_within_deg: float = limit(
+        0.38,
+        "degrees",
+        "The same within takes, once each take's mean and straight line are taken out.",
+        f"{_CLEAN}: 0.06 to 0.34; with an unknown cause of 1 degree 0.30 and more (2026-11-21).",
+    )
+    healthy_noises: float = limit(
+        3.0,
+        "times the noise",
+        "With a coarse reference more is allowed: so many times what changes from row to row.",
+        CHOSEN,
+    )
+    healthy_within_noises: float = limit(
+        2.5, "times the noise", "The same within takes, and for what joints share.", CHOSEN
+    )
+    healthy_shared_deg: float = limit(
+        0.35, "degrees", "What several joints share is no healthy glove's above this.", CHOSEN
+    )
+    shared_p_value: float = limit(
+        0.01, "p value", "That errors shifted in time against each other have so much in common.", CHOSEN
+    )
+    shared_shortest_s: int = limit(8, "s", "Shorter takes have too few different shifts.", CHOSEN)
+    enough_stretches: int = limit(
+        20, "stretches of 10 s", "With so many a bound that is low is no lack of data.", CHOSEN
+    )
+
+    association_p_value: float = limit(
+        0.02,
+        "p value",
+        "All columns counted; above it no column is listed beside an unexplained error.",
+        "Raised from 0.01 when the two ways to judge columns were corrected apart (2026-11-21).",
+    )
+    association_share: float = limit(
+        0.04, "share of the mean squared error", "A listed column must explain so much.", CHOSEN
+    )
+    association_least_weight: float = limit(
+        0.3,
+        "weight, 0 to 1",
+        "Where the base is less sure, its error says nothing of a column.",
+        CHOSEN,
+    )
+
+    hold_shortest_s: float = limit(
+        8.0,
+        "s",
+        "A shorter hold is not judged.",
+        "It does not show whether a drift slows down.",
+    )
+    hold_moved_share: float = limit(
+        0.05,
+        "share of the sensor's span",
+        "A sensor that changes by more from one second to the next moves.",
+        "Creep begins more slowly; the value is chosen, not tuned.",
+    )
+    hold_same_pose_share: float = limit(
+        0.2,
+        "share of the sensor's span",
+        "Holds without a name are of one pose when no sensor differs by more.",
+        _HOLDS,
+    )
+    hold_fewest: int = limit(
+        4,
+        "holds",
+        "With fewer holds of repeated poses their drift is not judged.",
+        "With fewer, turning whole holds around cannot bring chance far below 1 in 20.",
+    )
+    hold_fewest_of_a_pose: int = limit(
+        3, "holds", "A pose held less often does not count; nor do fewer pairs for a recovery.", _HOLDS
+    )
+    hold_p_value: float = limit(
+        0.05, "p value", "That holds drift so much alike by chance.", "The usual level."
+    )
+    hold_least_share: float = limit(
+        0.01, "share of the sensor's span", "A smaller drift is not worth a name.", _HOLDS
+    )
+    hold_half: float = limit(
+        0.5,
+        "share of the drift",
+        "Of what goes on elsewhere, or is gone when the pose comes back: above and below it mean different"
+        " causes.",
+        "The middle between all and nothing.",
+    )
+    hold_decided_se: float = limit(
+        2.0, "standard errors", "So far from that middle the holds have decided.", "The usual level."
+    )
+    hold_far_share: float = limit(
+        0.4,
+        "share of the spans, mean over sensors",
+        "Poses so far apart are reached from opposite sides.",
+        _HOLDS,
+    )
+    hold_one_way_share: float = limit(
+        0.8, "share of the holds", "A sensor that drifts one way in fewer is not told of.", _HOLDS
+    )
+
+    reference_sure_correlation: float = limit(
+        0.5,
+        "correlation",
+        "Of reference and own sensor, above which a take can be held against others.",
+        _REFERENCE,
+    )
+    reference_clear_correlation: float = limit(
+        0.8,
+        "correlation",
+        "The same where as many takes run one way as the other.",
+        "A neighbour that moves along may turn a weaker one around; the value is chosen, not tuned.",
+    )
+    reference_radians_within: float = limit(
+        1.4,
+        "factor",
+        "A slope that is 57.3 times smaller than another, within this factor, means radians.",
+        "Gains differ between wearings; the value is chosen, not tuned.",
+    )
+    reference_least_apart_deg: float = limit(
+        12.0,
+        "degrees",
+        "Takes of one wearing contradict each other where their angles differ by more.",
+        _REFERENCE,
+    )
+    reference_times_apart: float = limit(
+        4.0, "times what either line leaves", "And by more than so many times that.", _REFERENCE
+    )
+    reference_still_deg: float = limit(
+        0.5, "degrees", "A reference that stays within this while its sensor moves is frozen.", CHOSEN
+    )
+    reference_moving_share: float = limit(
+        0.3, "share of the largest range", "A sensor that covers more of it in a take moves.", CHOSEN
+    )
+    reference_jump_deg: float = limit(
+        25.0, "degrees", "A larger step between two frames, while the sensor stands, is a jump.", CHOSEN
+    )
+    reference_standing_share: float = limit(
+        0.1,
+        "share of the sensor's range",
+        "A smaller step between two frames is a sensor that stands.",
+        CHOSEN,
+    )
+    reference_fewest_rows: int = limit(
+        30, "frames", "A take in which a rotation was measured less often is not looked at.", CHOSEN
+    )
+
+
+DIAGNOSIS_LIMITS = DiagnosisLimits()

@@ -1,0 +1,76 @@
+"""When an effect is told from its control and from chance: limits that several effects share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from glovecal_models.limit import limit
+
+CHOSEN = "Not tuned; chosen."
+
+
+@dataclass(frozen=True)
+class SignificanceLimits:
+    """What an effect must save on held-out takes, and how surely."""
+
+    least_share: float = limit(
+        0.04,
+        "share of the squared error",
+        "An effect must save so much of a joint's held-out squared error beyond its control.",
+        "Not tuned; chosen with the first version of the diagnosis (2026-11-21).",
+    )
+    least_session_share: float = limit(
+        0.12,
+        "share of the squared error",
+        "The same for causes that change from take to take: there are few takes.",
+        "Raised from 0.08 when known angles held one by one were first judged (2026-11-21); no false-alarm"
+        " rate is recorded.",
+    )
+    joint_p_value: float = limit(
+        0.002,
+        "p value",
+        "One-sided signed-rank test of one joint's blocks of 5 s, effect against control; divided by a fifth"
+        " of the number of joints.",
+        "Not tuned; chosen with the first version of the diagnosis (2026-11-21).",
+    )
+    pooled_p_value: float = limit(
+        0.001,
+        "p value",
+        "The same test of all joints together.",
+        "Not tuned; chosen with the first version of the diagnosis (2026-11-21).",
+    )
+    fewest_blocks: int = limit(
+        9,
+        "blocks of 5 s",
+        "With fewer no effect is judged.",
+        "Lowered from 16 on 2026-11-21. With 9 blocks the smallest exact p value is 1/512, just below 0.002.",
+    )
+    clear_share: float = limit(
+        0.25,
+        "share of the squared error",
+        "A cause that changes from take to take and saves so much beyond its control is clear: its p value"
+        " must only be below the clear one that the effect declares, else below the faint one.",
+        "Causes that change from take to take save 0.46 and more at 1.3 noise floors, donnings of real ankles"
+        " 0.26; healthy simulated gloves 0.21 at most. Lowered from 0.3 for the ankles (2026-11-21).",
+    )
+    delay_clear_se: float = limit(
+        3.0,
+        "standard errors",
+        "By so much the shape of a delay must speak for a lag to be told from a clock offset.",
+        "Not tuned; chosen on 2026-11-21, beside the scores of `delay_middle_se`.",
+    )
+    delay_middle_se: float = limit(
+        1.5,
+        "standard errors",
+        "Where the shape does not decide, a score above this puts lag first, below it clock offset.",
+        "Simulated gloves with 25 ms: clock offsets reach -3 to 2, lags 0 to 10 (2026-11-21).",
+    )
+    per_take_offset_share: float = limit(
+        0.02,
+        "share of the squared error",
+        "Offsets of each take must save so much of the error without any offset beyond a common one.",
+        CHOSEN,
+    )
+
+
+SIGNIFICANCE_LIMITS = SignificanceLimits()
