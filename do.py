@@ -108,6 +108,8 @@ def docs(arguments: list[str]) -> int:
     with tempfile.TemporaryDirectory() as temporary:
         site = Path(temporary, "site") if SMOKE in arguments else ROOT / "site"
         strict = ("--fail-on-warning", "--fresh-env", "--quiet", "--doctree-dir", f"{temporary}/doctrees")
+        if SMOKE not in arguments:
+            run("python", "docs/thresholds_page.py", groups=("docs",))
         code = run("sphinx-build", *strict, "--conf-dir", "docs", ".", str(site), groups=("docs",))
         pages = sum(1 for _ in site.rglob("*.html"))
     if code == 0:

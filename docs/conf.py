@@ -1,5 +1,7 @@
 """The site: README.md, docs/ and the wire format as they stand, and two references made from the code.
 
+``docs/thresholds.md`` is made from the code too, but kept in the repository (``thresholds_page.py``).
+
 Built by ``python3 do.py docs``. The source folder is the repository, so that a link from one page to
 another is the same on the site and in the repository.
 """
@@ -57,6 +59,7 @@ NAVIGATION = {
     "Reference": [
         "Commands <docs/commands>",
         "REST <docs/rest>",
+        "docs/thresholds",
         "Messages on the wire <client/glovecal_client/wire/README>",
     ],
     "Project": ["As measured <docs/measured>", "ARCHITECTURE", "CHANGELOG"],

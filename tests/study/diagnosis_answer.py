@@ -9,16 +9,17 @@ from blind_glove import BlindGlove
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.effects.base.assessment import Assessment
+from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 
 NOTHING = "nothing"
 
 
-def diagnosis_answer(glove: BlindGlove) -> dict[str, Any]:
+def diagnosis_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_LIMITS) -> dict[str, Any]:
     """First name ("nothing" for none), confidence set, ranking, and each effect's evidence.
 
     What is known by a signature in the recording comes before what is ranked by the error it saves.
     """
-    found = diagnose(glove.takes, glove.layout, linear=glove.linear)
+    found = diagnose(glove.takes, glove.layout, linear=glove.linear, limits=limits.diagnosis)
     signatures = list(dict.fromkeys(item.effect for item in found.signature))
     ranked = [*signatures, *(item.effect for item in found.naming.ranked)]
     return {

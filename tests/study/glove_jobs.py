@@ -12,15 +12,18 @@ from typing import Any
 from blind_glove import BlindGlove
 from finished_gloves import FinishedGloves
 
+from glovecal_models.improvement.limits import ImprovementLimits
 from glovecal_models.threads import begin_worker
 
 WORKERS = 2
-Job = Callable[[BlindGlove], dict[str, Any]]
+Answer = Callable[[BlindGlove], dict[str, Any]]
+"""Of one glove, by the limits that were chosen."""
+Job = Callable[[BlindGlove, ImprovementLimits], dict[str, Any]]
 Row = tuple[BlindGlove, dict[str, Any]]
 
 
 def answers(
-    gloves: Sequence[BlindGlove], job: Job, finished: FinishedGloves, label: str, workers: int = WORKERS
+    gloves: Sequence[BlindGlove], job: Answer, finished: FinishedGloves, label: str, workers: int = WORKERS
 ) -> list[Row]:
     """The job's answer for every glove, in order. A job that fails is reported and left out."""
     waiting = [glove for glove in gloves if finished.get(glove.key) is None]

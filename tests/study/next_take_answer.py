@@ -9,6 +9,7 @@ from blind_glove import BlindGlove
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.next_take import NextTake
+from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 from glovecal_models.simulation.session_plan import TakeMotion
 from glovecal_models.takes.take import Take
 
@@ -16,15 +17,15 @@ MOST_TAKES = 2
 NEW_WEARING_S = 40.0
 
 
-def next_take_answer(glove: BlindGlove) -> dict[str, Any]:
+def next_take_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_LIMITS) -> dict[str, Any]:
     """Confidence sets before and after each recorded take, and the motions that were asked for."""
     takes = list(glove.takes)
-    found = diagnose(takes, glove.layout, linear=glove.linear)
+    found = diagnose(takes, glove.layout, linear=glove.linear, limits=limits.diagnosis)
     sets, motions = [list(found.naming.confidence_set)], []
     while len(motions) < MOST_TAKES and len(sets[-1]) > 1 and found.next_take is not None:
         motions.append(found.next_take.motion)
         takes.append(_recorded(glove, found.next_take, len(motions) - 1))
-        found: Diagnosis = diagnose(takes, glove.layout, linear=glove.linear)
+        found: Diagnosis = diagnose(takes, glove.layout, linear=glove.linear, limits=limits.diagnosis)
         sets.append(list(found.naming.confidence_set))
     return {"confidence_sets": sets, "motions": motions, **glove.told()}
 

@@ -21,6 +21,7 @@ from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_effect import add_effect
+from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 
 SAMPLES = 300
 """Representative frames: joints of one sensor reach the floor with so many, in seconds."""
@@ -32,7 +33,7 @@ def training_settings(glove: BlindGlove, folds: int = 3) -> TrainingSettings:
     return TrainingSettings("linear" if glove.linear else "lmc_gpr", samples=SAMPLES, folds=folds)
 
 
-def repair_answer(glove: BlindGlove) -> dict[str, Any]:
+def repair_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_LIMITS) -> dict[str, Any]:
     """RMSE over the affected joints, degrees: before, after, and the clean twin's."""
     settings = training_settings(glove)
     model = train(glove.takes, glove.layout, "study", training_settings(glove, folds=0))
@@ -43,7 +44,13 @@ def repair_answer(glove: BlindGlove) -> dict[str, Any]:
     told = {"rotations": list(rotations), "twin_deg": _rmse(twin, rotations), **glove.told()}
     try:
         addition = add_effect(
-            model, glove.takes, glove.truth, rotations=rotations, constants=constants, settings=settings
+            model,
+            glove.takes,
+            glove.truth,
+            rotations=rotations,
+            constants=constants,
+            settings=settings,
+            limits=limits,
         )
     except BadInput as problem:
         return told | {"added": False, "sentence": str(problem)}

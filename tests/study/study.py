@@ -10,6 +10,7 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -19,13 +20,20 @@ from finished_gloves import FinishedGloves, software_hash
 from glove_choices import effect_names
 from glove_jobs import WORKERS, Row, answers
 from study_figure import StudyFigure, table
+from study_limits import digest, other_limits, read_limits
 from study_parts import PARTS, StudyChoices
 
+from glovecal_models.errors import BadInput
+from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS
 from glovecal_models.threads import pin_blas_to_one_thread
 
 SET_ASIDE = (
     "use the test generators' set-aside forms instead of the open ones; "
     "nobody may look at set-aside results while tuning"
+)
+LIMITS = (
+    "other limits, by name, as a TOML file with the tables diagnosis, comparison and improvement; "
+    "docs/thresholds.md lists them"
 )
 PICTURES = (".png", ".svg")
 SMOKE = ("names", "--effects", "lag", "--gloves", "1", "--workers", "1")
@@ -42,10 +50,11 @@ def main(arguments: Sequence[str]) -> int:
     wanted = tuple(name for name in options.effects.split(",") if name)
     try:
         effect_names(wanted)
-    except ValueError as problem:
+        limits = IMPROVEMENT_LIMITS if options.limits is None else read_limits(options.limits)
+    except (ValueError, OSError, BadInput) as problem:
         _parser().error(str(problem))
     pin_blas_to_one_thread()
-    choices = StudyChoices(options.gloves, options.clean, options.pairs, wanted, options.set_aside)
+    choices = StudyChoices(options.gloves, options.clean, options.pairs, wanted, options.set_aside, limits)
     parts = [name for name in PARTS if not options.parts or name in options.parts]
     try:
         return 0 if run(parts, choices, options.folder, options.workers) else 1
@@ -57,6 +66,7 @@ def main(arguments: Sequence[str]) -> int:
 def run(parts: Sequence[str], choices: StudyChoices, folder: Path, workers: int = WORKERS) -> bool:
     """Run parts and write what they found into ``folder``. Whether every glove could be judged."""
     software = software_hash()
+    judged = digest(software, choices.limits)
     figures: dict[str, list[StudyFigure]] = {}
     confused: list[Row] = []
     complete = True
@@ -65,7 +75,8 @@ def run(parts: Sequence[str], choices: StudyChoices, folder: Path, workers: int 
         part = PARTS[name]
         print(f"\n== {name}: {part.sentence} ==", flush=True)
         gloves = part.gloves(choices)
-        rows = answers(gloves, part.job, FinishedGloves(folder, name, software), name, workers)
+        finished = FinishedGloves(folder, name, judged)
+        rows = answers(gloves, partial(part.job, limits=choices.limits), finished, name, workers)
         complete &= len(rows) == len(gloves)
         figures[name] = part.figures(rows)
         print(table(figures[name]), flush=True)
@@ -82,7 +93,7 @@ def run(parts: Sequence[str], choices: StudyChoices, folder: Path, workers: int 
             return False
     if confused:
         _draw(confused, folder, ending)
-    _write(figures, choices, software, folder / f"study{ending}")
+    _write(figures, choices, judged, folder / f"study{ending}")
     return complete
 
 
@@ -102,13 +113,16 @@ def _write(figures: dict[str, list[StudyFigure]], choices: StudyChoices, softwar
     """Parts that were not run now keep what they found with the same programs."""
     kept = _earlier(path.with_suffix(".json"), software) | figures
     forms = "set-aside forms" if choices.set_aside else "open forms"
-    head = f"# Blind study of the diagnosis\n\nSimulated gloves, {forms}; programs {software[:10]}.\n"
+    others = other_limits(choices.limits)
+    told = "".join(f"; {name} = {value:g}" for name, value in others.items())
+    head = f"# Blind study of the diagnosis\n\nSimulated gloves, {forms}; programs {software[:10]}{told}.\n"
     parts = [(name, part, kept[name]) for name, part in PARTS.items() if name in kept]
     text = [head, *(f"## {name}\n\n{part.sentence}\n\n{table(some)}\n" for name, part, some in parts)]
     path.with_suffix(".md").write_text("\n".join(text), encoding="utf-8")
     document = {
         "software": software,
         "set_aside": choices.set_aside,
+        "limits": others,
         "figures": {name: [figure.to_document() for figure in some] for name, _, some in parts},
     }
     path.with_suffix(".json").write_text(json.dumps(document, indent=1), encoding="utf-8")
@@ -133,6 +147,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--pairs", type=int, default=24, help="gloves with two effects per size (default 24)")
     parser.add_argument("--effects", default="", help="only these, separated by commas")
     parser.add_argument("--set-aside", action="store_true", help=SET_ASIDE)
+    parser.add_argument("--limits", type=Path, metavar="FILE", help=LIMITS)
     smoke = "one glove with one effect, in a temporary folder: seconds"
     parser.add_argument("--smoke", action="store_true", help=smoke)
     parser.add_argument("--workers", type=int, default=WORKERS, help="processes (default 2)")

@@ -24,6 +24,8 @@ from study_figure import StudyFigure
 from walk_answer import pair_answer, walk_answer
 from walk_figures import alarm_figures, false_alarm_figures, next_take_figures, pairs_figures
 
+from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
+
 LARGE_SIZE = 2.6
 REMEMBERING = ("creep", "hysteresis", "lag")
 LEAD_S = 30.0
@@ -45,6 +47,7 @@ class StudyChoices:
     effects: tuple[str, ...] = ()
     """None given means all."""
     set_aside: bool = False
+    limits: ImprovementLimits = IMPROVEMENT_LIMITS
 
 
 @dataclass(frozen=True)

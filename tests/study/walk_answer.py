@@ -11,24 +11,26 @@ from repair_answer import training_settings
 from glovecal_models.calibration.held_out_check import held_out_errors
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.improvement.improve import improve
+from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 
 
-def walk_answer(glove: BlindGlove) -> dict[str, Any]:
+def walk_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_LIMITS) -> dict[str, Any]:
     """The diagnosis of the untouched takes, and the whole walk."""
-    return diagnosis_answer(glove) | {"walk": walk(glove)}
+    return diagnosis_answer(glove, limits) | {"walk": walk(glove, limits)}
 
 
-def pair_answer(glove: BlindGlove) -> dict[str, Any]:
+def pair_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_LIMITS) -> dict[str, Any]:
     """The same, and the clean twin's error beside the walk's last one, over all joints."""
     settings = training_settings(glove)
     prepared = PreparedTakes.of(glove.clean_takes, glove.layout)
     twin = held_out_errors(prepared, glove.layout.rotations, (), settings)
-    return walk_answer(glove) | {"twin_deg": round(twin.over_all_deg, 4)}
+    return walk_answer(glove, limits) | {"twin_deg": round(twin.over_all_deg, 4)}
 
 
-def walk(glove: BlindGlove) -> dict[str, Any]:
+def walk(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_LIMITS) -> dict[str, Any]:
     """The contract's document, shortened to what is marked."""
-    document = improve(glove.takes, glove.layout, "study", training_settings(glove)).to_document()
+    settings = training_settings(glove)
+    document = improve(glove.takes, glove.layout, "study", settings, limits=limits).to_document()
     added = [step["added"] for step in document["steps"] if step["added"]]
     return {
         "added": [item["effect"] for item in added],

@@ -51,11 +51,11 @@ def error_spectrum(
     generator: np.random.Generator,
     limits: ComparisonLimits = COMPARISON_LIMITS,
 ) -> ErrorSpectrum | None:
-    """None when fewer than ``fewest_blocks`` blocks were measured without a gap."""
+    """None when fewer than ``fewest_spectrum_blocks`` blocks were measured without a gap."""
     column = found.column(rotation)
     mean = float(np.nanmean(found.stacked("error")[:, column]))
     blocks = [block for item in found.takes for block in _blocks(item, column, mean)]
-    if len(blocks) < limits.fewest_blocks:
+    if len(blocks) < limits.fewest_spectrum_blocks:
         return None
     shares = np.array([(np.mean(block.slow**2), np.mean(block.error**2)) for block in blocks])
     slow, low, high = _share(shares, generator)

@@ -69,7 +69,7 @@ class ComparisonLimits:
         "With fewer there is no floor from repeated poses.",
         "The spread would be a guess; the value is chosen, not tuned.",
     )
-    fewest_blocks: int = limit(
+    fewest_spectrum_blocks: int = limit(
         4, "blocks of 4 s without a gap", "With fewer there is no floor from the spectrum.", _CHOSEN
     )
     fewest_pairs: int = limit(

@@ -42,7 +42,7 @@ def from_repeated_poses(
     generator: np.random.Generator,
     limits: ComparisonLimits = COMPARISON_LIMITS,
 ) -> NoiseFloor | None:
-    """``held``: the joint's holds in each take. None with fewer than ``fewest_repeats`` repeats to compare."""
+    """``held``: the joint's holds in each take. None with too few repeats to compare."""
     stays: dict[tuple[str, str], list[_Repeat]] = defaultdict(list)
     for item, of_take in zip(takes, held, strict=True):
         for pose, rows in _stays(item, column, of_take, limits.shortest_hold_s):

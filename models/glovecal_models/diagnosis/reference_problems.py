@@ -172,8 +172,8 @@ def _of_rotation(
         if jumps:
             problems.append(
                 f"{rotation} in take {take.name}: the reference jumps by more than"
-                f" {limits.reference_jump_deg:g} degrees {jumps} time{'s' if jumps > 1 else ''} while its sensor"
-                " stands. Did a marker swap?"
+                f" {limits.reference_jump_deg:g} degrees {jumps} time{'s' if jumps > 1 else ''} while its"
+                " sensor stands. Did a marker swap?"
             )
     sign = np.sign(np.median(correlations))
     for (take, _), correlation in zip(measured, correlations, strict=True):

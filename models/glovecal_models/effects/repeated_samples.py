@@ -23,7 +23,7 @@ from glovecal_models.effects.base.signature_effect import (
 )
 from glovecal_models.takes.take import Take
 
-LEAST_SHARE = 0.02
+LEAST_REPEATED_SHARE = 0.02
 """Of the moments inside a movement."""
 LEAST_COUNT = 10
 BEYOND_CHANCE = 1.5
@@ -119,12 +119,12 @@ def _by_chance(values: np.ndarray, steps: np.ndarray, near: np.ndarray, together
 
 def _is_found(found: Sequence[Repeats]) -> bool:
     interrupted, moving = sum(item.interrupted for item in found), sum(item.moving for item in found)
-    if interrupted < LEAST_COUNT or interrupted < LEAST_SHARE * (interrupted + moving):
+    if interrupted < LEAST_COUNT or interrupted < LEAST_REPEATED_SHARE * (interrupted + moving):
         return False
     together, by_chance = (
         float(np.mean([getattr(r, name) for r in found])) for name in ("together", "by_chance")
     )
-    return together >= LEAST_SHARE + BEYOND_CHANCE * by_chance
+    return together >= LEAST_REPEATED_SHARE + BEYOND_CHANCE * by_chance
 
 
 def _finding(kind: str, takes: Sequence[Take], found: Sequence[Repeats]) -> Finding | None:

@@ -21,7 +21,7 @@ MOST_MISFIT = 5.0
 """Standard deviations of the calibration by which a hand may have to bend for its tips to touch. Where the
 calibration knows its own error, a true touch needs 1.5 (chi with 3 degrees of freedom), and over 5 in one of
 65000 frames."""
-LEAST_SHARE = 0.5
+LEAST_TOUCHING_SHARE = 0.5
 """Of the frames in which the tips must have touched for the take to be a touching motion."""
 SUSPICIOUS_MISFIT = 2.5
 """Of the middle frame: one true touch in ten is as far off, if the calibration knows its error."""
@@ -80,11 +80,11 @@ def require_happened(
     """Raise TouchNotSeen where the tips cannot have touched in most frames, or another finger's did."""
     share, misfit = float(verdict.believable.mean()), float(np.median(verdict.misfit))
     other = _better_finger(contact, misfit, hand, skeleton) if misfit > SUSPICIOUS_MISFIT else None
-    if share >= LEAST_SHARE and other is None:
+    if share >= LEAST_TOUCHING_SHARE and other is None:
         return
     said = (
         f"{_what(contact)} cannot be seen in this take: {100 * share:.0f} % of its {len(verdict.reached)} "
-        f"frames fit it (at least {100 * LEAST_SHARE:.0f} % must). The tips are read "
+        f"frames fit it (at least {100 * LEAST_TOUCHING_SHARE:.0f} % must). The tips are read "
         f"{np.median(verdict.apart_mm):.0f} mm off (median), {misfit:.1f} times what the calibration may be "
         f"wrong by (at most {MOST_MISFIT:g})"
     )

@@ -31,7 +31,7 @@ WORTHWHILE = 0.9
 """The unexplained variance must fall to this share (5 % of the error) for an offset to be named."""
 LOOKS_LIKE_LAG_S = -0.15
 """Readings this much late may as well come from a lag in the sensors."""
-SHORTEST_S = 2.0
+SHORTEST_SCANNED_S = 2.0
 
 Verdict = Literal["offset", "agrees", "not judgeable", "range too small"]
 
@@ -94,7 +94,7 @@ def aligned(take: Take, offset_s: float) -> Take:
 
 def on_grid(take: Take) -> Grid | None:
     """None when the take is too short, nothing was measured, or nothing moves."""
-    if take.duration_s < SHORTEST_S or len(take.reference_time_s) < 10:
+    if take.duration_s < SHORTEST_SCANNED_S or len(take.reference_time_s) < 10:
         return None
     complete = np.isfinite(take.reference).all(axis=0)
     moves = complete & (np.ptp(np.where(complete, take.reference, 0.0), axis=0) > 5.0)

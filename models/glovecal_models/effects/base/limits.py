@@ -51,7 +51,7 @@ class SignificanceLimits:
         "A cause that changes from take to take and saves so much beyond its control is clear: its p value"
         " must only be below the clear one that the effect declares, else below the faint one.",
         "Causes that change from take to take save 0.46 and more at 1.3 noise floors, donnings of real ankles"
-        " 0.26; healthy simulated gloves 0.21 at most. Lowered from 0.3 for the ankles (2026-11-21).",
+        " 0.26; healthy gloves 0.21 at most. Lowered from 0.3 for the ankles (2026-11-21).",
     )
     delay_clear_se: float = limit(
         3.0,

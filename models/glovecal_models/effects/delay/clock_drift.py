@@ -17,7 +17,7 @@ from scipy.optimize import minimize
 from glovecal_models.takes.clock_scan import FINE_S, WORTHWHILE, Grid, on_grid, unexplained
 from glovecal_models.takes.take import Take
 
-SHORTEST_S = 60.0
+SHORTEST_DRIFT_S = 60.0
 LARGEST_PPM = 2000.0
 END_STEP_S = 0.02
 """Between neighbouring drifts of the search, at either end of the take."""
@@ -53,7 +53,7 @@ class ClockDrift:
 def clock_drift(take: Take, offset_s: float) -> ClockDrift | None:
     """The drift about a known offset, or None when the take is too short or a drift does not pay."""
     grid = on_grid(take)
-    if grid is None or take.duration_s < SHORTEST_S:
+    if grid is None or take.duration_s < SHORTEST_DRIFT_S:
         return None
     middle = float(grid.time_s.mean())
     half = take.duration_s / 2.0

@@ -25,7 +25,7 @@ OVER_STATIONARY = 3.0
 """Variance of the 10 s means over what stationary errors would give."""
 FOLLOWS = 1.5
 """Von Neumann's ratio: 2 for means in no order, below 1 for a random walk."""
-CERTAINTY = 0.01
+WALK_P_VALUE = 0.01
 POSTURE_DEGREE = 3
 
 
@@ -73,7 +73,7 @@ def slip_walk(
     excess = max(variance - expected, 0.0)
     # The means of a walk hold one another: about half of them count as independent.
     independent = max(free / 2.0, 1.0)
-    least = max(variance * independent / float(chi2.ppf(1.0 - CERTAINTY, independent)) - expected, 0.0)
+    least = max(variance * independent / float(chi2.ppf(1.0 - WALK_P_VALUE, independent)) - expected, 0.0)
     # A walk of rate q gives J means of length T a variance of q² T (J + 1) / 6.
     walked = sum(MEAN_S * (len(means) + 1) / 6.0 * (len(means) - 1) for means in long) / free
     return SlipWalk(

@@ -16,7 +16,7 @@ from glovecal_models.takes.take import Take
 
 HEALTHY_DEG, HEALTHY_LASTS_S = 0.4, 25.0
 """Every glove wanders by so much and forgets it within this time (first-order)."""
-CERTAINTY = 0.002
+SPREAD_P_VALUE = 0.002
 """That a healthy glove's takes differ so much, for one joint of several."""
 MEAN_S = 10.0
 SHORTEST_TAKE_S = 2 * MEAN_S
@@ -36,7 +36,7 @@ class TakeSpread:
     size_deg: float
     """Standard deviation about the wearing's mean, without what context columns explain."""
     least_deg: float
-    """Its lower bound, one-sided, at ``CERTAINTY``."""
+    """Its lower bound, one-sided, at ``SPREAD_P_VALUE``."""
     healthy_deg: float
     """The same of a healthy glove with takes of this length."""
     over_wander: float
@@ -62,7 +62,7 @@ def spread_of_takes(takes: Sequence[Take], errors: Sequence[np.ndarray]) -> Take
         return None
     left = target - explained @ (explained.T @ target)
     variance = float(left @ left) / free
-    least = float(np.sqrt(variance * free / float(chi2.ppf(1.0 - CERTAINTY, free))))
+    least = float(np.sqrt(variance * free / float(chi2.ppf(1.0 - SPREAD_P_VALUE, free))))
     inside = float(np.mean([each.var(ddof=1) for each in means]))
     length = float(np.median([len(each) for each in means])) * MEAN_S
     healthy = _wander_of_mean(length)

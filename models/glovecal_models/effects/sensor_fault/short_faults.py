@@ -17,7 +17,7 @@ from glovecal_models.effects.sensor_fault.reading_faults import GRADUAL_SHARE, c
 
 FEWEST = 3
 """Of either kind, in all takes together."""
-STUCK_FRAMES, STUCK_S = 6, 0.08
+SHORT_STUCK_FRAMES, SHORT_STUCK_S = 6, 0.08
 STUCK_STEPS = 3.0
 """Of the converter: the reference must ask for so much more or less while a value stays."""
 STUCK_DEG = 3.0
@@ -63,7 +63,11 @@ def shortly_stuck(
     margin = GRADUAL_SHARE * (high - low)
     least = max(STUCK_STEPS * smallest_step(readings), STUCK_DEG * gain)
     for start, end in constant_runs(readings):
-        if end - start < STUCK_FRAMES or end == len(readings) or time_s[end] - time_s[start] < STUCK_S:
+        if (
+            end - start < SHORT_STUCK_FRAMES
+            or end == len(readings)
+            or time_s[end] - time_s[start] < SHORT_STUCK_S
+        ):
             continue
         asked = smooth[end] - smooth[start]
         released = readings[end] - readings[end - 1]

@@ -26,7 +26,7 @@ CONTACT_SD_MM = 0.3
 """How far tips that touch are from one point."""
 STILL_DEG = 0.02
 MOST_STEPS = 15
-LEAST_SHARE = 0.02
+LEAST_STEP_SHARE = 0.02
 """Of a step that is tried."""
 
 
@@ -134,7 +134,7 @@ class TouchPosterior:
             while True:
                 tried = {name: force[name] + share * (wanted[name] - force[name]) for name in names}
                 after = {name: prior[name] + covariance[name] @ tried[name] for name in names}
-                if share < LEAST_SHARE:
+                if share < LEAST_STEP_SHARE:
                     break
                 if self._cost(tried, covariance, self._conditions(after), noises) <= before:
                     break

@@ -1,0 +1,60 @@
+"""A study with other limits: read by name, handed down to the diagnosis, kept apart from usual answers."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from diagnosis_answer import NOTHING, diagnosis_answer
+from glove_choices import with_cause
+from study_limits import digest, limits_from, other_limits, read_limits
+
+from glovecal_models.errors import BadInput
+from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS
+
+
+def test_limits_are_read_by_name(tmp_path):
+    file = tmp_path / "stricter.toml"
+    file.write_text("[diagnosis]\nclear_share = 0.3\n[comparison]\nat_floor_times = 1.1\n")
+    limits = read_limits(file)
+    assert (limits.diagnosis.clear_share, limits.comparison.at_floor_times) == (0.3, 1.1)
+    assert other_limits(limits) == {"diagnosis.clear_share": 0.3, "comparison.at_floor_times": 1.1}
+    assert other_limits(limits_from({"improvement": {"least_gain": 0.05}})) == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("[diagnosis]\nclear = 0.3\n", r"no limit 'clear'; there are .*clear_share, .*"),
+        ("[sampling]\nenough_deg = 1\n", "no table of limits 'sampling'; there are diagnosis, comparison, "),
+        ("clear_share = 0.3\n", "no table of limits 'clear_share'"),
+        ("[diagnosis\n", "cannot be read as TOML"),
+    ],
+)
+def test_what_is_unknown_is_refused(tmp_path, text, told):
+    file = tmp_path / "wrong.toml"
+    file.write_text(text)
+    with pytest.raises(BadInput, match=told):
+        read_limits(file)
+    study = Path(__file__).with_name("study.py")
+    command = [sys.executable, str(study), "names", "--limits", str(file), "--folder", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+
+
+def test_answers_with_other_limits_are_kept_apart():
+    software = "a" * 64
+    assert digest(software, IMPROVEMENT_LIMITS) == software
+    one, two = (digest(software, limits_from({"diagnosis": {"least_share": x}})) for x in (0.05, 0.06))
+    assert len({software, one, two}) == 3
+
+
+def test_other_limits_reach_the_diagnosis():
+    glove = with_cause("short", "hysteresis", 2.6, 0)
+    assert glove is not None
+    assert diagnosis_answer(glove)["first"] == "hysteresis"
+    strict = limits_from({"diagnosis": {"joint_p_value": 0.0, "pooled_p_value": 0.0, "clear_share": 2.0}})
+    assert diagnosis_answer(glove, strict)["first"] == NOTHING
