@@ -77,7 +77,7 @@ def _assigned(node: ast.stmt) -> list[tuple[str, float]]:
         value = ast.literal_eval(node.value) if node.value is not None else None
     except ValueError:
         return []
-    pairs = [(target, value) for target in targets if isinstance(target, ast.Name)]
+    pairs: list[tuple[ast.expr, Any]] = [(target, value) for target in targets]
     for target in targets:
         if isinstance(target, ast.Tuple) and isinstance(value, tuple):
             pairs += zip(target.elts, value, strict=True)

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from multiprocessing import get_context
-from typing import Any
+from typing import Any, Protocol
 
 from blind_glove import BlindGlove
 from finished_gloves import FinishedGloves
@@ -18,8 +18,13 @@ from glovecal_models.threads import begin_worker
 WORKERS = 2
 Answer = Callable[[BlindGlove], dict[str, Any]]
 """Of one glove, by the limits that were chosen."""
-Job = Callable[[BlindGlove, ImprovementLimits], dict[str, Any]]
 Row = tuple[BlindGlove, dict[str, Any]]
+
+
+class Job(Protocol):
+    """What is asked of a glove."""
+
+    def __call__(self, glove: BlindGlove, limits: ImprovementLimits) -> dict[str, Any]: ...
 
 
 def answers(

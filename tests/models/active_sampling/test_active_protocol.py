@@ -20,7 +20,6 @@ from glovecal_models.sampling.active.known_readings import (
     known_from_takes,
 )
 from glovecal_models.sampling.active.next_step import (
-    LONGEST_CAPTURE_S,
     NextStep,
     candidate_steps,
     diagnosed_take,
@@ -31,6 +30,7 @@ from glovecal_models.sampling.active.next_step import (
 from glovecal_models.sampling.active.proposal import propose
 from glovecal_models.sampling.catalogue import Equipment, make_protocol
 from glovecal_models.sampling.engine import Sampling, begin_sampling
+from glovecal_models.sampling.limits import SAMPLING_LIMITS
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.sampled_takes import sampled_takes
 from glovecal_models.sampling.state import Attempt, NextSteps, SamplingState
@@ -147,7 +147,7 @@ def test_what_a_person_left_out_is_not_proposed_again(active: AskedSession) -> N
 
 def test_it_ends_when_nothing_is_left_or_the_time_is_up(active: AskedSession) -> None:
     choose = NextStep(LAYOUT)
-    late = choose(replace(active.state, capture_s=LONGEST_CAPTURE_S))
+    late = choose(replace(active.state, capture_s=SAMPLING_LIMITS.longest_capture_s))
     assert (late.are_last, [step.name for step in late.steps]) == (True, ["flat-end", "fist-end"])
     known = known_from_state(active.state)
     sure = tuple(replace(block, samples=1e6, shared_sd_deg=0.01) for block in known.blocks)
