@@ -2,99 +2,199 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from html import escape
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from markupsafe import Markup
+
+from glovecal_service.next_command import next_command
+from glovecal_service.report.caption import Caption
 from glovecal_service.report.diagnosis_pictures import (
     errors_beside_floors,
     heat_of_candidates,
-    saved_beside_decoys,
+    saved_beside_controls,
 )
-from glovecal_service.report.hold_table import hold_table
-from glovecal_service.report.html import figure, listed, table, whole_page
-from glovecal_service.report.sentences import counted
+from glovecal_service.report.documents import current
+from glovecal_service.report.effects import declarations_in, effect_card, effects_explained
+from glovecal_service.report.html import (
+    Fact,
+    Section,
+    counted,
+    degrees,
+    figure,
+    listed,
+    names_of,
+    note,
+    page,
+    paragraph,
+    table,
+)
 
-HEADS = ("effect", "where", "error before", "with it", "with its decoy", "beyond chance")
-LEFT_HEADS = (
-    "what is left goes with", "rotation", "explains, degrees", "probability by chance, all columns counted",
+HEADS = ("effect", "where", "error before", "with the effect", "with its control", "significant")
+RESIDUAL_HEADS = (
+    "unexplained residual is associated with", "rotation", "RMS contribution, degrees",
+    "p value, all columns counted",
 )  # fmt: skip
-SCALE = (
-    "Degrees, on takes left out, readings and reference smoothed alike. A decoy has the same freedom as its "
-    "effect and cannot be right: what it saves, flexibility saves."
+HOLD_HEADS = (
+    *("pose", "sensor", "holds", "seconds each", "change, % of span", "same sign in", "time constant, s"),
 )
+SCALE = (
+    "Held-out RMSE in degrees; readings and reference identically smoothed. A control has the same freedom as "
+    "its effect and cannot be right: what it saves is flexibility, not cause."
+)
+NOTHING_NAMED = "No known effect beats its control significantly."
 
 
-def diagnosis_page(found: Mapping[str, Any]) -> str:
-    """HTML. Keys that a diagnosis of another version lacks are left out."""
-    model, takes = str(found.get("model", "")), found.get("takes") or []
-    names = ", ".join(take["name"] for take in takes[:12]) + (" ..." if len(takes) > 12 else "")
-    named, rotations = found.get("named"), found.get("rotations") or {}
-    candidates = found.get("candidates") or []
-    headline = named["sentence"] if named else "No known effect saves more than its decoy and chance do."
-    held = found.get("hold_drift")
-    if held:
-        headline = held["sentence"]
-    parts = [
-        f"<h1>What model {escape(model[:12])} lacks, by {counted(len(takes), 'take')}</h1>",
-        f"<p>Takes: {escape(names)}.</p>" if names else "",
-        *_warned("The reference first", found.get("reference_problems")),
-        *_warned("Found in the recording", [item["sentence"] for item in found.get("findings") or ()]),
-        f"<p><strong>{escape(headline)}</strong></p>",
-        _next_take(found.get("next_take")),
-        *_left(found.get("something_left") or {}),
+def diagnosis_page(
+    stored: Mapping[str, Any],
+    caption: Caption | None = None,
+    declarations: Sequence[Mapping[str, Any]] = (),
+) -> str:
+    """HTML. Keys that a diagnosis of another version lacks are left out.
+
+    ``caption`` of the model, where the store has it; ``declarations`` of the user's own effects.
+    """
+    found, own = current(stored), declarations_in(declarations)
+    of = caption or Caption(str(found.get("model", "")))
+    takes, candidates = found.get("takes") or [], found.get("candidates") or []
+    rotations, held = found.get("rotations") or {}, found.get("hold_drift")
+    named = found.get("named") or {}
+    explained = list(dict.fromkeys([*named.get("confidence_set", ()), *_effects(named)]))
+    shown = [effect_card(name, _parameters(named, name), own.get(name)) for name in explained]
+    tried = [item["effect"] for item in candidates if item["effect"] not in explained]
+    sections = [
+        Section("The effect" if len(explained) == 1 else "The effects that are possible", shown),
+        Section("What was tried", [*_candidates(candidates), *effects_explained(tried, own)]),
+        Section("What remains unexplained", _unexplained(found.get("unexplained_residual") or {})),
     ]
-    if candidates:
-        parts += ["<h2>What was tried</h2>", figure(*saved_beside_decoys(candidates))]
-        heat = heat_of_candidates(candidates)
-        parts += [figure(*heat)] if heat is not None else []
-        parts += [_table(candidates), f"<p>{escape(SCALE)}</p>"]
     if held and held["poses"]:
-        parts += ["<h2>What readings do while a pose is held</h2>", hold_table(held)]
+        sections.append(Section("Readings while a pose is held", [hold_table(held)]))
     if rotations and not held:
-        parts += ["<h2>How far off each rotation is</h2>", figure(*errors_beside_floors(rotations))]
-    why = [f"{item['effect']}: {item['why']}" for item in found.get("not_judgeable") or ()]
-    if why:
-        parts += ["<h2>Cannot be judged from these takes</h2>", listed(why)]
-    return whole_page(f"diagnosis of model {model[:12]}", parts)
-
-
-def _warned(heading: str, sentences: list[str] | None) -> list[str]:
-    if not sentences:
-        return []
-    return [f'<div class="note"><b>{escape(heading)}</b>{listed(sentences)}</div>']
-
-
-def _next_take(following: Mapping[str, Any] | None) -> str:
-    if not following:
-        return ""
-    rivals = " and ".join(following.get("separates") or ())
-    text = f"To tell {rivals} apart record {following['seconds']} s: {following['what']}"
-    return f'<p class="note">{escape(text)}</p>'
-
-
-def _left(left: Mapping[str, Any]) -> list[str]:
-    """Whether something is left, and the columns it goes with."""
-    parts = [f"<p>{escape(left.get('sentence', ''))}</p>"]
-    rows = [
-        (item["phrase"], item["rotation"], _degrees(item["size_deg"]), f"{item['probability']:.3f}")
-        for item in left.get("goes_with") or ()
+        sections.append(Section("Error of each rotation", [figure(*errors_beside_floors(rotations))]))
+    sections += [
+        Section("Not identifiable from these takes", _not_identifiable(found.get("not_identifiable") or ())),
+        Section("Details", [_details(found, takes)]),
     ]
-    return [*parts, table(LEFT_HEADS, rows)] if rows else parts
+    notes = [
+        *_warned("Problems of the reference", found.get("reference_problems")),
+        *_warned("Found in the recording", [item["sentence"] for item in found.get("findings") or ()]),
+        *next_take_note(found.get("next_take")),
+    ]
+    title = f"Missing effects in {of.title} ({counted(len(takes), 'take')})"
+    return page(title, _summary(found), sections, notes=notes)
 
 
-def _table(candidates: list[Mapping[str, Any]]) -> str:
+def hold_table(held: Mapping[str, Any]) -> Markup:
+    """How readings drift within held poses: the ``hold_drift`` of a diagnosis or an improvement."""
+    rows = [
+        (
+            pose["pose"], name, str(pose["holds"]), f"{pose['duration_s']:.0f}",
+            f"{drift['change_pct']:+.1f}", str(drift["same_sign_holds"]), _time_constant(pose),
+        )
+        for pose in held["poses"]
+        for name, drift in pose["sensors"].items()
+    ]  # fmt: skip
+    return table(HOLD_HEADS, rows)
+
+
+def next_take_note(following: Mapping[str, Any] | None) -> list[Markup]:
+    """The recording that tells rivals apart."""
+    if not following:
+        return []
+    rivals = " and ".join(following.get("separates") or ())
+    return [note("", [f"To tell {rivals} apart record {following['seconds']} s: {following['what']}"])]
+
+
+def _summary(found: Mapping[str, Any]) -> list[Fact]:
+    named, held = found.get("named"), found.get("hold_drift")
+    rotations = found.get("rotations") or {}
+    if held:
+        facts = [Fact("Verdict", held["sentence"])]
+    elif not named:
+        facts = [Fact("Verdict", NOTHING_NAMED)]
+    else:
+        rivals = [name for name in named.get("confidence_set") or () if name != named["effect"]]
+        also = f"; these takes cannot tell it from {', '.join(rivals)}" if rivals else ""
+        facts = [Fact("Verdict", f"{named['effect']} is missing{also}.")]
+        size = next((_size(item) for item in found.get("candidates") or () if _is(item, named)), None)
+        facts.append(Fact("Size", size or named["sentence"]))
+        facts.append(Fact("Place", ", ".join(named.get("where") or ()) or "all takes"))
+    if rotations and not named and not held:
+        name, error, floor = _worst(rotations)
+        beside = "" if floor is None else f" (noise floor {floor:.2f})"
+        facts += [Fact("Size", f"{error:.2f} degrees{beside}"), Fact("Place", f"largest error at {name}")]
+    return [*facts, Fact("Next", next_command(str(found.get("model", "MODEL")), found), is_command=True)]
+
+
+def _size(item: Mapping[str, Any]) -> str:
+    before, after, control = (
+        degrees(item.get(f"rmse_{when}_deg")) for when in ("before", "after", "control")
+    )
+    p_value = item.get("p_value")
+    p = "" if p_value is None else f", p = {p_value:.2g}"
+    return f"reduces the held-out error from {before} to {after} degrees (control: {control}{p})"
+
+
+def _is(item: Mapping[str, Any], named: Mapping[str, Any]) -> bool:
+    return item["effect"] == named["effect"]
+
+
+def _worst(rotations: Mapping[str, Mapping[str, Any]]) -> tuple[str, float, float | None]:
+    name = max(rotations, key=lambda name: rotations[name].get("rmse_deg") or 0.0)
+    return name, rotations[name].get("rmse_deg") or 0.0, rotations[name].get("noise_floor_deg")
+
+
+def _effects(named: Mapping[str, Any]) -> list[str]:
+    return [named["effect"]] if named.get("effect") else []
+
+
+def _parameters(named: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    return (named.get("parameters") or {}) if named.get("effect") == name else {}
+
+
+def _warned(heading: str, sentences: Sequence[str] | None) -> list[Markup]:
+    return [note(heading, sentences)] if sentences else []
+
+
+def _candidates(candidates: Sequence[Mapping[str, Any]]) -> list[Markup]:
+    if not candidates:
+        return []
+    heat = heat_of_candidates(candidates)
+    pictures = [figure(*saved_beside_controls(candidates)), *([figure(*heat)] if heat is not None else [])]
     rows = [
         (
             item["effect"],
             ", ".join(item.get("where") or ()) or "-",
-            *(_degrees(item.get(f"rmse_{when}_deg")) for when in ("before", "after", "decoy")),
+            *(degrees(item.get(f"rmse_{when}_deg")) for when in ("before", "after", "control")),
             "yes" if item.get("passes") else "no",
         )
         for item in candidates
     ]
-    return table(HEADS, rows)
+    return [*pictures, table(HEADS, rows), paragraph(SCALE)]
 
 
-def _degrees(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2f}"
+def _unexplained(residual: Mapping[str, Any]) -> list[Markup]:
+    """Whether something is left, and the columns it is associated with."""
+    sentence = residual.get("sentence")
+    parts = [paragraph(sentence)] if sentence else []
+    rows = [
+        (item["phrase"], item["rotation"], degrees(item["size_deg"]), f"{item['p_value']:.3f}")
+        for item in residual.get("associations") or ()
+    ]
+    return [*parts, table(RESIDUAL_HEADS, rows)] if rows else parts
+
+
+def _not_identifiable(items: Sequence[Mapping[str, Any]]) -> list[Markup]:
+    by_reason: dict[str, list[str]] = {}
+    for item in items:
+        by_reason.setdefault(item["why"], []).append(item["effect"])
+    return [listed([f"{', '.join(names)}: {why}" for why, names in by_reason.items()])] if by_reason else []
+
+
+def _details(found: Mapping[str, Any], takes: Sequence[Mapping[str, Any]]) -> Markup:
+    rows = [("model", str(found.get("model", "-"))), ("takes", names_of(takes) or "-")]
+    return table(("", ""), rows)
+
+
+def _time_constant(pose: Mapping[str, Any]) -> str:
+    return f"> {pose['duration_s']:.0f}" if pose["tau_is_lower_bound"] else f"{pose['tau_s']:.2g}"

@@ -1,42 +1,46 @@
-"""The part of a page about fingertips: sentence, table, and the hand where it is farthest off."""
+"""Fingertips on a page: sentence, table, and both hands in the frame with the largest error."""
 
 from __future__ import annotations
 
-from html import escape
-from typing import get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
+from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from glovecal_models.comparison.fingertips import FingertipErrors, TipErrors
 from glovecal_models.hand.dimensions import HandDimensions
-from glovecal_models.hand.forward_kinematics import forward_kinematics
-from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_service.report.drawing import FLOOR, MEASURED, MODEL, figure_svg
-from glovecal_service.report.hand_drawing import View, draw_hand, draw_scale
-from glovecal_service.report.html import figure, table
+from glovecal_models.hand.forward_kinematics import HandFrames, forward_kinematics
+from glovecal_models.hand.skeleton import Skeleton, hand_skeleton
+from glovecal_service.report.drawing import FLOOR, MEASURED, MODEL, QUIET, figure_svg, legend_above
+from glovecal_service.report.html import figure, paragraph, table
 
-HEADS = ("fingertip", "RMSE", "noise floor", "95 % below", "its own spread", "frames")
+HEADS = ("fingertip", "RMSE", "noise floor", "95 % below", "error when predicting the mean", "frames")
 SCALES = (
-    "Millimetres between the predicted and the measured fingertip, seen from the palm. Noise floors are "
-    "those of the joints, carried to the tip as if independent, with the ends of their 95 % intervals. Its "
-    "own spread: the error of always answering the mean angles. Thumb to index: how wrong the distance "
-    "between these two tips is."
+    "Distance in mm between the predicted and the measured fingertip, relative to the palm. Noise floors are "
+    "those of the joints, propagated to the tip as if independent, with 95 % intervals. Thumb to index: the "
+    "error of the distance between these two tips."
 )
+View = Literal["from the back", "from the thumb's side"]
+_SEEN: dict[View, np.ndarray] = {
+    "from the back": np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0]]),
+    "from the thumb's side": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
+}
+"""Each view's right and up, in the skeleton's frame; the fingers of a flat hand point up."""
+SCALE_MM = 50.0
 VIEWS: tuple[View, ...] = get_args(View)
 
 
-def fingertips_part(errors: FingertipErrors | None, dimensions: HandDimensions | None) -> list[str]:
-    """HTML; nothing where the layout is no hand."""
+def fingertips_part(errors: FingertipErrors | None, dimensions: HandDimensions | None) -> list[Markup]:
+    """Nothing where the layout is no hand."""
     if errors is None:
         return []
     return [
-        "<h2>How far off the fingertips are</h2>",
-        f"<p>{escape(errors.sentence)}</p>",
+        paragraph(errors.sentence),
         figure(*_picture(errors, dimensions)),
         _table(errors),
-        f"<p>{escape(SCALES)}</p>",
+        paragraph(SCALES),
     ]
 
 
@@ -45,7 +49,7 @@ def _rows(errors: FingertipErrors) -> dict[str, TipErrors]:
     return rows if errors.thumb_index is None else {**rows, "thumb to index": errors.thumb_index}
 
 
-def _table(errors: FingertipErrors) -> str:
+def _table(errors: FingertipErrors) -> Markup:
     rows = [
         (
             name, f"{one.rmse_mm:.2f}", _floor(one), f"{one.percentile_95_mm:.2f}", f"{one.baseline_mm:.1f}",
@@ -76,16 +80,16 @@ def _picture(errors: FingertipErrors, dimensions: HandDimensions | None) -> tupl
         bars, *hands = page.subplots(1, 1 + len(VIEWS), width_ratios=(1.5, 1, 1))
         _draw_bars(bars, errors)
         for axes, view in zip(hands, VIEWS, strict=True):
-            draw_hand(axes, skeleton, measured, 0, view, color=MEASURED, linewidth=1.2, label="measured")
-            draw_hand(axes, skeleton, predicted, 0, view, color=MODEL, linewidth=1.2, label="predicted")
-            draw_scale(axes, view)
-        hands[0].legend(frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.02), ncols=2)
+            _draw_hand(axes, skeleton, measured, 0, view, color=MEASURED, linewidth=1.2, label="measured")
+            _draw_hand(axes, skeleton, predicted, 0, view, color=MODEL, linewidth=1.2, label="predicted")
+            _draw_scale(axes, view)
+        hands[0].legend(loc="upper center", bbox_to_anchor=(0.5, -0.02), ncols=2)
 
     sentence = (
-        f"Right: the frame in which a fingertip is farthest off, take {worst.take} at {worst.time_s:.1f} s: "
-        f"the {worst.finger} by {worst.error_mm:.1f} mm."
+        f"Right: the frame with the largest error, take {worst.take} at {worst.time_s:.1f} s: "
+        f"{worst.finger} by {worst.error_mm:.1f} mm."
     )
-    return figure_svg(draw, 9, 3.4), sentence
+    return figure_svg(draw, 9, 3.6), sentence
 
 
 def _draw_bars(axes: Axes, errors: FingertipErrors) -> None:
@@ -99,4 +103,37 @@ def _draw_bars(axes: Axes, errors: FingertipErrors) -> None:
         axes.plot(floor.floor_mm, row, "|", color=FLOOR, markersize=11, markeredgewidth=3, label=label)
     axes.set_yticks(rows, [name for name, _ in items])
     axes.set_xlabel("mm")
-    axes.legend(frameon=False, loc="lower left", bbox_to_anchor=(0, 1), ncols=2)
+    axes.set_xlim(0, None)
+    legend_above(axes, 2)
+
+
+def _draw_hand(
+    axes: Axes, skeleton: Skeleton, frames: HandFrames, frame: int, view: View, **style: Any
+) -> None:
+    """The bones of one frame, in mm."""
+    label = style.pop("label", None)
+    seen = _SEEN[view]
+    for line in _lines(skeleton, frames, frame):
+        right, up = seen @ line.T
+        axes.plot(right, up, marker="o", markersize=2.5, label=label, solid_capstyle="round", **style)
+        label = None
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+
+
+def _draw_scale(axes: Axes, view: View) -> None:
+    """The view's name above, and a bar of ``SCALE_MM`` below the wrist."""
+    axes.set_title(view)
+    axes.plot([-SCALE_MM, 0.0], [-12.0, -12.0], color=QUIET, linewidth=3, solid_capstyle="butt")
+    axes.text(-SCALE_MM / 2, -16.0, f"{SCALE_MM:.0f} mm", ha="center", va="top")
+
+
+def _lines(skeleton: Skeleton, frames: HandFrames, frame: int) -> list[np.ndarray]:
+    """Palm to tip of each finger, and across the knuckles; each (K, 3)."""
+    fingers = []
+    for tip, last in enumerate(skeleton.tip_joints):
+        joints = frames.joints_mm[frame, list(skeleton.carrying(last))]
+        fingers.append(np.vstack([joints, frames.tips_mm[frame, tip]]))
+    names = [joint.name for joint in skeleton.joints]
+    knuckles = frames.joints_mm[frame, [names.index(f"{finger}_MCP") for finger in "IMRP"]]
+    return [*fingers, knuckles]

@@ -14,7 +14,7 @@ from typing import Literal
 from fastapi import APIRouter, Response
 from fastapi.responses import FileResponse, HTMLResponse
 
-from glovecal_service.report.html import STYLE, table, whole_page
+from glovecal_service.report.html import STYLE, render
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.health import ready
 from glovecal_service.rest.http.problem import Problem
@@ -45,18 +45,7 @@ START = """SwaggerUIBundle({
 @router.get("/")
 def front(parts: PartsNeeded) -> HTMLResponse:
     """A page for whoever opens the service's address in a browser."""
-    page = whole_page(
-        "the service",
-        [
-            "<h1>Glovecal</h1><p>Joint rotations you can trust, from data gloves: this service learns each "
-            "person's calibration, keeps it, and serves calibrated poses live.</p>",
-            table(("", ""), _state(parts)),
-            '<p><a href="docs">API reference</a> · <a href="v1/openapi.json">OpenAPI document</a> · '
-            '<a href="v1/health/ready">health</a> · <a href="v1/metrics">metrics</a></p>'
-            "<p>The same on the command line: set GLOVECAL_URL to this page's address and type "
-            "<code>glovecal --help</code>.</p>",
-        ],
-    )
+    page = render("front.html", "the service", state=_state(parts))
     return HTMLResponse(page, headers={"Content-Security-Policy": FRONT_POLICY, "Cache-Control": "no-store"})
 
 

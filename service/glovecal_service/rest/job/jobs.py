@@ -145,12 +145,16 @@ def report_on_job(id: IdInPath, store: StoreNeeded) -> Response:
         )
     if job.result is None:
         raise Conflict(f"job {id} is {job.state}; it has a page once it is done")
-    if job.kind == "diagnose":
-        from glovecal_service.report.diagnosis_page import diagnosis_page  # draws: few requests need it
+    from glovecal_service.report.caption import caption_of  # pages draw: few requests need them
 
-        page = diagnosis_page(job.result)
+    if job.kind == "diagnose":
+        from glovecal_service.report.diagnosis_page import diagnosis_page
+
+        caption = caption_of(store, str(job.result.get("model", "")))
+        page = diagnosis_page(job.result, caption, job.payload.get("declarations") or ())
     else:
         from glovecal_service.report.improvement_page import improvement_page
 
-        page = improvement_page(job.result, job.payload["method"], job.payload["subject"])
+        caption = caption_of(store, str(job.result["steps"][-1].get("model") or ""))
+        page = improvement_page(job.result, job.payload["method"], job.payload["subject"], caption)
     return Response(page, media_type="text/html; charset=utf-8")

@@ -14,7 +14,7 @@ from glovecal_models.comparison.compare import compare
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_service.jobs.model_work import trained_ids
 from glovecal_service.plain import plain
-from glovecal_service.report.reported_model import ReportedModel
+from glovecal_service.report.caption import ReportedModel, caption_of
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.request_types import Id, ModelInPath, ModelReference, StrictBody
@@ -119,7 +119,7 @@ def compare_model(id: ModelInPath, body: Against, parts: PartsNeeded) -> dict[st
 )
 def report_on_model(id: ModelInPath, body: AgainstBeside, parts: PartsNeeded) -> Response:
     """Errors, where they are, what they depend on; each picture with a sentence that says what it shows."""
-    from glovecal_service.report.page import report_page  # it draws, and few requests ask for that
+    from glovecal_service.report.comparison_page import report_page  # it draws, and few requests ask for that
 
     record, model, wanted, seen = chosen(id, body, parts)
     takes = [parts.store.takes.load(take) for take in wanted]
@@ -127,10 +127,10 @@ def report_on_model(id: ModelInPath, body: AgainstBeside, parts: PartsNeeded) ->
     for reference in body.beside:
         other, loaded, _, also_seen = chosen(reference, body, parts)
         if other.id != record.id:
-            others[other.id] = ReportedModel(other.id, loaded, also_seen)
+            others[other.id] = ReportedModel(other.id, loaded, also_seen, caption_of(parts.store, other.id))
     ancestors, simpler = _versions_before(parts, record)
     page = report_page(
-        ReportedModel(record.id, model, seen),
+        ReportedModel(record.id, model, seen, caption_of(parts.store, record.id)),
         takes,
         list(others.values()),
         ancestors=ancestors,

@@ -155,7 +155,8 @@ def examine(body: ExaminationRequest, store: StoreNeeded) -> dict[str, Any]:
 def report(body: ExaminationRequest, store: StoreNeeded) -> Response:
     from glovecal_service.report.examination_page import examination_page  # draws: few requests need it
 
-    return Response(examination_page(_document(body, store)), media_type="text/html; charset=utf-8")
+    subject = store.takes.get(body.takes[0]).subject
+    return Response(examination_page(_document(body, store), subject), media_type="text/html; charset=utf-8")
 
 
 def _document(body: ExaminationRequest, store: Store) -> dict[str, Any]:

@@ -1,0 +1,47 @@
+"""The one command after a diagnosis, on the command line and on its page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from glovecal_service.report.documents import current
+
+SHORT = 12
+LONG_ENOUGH_S = 60
+"""Of movement, to tell an unexplained residual from noise."""
+
+
+def next_command(model: str, stored: Mapping[str, Any]) -> str:
+    """For a diagnosis document of that model, also one that an earlier service stored."""
+    found, short = current(stored), model[:SHORT]
+    if found.get("reference_problems"):
+        return f"glovecal take check {_take_of(found)}"
+    named, following = found.get("named"), found.get("next_take")
+    if named and named.get("verdict") == "named":
+        where = "".join(f" --rotation {name}" for name in named.get("where") or ())
+        return f"glovecal add-effect {short} {named['effect']}" + where * _is_on_rotations(found)
+    if following:
+        return f"glovecal record GLOVE deciding --seconds {following['seconds']}"
+    if named:
+        return f"glovecal add-effect {short} {named['effect']}"
+    residual = found.get("unexplained_residual") or {}
+    if residual.get("is_significant"):
+        return f"glovecal where {short} --report where.html"
+    if residual.get("not_identifiable"):
+        return f"glovecal record GLOVE free-motion --seconds {LONG_ENOUGH_S}"
+    return f"glovecal model activate {short}"
+
+
+def _take_of(found: Mapping[str, Any]) -> str:
+    """The take that the first problem speaks of, else the first of all."""
+    names = [take["name"] for take in found.get("takes") or ()]
+    problem = found["reference_problems"][0]
+    spoken_of = [name for name in names if f"take {name}:" in problem]
+    name = (spoken_of or names or ["TAKE"])[0]
+    return f"'{name}'" if " " in name else name
+
+
+def _is_on_rotations(found: Mapping[str, Any]) -> bool:
+    """Whether the named effect is a correction; a fault is named by its sensors or takes."""
+    return found["named"].get("kind") == "correction"
