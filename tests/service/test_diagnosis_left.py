@@ -39,7 +39,7 @@ def test_the_document_tells_size_and_chance(found):
 
 def test_the_page_shows_the_columns(found):
     page = diagnosis_page(found)
-    assert "what is left goes with</th>" in page
+    assert "unexplained residual is associated with</th>" in page
     assert "c.strap_n" in page
 
 

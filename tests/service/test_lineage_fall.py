@@ -1,4 +1,4 @@
-"""The fall of the error over a model's versions has the line that the newest effect's decoy would reach."""
+"""The fall of the error over a model's versions has the line that the newest effect's control would reach."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from realtime_support import LAYOUT
 
 from glovecal_models.comparison.compare import compare
 from glovecal_models.takes.take import Take
-from glovecal_service.report.lineage_fall import lineage_fall
+from glovecal_service.report.error_fall import lineage_fall
 
 
-def test_the_decoys_line_is_drawn_at_its_share_of_the_error_before() -> None:
+def test_the_controls_line_is_drawn_at_its_share_of_the_error_before() -> None:
     frames = moving_frames(300)
     readings = np.array([frame.readings for frame in frames], dtype=np.float64)
     time_s = np.arange(300) / 100.0
@@ -24,7 +24,7 @@ def test_the_decoys_line_is_drawn_at_its_share_of_the_error_before() -> None:
     child = model_with(replace(added("hysteresis", (5.0,), (0.1,)), evidence=evidence))
     before = compare(base, [take]).over_all
     picture, sentence = lineage_fall([base, child], {}, [take], before)
-    assert f"the last effect's decoy would leave {0.75 * before.rmse_deg:.2f}" in sentence
-    assert "with the effect" in picture
+    assert f"(control of the last effect: {0.75 * before.rmse_deg:.2f})" in sentence
+    assert "control in the effect" in picture
     plain = model_with(added("hysteresis", (5.0,), (0.1,)))
-    assert "decoy" not in lineage_fall([base, plain], {}, [take], before)[1]
+    assert "control" not in lineage_fall([base, plain], {}, [take], before)[1]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Caption:
-    """What is known of a model without loading it. A version counts the models it was made from, and itself."""
+    """What is known of a model without loading it; ``version`` counts it and the models it was made from."""
 
     id: str
     subject: str = ""

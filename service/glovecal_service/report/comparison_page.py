@@ -96,12 +96,12 @@ def _summary(main: ReportedModel, numbers: Comparison, where: WhereItFails) -> l
     verdict = (
         f"All of {counted(done, 'rotation')} are at their noise floor."
         if is_done
-        else f"{len(where.rotations) - done} of {counted(len(where.rotations), 'rotation')} above their noise "
-        "floor."
+        else f"{len(where.rotations) - done} of {counted(len(where.rotations), 'rotation')} above their "
+        "noise floor."
     )
     size = (
-        f"RMSE {overall.rmse_deg:.2f} degrees over {counted(len(numbers.rotations), 'rotation')}{floor}; error "
-        f"when predicting the mean: {overall.baseline_deg:.1f}"
+        f"RMSE {overall.rmse_deg:.2f} degrees over {counted(len(numbers.rotations), 'rotation')}{floor}; "
+        f"error when predicting the mean: {overall.baseline_deg:.1f}"
     )
     claimed = f"{100 * overall.coverage:.0f} % of errors within one claimed SD (expected: 68 %)"
     verb = "model activate" if is_done else "diagnose"

@@ -39,8 +39,8 @@ HOLD_HEADS = (
     *("pose", "sensor", "holds", "seconds each", "change, % of span", "same sign in", "time constant, s"),
 )
 SCALE = (
-    "Held-out RMSE in degrees; readings and reference identically smoothed. A control has the same freedom as "
-    "its effect and cannot be right: what it saves is flexibility, not cause."
+    "Held-out RMSE in degrees; readings and reference identically smoothed. A control has the same "
+    "freedom as its effect and cannot be right: what it saves is flexibility, not cause."
 )
 NOTHING_NAMED = "No known effect beats its control significantly."
 

@@ -149,11 +149,17 @@ def _drawn(known: Effect) -> str | None:
         left, right = figure.subplots(1, 2, width_ratios=(2, 1))
         left.plot(time, without, color=MEASURED, linewidth=1, linestyle="--", label="without")
         left.plot(time, with_it, color=MODEL, linewidth=1.4, label="with the effect")
-        left.set(xlabel="time", ylabel=label, xticks=(), yticks=())
+        left.set(xlabel=_time_label(known), ylabel=label, xticks=(), yticks=())
         legend_above(left)
         _against(right, without, with_it)
 
     return figure_svg(draw, 5, 2)
+
+
+def _time_label(known: Effect) -> str:
+    if known.context:
+        return f"time; c.{known.context[0]} rises"
+    return "time; glove put on again half-way" if known.changes_between_takes else "time"
 
 
 def _against(axes: Axes, without: np.ndarray, with_it: np.ndarray) -> None:
@@ -177,12 +183,13 @@ def _by_columns(known: Effect) -> tuple[np.ndarray, np.ndarray, np.ndarray, str]
     joined, own = np.concatenate(columns), np.concatenate([take.own[:, 0] for take in takes])
     if not joined.shape[1]:
         return None
-    column = joined[:, int(np.argmax(np.std(joined, axis=0) * prior))]
+    sizes = np.std(joined, axis=0) * prior
+    column = joined[:, int(np.flatnonzero(sizes >= 0.999 * sizes.max())[-1])]
     largest = float(np.max(np.abs(column)))
     if not np.isfinite(largest) or largest == 0:
         return None
     weight = SHOWN_DEG / largest
-    if known.has_memory:
+    if known.has_memory and not known.context:
         # In degrees of the joint: more than all of it makes no sense, and a sensor comes late, never early.
         late = -float(np.sign(np.sum(column[1:] * np.diff(own))) or -1.0)
         weight = late * min(weight, 1.0)
@@ -194,7 +201,8 @@ def _ramp_and_hold(known: Effect, number: int) -> Signals:
     time = np.arange(0, KNOTS_S[-1], 1 / RATE_HZ)
     motion = LOW_DEG + (HIGH_DEG - LOW_DEG) * np.interp(time, KNOTS_S, KNOTS_SHARE)
     neighbour = 1.5 * np.sin(2 * np.pi * time / 7.0)
-    context = dict.fromkeys(known.context, 1.0 + number + time / time[-1])
+    rising = 1.0 + number + time / KNOTS_S[-1]
+    context = dict.fromkeys(known.context, rising)
     return Signals(
         time, motion[:, None], {"neighbour": neighbour}, context, f"wearing {number + 1}",
         f"take {number + 1}", np.zeros(1),

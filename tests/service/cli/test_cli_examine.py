@@ -55,8 +55,8 @@ def test_from_still_takes_to_a_model_that_reads_the_neighbours(eve: Run, tmp_pat
     assert "I_PIP stays within" in told.out
     assert "--keep NAME" in told.out
     html = page.read_text()
-    assert "Who pulls on whom" in html
-    assert "What would change" in html
+    assert "Which sensor affects which" in html
+    assert "Proposed layout" in html
     assert "plain" in html
     kept = eve("take", "examine", "-s", "eve", "--keep", "eves")
     assert "it reads IM_ABD otherwise" in kept.out

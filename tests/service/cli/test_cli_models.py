@@ -90,7 +90,7 @@ def test_a_page_with_both_models_is_written_beside_the_json(walked, tmp_path):
     answer = run("compare", *(models[m]["id"] for m in ("linear", "raw")), "--report", page, "--json")
     assert list(answer.json) == [models[m]["id"] for m in ("linear", "raw")]
     assert f"Wrote {page}" in answer.err
-    assert "Side by side" in page.read_text()
+    assert "Models side by side" in page.read_text()
     assert "exists already" in run("compare", models["raw"]["id"], "--report", page).said
 
 

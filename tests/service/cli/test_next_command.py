@@ -1,6 +1,6 @@
 """The one command after a diagnosis: activating comes last, and not where nothing could be judged."""
 
-from glovecal_service.cli.effect.diagnosis import next_command
+from glovecal_service.next_command import next_command
 
 MODEL = "0123456789abcdef"
 

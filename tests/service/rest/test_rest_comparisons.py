@@ -95,8 +95,8 @@ def test_the_report_is_one_whole_page(glove: tuple[RestClient, str, list[str]]) 
     assert "script" not in outline.count
     assert outline.count["svg"] == outline.count["figure"] == outline.count["figcaption"] == 6
     assert "the reading of sensor B" in page
-    assert "chance goes as far in 0.1 % of trials: this is structure" in page
-    assert "trained on 1 of these takes" in page
+    assert "p = 0.001: significant" in page
+    assert "was trained on 1 of these takes" in page
     assert "simulated" not in page
 
 
@@ -119,7 +119,7 @@ def test_models_stand_side_by_side_in_one_report(
     outline = Outline()
     outline.feed(page)
     assert outline.count["svg"] == outline.count["figcaption"] == 7
-    assert "Side by side" in page
+    assert "Models side by side" in page
     rmse = {f"raw {raw[:6]}": 0.0, f"linear {model[:6]}": 0.0}
     for name, id in zip(rmse, (raw, model), strict=True):
         rmse[name] = client.post(f"/models/{id}/compare", {"takes": takes[1:]})["over_all"]["rmse_deg"]

@@ -46,7 +46,7 @@ def test_an_examination_and_its_page(client: RestClient, takes: list[str]) -> No
     assert not any(proposal["is_change"] for proposal in found["proposals"])
     page = client.page("/takes/examination/report", {"takes": takes[:1]})
     assert page.startswith("<!doctype html>")
-    assert "Who pulls on whom" in page
+    assert "Which sensor affects which" in page
     nothing = client.post("/takes/examination", {"takes": takes[:1], "range_takes": []})
     assert nothing["rotations"][0]["active_range"]["source"] == "what the glove can send"
 

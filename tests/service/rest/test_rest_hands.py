@@ -79,6 +79,6 @@ def test_errors_in_mm_are_those_of_the_subjects_hand(
     assert own["is_assumed"] is False
     assert own["over_all"]["rmse_mm"] == pytest.approx(assumed["over_all"]["rmse_mm"] / 2)
     page = client.page(f"/models/{model}/report", against)
-    assert "How far off the fingertips are" in page
+    assert ">Fingertips</h2>" in page
     assert own["sentence"] in page
-    assert "farthest off, take b at" in page
+    assert "largest error, take b at" in page
