@@ -115,7 +115,7 @@ def test_a_second_wearing_by_events_and_what_is_said(service: RestClient, place:
         if kind == "say":
             said.append(data)
             # A busy computer loses frames, and a step with it: then once more.
-            if "Step " in data or data.startswith("Once more: "):
+            if "Step " in data or data.startswith("Repeat: "):
                 leaves_out = "Bend all knuckles" in data
                 service.post(f"/sampling/{id}/{'skip' if leaves_out else 'go'}")
     view = service.get(f"/sampling/{id}")
@@ -196,9 +196,9 @@ def test_a_lost_glove_is_waited_for(service: RestClient, place: DemoPlace, worn:
     service.post(f"/sampling/{id}/go")
     in_phase(service, id, "recording")
     worn.pop().close()
-    assert in_phase(service, id, "lost")["say"] == "The glove is gone. I wait for it."
+    assert in_phase(service, id, "lost")["say"] == "Signal lost, waiting for the glove."
     worn.append(put_on(place))
-    assert "The glove is back." in in_phase(service, id, "waiting")["say"]
+    assert "Signal restored." in in_phase(service, id, "waiting")["say"]
     service.post(f"/sampling/{id}/stop")
     assert over(service, id)["phase"] == "stopped"
     assert service.get(f"/sampling/{id}")["takes"] == []
@@ -279,15 +279,15 @@ class Terminal:
 def test_the_command_walks_a_person_through_it_by_keys(service: RestClient, place: DemoPlace) -> None:
     terminal = Terminal(place, "sample", "--glove", GLOVE, "-s", "anna", "--protocol", "second_wearing")
     terminal.wait_for("Step 1 of 5. Open and close the hand")
-    terminal.wait_for("% of a sensor's range (5 is still)")
+    terminal.wait_for("% of a sensor's range (still: below 5 %)")
     terminal.press("u")
     terminal.wait_for("there is nothing to undo")
     terminal.press("s")
-    terminal.wait_for("Left out. Step 2 of 5.")
+    terminal.wait_for("Skipped. Step 2 of 5.")
     terminal.press(" ")
     terminal.wait_for("Ready.")
     terminal.press("q")
-    terminal.wait_for("Go on with: glovecal sample resume ")
+    terminal.wait_for("Continue with: glovecal sample resume ")
     assert terminal.close() == 0
     (paused,) = service.get("/sampling", {"glove": GLOVE, "only_open": True})
     assert paused["phase"] == "paused"
@@ -295,7 +295,7 @@ def test_the_command_walks_a_person_through_it_by_keys(service: RestClient, plac
     again.wait_for("Step 2 of 5.")
     for _ in range(4):
         again.press("s")
-        again.wait_for("Left out." if _ < 3 else "Done. Thank you.")
+        again.wait_for("Skipped." if _ < 3 else "Done. Thank you.")
     again.wait_for("0 takes of 0 steps")
     assert again.close() == 0
 

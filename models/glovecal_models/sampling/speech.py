@@ -15,18 +15,18 @@ def recording(step: Step) -> str:
 
 
 def again(reasons: tuple[str, ...]) -> str:
-    return f"Once more: {reasons[0]}"
+    return f"Repeat: {reasons[0]}"
 
 
 COUNTDOWN = "Ready."
 SETTLING = "Keep still."
 GOOD = "Good."
-LOST = "The glove is gone. I wait for it."
-BACK = "The glove is back."
-PAUSED = "Pause."
-SKIPPED = "Left out."
-UNDONE = "Taken back."
-CHOOSING = "One moment."
+LOST = "Signal lost, waiting for the glove."
+BACK = "Signal restored."
+PAUSED = "Paused."
+SKIPPED = "Skipped."
+UNDONE = "Undone."
+CHOOSING = "Choosing the next step."
 DONE = "Done. Thank you."
 STOPPED = "Stopped."
-INTERRUPTED = "The service was interrupted; this step begins again."
+INTERRUPTED = "The service was interrupted; repeating this step."

@@ -28,28 +28,28 @@ SEEDS = 10_000
 
 def demo(
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print the figures as one line of JSON, last.")
+        bool, typer.Option("--json", help="Print the figures as one line of JSON at the end.")
     ] = False,
     keep: Annotated[bool, typer.Option("--keep", help="Leave the service and a live glove running.")] = False,
     seed: Annotated[
         int | None,
-        typer.Option(min=0, help="Which simulated hands and gloves. Default: a new hidden effect each time."),
+        typer.Option(min=0, help="Seed of the simulation. Default: another hidden effect each time."),
     ] = None,
     effect: Annotated[
         str,
         typer.Option(
-            help="What is hidden in the second glove: random, none, unknown, or a name of glovecal effects."
+            help="Effect hidden in the second glove: random, none, unknown, or a name from glovecal effects."
         ),
     ] = "random",
     write_takes: Annotated[
         Path | None,
         typer.Option(
             file_okay=False,
-            help="Only write the second glove's takes into this folder, as CSV files for the other verbs.",
+            help="Only write the second glove's takes to this folder as CSV files.",
         ),
     ] = None,
     smoke: Annotated[
-        bool, typer.Option("--smoke", help="Seconds of the first act only: does everything run here?")
+        bool, typer.Option("--smoke", help="Run a few seconds of the first part as a self-test.")
     ] = False,
 ) -> None:
     """Calibrate a simulated CyberGlove live, then find the effect hidden in another; under 90 seconds."""
@@ -95,8 +95,8 @@ def _run(seed: int, effect: str, drawn: int, *, as_json: bool, keep: bool) -> No
             _second_act(service, place, hidden, second)
             seconds = time.monotonic() - started
             out.print(
-                f"\nAll this was done by glovecal serve, capture and REST in {seconds:.0f} s. Gloves and "
-                "hands are simulated; their truth is known."
+                f"\nDone with glovecal serve, capture and REST in {seconds:.0f} s. Gloves and hands are "
+                "simulated, so the true angles are known."
             )
             out.print(NEXT)
             if as_json:
@@ -129,36 +129,35 @@ def _second_act(service: RestClient, place: DemoPlace, hidden: HiddenSession, fo
 
     plan = hidden.session.plan
     out.print(
-        f"\nSecond act: another simulated subject, {plan.takes} takes in {plan.wearings} wearings of a glove "
-        f"with {len(plan.sensors)} sensors.\nSomething may be hidden in it (seed {hidden.seed}; --seed "
-        f"{hidden.seed} shows it again). {plan.takes - len(found.tests)} takes are for training, "
-        f"{len(found.tests)} for testing."
+        f"\nSecond part: another simulated subject, {plan.takes} takes in {plan.wearings} wearings of a "
+        f"glove with {len(plan.sensors)} sensors.\nThe glove may have a hidden effect (repeat with --seed "
+        f"{hidden.seed}). {plan.takes - len(found.tests)} takes for training, {len(found.tests)} held out."
     )
 
     def live() -> None:
         out.print(live_sentence(live_child(service, place, hidden.live(), found)))
 
     second_act(service, found, out.print, err.print, live)
-    out.print("\nError on takes not trained on, all rotations (degrees, RMSE):")
+    out.print("\nHeld-out error, all rotations (RMSE, degrees):")
     for line in (*chart(found), *fall(found), "", *verdict(hidden, found)):
         out.print(line)
 
 
 def _write(hidden: HiddenSession, folder: Path, effect: str) -> None:
     training, test = hidden.write(folder)
-    out.print(f"{training}: {len(hidden.training)} simulated takes to learn from")
-    out.print(f"{test}: {len(hidden.test)} simulated takes to test on")
-    out.print(f"{hidden.write_truth(folder)}: what is hidden in them; look at it last")
+    out.print(f"{training}: {len(hidden.training)} simulated takes for training")
+    out.print(f"{test}: {len(hidden.test)} simulated takes held out for testing")
+    out.print(f"{hidden.write_truth(folder)}: the hidden effect (the answer)")
     out.print(
         f"Made by glovecal demo --effect {effect} --seed {hidden.seed}; column c.simulated marks every row."
     )
 
 
 NEXT = """
-Where to look next:
-  docs/tutorial.md          the second act by your own hand, verb by verb
-  glovecal demo --effect hysteresis | none | unknown   another effect, none, or one that has no name
-  glovecal demo --keep      leaves it running, with the address of its REST interface
+Next:
+  docs/tutorial.md          the second part step by step, command by command
+  glovecal demo --effect hysteresis | none | unknown   another effect, none, or one outside the catalogue
+  glovecal demo --keep      keeps the service running and prints its REST address
   glovecal serve            your own service; then glovecal capture --device cyberglove --glove right
   glovecal take import      calibrate from recordings you have (CSV, Parquet)
-  README.md                 connect your glove, walk the loop, deploy"""
+  README.md                 connect your glove, improve its model, deploy"""

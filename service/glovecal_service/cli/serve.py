@@ -10,7 +10,7 @@ import typer
 def serve(
     smoke: Annotated[
         bool,
-        typer.Option("--smoke", help="On free ports in a temporary folder, until ready; then stop."),
+        typer.Option("--smoke", help="Start on free ports in a temporary folder and stop once ready."),
     ] = False,
 ) -> None:
     """Run the service: zenoh router, real-time prediction, recorder and REST. Ctrl-C stops it.

@@ -46,8 +46,8 @@ def fall(found: Findings) -> list[str]:
     above, left = (max(errors[name] ** 2 - floor**2, 0.0) ** 0.5 for name in ("lmc_gpr", "with_effect"))
     times = errors["with_effect"] / floor
     return [
-        f"Above the floor LMC-GPR was off by {above:.2f} degrees, with the effect by {left:.2f}. The error "
-        f"is now {times:.1f} times the floor."
+        f"Error above the noise floor: LMC-GPR {above:.2f} degrees, with the effect {left:.2f}. The error is "
+        f"{times:.1f} times the noise floor."
     ]
 
 
@@ -55,34 +55,37 @@ def verdict(hidden: HiddenSession, found: Findings) -> list[str]:
     """What was hidden, and whether that is what was said."""
     truth, named = hidden.truth, _named(found)
     perfect = max(hidden.session.floor_deg.values())
-    floor = f"A perfect calibration of this glove without it would be off by up to {perfect:.2f} degrees."
+    floor = f"Without it, a perfect calibration of this glove has an error of up to {perfect:.2f} degrees."
     if truth is None:
-        told = ["Hidden was: nothing. This simulated glove is healthy."]
+        told = ["Hidden effect: none. This simulated glove is healthy."]
         told.append("Right: nothing was named." if named is None else f"Wrong: {named} was named.")
         if named is None and found.diagnosis["something_left"]["is_left"]:
             told.append(
-                f"What was said to be left is the slip of any cloth, {hidden.session.plan.nuisance_deg:g} "
-                "degrees in this simulation; it has no cause that could be named."
+                f"The unexplained residual is the normal slip of cloth, {hidden.session.plan.nuisance_deg:g} "
+                "degrees in this simulation; the catalogue has no effect for it."
             )
         return told
     where = "all sensors" if len(truth.channels) == len(hidden.session.plan.sensors) else ""
     told = [
-        f"Hidden was: {truth.name}, of the form {truth.form}, on {where or ', '.join(truth.channels)}. "
+        f"Hidden effect: {truth.name} (form: {truth.form}) on {where or ', '.join(truth.channels)}. "
         f"{truth.description}",
         floor,
     ]
     if is_right(hidden, found):
         also = _named_after(found)
         if truth.name.startswith("unknown:"):
-            return [*told, "Right: no effect of the catalogue was named, and something was said to be left."]
+            return [
+                *told,
+                "Right: no effect of the catalogue was named, and an unexplained residual was reported.",
+            ]
         if also is not None:
-            return [*told, f"Right: {named} was named. Wrong: {also} was named too, afterwards."]
+            return [*told, f"Right: {named} was named. Wrong: {also} was named afterwards."]
         return [*told, f"Right: {named} was named."]
     if truth.name.startswith("unknown:"):
-        said = f"{named} was named" if named else "nothing was said to be left"
-        return [*told, f"Wrong: {said}, and no effect of the catalogue is this one."]
+        said = f"{named} was named" if named else "no unexplained residual was reported"
+        return [*told, f"Wrong: {said}; this effect is not in the catalogue."]
     if truth.name in _confidence_set(found):
-        return [*told, f"Not quite: {named} was named first; {truth.name} is in the confidence set."]
+        return [*told, f"Partly right: {named} was named first; {truth.name} is in the confidence set."]
     return [*told, f"Wrong: {'nothing' if named is None else named} was named."]
 
 

@@ -12,7 +12,7 @@ def keep_running(place: DemoPlace, seed: int, say: Callable[[str], None]) -> Non
     """Stream free motion again and again; returns on Ctrl-C."""
     say(f"\nStill running. REST: {place.url}/v1/openapi.json")
     say(f"  export GLOVECAL_URL={place.url} GLOVECAL_ZENOH={place.zenoh}")
-    say(f"  glovecal model list;  glovecal watch {GLOVE};  Ctrl-C here ends it and removes its data.")
+    say(f"  glovecal model list;  glovecal watch {GLOVE};  Ctrl-C here stops it and removes its data.")
     options = {"seed": str(seed), "motion": "free", "wearing": "1"}
     try:
         while True:

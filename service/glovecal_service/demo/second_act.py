@@ -135,7 +135,7 @@ def _finished(service: RestClient, job: dict[str, Any], progress: Say) -> dict[s
 
 
 def _say_errors(comparison: dict[str, Any], say: Say) -> None:
-    say("LMC-GPR on takes it has not seen, error beside the noise floor (degrees):")
+    say("LMC-GPR, held-out error and noise floor (RMSE, degrees):")
     for name, errors in comparison["rotations"].items():
         floor = errors["floor"]
         known = "unknown" if floor is None else f"{floor['floor_deg']:.2f}"
@@ -147,7 +147,7 @@ def _say_diagnosis(found: dict[str, Any], say: Say) -> None:
         say(f"Found in the recording: {sentence}")
     named = found["named"]
     if named is None:
-        say("Diagnosis: nothing can be named; no known effect saves more than its decoy and chance do.")
+        say("Diagnosis: no known effect beats its control significantly.")
         say(found["something_left"]["sentence"])
         return
     say(f"Diagnosis: {named['sentence']}")
@@ -155,10 +155,10 @@ def _say_diagnosis(found: dict[str, Any], say: Say) -> None:
     following = found["next_take"]
     if following:
         rivals = " and ".join(following["separates"])
-        say(f"To tell {rivals} apart one would record {following['seconds']} s: {following['what']}")
+        say(f"To tell {rivals} apart record {following['seconds']} s: {following['what']}")
 
 
 def _after(found: dict[str, Any]) -> str:
     if found["named"] is None:
-        return f"nothing more can be named. {found['something_left']['sentence']}"
+        return f"no further effect beats its control significantly. {found['something_left']['sentence']}"
     return found["named"]["sentence"]

@@ -40,12 +40,12 @@ def sentences(found: Walk) -> list[str]:
     spread = found.comparisons["linear"]["over_all"]["baseline_deg"]
     median, late = found.meter.latency_ms(50), found.meter.latency_ms(99)
     return [
-        f"Scale: always answering the mean angle would be off by {spread:.1f} degrees; the glove's own noise "
-        "and 8-bit steps are about 1 degree.",
-        f"LMC-GPR leaves {rmse['lmc_gpr'] / rmse['linear']:.2f} of the linear error; SPGP is "
-        f"{rmse['spgp'] / rmse['lmc_gpr']:.2f} of LMC-GPR.",
-        f"Live: reading to pose {median:.2f} ms (median), {late:.2f} ms (99 %) through two hops of zenoh; "
-        "a frame lasts 8.3 ms at 120 Hz.",
+        f"Scale: the error when predicting the mean is {spread:.1f} degrees; sensor noise and 8-bit steps "
+        "are about 1 degree.",
+        f"Error ratios: LMC-GPR to linear {rmse['lmc_gpr'] / rmse['linear']:.2f}, SPGP to LMC-GPR "
+        f"{rmse['spgp'] / rmse['lmc_gpr']:.2f}.",
+        f"Live: reading to pose {median:.2f} ms (median), {late:.2f} ms (99th percentile) through two zenoh "
+        "hops; frame period 8.3 ms at 120 Hz.",
         f"Frames: {frames['sent']} sent, {frames['received']} poses received, "
         f"{frames['skipped']} skipped by the service, {lost} lost.",
     ]

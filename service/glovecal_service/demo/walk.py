@@ -65,7 +65,7 @@ def walk(service: RestClient, place: DemoPlace, seed: int, say: Say, plan: WalkP
     for method in plan.before:
         _finish_training(service, _start_training(service, method, ids), found, say)
     service.post(f"/models/{found.models[served]}/activate")
-    trains_on = f"; {plan.meanwhile} trains on in the background" if plan.meanwhile else ""
+    trains_on = f"; {plan.meanwhile} is training in the background" if plan.meanwhile else ""
     say(f"Model {found.models[served][:12]} ({served}) is active{trains_on}.")
     meanwhile = _start_training(service, plan.meanwhile, ids) if plan.meanwhile else None
     say("The glove is taken off and put on again.")

@@ -23,7 +23,7 @@ from glovecal_models.effects.base.signature_effect import SignatureEffect
 from glovecal_models.effects.catalogue import effect, effect_of_declaration
 from glovecal_models.errors import BadInput
 from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES
-from glovecal_models.simulation.causes.cause import Cause
+from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 from glovecal_service.report.drawing import FLOOR, MEASURED, MODEL, figure_svg, legend_above

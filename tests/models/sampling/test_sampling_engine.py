@@ -49,7 +49,7 @@ def test_a_hand_that_does_not_rest_is_not_recorded(ready: Bench) -> None:
     assert ready.pass_time(9.0, moving) == "settling"
     assert ready.pass_time(2.0, moving) == "judged"
     assert ready.state.attempts[-1].reasons[0].startswith("the hand did not come to rest (")
-    assert ready.state.said.startswith("Once more: ")
+    assert ready.state.said.startswith("Repeat: ")
     assert ready.pass_time(20.0) == "judged"
     assert ready.event("go") == "countdown"
 
@@ -125,7 +125,7 @@ def test_a_lost_glove_is_waited_for(ready: Bench) -> None:
     assert ready.pass_time(600.0, None) == "lost"
     assert ready.pass_time(0.2) == "lost"
     assert ready.pass_time(0.3) == "waiting"
-    assert ready.state.said == "The glove is back. Step 2 of 4. Do flat."
+    assert ready.state.said == "Signal restored. Step 2 of 4. Do flat."
     do_step(ready)
     assert ready.state.step == "fist"
 

@@ -67,11 +67,11 @@ def test_a_cause_without_a_name_is_said_to_be_left(service, tmp_path):
     assert list(figures["error_fall_deg"]) == ["raw", "linear", "lmc_gpr"]
     assert found.child is None
     assert found.served == found.models["lmc_gpr"]
-    assert any("nothing can be named" in sentence for sentence in said)
+    assert any("no known effect beats its control" in sentence for sentence in said)
     assert figures["hidden"]["truth"].startswith("unknown:")
     assert figures["hidden"]["right"] is True
     assert any("Something is left" in sentence for sentence in said)
-    assert any("something was said to be left" in sentence for sentence in ending)
+    assert any("an unexplained residual was reported" in sentence for sentence in ending)
 
 
 def test_a_wrong_name_is_called_wrong():
@@ -79,7 +79,7 @@ def test_a_wrong_name_is_called_wrong():
     named = {"effect": "creep", "confidence_set": ["creep", "lag"]}
     error = {"over_all": {"rmse_deg": 2.0, "floor": None}}
     found = Findings(comparisons={"lmc_gpr": error}, diagnosis={"named": named})
-    assert verdict(hidden, found)[-1].startswith("Not quite: creep was named first; lag is in")
+    assert verdict(hidden, found)[-1].startswith("Partly right: creep was named first; lag is in")
     named["confidence_set"] = ["creep"]
     assert verdict(hidden, found)[-1] == "Wrong: creep was named."
     assert hidden_contract(hidden, found)["hidden"]["right"] is False

@@ -154,7 +154,7 @@ def _record_with_lead_in(live: dict[str, str]) -> None:
     """The glove streams for seconds already: the take begins before it was asked for."""
     run = partial(glovecal, live)
     said = run("record", GLOVE, "second", "--seconds", 0.3, "--lead-in", 0.5).out
-    assert re.search(r"Lead-in: 0\.[45] of the 0\.5 s before it \(\d+ frames\)\.", said)
+    assert re.search(r"Pre-roll: 0\.[45] of the 0\.5 s before it \(\d+ frames\)\.", said)
     assert re.search(r"lead-in +\d+ of them in 0\.[45]", run("take", "check", "second").out)
     assert "lead-in" in run("record", GLOVE, "x", "--lead-in", 601).said.lower()
 
@@ -229,7 +229,7 @@ def test_interrupted_training_leaves_nothing(anna_of_its_own, number):
     said, complaints = _end(process, number)
     assert process.returncode == {signal.SIGINT: 130, signal.SIGTERM: 143}[number]
     assert said == ""
-    assert complaints.endswith("is cancelled; what it finished is kept for the next try.\n")
+    assert complaints.endswith("cancelled; finished parts are kept for the next attempt.\n")
     assert len(complaints.splitlines()) == 1
     eventually(lambda: not _session(process.pid), "no process is left")
     (job,) = glovecal(settings, "job", "list", "--json").json

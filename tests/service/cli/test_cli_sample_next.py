@@ -74,7 +74,7 @@ def test_what_a_diagnosis_asks_for_stands_beside_it(folder: Path) -> None:
         assert job is not None
         store.jobs.finish(job.id, job.attempt, {"model": model, "next_take": wanted})
     assert run(folder, model[:8], "--json").json["diagnosed"]["separates"] == ["lag", "clock_offset"]
-    assert "Beside that, 25 s: Swing fast. The diagnosis cannot tell" in run(folder, "-s", "anna").out
+    assert "Also useful, 25 s: Swing fast. The diagnosis cannot tell" in run(folder, "-s", "anna").out
 
 
 def test_without_a_model_or_its_takes_it_says_so(folder: Path) -> None:

@@ -18,6 +18,9 @@ from cli_running import glovecal
 from glovecal_models.calibration import artifact
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.takes.table import read_takes
+from glovecal_service.rest.in_process import in_process_client
+from glovecal_service.rest.job.jobs import WITH_PAGES
+from glovecal_service.settings import Settings
 
 STORED = Path(__file__).parents[1] / "stored_example"
 EXPECTED = json.loads((STORED / "expected.json").read_text(encoding="utf-8"))
@@ -65,6 +68,18 @@ def test_each_job_is_shown(run, job: str):
     shown = run("job", "show", job)
     assert shown.code == 0, shown.err
     assert run("job", "show", job, "--json").json["state"] == "done"
+
+
+@pytest.mark.parametrize("job", EXPECTED["jobs"])
+def test_each_diagnosis_and_improvement_still_has_its_page(folder: Path, job: str):
+    with in_process_client(Settings(data=folder)) as client:
+        kind = client.get(f"/jobs/{job}")["kind"]
+        if kind not in WITH_PAGES:
+            return
+        page = client.download(f"/jobs/{job}/report").decode()
+    assert "version" in page[page.index("<h1>") : page.index("</h1>")]
+    assert "<dt>Next</dt><dd><code>glovecal " in page
+    assert "control" in page
 
 
 def test_it_goes_on_from_there(run, folder: Path):

@@ -15,7 +15,7 @@ from glovecal_service.cli.terminal.printing import out
 
 GloveOption = Annotated[
     str,
-    typer.Option("--glove", help="Its name on the wire, such as right-hand.", callback=identifier("glove")),
+    typer.Option("--glove", help="The glove's name, such as right-hand.", callback=identifier("glove")),
 ]
 
 
@@ -33,7 +33,7 @@ def capture(
     device: Annotated[
         str,
         typer.Option(
-            help="cyberglove, cyberglove:PORT, replay:FILE, simulated, or another's NAME[:ARGUMENT]."
+            help="cyberglove, cyberglove:PORT, replay:FILE, simulated, or NAME[:ARGUMENT] of a driver."
         ),
     ],
     glove: GloveOption,
@@ -42,11 +42,11 @@ def capture(
         str | None, typer.Option(help="Name of this donning.", callback=identifier("wearing"))
     ] = None,
     option: Annotated[
-        list[str] | None, typer.Option(help="KEY=VALUE for the device, see below; repeat.")
+        list[str] | None, typer.Option(help="KEY=VALUE for the device, see below; repeatable.")
     ] = None,
     connect: Zenoh = DEFAULT_ZENOH,
     site: Site = "lab",
-    data: Annotated[Path, typer.Option(envvar="GLOVECAL_DATA", help="Where the local log goes.")] = Path(
+    data: Annotated[Path, typer.Option(envvar="GLOVECAL_DATA", help="Folder of the local log.")] = Path(
         "glovecal-data"
     ),
 ) -> None:

@@ -11,10 +11,10 @@ from glovecal_service.cli.terminal.printing import print_json, print_table
 
 
 def find_port(
-    port: Annotated[list[str] | None, typer.Argument(help="More ports to look at, or patterns.")] = None,
+    port: Annotated[list[str] | None, typer.Argument(help="Further ports or patterns to try.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Look at every serial port and say what answers. Takes some seconds."""
+    """Try every serial port and show what answers. Takes some seconds."""
     from glovecal_client.capture.find_port import find_ports
 
     found = [item.to_json() for item in find_ports(port or [])]
@@ -22,4 +22,4 @@ def find_port(
         print_json(found)
         return
     columns = {"path": "port", "kind": "what", "sentence": "what answered"}
-    print_table(found, columns, empty="This computer has no serial ports; is the cable plugged in?")
+    print_table(found, columns, empty="No serial ports found. Is the cable plugged in?")

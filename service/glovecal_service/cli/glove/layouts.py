@@ -37,7 +37,7 @@ def list_gloves(as_json: AsJson = False) -> None:
     ]
     print_table(
         layouts,
-        {"name": "layout", "sensors": "sensors", "rotations": "rotations", "title": "what it is"},
+        {"name": "layout", "sensors": "sensors", "rotations": "rotations", "title": "description"},
         empty="No layouts.",
     )
     out.print()
@@ -51,7 +51,7 @@ def list_gloves(as_json: AsJson = False) -> None:
             "simulated": "simulated",
             "last_seen_at": "last seen",
         },
-        empty="No glove was seen yet. Start one: glovecal capture --device cyberglove:PORT --glove NAME",
+        empty="No glove seen yet. Start one: glovecal capture --device cyberglove:PORT --glove NAME",
     )
 
 
@@ -84,13 +84,13 @@ def wear(
     glove: Glove,
     subject: Annotated[str | None, typer.Argument(help="Who wears it now.", callback=subject_named)] = None,
     wearing: Annotated[
-        str | None, typer.Option(help="Name of this donning; readings shift between them.")
+        str | None, typer.Option(help="Name of this wearing; readings shift between wearings.")
     ] = None,
-    nobody: Annotated[bool, typer.Option("--nobody", help="It was taken off.")] = False,
+    nobody: Annotated[bool, typer.Option("--nobody", help="The glove was taken off.")] = False,
 ) -> None:
-    """Say who wears a glove now; the live service changes to that subject's model."""
+    """Set who wears a glove; the live service switches to that subject's model."""
     if (subject is None) != nobody:
-        raise typer.BadParameter("say who wears it: SUBJECT, or --nobody")
+        raise typer.BadParameter("give SUBJECT, or --nobody")
     with connect() as service:
         service.put(f"/gloves/{glove}/wearer", {"subject": subject, "wearing": wearing})
     out.print(f"{glove} is worn by {subject or 'nobody'}.")

@@ -21,22 +21,24 @@ BEGINS_WITHIN_S = 10.0
 
 def record(
     glove: Glove,
-    name: Annotated[str, typer.Argument(help="What the take will be called.")],
-    seconds: Annotated[float, typer.Option(min=0.1, help="How long.")] = 10.0,
+    name: Annotated[str, typer.Argument(help="Name of the take.")],
+    seconds: Annotated[float, typer.Option(min=0.1, help="Duration in seconds.")] = 10.0,
     subject: Annotated[
         str | None,
-        typer.Option("--subject", "-s", help="Default: who wears it.", callback=subject_named),
+        typer.Option("--subject", "-s", help="Default: the wearer of the glove.", callback=subject_named),
     ] = None,
     wearing: Annotated[str | None, typer.Option(help="Default: the glove's wearing.")] = None,
     lead_in: Annotated[
         float,
         typer.Option(
-            min=0, max=600, help="Seconds before it to fetch from the capture log, for effects with a memory."
+            min=0,
+            max=600,
+            help="Pre-roll: seconds before the take to fetch from the capture log, for effects with memory.",
         ),
     ] = 60.0,
     as_json: AsJson = False,
 ) -> None:
-    """Record a take from a glove that is streaming to the service. Ctrl-C ends it sooner."""
+    """Record a take from a glove that is streaming to the service. Ctrl-C stops it early."""
     wanted = {"glove": glove, "name": name, "subject": subject, "wearing": wearing, "lead_s": lead_in}
     with connect() as service:
         started = service.post(
@@ -44,7 +46,7 @@ def record(
         )
         try:
             _wait_for_the_recorder(service, started["id"], glove)
-            err.print(f"Recording {name} for {seconds:g} s; Ctrl-C ends it sooner.")
+            err.print(f"Recording {name} for {seconds:g} s; Ctrl-C stops early.")
             wait_seconds(seconds, f"recording {name}", quiet=as_json)
         except KeyboardInterrupt:
             err.print("Stopped.")
@@ -59,16 +61,16 @@ def record(
     if "take" in facts:
         out.print(
             f"Take {facts['take'][:12]}: {facts['recorded']} of {facts['sent']} frames sent, "
-            f"{facts['repaired']} of them fetched from the capture log, {facts['missing_frames']} missing."
+            f"{facts['repaired']} fetched from the capture log, {facts['missing_frames']} missing."
         )
     if finished["state"] == "repairing":
         err.print(
-            f"Recording {finished['id']} is {facts['sentence']}. It is completed as soon as capture answers; "
+            f"Recording {finished['id']} is {facts['sentence']}. It completes as soon as capture answers; "
             "glovecal take list shows its state.",
             style="yellow",
         )
     if lead_in and "take" in facts:
-        out.print(f"Lead-in: {facts['lead_in']['sentence']}.")
+        out.print(f"Pre-roll: {facts['lead_in']['sentence']}.")
 
 
 def _wait_for_the_recorder(service: RestClient, recording: str, glove: str) -> None:
@@ -78,7 +80,7 @@ def _wait_for_the_recorder(service: RestClient, recording: str, glove: str) -> N
         if time.monotonic() > until:
             service.post(f"/recordings/{recording}/stop")
             raise NobodyThere(
-                f"nobody records glove {glove}: no recorder took recording {recording} on within "
-                f"{BEGINS_WITHIN_S:g} s; is glovecal serve running on this data folder?"
+                f"recording {recording} of glove {glove} did not start within {BEGINS_WITHIN_S:g} s; is "
+                "glovecal serve running on this data folder?"
             )
         time.sleep(0.05)

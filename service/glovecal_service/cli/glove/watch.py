@@ -34,12 +34,12 @@ WIDEST_BAR, DEGREES_A_BLOCK = 30, 4.0
 
 def watch(
     glove: Glove,
-    seconds: Annotated[float | None, typer.Option(min=0.1, help="Stop after so many seconds.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.1, help="Stop after this many seconds.")] = None,
     connect: Zenoh = DEFAULT_ZENOH,
     site: Site = "lab",
     as_json: AsJson = False,
 ) -> None:
-    """Show a glove's calibrated rotations as they come; with --json one line a pose. Ctrl-C ends it."""
+    """Show a glove's calibrated rotations live; with --json one line per pose. Ctrl-C stops it."""
     from glovecal_client.pose_subscriber import PoseSubscriber
     from glovecal_client.session import open_client
 
@@ -52,10 +52,10 @@ def watch(
     except NoAnswer as error:
         raise NobodyThere(str(error)) from error
     if not came:
-        raise Refusal(f"no pose of glove {glove} came; {_HINT}")
+        raise Refusal(f"no pose of glove {glove} received; {_HINT}")
 
 
-_HINT = "is it captured (glovecal glove list shows the gloves seen), and at this site?"
+_HINT = "check that it is captured (glovecal glove list shows the gloves seen) and at this site"
 
 
 class _Counts:

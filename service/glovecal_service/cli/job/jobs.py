@@ -9,7 +9,7 @@ from glovecal_service.cli.terminal.options import AsJson, Job
 from glovecal_service.cli.terminal.printing import moment, out, print_facts, print_json, print_table
 from glovecal_service.cli.terminal.waiting import wait_for_job
 
-app = typer.Typer(help="Long work: state, progress, cancel.", no_args_is_help=True)
+app = typer.Typer(help="Jobs (long work): state, progress, cancel.", no_args_is_help=True)
 
 
 @app.command("list")
@@ -25,7 +25,7 @@ def list_jobs(as_json: AsJson = False) -> None:
         for row in rows
     ]
     columns = {"id": "job", "kind": "kind", "subject": "subject", "state": "state", "done": "done"}
-    print_table(shown, {**columns, "last": "last word"}, empty="No jobs yet. glovecal train starts one.")
+    print_table(shown, {**columns, "last": "last message"}, empty="No jobs yet. glovecal train starts one.")
 
 
 @app.command("show")
@@ -44,11 +44,11 @@ def show(job: Job, as_json: AsJson = False) -> None:
             "subject": document["subject"],
             "state": document["state"],
             "done": f"{100 * document['fraction']:.0f} %",
-            "last word": document["sentence"] or None,
+            "last message": document["sentence"] or None,
             "error": document["error"],
             "model": result.get("model"),
             "attempt": document["attempt"],
-            "asked": moment(document["created_at"]),
+            "created": moment(document["created_at"]),
             "started": moment(document["started_at"]),
             "finished": moment(document["finished_at"]),
         }
@@ -59,7 +59,7 @@ def show(job: Job, as_json: AsJson = False) -> None:
 
 @app.command("wait")
 def wait(job: Job, as_json: AsJson = False) -> None:
-    """Wait until a job has ended; exit code 1 unless it is done. Ctrl-C leaves the job running."""
+    """Wait until a job ends; exit code 1 unless it is done. Ctrl-C leaves the job running."""
     with connect() as service:
         document = wait_for_job(service, job, quiet=as_json, cancel=False)
     if as_json:
@@ -70,7 +70,7 @@ def wait(job: Job, as_json: AsJson = False) -> None:
 
 @app.command("cancel")
 def cancel(job: Job) -> None:
-    """Stop a job; what it finished so far is kept for the next try."""
+    """Cancel a job; finished parts are kept for the next attempt."""
     with connect() as service:
         document = service.post(f"/jobs/{job}/cancel")
     if document["finished_at"] is None:

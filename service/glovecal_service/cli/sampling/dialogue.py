@@ -1,4 +1,4 @@
-"""A sampling in the terminal: what is said, a bar of steadiness, and the user's keys."""
+"""A sampling in the terminal: what is said, a bar that shows how still the hand is, and the user's keys."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LOOK_EVERY_S = 0.12
 TAKES_WITHIN_S = 60.0
 BAR = 20
 KEYS = {" ": "go", "r": "redo", "u": "undo", "s": "skip", "q": "pause"}
-HELP = "space: go   r: again   u: take back   s: leave out   q: pause"
+HELP = "space: start   r: repeat   u: undo   s: skip   q: pause"
 
 
 def walk(service: RestClient, view: dict[str, Any], *, quiet: bool = False) -> dict[str, Any]:
@@ -82,4 +82,4 @@ def _steadiness(view: dict[str, Any]) -> str:
     blocks = min(BAR, round(BAR * percent / (4 * still)))
     word = "still" if percent <= still else "moving"
     drawn = "█" * blocks + "·" * (BAR - blocks)
-    return f"{drawn} {word}: {percent:.1f} % of a sensor's range ({still:g} is still)"
+    return f"{drawn} {word}: {percent:.1f} % of a sensor's range (still: below {still:g} %)"

@@ -28,12 +28,12 @@ def next_steps(
     ] = None,
     subject: OnlySubject = None,
     layout: OnlyLayout = None,
-    most: Annotated[int, typer.Option(min=1, max=200, help="How many steps are shown.")] = 5,
+    most: Annotated[int, typer.Option(min=1, max=200, help="Steps to show.")] = 5,
     as_json: AsJson = False,
 ) -> None:
-    """Show which poses and motions would teach a model most for their time, and what is expected of them.
+    """Show which poses and motions reduce a model's uncertainty most for their time.
 
-    With --subject it is the active model. Nothing is recorded: glovecal sample --protocol active does that.
+    With --subject: its active model. Nothing is recorded; to record: glovecal sample --protocol active.
     """
     with connect() as service:
         chosen = model or active_model(service, subject, layout)
@@ -46,7 +46,7 @@ def next_steps(
         out.print(sentence)
     if found["diagnosed"] is not None:
         wanted = found["diagnosed"]
-        out.print(f"Beside that, {wanted['seconds']:g} s: {wanted['what']} {wanted['reason']}")
+        out.print(f"Also useful, {wanted['seconds']:g} s: {wanted['what']} {wanted['reason']}")
 
 
 def _row(step: dict[str, Any], found: dict[str, Any]) -> dict[str, Any]:

@@ -46,7 +46,7 @@ def sample(
     wearing: Annotated[str | None, typer.Option(help="Default: the glove's wearing.")] = None,
     protocol: Annotated[str, typer.Option(help=f"One of {', '.join(PROTOCOLS)}.")] = "new_subject",
     trigger: Annotated[
-        str, typer.Option(help=f"What begins a step: {', '.join(TRIGGERS)} (of the hand).")
+        str, typer.Option(help=f"What starts a step: {', '.join(TRIGGERS)} (hand held still).")
     ] = "key",
     widget: Annotated[
         list[str] | None, typer.Option(help="Widgets you have, such as IM_ABD=0,12,20; repeatable.")
@@ -57,8 +57,8 @@ def sample(
     rod: Annotated[list[float] | None, typer.Option(help="Length of a rod in mm; repeatable.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Lead a person through a protocol. Keys: space goes on, r does again, u takes back, s leaves out,
-    q pauses and leaves."""
+    """Lead a person through a protocol. Keys: space starts a step, r repeats, u undoes, s skips,
+    q pauses and quits."""
     if context.invoked_subcommand is not None:
         return
     for what, value in (("glove", glove), ("subject", subject)):
@@ -104,8 +104,10 @@ def list_samplings(
         for view in found
     ]
     headings = {"id": "id", "glove": "glove", "subject": "subject", "protocol": "protocol", "phase": "phase"}
-    more = {"done": "steps done", "takes": "takes", "began": "began"}
-    print_table(rows, headings | more, empty="No sampling yet: glovecal sample --glove G --subject S.")
+    more = {"done": "steps done", "takes": "takes", "began": "started"}
+    print_table(
+        rows, headings | more, empty="No sampling yet. Start one: glovecal sample --glove NAME --subject NAME"
+    )
 
 
 app.command("next")(next_steps)
@@ -116,7 +118,7 @@ def resume(
     sampling: Annotated[str, typer.Argument(help="Sampling id.", callback=_sampling_id)],
     as_json: AsJson = False,
 ) -> None:
-    """Go on with a sampling that was interrupted."""
+    """Continue an interrupted sampling."""
     with connect() as service:
         view = service.get(f"/sampling/{sampling}")
         if not view["open"]:
@@ -129,7 +131,7 @@ def resume(
 
 def _require_keyboard(trigger: str) -> None:
     if trigger == "key" and not sys.stdin.isatty():
-        raise Refusal("this is no terminal, so nobody can press a key: use --trigger timer or still")
+        raise Refusal("there is no terminal to read keys from; use --trigger timer or --trigger still")
 
 
 def _lead(service: RestClient, view: dict[str, Any], as_json: bool) -> None:
@@ -138,7 +140,7 @@ def _lead(service: RestClient, view: dict[str, Any], as_json: bool) -> None:
         print_json(view)
         return
     if view["open"]:
-        out.print(f"Interrupted. Go on with: glovecal sample resume {view['id']}")
+        out.print(f"Interrupted. Continue with: glovecal sample resume {view['id']}")
         return
     bad = [step for step in view["steps"] if step["outcome"] != "good"]
     for step in bad:

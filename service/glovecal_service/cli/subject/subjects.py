@@ -26,15 +26,16 @@ Name = Annotated[str, typer.Argument(help="Short name: a-z, 0-9, _ and -.", call
 HandLength = Annotated[
     float | None,
     typer.Option(
-        "--hand-length-mm", help="From the wrist crease to the tip of the middle finger; the rest follows."
+        "--hand-length-mm",
+        help="From the wrist crease to the tip of the middle finger; other sizes are derived.",
     ),
 ]
 DimensionsFile = Annotated[
     Path | None,
     typer.Option(
         "--dimensions",
-        help="TOML file of what was measured in mm, such as hand_length = 190; glovecal subject skeleton "
-        "NAME lists all names.",
+        help="TOML file of measured sizes in mm, such as hand_length = 190; glovecal subject skeleton NAME "
+        "lists all names.",
         exists=True,
         dir_okay=False,
     ),
@@ -45,12 +46,12 @@ Hand = Annotated[Handedness | None, typer.Option("--hand", help="right or left."
 @app.command("add")
 def add(
     name: Name,
-    title: Annotated[str, typer.Option(help="The name as people write it.")] = "",
+    title: Annotated[str, typer.Option(help="Full name.")] = "",
     hand_length_mm: HandLength = None,
     dimensions: DimensionsFile = None,
     hand: Hand = None,
 ) -> None:
-    """Add a subject; with the size of the hand, errors are told in mm too."""
+    """Add a subject; with hand sizes, errors are also given in mm."""
     measured = _measured_dimensions(hand_length_mm, dimensions)
     body = {"name": name, "title": title, "dimensions": measured, "hand": hand or "right"}
     with connect() as service:
@@ -65,7 +66,7 @@ def measure(
     dimensions: DimensionsFile = None,
     hand: Hand = None,
 ) -> None:
-    """Say how large a subject's hand is; replaces all that was measured before."""
+    """Set the measured sizes of a subject's hand; earlier ones are replaced."""
     if hand_length_mm is None and dimensions is None:
         raise typer.BadParameter("give --hand-length-mm or --dimensions")
     measured = _measured_dimensions(hand_length_mm, dimensions)
@@ -110,7 +111,7 @@ def list_subjects(as_json: AsJson = False) -> None:
 
 @app.command("show")
 def show(name: Name, as_json: AsJson = False) -> None:
-    """Show one subject: takes, models, which one predicts live."""
+    """Show one subject: takes, models and the active model."""
     with connect() as service:
         document = service.get(f"/subjects/{name}")
         if as_json:
@@ -138,7 +139,7 @@ def show(name: Name, as_json: AsJson = False) -> None:
 def remove(
     name: Name,
     takes: Annotated[
-        bool, typer.Option("--takes", help="Remove the subject's takes too; never those of a model.")
+        bool, typer.Option("--takes", help="Also remove its takes, except those of models.")
     ] = False,
 ) -> None:
     """Remove a subject that owns no takes and no models. Imported files stay in the data folder."""
@@ -154,7 +155,7 @@ def _remove_takes(service: RestClient, subject: str) -> None:
     models = service.get("/models", {"subject": subject})
     if models:
         raise Refusal(
-            f"subject {subject} has {len(models)} models, which keep the takes they were trained on"
+            f"subject {subject} has {len(models)} models, which need the takes they were trained on"
         )
     for row in service.get("/takes", {"subject": subject}):
         service.delete(f"/takes/{row['id']}")

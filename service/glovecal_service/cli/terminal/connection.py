@@ -84,5 +84,5 @@ def _require_usable(settings: Settings) -> None:
     except OSError as error:
         raise Refusal(
             f"the data folder {str(settings.data)!r} cannot be used ({sentence_of(error)}); set "
-            "GLOVECAL_DATA to a folder that you may write to, or GLOVECAL_URL to a service"
+            "GLOVECAL_DATA to a writable folder, or GLOVECAL_URL to a running service"
         ) from error

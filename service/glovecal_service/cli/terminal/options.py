@@ -74,7 +74,7 @@ Subject = Annotated[
     str, typer.Option("--subject", "-s", help="The subject's short name.", callback=subject_named)
 ]
 OnlySubject = Annotated[
-    str | None, typer.Option("--subject", "-s", help="Only this one's.", callback=subject_named)
+    str | None, typer.Option("--subject", "-s", help="Only of this subject.", callback=subject_named)
 ]
 OnlyLayout = Annotated[
     str | None, typer.Option("--layout", "-l", help="Only of this layout.", callback=identifier("layout"))
@@ -88,7 +88,9 @@ Take = Annotated[str, typer.Argument(help="Take: its name, its id, or the beginn
 Glove = Annotated[str, typer.Argument(help="The glove's name.", callback=identifier("glove"))]
 Site = Annotated[
     str,
-    typer.Option(envvar="GLOVECAL_SITE", help="Second part of every key.", callback=identifier("site")),
+    typer.Option(
+        envvar="GLOVECAL_SITE", help="Site: the second part of every zenoh key.", callback=identifier("site")
+    ),
 ]
 Zenoh = Annotated[
     str, typer.Option("--connect", envvar="GLOVECAL_ZENOH", help="The service's zenoh endpoint.")

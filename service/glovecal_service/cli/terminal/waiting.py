@@ -41,7 +41,7 @@ def wait_for_job(
         except (KeyboardInterrupt, SystemExit):
             if cancel:
                 service.post(f"/jobs/{job}/cancel")
-                err.print(f"Job {job} is cancelled; what it finished is kept for the next try.")
+                err.print(f"Job {job} cancelled; finished parts are kept for the next attempt.")
             raise
         except ServiceError as error:
             if not error.title.startswith("Job "):

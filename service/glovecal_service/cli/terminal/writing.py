@@ -17,7 +17,7 @@ from glovecal_service.cli.terminal.refusal import Refusal
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
 
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files that are there already.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")]
 
 Report = Annotated[
     Path | None, typer.Option("--report", help="Write a page with pictures to this .html file.")
@@ -30,9 +30,9 @@ def require_place(*files: Path, overwrite: bool) -> None:
         if not file.parent.is_dir():
             raise Refusal(f"cannot write {file}: there is no folder {file.parent}")
         if file.is_dir():
-            raise Refusal(f"cannot write {file}: it is a folder; name a file")
+            raise Refusal(f"cannot write {file}: it is a folder; give a file name")
         if file.exists() and not overwrite:
-            raise Refusal(f"{file} exists already; name another file, or replace it with --overwrite")
+            raise Refusal(f"{file} exists already; give another name, or replace it with --overwrite")
 
 
 def write_whole(contents: Mapping[Path, bytes], *, tell: Console = out) -> None:

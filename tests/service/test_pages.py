@@ -1,0 +1,238 @@
+"""Pages: title, summary, contents, valid HTML, axes; from documents of today and of an earlier service."""
+
+from __future__ import annotations
+
+import json
+import re
+from datetime import date
+from html.parser import HTMLParser
+from typing import Any
+
+import pytest
+from matplotlib.figure import Figure
+
+from glovecal_models.effects.catalogue import catalogue
+from glovecal_service.report import diagnosis_pictures, error_fall
+from glovecal_service.report.caption import Caption
+from glovecal_service.report.diagnosis_page import diagnosis_page
+from glovecal_service.report.documents import NEW_NAMES, current
+from glovecal_service.report.drawing import MODEL, svg
+from glovecal_service.report.effects import effect_card
+from glovecal_service.report.error_fall import Fall, FloorBand
+from glovecal_service.report.html import counted_once
+from glovecal_service.report.improvement_page import improvement_page
+
+MODEL_ID = "da3a26b60b009b5f723ad22934052eafaf153ce82b8234bd8d25d79c31c7f073"
+CAPTION = Caption(MODEL_ID, "pia", "linear", 2, date(2026, 11, 22))
+VOID = {"meta", "br", "path", "use", "rect", "circle", "image", "link"}
+
+
+class Strict(HTMLParser):
+    """Elements are closed in their order, ids are there once, links point at one, nothing is from outside."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.count: dict[str, int] = {}
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.count[tag] = self.count.get(tag, 0) + 1
+        names = [name for name, _ in attrs]
+        assert len(names) == len(set(names)), f"{tag} has an attribute twice"
+        for name, value in attrs:
+            if name == "id":
+                self.ids.append(value or "")
+            if name in ("src", "href", "xlink:href"):
+                self.links.append(value or "")
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag not in VOID:
+            assert self.open.pop() == tag
+
+
+def strict(page: str) -> Strict:
+    parser = Strict()
+    parser.feed(page)
+    parser.close()
+    assert parser.open == []
+    assert len(parser.ids) == len(set(parser.ids))
+    assert all(link.startswith(("#", "data:")) for link in parser.links)
+    assert {link[1:] for link in parser.links if link.startswith("#")} <= set(parser.ids)
+    assert "script" not in parser.count
+    assert page.startswith("<!doctype html>")
+    assert "default-src &#39;none&#39;" in page or "default-src 'none'" in page
+    return parser
+
+
+def candidate(effect: str, after: float, *, passes: bool) -> dict[str, Any]:
+    return {
+        "effect": effect, "where": ["I_MCP"] if passes else [],
+        "rmse_before_deg": 3.6, "rmse_after_deg": after,
+        "rmse_control_deg": 3.5, "saved_share": {"I_MCP": 0.8, "I_PIP": 0.1},
+        "control_saved_share": {"I_MCP": 0.1, "I_PIP": 0.0}, "p_value": None, "passes": passes,
+    }  # fmt: skip
+
+
+@pytest.fixture
+def diagnosis() -> dict[str, Any]:
+    first = sorted(name for name, item in catalogue().items() if item.has_columns and item.parameters)[0]
+    parameter = catalogue()[first].parameters[0]
+    return {
+        "model": MODEL_ID,
+        "takes": [{"id": "b8fc5a4a2e5a", "name": "w1-t1"}],
+        "rotations": {"I_MCP": {"rmse_deg": 3.4, "noise_floor_deg": 0.6}},
+        "named": {
+            "effect": first, "where": ["I_MCP"], "kind": "correction", "verdict": "named",
+            "confidence_set": [first], "sentence": "It is.",
+            "parameters": {"I_MCP": {f"{parameter.name}_{parameter.unit}": 1.25}},
+        },
+        "candidates": [candidate(first, 1.2, passes=True), candidate("no_such_effect", 3.7, passes=False)],
+        "not_identifiable": [{"effect": "palm <b>", "why": "no sensor"}],
+        "findings": [
+            {"sentence": "Take w1-t1: sensor A stands still for 1.5 s."},
+            {"sentence": "Take w1-t2: sensor A stands still for 2.5 s."},
+        ],
+        "reference_problems": [],
+        "hold_drift": None,
+        "unexplained_residual": {
+            "is_significant": True, "sentence": "A slow error (over 1 s) is unexplained.",
+            "not_identifiable": None,
+            "associations": [
+                {"phrase": "c.strap_n", "rotation": "I_MCP", "size_deg": 0.7, "p_value": 0.01, "column": "x"}
+            ],
+        },
+        "next_take": {"what": "Swing.", "seconds": 25, "separates": ["a", "b"]},
+    }  # fmt: skip
+
+
+@pytest.fixture
+def improvement() -> dict[str, Any]:
+    return {
+        "steps": [
+            {"model": MODEL_ID, "added": None, "rmse_deg": 3.6, "per_rotation": {"I_MCP": 3.6},
+             "control_rmse_deg": None},
+            {"model": MODEL_ID, "rmse_deg": 1.4, "per_rotation": {"I_MCP": 1.4}, "control_rmse_deg": 3.4,
+             "added": {"effect": "no_such_effect", "where": ["I_MCP"], "verdict": "named",
+                       "confidence_set": ["no_such_effect"], "parameters": {"offset_s": -0.07}}},
+        ],
+        "baselines": {"raw": 4.2}, "noise_floor_deg": {"I_MCP": 0.6},
+        "noise_floor_interval_deg": {"I_MCP": [0.5, 0.7]}, "stopped": "nothing_named", "undone": [],
+        "hold_drift": None, "unexplained_residual": False, "next_take": None, "sentences": ["One.", "Two."],
+    }  # fmt: skip
+
+
+def older(document: Any) -> Any:
+    """The document under the keys of a service before 2026-11-23."""
+    names = {new: old for old, new in NEW_NAMES.items()}
+    if isinstance(document, dict):
+        return {names.get(key, key): older(value) for key, value in document.items()}
+    return [older(item) for item in document] if isinstance(document, list) else document
+
+
+def test_a_diagnosis_has_a_title_a_summary_and_contents(diagnosis: dict[str, Any]) -> None:
+    page = diagnosis_page(diagnosis, CAPTION)
+    parser = strict(page)
+    assert "<h1>Missing effects in pia, version 2 of 22 November 2026 (1 take)</h1>" in page
+    head = page[: page.index("<nav")]
+    assert [re.sub("<.*?>", "", item) for item in re.findall(r"<dt>.*?</dt>", head)] == [
+        "Verdict", "Size", "Place", "Next",
+    ]  # fmt: skip
+    assert "reduces the held-out error from 3.60 to 1.20 degrees (control: 3.50)" in head
+    assert "<code>glovecal add-effect da3a26b60b00" in head
+    assert MODEL_ID[:12] not in page[page.index("<h1>") : page.index("</h1>")]
+    assert MODEL_ID in page[page.index('id="details"') :]
+    assert "contents" in page.lower()
+    assert sum(link.startswith("#") and link[1:] in parser.ids for link in parser.links) >= 6
+    assert "(2 times, this is the first)" in page
+    assert "palm &lt;b&gt;" in page
+
+
+def test_the_named_effect_is_explained_with_picture_and_parameters(diagnosis: dict[str, Any]) -> None:
+    page = diagnosis_page(diagnosis, CAPTION)
+    known = catalogue()[diagnosis["named"]["effect"]]
+    part = page[page.index('<h2 id="the-effect">') : page.index('<h2 id="what-was-tried">')]
+    assert "Schematic, not to scale" in part
+    assert "<svg" in part
+    assert "1.25" in part
+    assert f"{known.parameters[0].name.replace('_', ' ')}, {known.parameters[0].unit}" in part
+
+
+def test_documents_of_an_earlier_service_give_the_same_pages(
+    diagnosis: dict[str, Any], improvement: dict[str, Any]
+) -> None:
+    for document in (diagnosis, improvement):
+        assert older(document) != document
+        assert current(older(document)) == document
+    assert diagnosis_page(older(diagnosis), CAPTION) == diagnosis_page(diagnosis, CAPTION)
+    old = improvement_page(older(improvement), "linear", "pia", CAPTION)
+    assert old == improvement_page(improvement, "linear", "pia", CAPTION)
+
+
+def test_an_improvement_tells_each_step_once(improvement: dict[str, Any]) -> None:
+    page = improvement_page(json.loads(json.dumps(improvement)), "linear", "pia", CAPTION)
+    strict(page)
+    assert "<h1>Improvement of pia, version 2 of 22 November 2026</h1>" in page
+    assert "held-out error reduced from 3.60 to 1.40 degrees; noise floor 0.60" in page
+    steps = page[page.index('<h2 id="how-the-error-falls">') : page.index('<h2 id="effects-added">')]
+    assert steps.count("<tr>") == 3
+
+
+def test_a_page_without_anything_known_of_the_model_is_a_page() -> None:
+    page = diagnosis_page({"model": MODEL_ID, "takes": []})
+    strict(page)
+    assert "No known effect beats its control significantly." in page
+
+
+@pytest.mark.parametrize("name", sorted(catalogue()))
+def test_every_effect_is_explained_and_drawn(name: str) -> None:
+    card = effect_card(name)
+    assert catalogue()[name].explanation[:20] in card.unescape()
+    assert ("<svg" in card) == (catalogue()[name].kind != "nothing")
+
+
+def test_bars_start_at_zero_and_a_fall_over_decades_is_dots(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[Figure] = []
+    real = svg
+
+    def kept(draw: Any, width: float, height: float) -> str:
+        figure = Figure()
+        draw(figure.add_subplot())
+        drawn.append(figure)
+        return real(draw, width, height)
+
+    monkeypatch.setattr(error_fall, "svg", kept)
+    monkeypatch.setattr(diagnosis_pictures, "svg", kept)
+    band = FloorBand(0.5, 0.4, 0.6)
+    error_fall.error_fall([Fall("raw", 4.0, is_scale=True), Fall("a", 3.0), Fall("+ b", 1.0, 2.9)], band)
+    error_fall.error_fall([Fall("raw", 40.0), Fall("a", 1.0)], band)
+    diagnosis_pictures.errors_beside_floors({"A": {"rmse_deg": 3.0, "noise_floor_deg": 1.0}})
+    linear, wide, errors = (figure.axes[0] for figure in drawn)
+    assert (linear.get_yscale(), linear.get_ylim()[0]) == ("linear", 0.0)
+    assert wide.get_yscale() == "log"
+    assert not wide.patches[1:]  # the band only, no bar
+    assert wide.yaxis.get_major_formatter()(2.0, None) == "2"
+    assert errors.get_xlim()[0] == 0.0
+
+
+def test_pictures_follow_the_page_and_share_no_id() -> None:
+    first, second = (svg(lambda axes, n=n: axes.plot([0, n], marker="o", color=MODEL), 3, 2) for n in (1, 2))
+    ids = [set(re.findall(r'id="([^"]+)"', picture)) for picture in (first, second)]
+    assert ids[0]
+    assert not ids[0] & ids[1]
+    assert "var(--model, #1d6cab)" in first
+    assert "var(--ink, #1a1a1a)" in first
+    assert "fill: #ffffff" not in first
+
+
+def test_warnings_alike_stand_once() -> None:
+    said = counted_once(["Take a: 3 gaps.", "Take b: 5 gaps.", "Something else."])
+    assert said == ["Take a: 3 gaps. (2 times, this is the first)", "Something else."]
