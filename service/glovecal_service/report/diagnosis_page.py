@@ -14,7 +14,6 @@ from glovecal_service.report.diagnosis_pictures import (
     heat_of_candidates,
     saved_beside_controls,
 )
-from glovecal_service.report.documents import current
 from glovecal_service.report.effects import declarations_in, effect_card, effects_explained
 from glovecal_service.report.html import (
     Fact,
@@ -29,6 +28,7 @@ from glovecal_service.report.html import (
     paragraph,
     table,
 )
+from glovecal_service.stored_documents import current
 
 HEADS = ("effect", "where", "error before", "with the effect", "with its control", "significant")
 RESIDUAL_HEADS = (
@@ -68,7 +68,9 @@ def diagnosis_page(
         Section("What remains unexplained", _unexplained(found.get("unexplained_residual") or {})),
     ]
     if held and held["poses"]:
-        sections.append(Section("Readings while a pose is held", [hold_table(held)]))
+        sections.append(
+            Section("Readings while a pose is held", [paragraph(held["sentence"]), hold_table(held)])
+        )
     if rotations and not held:
         sections.append(Section("Error of each rotation", [figure(*errors_beside_floors(rotations))]))
     sections += [
@@ -109,7 +111,7 @@ def _summary(found: Mapping[str, Any]) -> list[Fact]:
     named, held = found.get("named"), found.get("hold_drift")
     rotations = found.get("rotations") or {}
     if held:
-        facts = [Fact("Verdict", held["sentence"])]
+        facts = _held_facts(held)
     elif not named:
         facts = [Fact("Verdict", NOTHING_NAMED)]
     else:
@@ -124,6 +126,24 @@ def _summary(found: Mapping[str, Any]) -> list[Fact]:
         beside = "" if floor is None else f" (noise floor {floor:.2f})"
         facts += [Fact("Size", f"{error:.2f} degrees{beside}"), Fact("Place", f"largest error at {name}")]
     return [*facts, Fact("Next", next_command(str(found.get("model", "MODEL")), found), is_command=True)]
+
+
+def _held_facts(held: Mapping[str, Any]) -> list[Fact]:
+    """Of a drift within held poses."""
+    drifts = [
+        (drift["change_pct"], f"{name} in pose {pose['pose']}, {counted(pose['holds'], 'hold')}", pose)
+        for pose in held["poses"]
+        for name, drift in pose["sensors"].items()
+    ]
+    possible = " or ".join(held.get("confidence_set") or ())
+    if not possible or not drifts:
+        return [Fact("Verdict", held["sentence"])]
+    change, place, pose = max(drifts, key=lambda item: abs(item[0]))
+    return [
+        Fact("Verdict", f"Readings drift while a pose is held: {possible}."),
+        Fact("Size", f"{change:+.1f} % of the sensor's span, time constant {_time_constant(pose)} s"),
+        Fact("Place", place),
+    ]
 
 
 def _size(item: Mapping[str, Any]) -> str:

@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from glovecal_models.calibration.added_effect import AddedEffect
+from glovecal_models.diagnosis.hold_drift import HAND
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.interval_effect import IntervalEffect
 from glovecal_models.effects.base.signals import Signals
@@ -36,6 +37,8 @@ SHOWN_DEG = 15.0
 KNOTS_S = (0, 2, 4, 9, 10, 13, 15, 20, 22, 24)
 KNOTS_SHARE = (0, 0, 1, 1, 0.5, 0.5, 1, 1, 0, 0)
 MOST_WEIGHTS = 200
+NO_EFFECTS = {HAND: "The hand itself gives way while a pose is held; the glove is right."}
+"""What else a diagnosis may name."""
 SIMULATED = SessionPlan(
     seed=4, sensors=("I_MCP", "I_PIP"), wearings=1, takes_per_wearing=1, take_s=12, bits=14,
     nuisance="white", reference_white_deg=0, reference_lasting_deg=0, sensor_noise_deg=0,
@@ -50,7 +53,7 @@ def effect_card(
     """One effect in a sentence and a picture, with its learned ``parameters`` as documents tell them."""
     known = _known(name, declaration)
     if known is None:
-        explanation, picture = "No effect of this name is installed here.", None
+        explanation, picture = NO_EFFECTS.get(name, "No effect of this name is installed here."), None
     else:
         explanation, picture = known.explanation, _picture_of(known)
     return effect_part(name, explanation, picture, _learned(known, parameters or {}))
@@ -180,6 +183,8 @@ def _by_columns(known: Effect) -> tuple[np.ndarray, np.ndarray, np.ndarray, str]
         prior = known.prior_sd(settings)
     except (BadInput, KeyError, ValueError):
         return None
+    if not known.context and not known.changes_between_takes:
+        columns, takes = columns[:1], takes[:1]
     joined, own = np.concatenate(columns), np.concatenate([take.own[:, 0] for take in takes])
     if not joined.shape[1]:
         return None

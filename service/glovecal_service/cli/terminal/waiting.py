@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, Any
 
-from rich.progress import BarColumn, Progress, Task, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, Task, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from glovecal_client.errors import ServiceError
@@ -67,17 +67,14 @@ def _short(sentence: str) -> str:
 
 
 def _bar(quiet: bool) -> Progress:
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(BAR_WIDTH),
-        TextColumn("{task.percentage:>3.0f} %"),
-    )
+    columns = (TextColumn("{task.description}"), BarColumn(BAR_WIDTH), TaskProgressColumn())
     shown = err.is_terminal and not quiet
     return Progress(*columns, _TimeColumn(), console=err, transient=True, disable=not shown)
 
 
 class _TimeColumn(TimeElapsedColumn):
-    """How long it will still take, where the job tells; else how long it has taken."""
+    """The job's own estimate of the time left, else the time elapsed: rich's TimeRemainingColumn extrapolates
+    from the bar, which jobs of unequal steps mislead."""
 
     def render(self, task: Task) -> Text:
         left = task.fields.get("left")
