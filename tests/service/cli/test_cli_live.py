@@ -133,7 +133,7 @@ def test_a_recorded_take_becomes_a_model_that_predicts_live(live, recorded):
         assert f"nobody wears glove {GLOVE}" in run("watch", GLOVE, "--seconds", 0.3).out.replace("\n", " ")
     silent = run("watch", "left-hand", "--seconds", 0.3, "--json")
     assert (silent.code, silent.out) == (1, "")
-    assert "no pose of glove left-hand came" in silent.said
+    assert "no pose of glove left-hand received" in silent.said
 
 
 def _run_the_documented_subscriber(live: dict[str, str]) -> None:

@@ -169,7 +169,7 @@ def test_a_data_folder_that_cannot_be(tmp_path):
     (tmp_path / "file").write_text("mine")
     answer = glovecal({"GLOVECAL_DATA": str(tmp_path / "file")}, "subject", "list")
     assert answer.code == 1
-    assert "set GLOVECAL_DATA to a folder" in answer.said
+    assert "set GLOVECAL_DATA to a writable folder" in answer.said
     assert (tmp_path / "file").read_text() == "mine"
     answer = glovecal({"GLOVECAL_DATA": str(tmp_path / "file" / "x")}, "take", "list", "--json")
     assert (answer.code, answer.out) == (1, "")
