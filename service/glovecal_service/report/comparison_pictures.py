@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from glovecal_models.comparison.compare import Comparison, RotationErrors
 from glovecal_models.comparison.floor_estimate import NoiseFloor
-from glovecal_models.comparison.where_it_fails import RotationFindings, WhereItFails, is_structure
+from glovecal_models.comparison.where_it_fails import RotationFindings, WhereItFails
 from glovecal_service.report.diagnosis_pictures import KEY, draw_heat
 from glovecal_service.report.drawing import FLOOR, MODEL, QUIET, legend_above, svg
 
@@ -71,7 +71,7 @@ def _place(name: str) -> tuple[int, bool]:
 
 def _cells(item: RotationFindings) -> dict[str, tuple[float, bool]]:
     """For each column of the heat map: degrees explained, and whether that is significant."""
-    cells = {one.covariate: (one.explained_deg, is_structure(one, item.rmse_deg)) for one in item.dependences}
+    cells = {one.covariate: (one.explained_deg, item.is_structure(one)) for one in item.dependences}
     if item.wearings is not None:
         cells["wearing"] = (item.wearings.spread_deg, item.wearings.is_no_noise)
     return cells

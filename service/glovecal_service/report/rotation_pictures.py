@@ -12,7 +12,7 @@ from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 from glovecal_models.comparison.stretches import windows
 from glovecal_models.comparison.structure import Dependence
 from glovecal_models.comparison.wearings import WearingErrors
-from glovecal_models.comparison.where_it_fails import STRUCTURE_PROBABILITY, RotationFindings, is_structure
+from glovecal_models.comparison.where_it_fails import RotationFindings
 from glovecal_service.report.drawing import (
     FLOOR,
     MEASURED,
@@ -80,9 +80,9 @@ def error_against(item: RotationFindings, one: Dependence) -> tuple[str, str]:
 
 
 def _verdict(item: RotationFindings, one: Dependence) -> str:
-    if is_structure(one, item.rmse_deg):
+    if item.is_structure(one):
         return "significant"
-    if one.probability <= STRUCTURE_PROBABILITY:
+    if one.probability <= item.limits.structure_p_value:
         return f"significant, but a small part of {item.rmse_deg:.1f} degrees"
     return "not significant"
 
