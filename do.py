@@ -27,6 +27,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent
 TOOLS = ROOT / ".tools"
 SMOKE = "--smoke"
+SIMULATED = "tests/simulated"
 SMOKE_TESTS = ("tests/models/test_training_choices.py", "tests/models/test_layout.py")
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
@@ -40,8 +41,11 @@ def uv() -> list[str]:
     return [str(TOOLS / "bin" / "uv")]
 
 
-def run(*command: str, groups: tuple[str, ...] = (), dev: bool = False) -> int:
-    """Run a command in the locked environment; with --smoke in the one that is there, as it is."""
+def run(*command: str, groups: tuple[str, ...] = (), dev: bool = False, beside: str = "") -> int:
+    """Run a command in the locked environment; with --smoke in the one that is there, as it is.
+
+    ``beside``: a folder whose modules a script may import beside its own.
+    """
     options = ["run", "--frozen", "--all-packages", "--no-default-groups"]
     for group in (*groups, *(("dev",) if dev else ())):
         options += ["--group", group]
@@ -52,6 +56,8 @@ def run(*command: str, groups: tuple[str, ...] = (), dev: bool = False) -> int:
         options = ["run", "--no-sync", "--offline"]
     quiet = ["--quiet"] if (ROOT / ".venv").is_dir() else []
     environment = {**os.environ, **ONE_THREAD, "UV_PYTHON_PREFERENCE": "only-system"}
+    if beside:
+        environment["PYTHONPATH"] = str(ROOT / beside)
     environment.pop("PYTHONDONTWRITEBYTECODE", None)  # every process would compile all packages anew
     return subprocess.run([*uv(), *quiet, *options, *command], cwd=ROOT, env=environment).returncode
 
@@ -94,12 +100,12 @@ def bench(arguments: list[str]) -> int:
 
 
 def paper(arguments: list[str]) -> int:
-    return run("python", "tests/paper/paper.py", *arguments)
+    return run("python", "tests/paper/paper.py", *arguments, beside=SIMULATED)
 
 
 def study(arguments: list[str]) -> int:
     if arguments[:1] == ["active"]:
-        return run("python", "tests/study/active_sampling.py", *arguments[1:])
+        return run("python", "tests/study/active_sampling.py", *arguments[1:], beside=SIMULATED)
     return run("python", "tests/study/study.py", *arguments)
 
 

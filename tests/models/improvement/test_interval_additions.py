@@ -98,7 +98,7 @@ def test_a_claim_that_becomes_no_truer_is_undone_and_few_takes_are_refused():
     assert undone.model is model
     assert "no nearer to the truth" in undone.sentence
     with pytest.raises(BadInput, match="2 were given, 3 are needed"):
-        add_effect(model, session.takes[:2], "garment_slip", settings=SETTINGS)
+        add_effect(model, session.takes[:2], "garment_slip", rotations=["I_PIP"], settings=SETTINGS)
 
 
 def test_a_fault_is_left_out_told_and_served_live():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import re
 import runpy
 import time
@@ -57,7 +58,7 @@ def test_examples_call_public_names_with_options_they_have(example):
     for node in ast.walk(ast.parse(example)):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id != "print":
             assert node.func.id in glovecal.__all__
-            accepted = getattr(glovecal, node.func.id).__code__.co_varnames
+            accepted = inspect.signature(getattr(glovecal, node.func.id)).parameters
             assert {word.arg for word in node.keywords} <= set(accepted)
 
 

@@ -144,7 +144,7 @@ def _slope(base: np.ndarray, coefficients: np.ndarray, own: np.ndarray) -> np.nd
 def _moved(time: np.ndarray, own: np.ndarray, rows: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """(rows, K): delayed and low-passed angle minus the angle itself."""
     result = np.empty((len(rows), len(cells)))
-    factor = max(1, round(float(np.median(np.diff(time))) / STEP_S))
+    factor = max(1, round(float(np.median(np.diff(time))) / STEP_S)) if len(time) > 1 else 1
     fine_time = time[0] + STEP_S * np.arange((len(time) - 1) * factor + 1)
     fine = np.interp(fine_time, time, own)
     at = np.searchsorted(fine_time, time[rows] - 1e-6)
