@@ -55,7 +55,9 @@ class Addition(Shown):
     @property
     def sentence(self) -> str:
         """The held-out errors before and after, and why it stays or not."""
-        return self.inner.sentence
+        from glovecal_models.improvement.text import addition_sentence
+
+        return addition_sentence(self.inner)
 
     @property
     def parameters(self) -> dict[str, dict[str, float]]:
@@ -64,9 +66,9 @@ class Addition(Shown):
 
     def table(self) -> Table:
         """One row for each rotation."""
-        document = self.inner.to_document()
+        before, after = self.inner.before, self.inner.after
         rows = [
-            (name, document["before"][name], document["after"][name], self._learned(name))
+            (name, before.rmse_deg(name), after.rmse_deg(name), self._learned(name))
             for name in self.rotations
         ]
         return Table.of(COLUMNS, rows, after=[self.sentence])
@@ -74,11 +76,13 @@ class Addition(Shown):
     def plot(self, ax: Axes | None = None) -> Axes:
         """Held-out error of each rotation before and after; gives the axes back."""
         axes = axes_for(ax, len(self.rotations))
-        document = self.inner.to_document()
-        for shift, key, color in ((-0.18, "before", SCALE), (0.18, "after", MODEL)):
+        for shift, when, found, color in (
+            (-0.18, "before", self.inner.before, SCALE),
+            (0.18, "after", self.inner.after, MODEL),
+        ):
             rows = [row + shift for row in range(len(self.rotations))]
-            errors = [document[key][name] for name in self.rotations]
-            axes.barh(rows, errors, height=0.34, color=color, label=f"{key} {self.effect}")
+            errors = [found.rmse_deg(name) for name in self.rotations]
+            axes.barh(rows, errors, height=0.34, color=color, label=f"{when} {self.effect}")
         named_rows(axes, self.rotations)
         axes.set_xlabel("held-out error (degrees)")
         return finished(axes)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from glovecal._calls import Progress, library_call
 from glovecal._effects import declared
@@ -34,67 +33,65 @@ class Diagnosis(Shown):
     inner: InnerDiagnosis
     """``glovecal_models.diagnosis.diagnosis.Diagnosis``: evidence for each rotation and block of time."""
 
-    @cached_property
-    def _document(self) -> dict[str, Any]:
-        return self.inner.to_document()
-
     @property
     def effect(self) -> str | None:
         """The effect that is named; None when none is."""
-        named = self._document["named"]
-        return None if named is None else named["effect"]
+        named = self.inner.named
+        return None if named is None else named.effect
 
     @property
     def rotations(self) -> tuple[str, ...]:
         """Where the named effect acts; sensors or takes where it is a fault of those."""
-        named = self._document["named"]
-        return () if named is None else tuple(named["where"])
+        named = self.inner.named
+        return () if named is None else named.where
 
     @property
     def confidence_set(self) -> tuple[str, ...]:
         """The named effect, and all that these takes cannot tell from it."""
-        named = self._document["named"]
-        return () if named is None else tuple(named["confidence_set"])
+        named = self.inner.named
+        return () if named is None else named.confidence_set
 
     @property
     def sentences(self) -> tuple[str, ...]:
         """What to know, the most important first."""
-        return tuple(self._document["sentences"])
+        from glovecal_models.diagnosis.text import diagnosis_sentences
+
+        return tuple(diagnosis_sentences(self.inner))
 
     @property
     def not_identifiable(self) -> dict[str, str]:
         """Effects that these takes cannot show, and why."""
-        return {item["effect"]: item["why"] for item in self._document["not_judgeable"]}
+        return {item.effect: item.why for item in self.inner.not_identifiable}
 
     @property
     def next_take(self) -> str | None:
         """What to record to tell the confidence set apart; None when there is nothing to tell apart."""
-        following = self._document["next_take"]
-        return None if following is None else f"{following['seconds']} s: {following['what']}"
+        following = self.inner.next_take
+        return None if following is None else f"{following.seconds} s: {following.what}"
 
     def table(self) -> Table:
         """One row for each effect that was tried, those that beat their control first."""
         rows = [
             (
-                item["effect"], ", ".join(item["where"]), item["rmse_before_deg"], item["rmse_after_deg"],
-                item["rmse_decoy_deg"], item["probability"], item["passes"],
+                item.effect, ", ".join(item.joints[i] for i in item.significant_joints), item.rmse_deg.before,
+                item.rmse_deg.after, item.rmse_deg.control, item.p_value, bool(item.significant_joints),
             )
-            for item in self._document["candidates"]
+            for item in self.inner.ranked_assessments
         ]  # fmt: skip
         return Table.of(COLUMNS, rows, after=self.sentences)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """What each effect saves of the held-out error beside what its control saves; gives the axes back."""
-        tried = self._document["candidates"]
+        tried = self.inner.ranked_assessments
         axes = axes_for(ax, len(tried))
-        for shift, key, color, label in (
-            (-0.18, "rmse_after_deg", MODEL, "effect"),
-            (0.18, "rmse_decoy_deg", CONTROL, "control"),
+        errors = [item.rmse_deg for item in tried]
+        for shift, saved, color, label in (
+            (-0.18, [item.before - item.after for item in errors], MODEL, "effect"),
+            (0.18, [item.before - item.control for item in errors], CONTROL, "control"),
         ):
             rows = [row + shift for row in range(len(tried))]
-            saved = [item["rmse_before_deg"] - item[key] for item in tried]
             axes.barh(rows, saved, height=0.34, color=color, label=label)
-        named_rows(axes, [item["effect"] + (" *" if item["passes"] else "") for item in tried])
+        named_rows(axes, [item.effect + (" *" if item.significant_joints else "") for item in tried])
         axes.axvline(0.0, color="black", linewidth=0.6)
         axes.set_xlabel("saved held-out error (degrees); *: significant")
         return finished(axes)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,10 +35,6 @@ class Improvement(Shown):
     inner: InnerImprovement
     """``glovecal_models.improvement.improvement.Improvement``: every step, what was undone and why."""
 
-    @cached_property
-    def _document(self) -> dict[str, Any]:
-        return self.inner.to_document()
-
     @property
     def model(self) -> CalibrationModel:
         """The last one, with every effect that stayed."""
@@ -53,7 +48,7 @@ class Improvement(Shown):
     @property
     def effects(self) -> tuple[str, ...]:
         """Those that were added, in order."""
-        return tuple(step["added"]["effect"] for step in self._document["steps"] if step["added"])
+        return tuple(step.added.effect for step in self.inner.steps if step.added is not None)
 
     @property
     def rmse_deg(self) -> tuple[float, ...]:
@@ -63,7 +58,7 @@ class Improvement(Shown):
     @property
     def noise_floor_deg(self) -> float | None:
         """Over all rotations (root mean square), degrees; None where it is unknown."""
-        floors = list(self._document["noise_floor_deg"].values())
+        floors = [floor.floor_deg for floor in self.inner.noise_floor.values()]
         return float(np.sqrt(np.mean(np.square(floors)))) if floors else None
 
     @property
@@ -74,7 +69,9 @@ class Improvement(Shown):
     @property
     def sentences(self) -> tuple[str, ...]:
         """What happened, and what is left."""
-        return self.inner.sentences
+        from glovecal_models.improvement.text import improvement_sentences
+
+        return tuple(improvement_sentences(self.inner))
 
     @property
     def diagnosis(self) -> Diagnosis | None:
@@ -84,13 +81,12 @@ class Improvement(Shown):
     def table(self) -> Table:
         """Simpler calibrations, every step, and the noise floor."""
         rows: list[tuple[str | float | None, ...]] = [
-            (name, error, None, None) for name, error in self._document["baselines"].items()
+            (name, error, None, None) for name, error in self.inner.baselines.items()
         ]
-        for step in self._document["steps"]:
-            added = step["added"]
-            label = self.inner.models[0].method if added is None else f"+ {added['effect']}"
-            where = None if added is None else ", ".join(added["where"])
-            rows.append((label, step["rmse_deg"], step["decoy_rmse_deg"], where))
+        for step in self.inner.steps:
+            label = self.inner.models[0].method if step.added is None else f"+ {step.added.effect}"
+            where = None if step.added is None else ", ".join(step.added.where)
+            rows.append((label, step.rmse_deg, step.control_rmse_deg, where))
         rows.append((NOISE_FLOOR, self.noise_floor_deg, None, None))
         return Table.of(COLUMNS, rows, after=self.sentences)
 
@@ -98,7 +94,7 @@ class Improvement(Shown):
         """The fall of the error as bars, each effect beside its control; gives the axes back."""
         rows = self.table().rows[:-1]
         axes = axes_for(ax, len(rows))
-        simpler = len(self._document["baselines"])
+        simpler = len(self.inner.baselines)
         for row, (_, error, control, _) in enumerate(rows):
             axes.barh(row, _degrees(error), color=SCALE if row < simpler else MODEL)
             if control is not None:
@@ -107,7 +103,7 @@ class Improvement(Shown):
             axes.axvline(self.noise_floor_deg, color=FLOOR, linestyle="--", label=NOISE_FLOOR)
         named_rows(axes, [str(row[0]) for row in rows])
         axes.set_xlim(left=0.0)
-        axes.set_xlabel("error on takes not trained on (degrees)")
+        axes.set_xlabel("held-out error (degrees)")
         return finished(axes)
 
 
@@ -131,7 +127,7 @@ def improve(
     """Train, then diagnose, add and verify until the noise floor, or until nothing more can be named.
 
     ``layout`` and ``method`` as for ``train``. Errors are on ``held_out`` when it is given, else on takes
-    left out of each fit. At most ``max_steps`` effects are added. Raises NotTrainable, BadInput, Cancelled.
+    held out of each fit. At most ``max_steps`` effects are added. Raises NotTrainable, BadInput, Cancelled.
     """
     from glovecal_models.calibration.training_settings import TrainingSettings
     from glovecal_models.improvement.improve import improve as improve_inner

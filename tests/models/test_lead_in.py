@@ -158,11 +158,12 @@ def test_what_went_before_tells_creep_where_it_stands(creeping):
     """The hand's way before the reference is read from the sensors: more of the creep is explained."""
     named = {}
     for name, cut in (("bare", without_lead_in), ("lead", with_lead_in)):
-        document = diagnose([cut(take) for take in creeping], LAYOUT).to_document()
-        assert document["named"]["confidence_set"] == ["creep"], name
-        named[name] = document["named"]["saved_deg"]
+        found = diagnose([cut(take) for take in creeping], LAYOUT).named
+        assert found is not None
+        assert found.confidence_set == ("creep",), name
+        named[name] = found.saved_deg
     assert named["lead"] > 1.2 * named["bare"]
 
 
 def test_a_clean_glove_with_it_is_left_alone(clean):
-    assert diagnose([with_lead_in(take) for take in clean], LAYOUT).to_document()["named"] is None
+    assert diagnose([with_lead_in(take) for take in clean], LAYOUT).named is None

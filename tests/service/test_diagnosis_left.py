@@ -1,4 +1,4 @@
-"""What is left and what it goes with, on the page and on the command line, from a real diagnosis."""
+"""The unexplained residual and its associations, on the page and on the terminal, from a real diagnosis."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 from glovecal_service.cli.effect.diagnosis import print_diagnosis
 from glovecal_service.report.diagnosis_page import diagnosis_page
+from glovecal_service.views.diagnosis import DiagnosisView
 
 SENSORS = ("I_MCP", "I_PIP")
 
@@ -27,14 +28,15 @@ def found() -> dict[str, Any]:
         pull = np.sin(take.time_s * (0.9 + 0.1 * number) + number)
         readings = take.readings + 5.0 * pull[:, None] * np.array([0.0, 1.0])
         takes.append(replace(take, readings=readings, context={"strap_n": pull}))
-    return diagnose(takes, Layout.from_columns("two", SENSORS, SENSORS), effects=[]).to_document()
+    found = diagnose(takes, Layout.from_columns("two", SENSORS, SENSORS), effects=[])
+    return DiagnosisView.of(found).document()
 
 
-def test_the_document_tells_size_and_chance(found):
-    first = found["something_left"]["goes_with"][0]
+def test_the_document_has_size_and_p_value(found):
+    first = found["unexplained_residual"]["associations"][0]
     assert (first["rotation"], first["column"]) == ("I_PIP", "context strap_n")
     assert first["size_deg"] > 0.5
-    assert first["probability"] <= 0.02
+    assert first["p_value"] <= 0.02
 
 
 def test_the_page_shows_the_columns(found):
@@ -45,7 +47,7 @@ def test_the_page_shows_the_columns(found):
 
 def test_the_command_line_shows_the_columns(found, capsys):
     print_diagnosis(found)
-    told = capsys.readouterr().out
-    assert "Something is left that no known effect explains" in told
-    assert "what is left goes with" in told
-    assert "c.strap_n" in told
+    printed = capsys.readouterr().out
+    assert "No known effect explains the residual" in printed
+    assert "residual is associated with" in printed
+    assert "c.strap_n" in printed

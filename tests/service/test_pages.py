@@ -20,7 +20,8 @@ from glovecal_service.report.effects import effect_card
 from glovecal_service.report.error_fall import Fall, FloorBand
 from glovecal_service.report.html import counted_once
 from glovecal_service.report.improvement_page import improvement_page
-from glovecal_service.stored_documents import NEW_NAMES, current
+from glovecal_service.stored_documents import current
+from glovecal_service.views.renamed_keys import RENAMED
 
 MODEL_ID = "da3a26b60b009b5f723ad22934052eafaf153ce82b8234bd8d25d79c31c7f073"
 CAPTION = Caption(MODEL_ID, "pia", "linear", 2, date(2026, 11, 22))
@@ -132,7 +133,7 @@ def improvement() -> dict[str, Any]:
 
 def older(document: Any) -> Any:
     """The document under the keys of a service before 2026-11-23."""
-    names = {new: old for old, new in NEW_NAMES.items()}
+    names = {new: old for old, new in RENAMED.items()}
     if isinstance(document, dict):
         return {names.get(key, key): older(value) for key, value in document.items()}
     return [older(item) for item in document] if isinstance(document, list) else document

@@ -30,7 +30,7 @@ def diagnosis_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_
         "rmse_deg": {name: round(value, 3) for name, value in found.rmse_deg.items()},
         "evidence": _evidence(found),
         "findings": sorted({f"{item.effect} {item.kind}" for item in found.findings}),
-        "not_judgeable": {item.effect: item.why for item in found.not_judgeable},
+        "not_identifiable": {item.effect: item.why for item in found.not_identifiable},
         **glove.told(),
     }
 
@@ -53,16 +53,16 @@ def _evidence(found: Diagnosis) -> dict[str, Any]:
 
 
 def _says_something(item: Assessment) -> bool:
-    return bool(item.touched) or any(abs(errors.saved) > 1e-6 for errors in item.errors)
+    return bool(item.significant_joints) or any(abs(errors.saved) > 1e-6 for errors in item.errors)
 
 
 def _of_one(item: Assessment) -> dict[str, Any]:
     """Shares of the squared error, joint by joint."""
     return {
-        "touched": [item.joints[place] for place in item.touched],
+        "significant_joints": [item.joints[place] for place in item.significant_joints],
         "saved": [round(errors.saved, 3) for errors in item.errors],
-        "decoy_saved": [round(errors.decoy_saved, 3) for errors in item.errors],
+        "control_saved": [round(errors.control_saved, 3) for errors in item.errors],
         "contrast": [round(errors.contrast, 3) for errors in item.errors],
         "saved_square": round(item.saved_square, 4),
-        "probability": item.probability,
+        "p_value": item.p_value,
     }

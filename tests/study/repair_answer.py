@@ -22,6 +22,7 @@ from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
+from glovecal_models.improvement.text import addition_sentence
 
 SAMPLES = 300
 """Representative frames: joints of one sensor reach the floor with so many, in seconds."""
@@ -56,7 +57,7 @@ def repair_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_LIM
         return told | {"added": False, "sentence": str(problem)}
     return told | {
         "added": addition.added,
-        "sentence": addition.sentence,
+        "sentence": addition_sentence(addition),
         "before_deg": _rmse(addition.before, rotations),
         "after_deg": _rmse(addition.after, rotations),
         "covered": _covered(glove, addition.model, rotations),

@@ -99,7 +99,7 @@ def test_figures_count_what_was_named_and_say_what_is_demanded(tmp_path):
     walked = {
         "added": ["lag", "creep"],
         "verdicts": ["named", "named"],
-        "something_left": False,
+        "unexplained_residual": False,
         "rmse_deg": [2.0, 1.0],
     }
     both = with_cause("pairs", "lag", 1.3, 1)

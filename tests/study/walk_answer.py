@@ -12,6 +12,7 @@ from glovecal_models.calibration.held_out_check import held_out_errors
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.improvement.improve import improve
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
+from glovecal_models.improvement.text import improvement_sentences
 
 
 def walk_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_LIMITS) -> dict[str, Any]:
@@ -28,17 +29,16 @@ def pair_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_LIMIT
 
 
 def walk(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_LIMITS) -> dict[str, Any]:
-    """The contract's document, shortened to what is marked."""
-    settings = training_settings(glove)
-    document = improve(glove.takes, glove.layout, "study", settings, limits=limits).to_document()
-    added = [step["added"] for step in document["steps"] if step["added"]]
+    """What is marked of an improvement."""
+    found = improve(glove.takes, glove.layout, "study", training_settings(glove), limits=limits)
+    added = [step.added for step in found.steps if step.added is not None]
     return {
-        "added": [item["effect"] for item in added],
-        "verdicts": [item["verdict"] for item in added],
-        "confidence_sets": [list(item["confidence_set"]) for item in added],
-        "rmse_deg": [round(step["rmse_deg"], 4) for step in document["steps"]],
-        "undone": [item["effect"] for item in document["undone"]],
-        "stopped": document["stopped"],
-        "something_left": bool(document["something_left"]),
-        "sentences": document["sentences"],
+        "added": [item.effect for item in added],
+        "verdicts": [item.verdict for item in added],
+        "confidence_sets": [list(item.confidence_set) for item in added],
+        "rmse_deg": [round(step.rmse_deg, 4) for step in found.steps],
+        "undone": [item.effect for item in found.undone],
+        "stopped": found.stopped,
+        "unexplained_residual": bool(found.diagnosis and found.diagnosis.residual.is_significant),
+        "sentences": improvement_sentences(found),
     }

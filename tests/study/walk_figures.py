@@ -17,12 +17,12 @@ def alarm_figures(rows: Sequence[Row]) -> list[StudyFigure]:
             at_most=0.0,
         ),
         StudyFigure.share(
-            'outside the catalogue: "something is left"', [_alarmed(row) for row in rows], at_least=0.95
+            'outside the catalogue: "unexplained residual"', [_alarmed(row) for row in rows], at_least=0.95
         ),
     ]
     for cause in dict.fromkeys(glove.truth for glove, _ in rows):
         some = [row for row in rows if row[0].truth == cause]
-        label = f'outside the catalogue: "something is left", {cause}'
+        label = f'outside the catalogue: "unexplained residual", {cause}'
         found.append(StudyFigure.share(label, [_alarmed(row) for row in some]))
     return found
 
@@ -30,14 +30,16 @@ def alarm_figures(rows: Sequence[Row]) -> list[StudyFigure]:
 def false_alarm_figures(rows: Sequence[Row]) -> list[StudyFigure]:
     """Of healthy gloves."""
     wrong = [bool(_wrong(row)) for row in rows]
-    alarms = [answer["walk"]["something_left"] for _, answer in rows]
+    alarms = [answer["walk"]["unexplained_residual"] for _, answer in rows]
     found = [
         StudyFigure.share("improve adds an effect to a clean glove", wrong, at_most=0.02),
-        StudyFigure.share('"something is left" on a clean glove', alarms, at_most=0.03),
+        StudyFigure.share('"unexplained residual" on a clean glove', alarms, at_most=0.03),
     ]
     for nuisance in ("white", "drift", "posture"):
-        some = [answer["walk"]["something_left"] for glove, answer in rows if glove.nuisance == nuisance]
-        found.append(StudyFigure.share(f'"something is left" on a clean glove, {nuisance} nuisance', some))
+        some = [
+            answer["walk"]["unexplained_residual"] for glove, answer in rows if glove.nuisance == nuisance
+        ]
+        found.append(StudyFigure.share(f'"unexplained residual" on a clean glove, {nuisance} nuisance', some))
     return found
 
 
@@ -90,10 +92,12 @@ def _wrong(row: Row) -> list[int]:
 def _unqualified(row: Row) -> bool:
     """A wrong name said plainly: neither ambiguous nor with the alarm beside it."""
     walk = row[1]["walk"]
-    return any(walk["verdicts"][place] == "named" for place in _wrong(row)) and not walk["something_left"]
+    return (
+        any(walk["verdicts"][place] == "named" for place in _wrong(row)) and not walk["unexplained_residual"]
+    )
 
 
 def _alarmed(row: Row) -> bool:
     """Where the cause's own column was named and added, nothing need be left."""
     walk = row[1]["walk"]
-    return walk["something_left"] or any(name in row[1]["right"] for name in walk["added"])
+    return walk["unexplained_residual"] or any(name in row[1]["right"] for name in walk["added"])

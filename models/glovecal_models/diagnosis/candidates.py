@@ -1,4 +1,4 @@
-"""Every effect that could be missing, assessed on the same rows, beside its decoy."""
+"""Every candidate effect, assessed on the same rows as its control."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ import numpy as np
 
 from glovecal_models.calibration.held_out import HeldOut, held_out
 from glovecal_models.diagnosis.forward_design import ForwardDesign
-from glovecal_models.diagnosis.not_identifiable import NotJudgeable, undecidable
-from glovecal_models.diagnosis.session_chance import session_probability
+from glovecal_models.diagnosis.not_identifiable import NotIdentifiable, undecidable
+from glovecal_models.diagnosis.permutation_test import session_p_value
 from glovecal_models.effects.base.assessment import (
     Assessment,
     JointErrors,
     block_starts,
     squared_in_blocks,
 )
-from glovecal_models.effects.base.decoy import decoy_columns
+from glovecal_models.effects.base.control import control_columns
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.signals import Signals
 
-DEALS_TRIED = 5
+PERMUTATIONS_TRIED = 5
 
 
 def assessed(
@@ -31,20 +31,20 @@ def assessed(
     generator: np.random.Generator,
     without: Set[str] = frozenset(),
     report: Callable[[str, float], None] | None = None,
-) -> tuple[list[Assessment], list[NotJudgeable]]:
-    """Every judgeable effect, and why the others are not.
+) -> tuple[list[Assessment], list[NotIdentifiable]]:
+    """Every identifiable effect, and why the others are not.
 
     ``without`` names effects that the model has already.
     """
     effects = [item for item in effects if item.stage == "compared" and item.name not in without]
     found: list[Assessment] = []
-    impossible: list[NotJudgeable] = []
+    impossible: list[NotIdentifiable] = []
     for number, effect in enumerate(effects):
         if report:
             report(f"trying {effect.name}", number / len(effects))
         why = effect.missing(design.signals)
         if why is not None:
-            impossible.append(NotJudgeable(effect.name, _with_advice(effect, why)))
+            impossible.append(NotIdentifiable(effect.name, _with_advice(effect, why)))
             continue
         item = effect.assess(design) or _assessed(design, effect, generator)
         if isinstance(item, Assessment):
@@ -62,7 +62,7 @@ def _with_advice(effect: Effect, why: str) -> str:
 
 def _assessed(
     design: ForwardDesign, effect: Effect, generator: np.random.Generator
-) -> Assessment | NotJudgeable:
+) -> Assessment | NotIdentifiable:
     evidence = _screened(design, effect, generator)
     errors = tuple(_joint_errors(item, np.array(design.unit_take)) for item in evidence)
     found = Assessment(
@@ -80,30 +80,30 @@ def _assessed(
         return found
     few = undecidable(design.signals, effect, design.limits)
     if few is not None:
-        return NotJudgeable(effect.name, few.why, few.record, found)
+        return NotIdentifiable(effect.name, few.why, few.record, found)
     some = any(item.contrast >= design.limits.least_session_share for item in errors)
-    return replace(found, probability=session_probability(design, effect, generator) if some else 1.0)
+    return replace(found, p_value=session_p_value(design, effect, generator) if some else 1.0)
 
 
 def _screened(design: ForwardDesign, effect: Effect, generator: np.random.Generator) -> tuple[Evidence, ...]:
-    """With one decoy; of dealt wearings the typical of several: one deal may nearly be the true one."""
-    if effect.decoy != "dealt wearings":
+    """With one control; of permuted wearings the median of several: one may nearly be the true partition."""
+    if effect.control != "permuted wearings":
         return screen(design, effect, generator)
-    tried = [screen(design, effect, generator) for _ in range(DEALS_TRIED)]
+    tried = [screen(design, effect, generator) for _ in range(PERMUTATIONS_TRIED)]
     middle = [
-        sorted(items, key=lambda item: item.decoy.saved)[DEALS_TRIED // 2]
+        sorted(items, key=lambda item: item.control.saved)[PERMUTATIONS_TRIED // 2]
         for items in zip(*tried, strict=True)
     ]
     return tuple(middle)
 
 
 def _joint_errors(evidence: Evidence, take: np.ndarray) -> JointErrors:
-    true, decoy = evidence.true, evidence.decoy
+    true, control = evidence.true, evidence.control
     starts = block_starts([len(part) for part in true.residual])
     return JointErrors(
         squared_in_blocks(true.residual, starts),
         squared_in_blocks(true.residual_added, starts),
-        squared_in_blocks(decoy.residual_added, starts),
+        squared_in_blocks(control.residual_added, starts),
         int(true.count.sum()),
         take[np.searchsorted(np.cumsum([len(part) for part in true.residual]), starts, side="right")],
     )
@@ -111,18 +111,18 @@ def _joint_errors(evidence: Evidence, take: np.ndarray) -> JointErrors:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What one effect saves on one joint in one design."""
+    """Held-out errors of one effect on one joint of one design."""
 
     true: HeldOut
-    decoy: HeldOut
+    control: HeldOut
     shape: np.ndarray
     """(P,) of the best."""
     settings: Settings
 
     @property
     def contrast(self) -> float:
-        """Share of the squared error saved beyond what the decoy saves."""
-        return self.true.saved - max(self.decoy.saved, 0.0)
+        """Share of the squared error saved beyond what the control saves."""
+        return self.true.saved - max(self.control.saved, 0.0)
 
 
 def screen(design: ForwardDesign, effect: Effect, generator: np.random.Generator) -> tuple[Evidence, ...]:
@@ -162,12 +162,12 @@ def _all_joints(
         return columns.reshape(len(columns), shapes, lanes, -1)
 
     true = [by_shape(effect.columns(take, settings, flat)) for take in tiled]
-    decoy = [by_shape(part) for part in decoy_columns(effect, tiled, settings, flat, generator)]
+    control = [by_shape(part) for part in control_columns(effect, tiled, settings, flat, generator)]
     prior = effect.prior_sd(settings)
     found = []
     for lane, joint in enumerate(joints):
         products = design.products[joint]
         right = held_out(products, design.rows(joint, [part[:, :, lane] for part in true]), prior)
-        wrong = held_out(products, design.rows(joint, [part[:, :, lane] for part in decoy]), prior)
+        wrong = held_out(products, design.rows(joint, [part[:, :, lane] for part in control]), prior)
         found.append(Evidence(right, wrong, grid[right.shape, lane], settings))
     return tuple(found)

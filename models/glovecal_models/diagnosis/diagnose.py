@@ -1,4 +1,4 @@
-"""Which physical effect is missing: from takes to a name, a set, or silence with a reason."""
+"""Which physical effect is missing: from takes to a name, a confidence set, or a reason why none is named."""
 
 from __future__ import annotations
 
@@ -11,25 +11,29 @@ from glovecal_models.diagnosis.candidates import assessed
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.hold_drift import hold_drift
-from glovecal_models.diagnosis.hold_drift_document import hold_next_take
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.naming import Naming, named
-from glovecal_models.diagnosis.next_take import next_take
-from glovecal_models.diagnosis.not_identifiable import NotJudgeable, as_known, deciding, likelier
-from glovecal_models.diagnosis.pose_labels import WHY_NOT_JUDGEABLE, are_pose_labels
+from glovecal_models.diagnosis.next_take import hold_next_take, next_take
+from glovecal_models.diagnosis.not_identifiable import (
+    ONLY_POSE_NAMES,
+    SINGLE_POSES,
+    NotIdentifiable,
+    as_known,
+    exceeding_named,
+    take_to_decide,
+)
+from glovecal_models.diagnosis.posed_holds import are_pose_labels
 from glovecal_models.diagnosis.problem import DiagnosisProblem
 from glovecal_models.diagnosis.reference_problems import reference_problems
 from glovecal_models.diagnosis.resampled import SMOOTHING
 from glovecal_models.diagnosis.signatures import are_held_levels, beside_levels, signature_findings
-from glovecal_models.diagnosis.something_left import not_told, something_left
+from glovecal_models.diagnosis.unexplained_residual import UnexplainedResidual, unexplained_residual
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.catalogue import candidates
 from glovecal_models.errors import Cancelled
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
-
-SINGLE_POSES = "the frames are single poses; record the movement from one to the next"
 
 
 def diagnose(
@@ -46,18 +50,18 @@ def diagnose(
     cancelled: Callable[[], bool] | None = None,
     report: Callable[[str, float], None] | None = None,
 ) -> Diagnosis:
-    """``known``: effects the model has already; they are part of the base. ``limits`` decide what is told.
+    """``known``: effects the model has already; they are part of the base. ``limits`` decide the verdicts.
 
     Raises BadInput, Cancelled.
     """
 
-    def said(text: str, share: float) -> None:
+    def progress(text: str, share: float) -> None:
         if cancelled and cancelled():
             raise Cancelled("the diagnosis was cancelled")
         if report:
             report(text, share)
 
-    said("looking at the reference", 0.0)
+    progress("checking the reference", 0.0)
     problem = DiagnosisProblem.of(takes, layout, linear, known, limits)
     problems = reference_problems(takes, layout, limits)
     design = problem.design()
@@ -69,52 +73,52 @@ def diagnose(
     has = _has(known)
     waiting = [item for item in tried if problem.is_sparse and item.needs_movement]
     judged = [item for item in tried if item not in waiting]
-    found, impossible = assessed(design, judged, np.random.default_rng(seed), has, said)
+    found, impossible = assessed(design, judged, np.random.default_rng(seed), has, progress)
     naming, beside, screened = named(found, limits), problem, design
-    undecided = likelier(impossible, naming)
+    undecided = exceeding_named(impossible, naming)
     if undecided:
-        # What may well be there is not to get another's name: the others are judged beside it.
+        # Their error must not be attributed to another effect: the others are assessed beside them.
         beside = problem.beside(*(as_known(item, judged) for item in undecided))
         others = [item for item in judged if item.name not in {each.effect for each in impossible}]
         screened = beside.design()
-        found, _ = assessed(screened, others, np.random.default_rng(seed), has, said)
+        found, _ = assessed(screened, others, np.random.default_rng(seed), has, progress)
         naming = named(found, limits)
-    impossible += [NotJudgeable(item.name, SINGLE_POSES) for item in waiting]
-    naming = _alikes_told_apart(naming, beside, screened, by_name)
+    impossible += [NotIdentifiable(item.name, SINGLE_POSES) for item in waiting]
+    naming = _with_alikes_ordered(naming, beside, screened, by_name)
     lacking = [item for item in every if item.name not in has]
     asked = signature_findings(takes, layout, problem.joints, naming, found, lacking)
     findings = tuple(asked) if signatures else ()
     naming = beside_levels(naming, takes, findings, by_name)
-    said("looking at what is left", 0.95)
+    progress("testing the residual", 0.95)
     if problem.is_sparse or are_held_levels(takes):
-        left = not_told(SINGLE_POSES)
+        residual = UnexplainedResidual(obstacle="single poses")
     else:
         rest = problem.with_first(naming, by_name).design()
-        may_be = [item.effect for item in impossible if item.saves_much]
-        left = something_left(rest, problem.even, layout, seed, may_be=may_be)
-    said("done", 1.0)
+        likely = [item.effect for item in impossible if item.saves_much]
+        residual = unexplained_residual(rest, problem.even, layout, seed, undecided=likely)
+    progress("done", 1.0)
     return Diagnosis(
         joints=problem.joints,
         rmse_deg=_held_out_errors(design),
         noise_floor_deg={name: float(value) for name, value in (noise_floor_deg or {}).items()},
         naming=naming,
         assessments=tuple(found),
-        not_judgeable=tuple(impossible),
+        not_identifiable=tuple(impossible),
         reference_problems=problems,
         findings=findings,
-        left=left,
-        next_take=next_take(naming.confidence_set, by_name) or deciding(impossible, left),
+        residual=residual,
+        next_take=next_take(naming.confidence_set, by_name) or take_to_decide(impossible, residual),
         effects=by_name,
         limits=limits,
     )
 
 
 def _has(known: Sequence[KnownEffect]) -> set[str]:
-    """The known effects, and those that what is left of them looks like."""
+    """The known effects, and those that their residue resembles."""
     return {name for item in known for name in (item.effect.name, *item.effect.alike)}
 
 
-def _alikes_told_apart(
+def _with_alikes_ordered(
     naming: Naming, problem: DiagnosisProblem, design: ForwardDesign, effects: Mapping[str, Effect]
 ) -> Naming:
     """The ranking with look-alikes of its first put in the order that they themselves decide.
@@ -158,7 +162,7 @@ def _of_pose_labels(
     seed: int,
     limits: DiagnosisLimits,
 ) -> Diagnosis:
-    """No effect can be judged by the names of poses; what readings do while one is held can."""
+    """Names of poses show no effect, but the drift of readings within held poses can be judged."""
     drift = hold_drift(takes, layout.sensors, seed=seed, limits=limits)
     return Diagnosis(
         joints=design.rotations,
@@ -166,12 +170,12 @@ def _of_pose_labels(
         noise_floor_deg={},
         naming=Naming((), ()),
         assessments=(),
-        not_judgeable=tuple(
-            NotJudgeable(item.name, WHY_NOT_JUDGEABLE) for item in tried if item.stage != "never"
+        not_identifiable=tuple(
+            NotIdentifiable(item.name, ONLY_POSE_NAMES) for item in tried if item.stage != "never"
         ),
         reference_problems=problems,
         findings=(),
-        left=not_told("no angle was measured"),
+        residual=UnexplainedResidual(obstacle="no measured angle"),
         next_take=hold_next_take(drift),
         effects={item.name: item for item in tried},
         hold_drift=drift,

@@ -1,22 +1,47 @@
-"""What a diagnosis found: evidence, names or silence with a reason, and what to record next."""
+"""What a diagnosis found: evidence, a named effect or a reason why there is none, and the next take."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Literal
 
-from glovecal_models.diagnosis.diagnosis_document import document
 from glovecal_models.diagnosis.hold_drift import HoldDrift
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.naming import Naming
 from glovecal_models.diagnosis.next_take import NextTake
-from glovecal_models.diagnosis.not_identifiable import NotJudgeable
+from glovecal_models.diagnosis.not_identifiable import NotIdentifiable
 from glovecal_models.diagnosis.signatures import may_explain
-from glovecal_models.diagnosis.something_left import Left
+from glovecal_models.diagnosis.unexplained_residual import UnexplainedResidual
 from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.facts import Kind
 from glovecal_models.effects.base.signature_effect import Finding
+
+Verdict = Literal["named", "ambiguous"]
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """The effect that a diagnosis names first."""
+
+    effect: str
+    where: tuple[str, ...]
+    """Rotations; sensors or takes where it is a fault of those."""
+    kind: Kind | None
+    """None where it is named by a drift within held poses: ``where`` are sensors then."""
+    confidence_set: tuple[str, ...]
+    """It and all that these takes cannot tell from it."""
+    parameters: Mapping[str, Mapping[str, float] | float]
+    """Learned numbers, units in their names; of each rotation where it was compared."""
+    saved_deg: float | None = None
+    """Held-out RMSE without it minus with it; None where it was found by its signature."""
+    control_saved_deg: float | None = None
+    """The same of its control."""
+
+    @property
+    def verdict(self) -> Verdict:
+        return "named" if len(self.confidence_set) < 2 else "ambiguous"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,12 +54,12 @@ class Diagnosis:
     noise_floor_deg: dict[str, float]
     naming: Naming
     assessments: tuple[Assessment, ...]
-    """Every effect that could be judged."""
-    not_judgeable: tuple[NotJudgeable, ...]
+    """Every identifiable effect."""
+    not_identifiable: tuple[NotIdentifiable, ...]
     reference_problems: tuple[str, ...]
     findings: tuple[Finding, ...]
     """What is known by a signature in the recording."""
-    left: Left
+    residual: UnexplainedResidual
     next_take: NextTake | None
     effects: Mapping[str, Effect]
     """Those asked for, by name."""
@@ -55,13 +80,61 @@ class Diagnosis:
         return tuple(item for item in self.findings if item.effect == self.findings[0].effect)
 
     @property
-    def by_gain(self) -> list[Assessment]:
-        """All assessments, those that pass first, then by how much they save."""
+    def ranked_assessments(self) -> list[Assessment]:
+        """All assessments, significant ones first, then by how much they save."""
         return sorted(
             self.assessments,
-            key=lambda item: (not item.touched, -item.saved_square, -max(e.contrast for e in item.errors)),
+            key=lambda item: (
+                not item.significant_joints,
+                -item.saved_square,
+                -max(e.contrast for e in item.errors),
+            ),
         )
 
-    def to_document(self) -> dict[str, Any]:
-        """Plain JSON-able data with sentences."""
-        return document(self)
+    @property
+    def named(self) -> NamedEffect | None:
+        """By its signature, else by the held-out error it saves, else by the drift within held poses."""
+        if self.signature:
+            return self._named_by_signature()
+        if self.naming.ranked:
+            return self._named_by_comparison()
+        held = self.hold_drift
+        return None if held is None or not held.confidence_set else _named_by_drift(held)
+
+    def _named_by_signature(self) -> NamedEffect:
+        first, rivals = self.signature[0], self.naming.confidence_set
+        return NamedEffect(
+            first.effect,
+            tuple(sorted({name for item in self.signature for name in item.where})),
+            self.effects[first.effect].kind,
+            rivals if first.effect in rivals else (first.effect,),
+            dict(first.evidence),
+        )
+
+    def _named_by_comparison(self) -> NamedEffect:
+        item = self.naming.ranked[0]
+        rmse = item.rmse_deg
+        return NamedEffect(
+            item.effect,
+            tuple(item.joints[i] for i in item.significant_joints),
+            self.effects[item.effect].kind,
+            self.naming.confidence_set,
+            {item.joints[i]: item.shape_described(i) for i in item.significant_joints},
+            rmse.before - rmse.after,
+            rmse.before - rmse.control,
+        )
+
+
+def _named_by_drift(held: HoldDrift) -> NamedEffect:
+    first = held.poses[0]
+    consistent = held.consistent(first)
+    return NamedEffect(
+        held.confidence_set[0],
+        tuple(name for name, _ in consistent),
+        None,
+        held.confidence_set,
+        {
+            name: {f"change_in_{first.pose}_pct": 100.0 * share, "tau_s": first.tau_s}
+            for name, share in consistent
+        },
+    )

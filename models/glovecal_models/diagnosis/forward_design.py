@@ -1,6 +1,6 @@
 """What a diagnosis is fitted on: each joint's own sensor from the measured angles (forward).
 
-A noisy reference rewards any low pass in this direction; strong smoothing and decoys take that away. The
+A noisy reference rewards any low pass in this direction; strong smoothing and controls take that away. The
 other direction, angle from sensors, is what adding an effect tries.
 """
 

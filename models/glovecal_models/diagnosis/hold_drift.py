@@ -1,6 +1,6 @@
 """How readings drift while a pose is held: creep, a hand that relaxes, or warm-up?
 
-``hold_fit`` measures the drift, ``hold_chance`` tells whether it is beyond chance.
+``hold_fit`` measures the drift and tests its significance.
 
 Without a measured angle a sensor that creeps and a hand that relaxes look the same. Warm-up does not: it goes
 on in one direction through all poses, and does not begin anew with each hold.
@@ -10,10 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
-from glovecal_models.diagnosis.hold_fit import HoldFit, PoseDrift, probability_of
+from glovecal_models.diagnosis.hold_fit import HoldFit, PoseDrift, p_value_of
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.posed_holds import posed_holds
 from glovecal_models.effects.base.facts import HoldDrift as HoldDriftKind
@@ -22,6 +23,7 @@ from glovecal_models.takes.take import Take
 
 HAND = "hand_relaxing"
 """No effect of the glove: the wearer's hand gives way."""
+HoldVerdict = Literal["named", "ambiguous", "nothing", "not_identifiable"]
 RIGID = "rigid"
 """Begins the names of poses held around a rigid form: there the hand cannot relax."""
 
@@ -34,8 +36,8 @@ class HoldDrift:
     poses: tuple[PoseDrift, ...]
     """Those held at least ``hold_fewest_of_a_pose`` times, the one that drifts most first."""
     holds: int
-    probability: float
-    """That holds whose drift has either sign drift so much alike."""
+    p_value: float
+    """Of the drift that the holds have in common, by flipping the sign of whole holds."""
     elsewhere: float | None
     """How fast readings drift in poses far from the first, as a share of how fast they do there: warm-up goes
     on (1), a sensor or hand that goes back turns around (negative). None when there is no such pose, or when
@@ -45,7 +47,7 @@ class HoldDrift:
     recovery: float | None
     """Share of a hold's drift that is gone when the pose comes back in the same take; None when none does."""
     confidence_set: tuple[str, ...] = ()
-    """Empty when nothing drifts beyond chance; a cause is alone only after holds of a rigid form."""
+    """Empty when nothing drifts significantly; a cause is alone only after holds of a rigid form."""
     why_not: str | None = None
     """Why it cannot be judged."""
     deg_of_span: Mapping[str, float] | None = None
@@ -53,8 +55,25 @@ class HoldDrift:
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS
 
     @property
-    def is_drifting(self) -> bool:
-        return bool(self.confidence_set)
+    def verdict(self) -> HoldVerdict:
+        if self.why_not is not None:
+            return "not_identifiable"
+        if not self.confidence_set:
+            return "nothing"
+        return "named" if len(self.confidence_set) == 1 else "ambiguous"
+
+    def change_deg(self, sensor: str, share: float) -> float | None:
+        """A share of a sensor's span in degrees, where angles are known."""
+        span = (self.deg_of_span or {}).get(sensor)
+        return None if span is None else share * span
+
+    def consistent(self, pose: PoseDrift) -> list[tuple[str, float]]:
+        """Sensors that drift one way in most holds of a pose with their signed shares, the largest first."""
+        limits = self.limits
+        is_large = np.abs(pose.share) >= limits.hold_least_share
+        sure = is_large & (pose.same_sign >= limits.hold_one_way_share * pose.holds)
+        order = [i for i in np.argsort(-np.abs(pose.share)) if sure[i]]
+        return [(self.sensors[i], float(pose.share[i])) for i in order]
 
 
 def hold_drift(
@@ -81,7 +100,7 @@ def hold_drift(
         tuple(sensors),
         tuple(poses),
         count,
-        probability_of(fits, np.random.default_rng(seed)),
+        p_value_of(fits, np.random.default_rng(seed)),
         _elsewhere(fits, limits),
         tuple(fit.held[0].pose for fit in _far(fits, limits.hold_far_share)),
         _recovery(fits, limits),
@@ -157,10 +176,10 @@ def _recovery(fits: Sequence[HoldFit], limits: DiagnosisLimits) -> float | None:
 
 
 def _causes(drift: HoldDrift) -> tuple[str, ...]:
-    """What could bring the drift about; nothing when there is none beyond chance."""
+    """What could bring the drift about; nothing when there is no significant one."""
     largest = max(float(np.abs(item.share).max()) for item in drift.poses)
     limits, half = drift.limits, drift.limits.hold_half
-    if drift.probability > limits.hold_p_value or largest < limits.hold_least_share:
+    if drift.p_value > limits.hold_p_value or largest < limits.hold_least_share:
         return ()
     goes_on = drift.elsewhere is None or drift.elsewhere >= half
     if drift.recovery is not None and drift.recovery < half and goes_on:
@@ -196,8 +215,8 @@ def _decided(
     if not set(_with_the_hold()) <= set(causes) or count < limits.hold_fewest:
         return causes
     size = max(float(np.abs(fit.changes.mean(axis=0)).mean()) for fit in rigid)
-    chance = probability_of(rigid, np.random.default_rng(seed))
-    if size >= limits.hold_least_share and chance <= limits.hold_p_value:
+    p_value = p_value_of(rigid, np.random.default_rng(seed))
+    if size >= limits.hold_least_share and p_value <= limits.hold_p_value:
         return drifting("begins anew with each hold")
     others = max((float(np.abs(fit.changes.mean(axis=0)).mean()) for fit in free), default=0.0)
     return (HAND,) if size < limits.hold_half * others else causes

@@ -3,10 +3,10 @@
 Each hold is fitted, sensor by sensor, with a level and b (1 - exp(-t / tau)) / (1 - exp(-T / tau)); b is the
 change within the hold of length T, and tau is common to all holds and sensors of a pose.
 
-Could holds drift so much alike by chance? Whole holds are turned around, all their sensors at once.
-
-Readings within a hold are far from independent, and the sensors of one hand drift together: a whole hold is
-the unit. A drift that is there by chance has either sign, and speeds up as often as it slows down.
+A randomization test tells whether that is beyond chance: the sign of whole holds is flipped, of all their
+sensors at once. Readings within a hold are far from independent, and the sensors of one hand drift together:
+a whole hold is the unit. Under the null hypothesis a drift has either sign, and speeds up as often as it
+slows down.
 """
 
 from __future__ import annotations
@@ -107,11 +107,11 @@ def _fitted(hold: PosedHold, course: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 DRAWN = 4000
-"""Ways to turn the holds around; all of them when there are fewer."""
+"""Sign flips of the holds; all of them when there are fewer."""
 
 
-def probability_of(fits: Sequence[HoldFit], generator: np.random.Generator) -> float:
-    """The smaller of two, doubled: holds turned upside down, and holds also reversed in time."""
+def p_value_of(fits: Sequence[HoldFit], generator: np.random.Generator) -> float:
+    """The smaller of two, doubled: holds with flipped sign, and holds also reversed in time."""
     upside = [np.stack([fit.changes, -fit.changes]) for fit in fits]
     reversed_too = [
         np.stack([fit.changes, -fit.changes, fit.reversed_changes, -fit.reversed_changes]) for fit in fits

@@ -1,4 +1,4 @@
-"""From assessments to a name: the cause that explains most, and those it cannot be told from."""
+"""From assessments to a name: the effect that explains most, and its confidence set."""
 
 from __future__ import annotations
 
@@ -16,33 +16,35 @@ class Naming:
     """The ranked causes; empty when nothing is to be named."""
 
     ranked: tuple[Assessment, ...]
-    """Every cause beyond chance, the one that saves most first."""
+    """Every significant effect, the one that saves most first."""
     confidence_set: tuple[str, ...]
     """The first, and all that these takes cannot tell from it."""
 
 
 def named(assessments: Sequence[Assessment], limits: DiagnosisLimits = DIAGNOSIS_LIMITS) -> Naming:
-    """Rank what passed its decoy and chance."""
-    passing = sorted((item for item in assessments if item.touched), key=lambda item: -item.saved_square)
+    """Rank the effects that beat their control significantly."""
+    passing = sorted(
+        (item for item in assessments if item.significant_joints), key=lambda item: -item.saved_square
+    )
     if not passing:
         return Naming((), ())
     best = passing[0]
-    rivals = [item.effect for item in passing[1:] if not _beaten(item, best, limits.rival_worse_se)]
+    worse_se = limits.rival_worse_se
+    rivals = [item.effect for item in passing[1:] if not _is_significantly_worse(item, best, worse_se)]
     return Naming(tuple(passing), (best.effect, *rivals))
 
 
-def _beaten(item: Assessment, best: Assessment, standard_errors: float) -> bool:
-    """Whether ``item`` leaves clearly more error than ``best`` on the joints that either touches.
+def _is_significantly_worse(item: Assessment, best: Assessment, standard_errors: float) -> bool:
+    """Whether ``item`` leaves significantly more error than ``best`` on the significant joints of either.
 
-    Causes that change from take to take are judged take by take: blocks of one take are no independent
-    witnesses of those.
+    Effects that change from take to take are compared take by take: blocks of one take are not independent.
     """
-    joints = sorted({*best.touched, *item.touched})
+    joints = sorted({*best.significant_joints, *item.significant_joints})
     worse = [
         (item.errors[j].added - best.errors[j].added) / (best.errors[j].base.sum() or 1.0) for j in joints
     ]
     takes = [best.errors[j].take for j in joints]
-    by_take = item.probability is not None and best.probability is not None
+    by_take = item.p_value is not None and best.p_value is not None
     worse = over_joints(worse, takes, by_take=by_take)
     if len(worse) < 2:
         return False

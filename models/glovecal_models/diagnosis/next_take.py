@@ -1,4 +1,4 @@
-"""The next take that would decide between rivals, with seconds and instructions."""
+"""The next take that would decide between rivals, with its length and instructions."""
 
 from __future__ import annotations
 
@@ -6,11 +6,25 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from glovecal_models.diagnosis.hold_drift import HAND, HoldDrift
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Motion
 
 MORE_WEARINGS = "more_wearings"
 MORE_TAKES = "more_takes"
+RIGID_HOLDS = Motion(
+    "rigid_holds",
+    "Close the hand around a rigid form, such as a rod or a bottle, so that it cannot relax, and hold it for"
+    " 20 s; open the hand for 10 s; six times. Name the pose rigid-fist, and give these takes together with"
+    " the others.",
+    180,
+)
+WARM_HOLDS = Motion(
+    "long_warm",
+    "Wear the switched-on glove for 10 min without touching it, then hold the same poses again; give the"
+    " seconds since power-on as c.power_on_s.",
+    120,
+)
 ANYTHING = Motion(
     MORE_TAKES,
     "Record three more takes of 20 s in free motion: no motion is known that decides, but more data may.",
@@ -42,6 +56,14 @@ def next_take(rivals: Sequence[str], effects: Mapping[str, Effect]) -> NextTake 
     motion = next((found for a, b in pairs if (found := _declared(a, b) or _declared(b, a))), None)
     motion = motion or _shown_by_one(known) or ANYTHING
     return NextTake(motion.name, motion.what, motion.seconds, tuple(rivals))
+
+
+def hold_next_take(drift: HoldDrift) -> NextTake | None:
+    """For what a drift within held poses is consistent with; None when nothing is to be decided."""
+    if len(drift.confidence_set) < 2:
+        return None
+    motion = RIGID_HOLDS if HAND in drift.confidence_set else WARM_HOLDS
+    return NextTake(motion.name, motion.what, motion.seconds, drift.confidence_set)
 
 
 def _declared(effect: Effect, other: Effect) -> Motion | None:

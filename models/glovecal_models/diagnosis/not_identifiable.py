@@ -1,8 +1,8 @@
-"""Effects that these takes cannot decide, though they may well be there, and what to record instead.
+"""Effects that these takes cannot decide, and what to record instead.
 
-Causes that change from take to take need takes that could have been dealt in many ways. With two wearings, or
-few takes, or a context that hardly differs, even a cause that is there explains no more than a deal by chance
-may; then what to record is said instead of a verdict.
+The permutation test of a cause that changes from take to take needs many distinct permutations. With two
+wearings, or few takes, or a context that hardly differs, no p value can be small enough, even where the cause
+is there; a recording is proposed instead of a verdict.
 """
 
 from __future__ import annotations
@@ -17,18 +17,20 @@ from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.naming import Naming
 from glovecal_models.diagnosis.next_take import MORE_TAKES, MORE_WEARINGS, NextTake
-from glovecal_models.diagnosis.session_chance import wearing_deals
-from glovecal_models.diagnosis.something_left import Left
+from glovecal_models.diagnosis.permutation_test import wearing_permutations
+from glovecal_models.diagnosis.unexplained_residual import UnexplainedResidual
 from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.signals import Signals
 
+SINGLE_POSES = "the frames are single poses; record the movement from one to the next"
+ONLY_POSE_NAMES = "the reference only names poses (0 or 1) and measures no angle"
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 
 
 @dataclass(frozen=True)
-class NotJudgeable:
+class NotIdentifiable:
     """An effect these takes cannot show."""
 
     effect: str
@@ -36,7 +38,7 @@ class NotJudgeable:
     record: NextTake | None = None
     """The recording after which they could."""
     would_save: Assessment | None = None
-    """What it saves on takes left out, by itself or by chance."""
+    """What it saves on held-out takes, whether it is there or by chance."""
 
     @property
     def joints_saved(self) -> tuple[int, ...]:
@@ -68,14 +70,14 @@ class Undecidable:
     record: NextTake
 
 
-def likelier(impossible: Sequence[NotJudgeable], naming: Naming) -> list[NotJudgeable]:
-    """Those that would save more than the one that is to be named."""
+def exceeding_named(impossible: Sequence[NotIdentifiable], naming: Naming) -> list[NotIdentifiable]:
+    """Those that would save more than the effect that is to be named."""
     if not naming.ranked:
         return []
     return [item for item in impossible if item.saved_square > naming.ranked[0].saved_square]
 
 
-def as_known(item: NotJudgeable, candidates: Sequence[Effect]) -> KnownEffect:
+def as_known(item: NotIdentifiable, candidates: Sequence[Effect]) -> KnownEffect:
     """On the joints where it saves much."""
     found = item.would_save
     assert found is not None
@@ -84,11 +86,12 @@ def as_known(item: NotJudgeable, candidates: Sequence[Effect]) -> KnownEffect:
     return KnownEffect(effect, where, tuple(found.shapes[i] for i in item.joints_saved))
 
 
-def deciding(impossible: Sequence[NotJudgeable], left: Left) -> NextTake | None:
-    """The recording that lets an effect be judged which may well be there, or a wearing if any may."""
+def take_to_decide(impossible: Sequence[NotIdentifiable], residual: UnexplainedResidual) -> NextTake | None:
+    """The recording that makes an effect identifiable: one that saves much; else a further wearing, where
+    something is unexplained."""
     asked = [item for item in impossible if item.record is not None]
     likely = sorted((item for item in asked if item.saves_much), key=lambda item: -item.saved_square)
-    unexplained = left.is_left or left.not_judgeable is not None
+    unexplained = residual.is_significant or residual.obstacle is not None
     wearing = [item for item in asked if item.record and item.record.motion == MORE_WEARINGS and unexplained]
     return next((item.record for item in (*likely, *wearing)), None)
 
@@ -96,14 +99,14 @@ def deciding(impossible: Sequence[NotJudgeable], left: Left) -> NextTake | None:
 def undecidable(
     takes: Sequence[Signals], effect: Effect, limits: DiagnosisLimits = DIAGNOSIS_LIMITS
 ) -> Undecidable | None:
-    """None when enough deals are possible for the effect to be told from chance."""
-    if effect.decoy == "dealt wearings":
+    """None when there are enough permutations for the p value that the effect needs."""
+    if effect.control == "permuted wearings":
         return _few_wearings(takes, effect, limits)
     return _few_takes(takes, effect, limits) if effect.context else None
 
 
 def _few_wearings(takes: Sequence[Signals], effect: Effect, limits: DiagnosisLimits) -> Undecidable | None:
-    ways = 1 + len(wearing_deals(takes, np.random.default_rng(0)))
+    ways = 1 + len(wearing_permutations(takes, np.random.default_rng(0)))
     needed = ceil(1 / effect.certainty.clear)
     if ways >= needed:
         return None
@@ -113,9 +116,8 @@ def _few_wearings(takes: Sequence[Signals], effect: Effect, limits: DiagnosisLim
     following = ORDINALS[len(wearings)] if len(wearings) < len(ORDINALS) else f"{len(wearings) + 1}th"
     many = NUMBERS[len(wearings)] if len(wearings) < len(NUMBERS) else str(len(wearings))
     why = (
-        f"{many} wearings cannot tell a {effect.spoken} from chance"
-        f" ({_ways(ways)} to deal the takes, {needed} are needed):"
-        f" record a {following} wearing, {each} takes each"
+        f"{many} wearings allow {_permutations(ways)} of their takes, a {effect.spoken} needs {needed} to be"
+        f" significant: record a {following} wearing with {each} takes"
     )
     what = (
         f"Take the glove off, put it on again and record {each} takes with the same motions as before;"
@@ -140,18 +142,18 @@ def _few_takes(takes: Sequence[Signals], effect: Effect, limits: DiagnosisLimits
     )
     more_takes = f"{more} more take{'s' if more > 1 else ''}"
     why = (
-        f"{takes_so_far} of c.{column} cannot tell {effect.name} from chance ({_ways(ways)} to deal them,"
-        f" {needed} are needed): record {more_takes}, each at another value of c.{column}"
+        f"{takes_so_far} of c.{column} allow {_permutations(ways)}, {effect.name} needs {needed} to be"
+        f" significant: record {more_takes}, each at another value of c.{column}"
     )
     what = f"Record {more_takes} in free motion, each at another value of c.{column} than all before."
     return Undecidable(why, NextTake(MORE_TAKES, what, _seconds(takes, more), (effect.name, "chance")))
 
 
-def _levels(takes: Sequence[Signals], column: str, alike: float) -> list[int]:
-    """How many takes are alike in the column's mean, for each value of it; ``alike``: share of its range."""
+def _levels(takes: Sequence[Signals], column: str, equal: float) -> list[int]:
+    """How many takes share a mean of the column, for each value of it; ``equal``: share of its range."""
     means = [float(np.nanmean(take.context[column])) for take in takes if _is_known(take, column)]
     every = np.concatenate([take.context[column] for take in takes if _is_known(take, column)])
-    width = max(alike * float(np.nanmax(every) - np.nanmin(every)), 1e-12)
+    width = max(equal * float(np.nanmax(every) - np.nanmin(every)), 1e-12)
     steps = np.cumsum(np.append(0, np.diff(np.sort(means)) > width))
     return np.bincount(steps).tolist()
 
@@ -164,8 +166,8 @@ def _arrangements(levels: Sequence[int]) -> int:
     return factorial(sum(levels)) // prod(factorial(count) for count in levels)
 
 
-def _ways(count: int) -> str:
-    return f"{count} way{'s' if count != 1 else ''}"
+def _permutations(count: int) -> str:
+    return f"{count} permutation{'s' if count != 1 else ''}"
 
 
 def _seconds(takes: Sequence[Signals], count: int) -> int:

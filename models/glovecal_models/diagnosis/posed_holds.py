@@ -9,11 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
-from glovecal_models.diagnosis.pose_labels import are_pose_labels, labels_at_frames
 from glovecal_models.diagnosis.signatures import own_sensors
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
+LABELS = (0.0, 1.0)
+"""Of a reference that names poses and measures no angle: 1 for a fist, 0 for a flat hand."""
 OUTERMOST_PCT = (2, 98)
 BIN_S = 0.25
 LONGEST_GAP_S = 1.0
@@ -146,3 +147,30 @@ def _named(found: Sequence[PosedHold], same_pose: float) -> list[PosedHold]:
             hold = replace(hold, pose=f"pose {near[0] + 1 if near else len(levels)}")
         result.append(hold)
     return result
+
+
+def are_pose_labels(takes: Sequence[Take]) -> bool:
+    """Whether all reference values of all takes are 0 or 1, both occur, and each lasts."""
+    values = [take.reference[np.isfinite(take.reference)] for take in takes if take.rotations]
+    return bool(values) and set(np.unique(np.concatenate(values)).tolist()) == set(LABELS)
+
+
+def labels_at_frames(take: Take) -> tuple[str, ...] | None:
+    """A pose name for each frame: the take's own, else its reference where that only names poses."""
+    if take.poses is not None:
+        return take.poses
+    if not take.rotations:
+        return None
+    measured = take.reference[np.isfinite(take.reference)]
+    if not len(measured) or not np.isin(measured, LABELS).all():
+        return None
+    levels = take.reference_at_frames(take.rotations)
+    return tuple(_label(take.rotations, row) for row in levels)
+
+
+def _label(rotations: Sequence[str], values: np.ndarray) -> str:
+    if not np.isfinite(values).all():
+        return ""
+    if len(values) > 1 and len(set(values.tolist())) == 1:
+        return f"reference {values[0]:g}"
+    return ", ".join(f"{name} {value:g}" for name, value in zip(rotations, values, strict=True))

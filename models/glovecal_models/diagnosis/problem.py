@@ -88,8 +88,8 @@ class DiagnosisProblem:
             delay = np.broadcast_to(delay, (len(self.even),))
             moved = [shifted(take, float(by)) for take, by in zip(self.even, delay, strict=True)]
             return replace(self, even=tuple(moved))
-        where = tuple(first.joints[i] for i in first.touched)
-        shapes = tuple(first.shapes[i] for i in first.touched)
+        where = tuple(first.joints[i] for i in first.significant_joints)
+        shapes = tuple(first.shapes[i] for i in first.significant_joints)
         return self.beside(KnownEffect(effects[first.effect], where, shapes))
 
 

@@ -23,7 +23,7 @@ def may_explain(effect: Effect, naming: Naming) -> bool:
     if not naming.ranked:
         return True
     first = naming.ranked[0]
-    share = np.mean([first.errors[joint].contrast for joint in first.touched])
+    share = np.mean([first.errors[joint].contrast for joint in first.significant_joints])
     only = all(item.effect in effect.also_explained_by for item in naming.ranked)
     return only and bool(share < effect.also_explained_share)
 

@@ -1,4 +1,4 @@
-"""How large the part of an error is that lasts for seconds, and how surely that is known.
+"""Slow error: the part of an error that lasts for seconds, with its lower 95 % bound.
 
 Means of neighbouring seconds are multiplied: noise that is forgotten within a second averages to nothing,
 whatever its size; an error that lasts gives its mean square. How far the products differ from one stretch of
@@ -95,7 +95,7 @@ class SlowError:
     """One joint, degrees root mean square; over the stretches in which it was measured."""
 
     size_deg: float
-    at_least_deg: float
+    lower_bound_deg: float
     """Lower end of the one-sided 95 % interval, never above ``size_deg``; 0 where so little data bounds it by
     nothing, since a mean square cannot be negative anyway."""
     noise_deg: float
@@ -162,3 +162,53 @@ def _noise(residual: Sequence[np.ndarray]) -> float:
     """Standard deviation of what changes from row to row, by the median of squared differences."""
     steps = np.concatenate([np.diff(part) for part in residual]) if residual else np.empty(0)
     return float(np.sqrt(np.median(steps**2) / 0.4549)) if len(steps) else 0.0
+
+
+SHIFTS = 199
+"""Of joints against each other, each take around its end: the null distribution of their covariance."""
+
+
+@dataclass(frozen=True)
+class SharedError:
+    """What the errors of several joints have in common."""
+
+    size_deg: float
+    """Of the covariance of two joints beyond its mean over shifts, root mean square over pairs."""
+    p_value: float
+    """Share of shifts with as much covariance."""
+
+
+NOTHING_SHARED = SharedError(0.0, 1.0)
+
+
+def shared_error(
+    joints: Sequence[Sequence[SecondMeans]],
+    generator: np.random.Generator,
+    limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
+) -> SharedError:
+    """From the covariance of second means; ``joints``: for each joint its takes."""
+    long = [take for take in zip(*joints, strict=True) if len(take[0].weight) >= limits.shared_shortest_s]
+    takes = [_together(take) for take in long]
+    if len(joints) < 2 or not takes:
+        return NOTHING_SHARED
+    pairs = np.triu_indices(len(joints), 1)
+    covariance = np.zeros((1 + SHIFTS, len(pairs[0])))
+    for values in takes:
+        length = values.shape[1]
+        moved = generator.integers(2, length - 1, (SHIFTS, len(joints)))
+        moved = np.concatenate([np.zeros((1, len(joints)), dtype=int), moved])
+        at = (np.arange(length) - moved[:, :, None]) % length
+        shifted = values[np.arange(len(joints))[None, :, None], at]
+        covariance += (shifted @ shifted.transpose(0, 2, 1))[:, *pairs]
+    covariance /= sum(values.shape[1] for values in takes)
+    square = np.mean(covariance**2, axis=1)
+    beyond = max(float(square[0] - square[1:].mean()), 0.0)
+    return SharedError(beyond**0.25, float(np.mean(square >= square[0] * (1 - 1e-9))))
+
+
+def _together(take: Sequence[SecondMeans]) -> np.ndarray:
+    """(J, S): second means about their mean, those of unfamiliar inputs made small."""
+    weight = np.array([item.weight for item in take])
+    mean = np.array([item.mean_deg for item in take])
+    centre = np.sum(weight * mean, axis=1) / np.maximum(weight.sum(axis=1), 1e-9)
+    return np.sqrt(weight) * (mean - centre[:, None])

@@ -3,7 +3,7 @@
 from typing import ClassVar
 
 from glovecal_models.effects.base.context_effect import ContextEffect
-from glovecal_models.effects.base.facts import Decoy
+from glovecal_models.effects.base.facts import Control
 from glovecal_models.effects.base.motions import ONE_FINGER
 
 
@@ -13,4 +13,4 @@ class ContactPressure(ContextEffect):
     source = "offset and gain per newton"
     shown_by: ClassVar = ONE_FINGER
     context: ClassVar = ("contact_n",)
-    decoy: ClassVar[Decoy] = "rolled in time"
+    control: ClassVar[Control] = "circularly shifted"

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from glovecal_models.effects.base.context_effect import ContextEffect
-from glovecal_models.effects.base.facts import Decoy, Settings
+from glovecal_models.effects.base.facts import Control, Settings
 from glovecal_models.effects.base.signals import Signals
 
 PREFIX = "context:"
@@ -30,11 +30,11 @@ class ContextDependence(ContextEffect):
         self.name = PREFIX + column  # pyright: ignore[reportAttributeAccessIssue]
         self.context = (column,)  # pyright: ignore[reportAttributeAccessIssue]
         self.explanation = f"The reading changes with the recorded column c.{column}."  # pyright: ignore[reportAttributeAccessIssue]
-        self.decoy: Decoy = "rolled in time" if changes_within_takes else "context of other takes"  # pyright: ignore[reportIncompatibleVariableOverride]
+        self.control: Control = "circularly shifted" if changes_within_takes else "context of other takes"  # pyright: ignore[reportIncompatibleVariableOverride]
 
     @classmethod
     def of(cls, column: str, takes: Sequence[Signals]) -> ContextDependence:
-        """With the decoy that suits how the column changes."""
+        """With the control that suits how the column changes."""
         known = [take.context[column] for take in takes if column in take.context]
         known = [part[np.isfinite(part)] for part in known]
         known = [part for part in known if len(part)]

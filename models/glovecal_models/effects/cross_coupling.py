@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from glovecal_models.effects.base.effect import InstantEffect
-from glovecal_models.effects.base.facts import Decoy, Rival, Settings
+from glovecal_models.effects.base.facts import Control, Rival, Settings
 from glovecal_models.effects.base.joint_units import in_joint_units, settle_joint_units
 from glovecal_models.effects.base.motions import ONE_FINGER
 from glovecal_models.effects.base.signals import Signals
@@ -29,8 +29,8 @@ class CrossCoupling(InstantEffect):
     one_joint_at_a_time: ClassVar[bool] = True
     shown_by: ClassVar = ONE_FINGER
     rivals: ClassVar = (Rival("palm_arch", ONE_FINGER), Rival("contact_pressure", ONE_FINGER))
-    caveat = "or a common cause that was not recorded, such as grip pressure or a strap"
-    decoy: ClassVar[Decoy] = "rolled in time"
+    caveat = "a common cause that was not recorded, such as grip pressure or a strap, looks the same"
+    control: ClassVar[Control] = "circularly shifted"
 
     def missing(self, takes: Sequence[Signals]) -> str | None:
         return None if any(take.others for take in takes) else "no other sensor was recorded"

@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.facts import Certainty, Decoy, Rival, Settings
+from glovecal_models.effects.base.facts import Certainty, Control, Rival, Settings
 from glovecal_models.effects.base.joint_units import in_joint_units, settle_joint_units
 from glovecal_models.effects.base.motions import CROSSED
 from glovecal_models.effects.base.signals import Signals
@@ -28,9 +28,9 @@ class DonningShift(WearingEffect):
         Rival(name, CROSSED) for name in ("warmup_drift", "temperature", "humidity", "supply_sag")
     )
     certainty: ClassVar = Certainty(
-        clear=0.04, faint=0.01, why="wearings can be dealt in one way, where context columns have many names"
+        clear=0.04, faint=0.01, why="there is one column of wearings, but context columns have many names"
     )
-    decoy: ClassVar[Decoy] = "dealt wearings"
+    control: ClassVar[Control] = "permuted wearings"
 
     def missing(self, takes: Sequence[Signals]) -> str | None:
         wearings = len({take.wearing for take in takes})

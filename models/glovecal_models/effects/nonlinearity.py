@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from glovecal_models.effects.base.effect import InstantEffect
-from glovecal_models.effects.base.facts import Decoy, Settings
+from glovecal_models.effects.base.facts import Control, Settings
 from glovecal_models.effects.base.joint_units import on_lanes
 from glovecal_models.effects.base.motions import RAMPS
 from glovecal_models.effects.base.signals import Signals
@@ -29,7 +29,7 @@ class Nonlinearity(InstantEffect):
     explanation = "The sensor is not proportional: the same movement reads differently in another posture."
     source = "smooth curve of the joint; bend sensors are curved: Kahlesz, Zachmann, Klein 2004"
     shown_by: ClassVar = RAMPS
-    decoy: ClassVar[Decoy] = "rolled in time"
+    control: ClassVar[Control] = "circularly shifted"
 
     def missing(self, takes: Sequence[Signals]) -> str | None:
         if not takes:

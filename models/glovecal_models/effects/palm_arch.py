@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 from glovecal_models.effects.base.effect import InstantEffect
-from glovecal_models.effects.base.facts import Decoy, Settings
+from glovecal_models.effects.base.facts import Control, Settings
 from glovecal_models.effects.base.motions import ONE_FINGER
 from glovecal_models.effects.base.signals import Signals
 
@@ -28,7 +28,7 @@ class PalmArch(InstantEffect):
     source = "Krnoul, Kanis, Zelezny, Muller 2016, section 3.3.3, equations 2 to 5"
     one_joint_at_a_time: ClassVar[bool] = True
     shown_by: ClassVar = ONE_FINGER
-    decoy: ClassVar[Decoy] = "rolled in time"
+    control: ClassVar[Control] = "circularly shifted"
 
     def missing(self, takes: Sequence[Signals]) -> str | None:
         known = [take.others[PALM] for take in takes if PALM in take.others]

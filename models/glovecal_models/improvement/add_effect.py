@@ -1,4 +1,4 @@
-"""Adding one effect to a calibration, with proof that it helps, or with the reason why it was undone."""
+"""Adding one effect to a calibration: kept when the held-out error falls, else undone."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from glovecal_models.effects.catalogue import effect as known_effect
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_interval import add_interval
 from glovecal_models.improvement.addition import Addition, total_rmse_deg
-from glovecal_models.improvement.control_share import share_left_by_decoy
+from glovecal_models.improvement.control_share import share_left_by_control
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 from glovecal_models.improvement.proposals import proposed
 from glovecal_models.takes.take import Take
@@ -48,7 +48,7 @@ def add_effect(
     before: HeldOutErrors | None = None,
     judged: Sequence[str] | None = None,
     least_gain: float | None = None,
-    decoy_share: float | None = None,
+    control_share: float | None = None,
     parent_id: str | None = None,
     take_hashes: Sequence[str] = (),
     limits: ImprovementLimits = IMPROVEMENT_LIMITS,
@@ -59,7 +59,7 @@ def add_effect(
 
     ``takes`` are the training takes. ``constants``: settings of an effect without columns, such as the
     clocks' offsets (default: as they are found in the takes). ``before`` saves measuring the parent,
-    ``decoy_share`` (of the error, that is left with the effect's decoy instead) screening it. Undone, with
+    ``control_share`` (of the error that is left with the control instead) screening it. Undone, with
     the reason, unless the held-out RMSE of the ``judged`` rotations (default: all chosen) falls by
     ``least_gain`` (default: of ``limits``); an effect that widens the interval is judged by its claim
     (``add_interval``). Raises BadInput for an unknown effect or rotation, or when the takes cannot carry it;
@@ -92,31 +92,30 @@ def add_effect(
     with_it = _part(report, 0.4, 0.8, f"with {name}")
     after = held_out_errors(prepared, chosen, wanted, settings, cancelled=cancelled, report=with_it)
     judged = tuple(judged or chosen)
-    gain = 1.0 - total_rmse_deg(after, judged) / max(total_rmse_deg(before, judged), 1e-12)
-    sentence = _sentence(name, judged, before, after, gain, least_gain)
-    if live is not None:
-        sentence = f"{sentence} {live.sentence}"
-    if gain < least_gain:
-        return Addition(name, chosen, False, sentence, before, after, model, has)
+    undone = Addition(
+        name, chosen, False, before, after, model, has, judged=judged, least_gain=least_gain, live=live
+    )
+    if undone.gain < least_gain:
+        return undone
     if report:
         report(f"learning {name} from all takes", 0.85)
     fit = fit_with_effects(prepared, chosen, wanted, settings, cancelled=cancelled)
-    if decoy_share is None and fresh.has_columns:
-        decoy_share = share_left_by_decoy(
+    if control_share is None and fresh.has_columns:
+        control_share = share_left_by_control(
             model, repaired_takes(takes, has), effect, chosen, cancelled, limits.diagnosis
         )
-    evidence = _evidence(before, after, chosen, decoy_share) | dict(live.evidence if live else {})
+    evidence = _evidence(before, after, chosen, control_share) | dict(live.evidence if live else {})
     effects = [*kept_lanes(model.effects, chosen), *fit.effects, *columnless_effects(wanted, model.effects)]
     effects = [replace(item, evidence=evidence) if item.name == name else item for item in effects]
     whole = before.with_those_of(after)
     child = child_model(model, parent_id, prepared, fit, effects, whole, settings, take_hashes)
     mine = [item.described() for item in fit.effects if item.name == name]
     described = {key: value for each in mine for key, value in each.items()}
-    return Addition(name, chosen, True, sentence, before, after, child, tuple(wanted), described)
+    return replace(undone, added=True, model=child, wanted=tuple(wanted), parameters=described)
 
 
 def _chosen(model: CalibrationModel, effect: Effect, rotations: Sequence[str] | None) -> tuple[str, ...]:
-    """What is wrong with a reference is wrong for all rotations. Raises BadInput."""
+    """A repaired reference concerns all rotations. Raises BadInput."""
     every = trained_rotations(model)
     chosen = tuple(every if rotations is None or effect.kind == "repair" else rotations)
     unknown = [item for item in chosen if item not in every]
@@ -145,12 +144,12 @@ def _acting_live(
 
 
 def _evidence(
-    before: HeldOutErrors, after: HeldOutErrors, rotations: Sequence[str], decoy_share: float | None
+    before: HeldOutErrors, after: HeldOutErrors, rotations: Sequence[str], control_share: float | None
 ) -> dict[str, float]:
-    """The held-out errors of ``rotations`` without the effect, with it, and with its decoy."""
+    """The held-out errors of ``rotations`` without the effect, with it, and with its control."""
     rmse_before = total_rmse_deg(before, rotations)
     found = {"rmse_before_deg": rmse_before, "rmse_after_deg": total_rmse_deg(after, rotations)}
-    return found if decoy_share is None else found | {"rmse_decoy_deg": decoy_share * rmse_before}
+    return found if control_share is None else found | {"rmse_control_deg": control_share * rmse_before}
 
 
 def _joined(has: Sequence[WantedEffect], fresh: WantedEffect) -> WantedEffect:
@@ -174,24 +173,6 @@ def _all_signals(takes: PreparedTakes) -> list[Signals]:
     """Signals of all joints as measured, to ask whether an effect can be judged at all."""
     own = [np.where(np.isfinite(part), part, 0.0) for part in takes.reference]
     return takes.signals(own, np.zeros(own[0].shape[1]), frozenset())
-
-
-def _sentence(
-    name: str,
-    rotations: Sequence[str],
-    before: HeldOutErrors,
-    after: HeldOutErrors,
-    gain: float,
-    least: float,
-) -> str:
-    where = ", ".join(rotations) if len(rotations) <= 4 else f"{len(rotations)} rotations"
-    change = f"from {total_rmse_deg(before, rotations):.2f} to {total_rmse_deg(after, rotations):.2f} degrees"
-    if gain >= least:
-        return f"{name} on {where}: the error on takes left out falls {change} ({100 * gain:.0f} %)."
-    return (
-        f"{name} on {where} was undone: the error on takes left out goes {change}"
-        f" ({100 * gain:+.0f} % saved; {100 * least:.0f} % is asked for)."
-    )
 
 
 def _part(report: Report | None, low: float, high: float, what: str) -> Report | None:

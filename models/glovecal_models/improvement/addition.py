@@ -4,14 +4,43 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from glovecal_models.calibration.held_out_check import HeldOutErrors
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.wanted_effect import WantedEffect
-from glovecal_models.improvement.claim_check import ClaimCheck
+from glovecal_models.effects.base.signature_effect import LiveCheck
+from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Calibration of claimed standard deviations."""
+
+    nlpd: float
+    """Mean negative log predictive density, nats."""
+    coverage: float
+    """Share of measurements within one claimed standard deviation; expected: 0.68."""
+    coverage_95: float
+    """Share within 1.96 of them; expected: 0.95."""
+
+
+@dataclass(frozen=True)
+class ClaimCheck:
+    """Before and after, on held-out takes."""
+
+    before: Claim
+    after: Claim
+    limits: ImprovementLimits = IMPROVEMENT_LIMITS
+
+    @property
+    def is_truer(self) -> bool:
+        return self.before.nlpd - self.after.nlpd >= self.limits.claim_least_fall_nats
+
+    @property
+    def is_no_worse(self) -> bool:
+        return self.after.nlpd - self.before.nlpd <= self.limits.claim_most_rise_nats
 
 
 @dataclass(frozen=True)
@@ -21,7 +50,6 @@ class Addition:
     effect: str
     rotations: tuple[str, ...]
     added: bool
-    sentence: str
     before: HeldOutErrors
     after: HeldOutErrors
     model: CalibrationModel
@@ -30,28 +58,23 @@ class Addition:
     """All effects of ``model``."""
     parameters: dict[str, dict[str, float]] = field(default_factory=dict)
     """For each rotation, units in the names."""
+    judged: tuple[str, ...] = ()
+    """Rotations whose held-out error decides."""
+    least_gain: float = 0.0
+    """Share of that error by which it must fall."""
+    live: LiveCheck | None = None
+    """How the effect acts on live frames, where it does."""
     claim: ClaimCheck | None = None
-    """Of an effect that widens the interval: how true it is before and after."""
+    """Of an effect that widens the interval: the claim decides instead of the error."""
 
-    def to_document(self) -> dict[str, Any]:
-        """Plain JSON-able data."""
-        return {
-            "effect": self.effect,
-            "where": list(self.rotations),
-            "added": self.added,
-            "sentence": self.sentence,
-            "before": _rmse(self.before, self.rotations),
-            "after": _rmse(self.after, self.rotations),
-            "parameters": self.parameters,
-            "claim": None if self.claim is None else self.claim.to_document(),
-        }
+    @property
+    def gain(self) -> float:
+        """Share of the held-out error of the judged rotations that is gone."""
+        before = total_rmse_deg(self.before, self.judged)
+        return 1.0 - total_rmse_deg(self.after, self.judged) / max(before, 1e-12)
 
 
 def total_rmse_deg(errors: HeldOutErrors, rotations: Sequence[str]) -> float:
     """Over all frames of ``rotations``."""
     square = sum(errors.square[name] for name in rotations)
     return float(np.sqrt(square / max(sum(errors.count[name] for name in rotations), 1)))
-
-
-def _rmse(errors: HeldOutErrors, rotations: Sequence[str]) -> dict[str, float]:
-    return {name: errors.rmse_deg(name) for name in rotations}

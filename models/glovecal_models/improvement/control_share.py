@@ -1,4 +1,4 @@
-"""What an effect's decoy would leave of the error: the line that the effect's own error has to beat."""
+"""The share of the error that an effect's control leaves: what the effect itself has to beat."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from glovecal_models.errors import Cancelled
 from glovecal_models.takes.take import Take
 
 
-def share_left_by_decoy(
+def share_left_by_control(
     model: CalibrationModel,
     takes: Sequence[Take],
     effect: Effect,
@@ -28,12 +28,12 @@ def share_left_by_decoy(
     cancelled: Callable[[], bool] | None = None,
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
 ) -> float | None:
-    """Of the RMSE of ``rotations`` on takes left out, at most 1; None when the takes cannot judge it.
+    """Of the RMSE of ``rotations`` on held-out takes, at most 1; None when the takes cannot judge it.
 
     Raises Cancelled.
     """
 
-    def said(text: str, share: float) -> None:
+    def progress(text: str, share: float) -> None:
         if cancelled and cancelled():
             raise Cancelled("adding an effect was cancelled")
 
@@ -45,22 +45,22 @@ def share_left_by_decoy(
     known = [item for item in known_effects(model) if item.effect.name != effect.name]
     linear = model.method in ("raw", "linear")
     direction = forward(even, model.layout, joints, linear=linear, known=known, limits=limits)
-    found, _ = assessed(direction, [effect], np.random.default_rng(0), set(), said)
+    found, _ = assessed(direction, [effect], np.random.default_rng(0), set(), progress)
     judged = next((item for item in found if item.effect == effect.name), None)
-    return None if judged is None else decoy_share(judged, rotations)
+    return None if judged is None else control_share(judged, rotations)
 
 
 def share_in(diagnosis: Diagnosis | None, name: str, rotations: Sequence[str]) -> float | None:
     """The same from a diagnosis; None without one, or when it does not rank the effect."""
     ranked = diagnosis.naming.ranked if diagnosis is not None else ()
     judged = next((item for item in ranked if item.effect == name), None)
-    return None if judged is None else decoy_share(judged, rotations)
+    return None if judged is None else control_share(judged, rotations)
 
 
-def decoy_share(judged: Assessment, rotations: Sequence[str]) -> float | None:
+def control_share(judged: Assessment, rotations: Sequence[str]) -> float | None:
     """The same from an assessment; None when it has none of ``rotations``."""
     pairs = zip(judged.joints, judged.errors, strict=True)
     errors = [error for name, error in pairs if name in rotations]
     base = sum(float(error.base.sum()) for error in errors)
-    decoy = sum(float(error.decoy.sum()) for error in errors)
-    return min(float(np.sqrt(max(decoy, 0.0) / base)), 1.0) if base > 0 else None
+    control = sum(float(error.control.sum()) for error in errors)
+    return min(float(np.sqrt(max(control, 0.0) / base)), 1.0) if base > 0 else None

@@ -1,4 +1,4 @@
-"""The loop walked by itself: diagnose, add, verify, until the floor is reached or nothing more is known."""
+"""The loop: diagnose, add, verify, until the noise floor is reached or nothing more can be named."""
 
 from __future__ import annotations
 
@@ -18,23 +18,19 @@ from glovecal_models.comparison.residuals import residuals
 from glovecal_models.comparison.rotation_noise import rotation_noise
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
-from glovecal_models.diagnosis.diagnosis_document import named_sentence
 from glovecal_models.diagnosis.known_effect import known_effects
 from glovecal_models.effects.base.signature_effect import SignatureEffect
 from glovecal_models.effects.catalogue import catalogue, effect
 from glovecal_models.improvement.add_effect import add_effect
-from glovecal_models.improvement.addition import Addition
-from glovecal_models.improvement.baselines import baselines
 from glovecal_models.improvement.control_share import share_in
-from glovecal_models.improvement.improvement import Improvement, Step, added_document
+from glovecal_models.improvement.improvement import AddedInStep, Improvement, Step, Stop, Trial
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 from glovecal_models.improvement.proposals import Proposed, repairs, widenings
-from glovecal_models.improvement.pruning import pruned
-from glovecal_models.improvement.step_errors import step_errors
-from glovecal_models.improvement.take_warnings import only_take_sentence, take_warnings
-from glovecal_models.improvement.walk_ending import closing_sentences, why_stopped
+from glovecal_models.improvement.remove_effect import without_redundant
+from glovecal_models.improvement.step_errors import baselines, step_errors, why_stopped
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.take_warnings import take_warnings
 
 
 def improve(
@@ -53,10 +49,10 @@ def improve(
 ) -> Improvement:
     """Train, then add what the diagnosis names while it pays. Raises NotTrainable, BadInput, Cancelled.
 
-    Errors are on ``holdout`` when given, else on takes left out of each fit.
+    Errors are on ``holdout`` when given, else on held-out takes.
     """
     settings = settings or TrainingSettings()
-    walk = _Walk(
+    loop = _Loop(
         takes,
         layout,
         subject,
@@ -68,14 +64,14 @@ def improve(
         cancelled,
         report,
     )
-    walk.start()
-    while len(walk.steps) <= max_steps and walk.go_on():
+    loop.start()
+    while len(loop.steps) <= max_steps and loop.go_on():
         pass
-    return walk.finished()
+    return loop.finished()
 
 
-class _Walk:
-    """The state of one walk."""
+class _Loop:
+    """The state of one loop."""
 
     def __init__(
         self,
@@ -91,19 +87,13 @@ class _Walk:
         report: Report | None,
     ) -> None:
         self.takes, self.subject, self.settings = list(takes), subject, settings
-        living = living_sensors(layout, takes)
-        self.layout = living.layout
+        self.living = living_sensors(layout, takes)
+        self.layout = self.living.layout
         self.holdout, self.seed, self.hashes = holdout, seed, hashes
         self.limits, self.cancelled, self.report = limits, cancelled, report
         self.steps: list[Step] = []
-        self.undone: list[Addition] = []
-        alone = only_take_sentence(self.takes)
-        self.sentences = [
-            *take_warnings(self.takes),
-            *living.sentences(layout.rotations),
-            *([alone] if alone and not holdout else ()),
-        ]
-        self.stopped = "nothing_named"
+        self.trials: list[Trial] = []
+        self.stopped: Stop = "nothing_named"
         self.diagnosis: Diagnosis | None = None
         self.floors: dict[str, NoiseFloor] = {}
         self.errors = HeldOutErrors({}, {})
@@ -117,7 +107,7 @@ class _Walk:
             take_hashes=self.hashes, cancelled=self.cancelled,
         )  # fmt: skip
         self.settings = settings_of(model, self.settings)
-        self._say("measuring the base on takes left out", 0.1)
+        self._say("measuring the base on held-out takes", 0.1)
         self.errors = self._held_out(model)
         self._step(model, None)
         found = residuals(model, self.takes)
@@ -125,14 +115,14 @@ class _Walk:
         self.floors = {name: item.floor for name, item in noise.items() if item.floor is not None}
 
     def go_on(self) -> bool:
-        """One round; False when the walk is over."""
+        """One round; False when the loop is over."""
         model = self.steps[-1].model
         share = 0.15 + 0.12 * len(self.steps)
         found = repairs(model, self._repaired(), self._not_repaired)
         self.has_looked = True
-        if self._add_first(found, None):
+        if self._add_first(found):
             return True
-        self._say("looking for what is missing", share)
+        self._say("diagnosing the residual", share)
         takes = self._repaired()
         floors = {name: floor.floor_deg for name, floor in self.floors.items()}
         self.diagnosis = diagnose(
@@ -144,7 +134,7 @@ class _Walk:
         for item in self.diagnosis.naming.ranked:
             if item.effect in tried:
                 continue
-            where = [item.joints[i] for i in item.touched]
+            where = [item.joints[i] for i in item.significant_joints]
             tried_effect = self.diagnosis.effects[item.effect]
             constants = None
             if isinstance(tried_effect, SignatureEffect):
@@ -162,18 +152,15 @@ class _Walk:
 
     def finished(self) -> Improvement:
         """Sum up."""
-        self.stopped = why_stopped(
-            self.stopped, self.steps, self.floors, self.diagnosis, self.limits.comparison
-        )
-        if self.diagnosis is not None:
-            self.sentences[:0] = self.diagnosis.reference_problems
-            self.sentences += closing_sentences(self.diagnosis, self.steps[-1], self.floors)
+        limits = self.limits.comparison
+        stopped = why_stopped(self.stopped, self.steps, self.floors, self.diagnosis, limits)
         names = trained_rotations(self.steps[0].model)
         scale = baselines(self.takes, self.layout, names, self.settings, self.holdout)
         self._say("done", 1.0)
         return Improvement(
-            tuple(self.steps), self.floors, self.stopped, self.diagnosis, tuple(self.undone),
-            scale, tuple(self.sentences),
+            tuple(self.steps), self.floors, stopped, self.diagnosis, tuple(self.trials), scale,
+            tuple(take_warnings(self.takes)), self.living,
+            self.takes[0].duration_s if len(self.takes) == 1 and not self.holdout else None,
         )  # fmt: skip
 
     def _add(
@@ -182,6 +169,7 @@ class _Walk:
         where: Sequence[str] | None,
         constants: dict[str, Any] | None,
         diagnosis: Diagnosis | None,
+        reasons: tuple[str, ...] = (),
     ) -> bool:
         model = self.steps[-1].model
         every = trained_rotations(model)
@@ -198,30 +186,28 @@ class _Walk:
         addition = add_effect(
             model, self.takes, name, rotations=chosen, constants=constants, settings=self.settings,
             before=self.errors.of(chosen), judged=judged, least_gain=least,
-            decoy_share=share_in(diagnosis, name, chosen), take_hashes=self.hashes,
+            control_share=share_in(diagnosis, name, chosen), take_hashes=self.hashes,
             limits=self.limits, cancelled=self.cancelled,
         )  # fmt: skip
-        self.sentences.append(addition.sentence)
         if not addition.added:
-            self.undone.append(addition)
+            self.trials.append(Trial(addition, reasons, diagnosis=diagnosis))
             return False
         self.errors = self.errors.with_those_of(addition.after)
-        model, self.errors, told = pruned(
+        model, self.errors, removed = without_redundant(
             addition, self.takes, self.errors, self.settings, self.hashes, self.cancelled, self.limits
         )
-        self.sentences += told
-        self._step(model, added_document(addition, constants, diagnosis), diagnosis)
+        self.trials.append(Trial(addition, reasons, removed, diagnosis))
+        self._step(model, AddedInStep.of(addition, constants, diagnosis), diagnosis)
         return True
 
     def _add_widenings(self) -> bool:
         steps = widenings(self.steps[-1].model, self._repaired(), self.diagnosis, self._tried | self._has)
-        return self._add_first(steps, self.diagnosis)
+        return self._add_first(steps)
 
-    def _add_first(self, steps: Sequence[Proposed], diagnosis: Diagnosis | None) -> bool:
+    def _add_first(self, steps: Sequence[Proposed]) -> bool:
         """The first of them that stays."""
         for name, proposal in steps:
-            self.sentences += [item for item in proposal.sentences if item not in self.sentences]
-            if self._add(name, proposal.rotations, proposal.constants, None):
+            if self._add(name, proposal.rotations, proposal.constants, None, proposal.sentences):
                 return True
         return False
 
@@ -238,7 +224,7 @@ class _Walk:
 
     @property
     def _tried(self) -> set[str]:
-        return {item.effect for item in self.undone}
+        return {trial.addition.effect for trial in self.trials if not trial.addition.added}
 
     def _repaired(self) -> list[Take]:
         return repaired_takes(self.takes, wanted_of(self.steps[-1].model))
@@ -250,16 +236,14 @@ class _Walk:
         )
 
     def _step(
-        self, model: CalibrationModel, added: dict[str, Any] | None, diagnosis: Diagnosis | None = None
+        self, model: CalibrationModel, added: AddedInStep | None, diagnosis: Diagnosis | None = None
     ) -> None:
-        per_rotation, over_all = step_errors(model, self.holdout, self.errors)
-        decoy = None
+        per_rotation, overall = step_errors(model, self.holdout, self.errors)
+        control = None
         if diagnosis is not None and added is not None:
-            share = share_in(diagnosis, added["effect"], added["where"])
-            decoy = None if share is None else share * self.steps[-1].rmse_deg
-            if diagnosis.naming.ranked and added["effect"] == diagnosis.naming.ranked[0].effect:
-                self.sentences.append(named_sentence(diagnosis))
-        self.steps.append(Step(model, added, over_all, per_rotation, decoy))
+            share = share_in(diagnosis, added.effect, added.where)
+            control = None if share is None else share * self.steps[-1].rmse_deg
+        self.steps.append(Step(model, added, overall, per_rotation, control))
 
     def _say(self, text: str, share: float) -> None:
         if self.report:

@@ -11,7 +11,7 @@ from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.known_effect import known_effects
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
-from glovecal_models.diagnosis.pose_labels import are_pose_labels
+from glovecal_models.diagnosis.posed_holds import are_pose_labels
 from glovecal_models.diagnosis.signatures import are_held_levels, own_sensors, static_errors
 from glovecal_models.effects.base.signature_effect import Proposal, Recorded, SignatureEffect
 from glovecal_models.effects.catalogue import catalogue

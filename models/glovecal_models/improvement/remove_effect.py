@@ -1,4 +1,4 @@
-"""Taking an effect out of a calibration again: its rotations are learned anew without it."""
+"""Removing an effect from a calibration: its rotations are learned anew without it."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.relearned import columnless_effects
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput
+from glovecal_models.improvement.addition import Addition
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 from glovecal_models.takes.take import Take
 
 
-def unneeded(
+def errors_if_redundant(
     model: CalibrationModel,
     takes: Sequence[Take],
     name: str,
@@ -26,7 +27,7 @@ def unneeded(
     cancelled: Callable[[], bool] | None = None,
     limits: ImprovementLimits = IMPROVEMENT_LIMITS,
 ) -> HeldOutErrors | None:
-    """The errors without effect ``name`` where it is not needed on the rotations of ``now``, else None."""
+    """The errors without effect ``name`` where it is redundant on the rotations of ``now``, else None."""
     settings = settings_of(model, settings)
     wanted = [item for item in wanted_of(model) if item.name != name]
     prepared = PreparedTakes.of(repaired_takes(takes, wanted), model.layout)
@@ -57,3 +58,30 @@ def remove_effect(
     errors = held_out_errors(prepared, every, wanted, settings, cancelled=cancelled)
     effects = [*fit.effects, *columnless_effects(wanted, model.effects)]
     return child_model(model, parent_id, prepared, fit, effects, errors, settings, take_hashes)
+
+
+def without_redundant(
+    addition: Addition,
+    takes: Sequence[Take],
+    errors: HeldOutErrors,
+    settings: TrainingSettings,
+    take_hashes: Sequence[str],
+    cancelled: Callable[[], bool] | None,
+    limits: ImprovementLimits = IMPROVEMENT_LIMITS,
+) -> tuple[CalibrationModel, HeldOutErrors, tuple[str, ...]]:
+    """The child without earlier effects that the new one makes redundant (an alias may have come first), the
+    ``errors`` then, and the names of the removed. Raises Cancelled."""
+    model, removed = addition.model, []
+    for earlier in addition.wanted:
+        # An effect that widens the interval explains no error, and makes no other redundant.
+        if earlier.name == addition.effect or not earlier.has_columns or addition.claim is not None:
+            continue
+        now = errors.of(earlier.rotations)
+        without = errors_if_redundant(model, takes, earlier.name, now, settings, cancelled, limits)
+        if without is not None:
+            errors = errors.with_those_of(without)
+            removed.append(earlier.name)
+            model = remove_effect(
+                model, takes, earlier.name, settings=settings, take_hashes=take_hashes, cancelled=cancelled
+            )
+    return model, errors, tuple(removed)

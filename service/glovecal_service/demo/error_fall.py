@@ -59,7 +59,7 @@ def verdict(hidden: HiddenSession, found: Findings) -> list[str]:
     if truth is None:
         told = ["Hidden effect: none. This simulated glove is healthy."]
         told.append("Right: nothing was named." if named is None else f"Wrong: {named} was named.")
-        if named is None and found.diagnosis["something_left"]["is_left"]:
+        if named is None and found.diagnosis["unexplained_residual"]["is_significant"]:
             told.append(
                 f"The unexplained residual is the normal slip of cloth, {hidden.session.plan.nuisance_deg:g} "
                 "degrees in this simulation; the catalogue has no effect for it."
@@ -98,7 +98,7 @@ def is_right(hidden: HiddenSession, found: Findings) -> bool:
         return named == truth.name
     if truth.column is not None:
         return named == f"context:{truth.column}"
-    return named is None and bool(found.diagnosis["something_left"]["is_left"])
+    return named is None and bool(found.diagnosis["unexplained_residual"]["is_significant"])
 
 
 def hidden_contract(hidden: HiddenSession, found: Findings) -> dict[str, Any]:

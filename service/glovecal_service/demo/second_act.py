@@ -148,17 +148,18 @@ def _say_diagnosis(found: dict[str, Any], say: Say) -> None:
     named = found["named"]
     if named is None:
         say("Diagnosis: no known effect beats its control significantly.")
-        say(found["something_left"]["sentence"])
+        say(found["unexplained_residual"]["sentence"])
         return
     say(f"Diagnosis: {named['sentence']}")
     say(f"Confidence set: {', '.join(named['confidence_set'])}.")
     following = found["next_take"]
     if following:
         rivals = " and ".join(following["separates"])
-        say(f"To tell {rivals} apart record {following['seconds']} s: {following['what']}")
+        say(f"To separate {rivals}, record {following['seconds']} s: {following['what']}")
 
 
 def _after(found: dict[str, Any]) -> str:
     if found["named"] is None:
-        return f"no further effect beats its control significantly. {found['something_left']['sentence']}"
+        residual = found["unexplained_residual"]["sentence"]
+        return f"no further effect beats its control significantly. {residual}"
     return found["named"]["sentence"]

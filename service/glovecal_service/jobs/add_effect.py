@@ -14,9 +14,9 @@ from glovecal_service.jobs.declared_effects import declared
 from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult
 from glovecal_service.jobs.model_work import ModelWork, takes_of, text_in
 from glovecal_service.jobs.task_key import task_key
-from glovecal_service.plain import plain
 from glovecal_service.store import Store
 from glovecal_service.store.records import JobRecord
+from glovecal_service.views.addition import AdditionResult, AdditionView
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class AddEffectJob:
     """Payload: ``model``, ``effect`` (name), ``declaration`` (document or None), ``rotations`` (or None for
     all), ``takes`` (ids, or None for those the model was trained on), ``activate``.
 
-    Result: the addition's document, ``model`` (the child; None when undone), ``parent``, ``active``.
+    Result: ``AdditionResult``.
     """
 
     def plan(self, store: Store, job: JobRecord) -> JobPlan:
@@ -55,7 +55,7 @@ class AddEffectJob:
             (result,) = results
             document = {**result.facts, "parent": record.id, "model": None, "active": False}
             if not result.facts["added"]:
-                return document
+                return AdditionResult.model_validate(document).document()
             active = bool(payload.get("activate", False))
             child = keep_child(
                 store,
@@ -66,7 +66,7 @@ class AddEffectJob:
                 {"addition": result.facts, "sentences": [result.facts["sentence"]]},
                 activate=active,
             )
-            return {**document, "model": child.id, "active": active}
+            return AdditionResult.model_validate({**document, "model": child.id, "active": active}).document()
 
         return JobPlan(
             tasks=[Task(key, f"{work.effect} on model {record.id[:12]}", run, work)],
@@ -81,7 +81,7 @@ def run(work: AdditionWork, cancelled: Callable[[], bool], report: Report) -> Ta
     on, model = work.on, work.on.model
     with known_by_name([*declared_in(model), *declared(work.declaration)]):
         known = model.error_estimate.get("rmse_deg")
-        error = "" if known is None else f", {known:.2f} degrees on takes left out so far"
+        error = "" if known is None else f", held-out error {known:.2f} degrees so far"
         report(f"looking at the takes for {work.effect}{error}", 0.0)
         found = add_effect(
             model,
@@ -95,7 +95,7 @@ def run(work: AdditionWork, cancelled: Callable[[], bool], report: Report) -> Ta
             report=report,
         )
     return TaskResult(
-        {"artifact": artifact_array(found.model)} if found.added else {}, plain(found.to_document())
+        {"artifact": artifact_array(found.model)} if found.added else {}, AdditionView.of(found).document()
     )
 
 

@@ -1,4 +1,4 @@
-"""Job kind ``diagnose``: a model and takes in, the evidence for effects that it lacks out."""
+"""Job kind ``diagnose``: a model and takes in, the evidence for missing effects out."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from glovecal_models.takes.take import Take
 from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult
 from glovecal_service.jobs.model_work import ModelWork, takes_of, text_in
 from glovecal_service.jobs.task_key import task_key
-from glovecal_service.plain import plain
 from glovecal_service.store import Store
 from glovecal_service.store.records import JobRecord
+from glovecal_service.views.diagnosis import DiagnosisResult, DiagnosisView
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class DiagnosisWork:
 class DiagnoseJob:
     """Payload: ``model``, ``takes`` (ids, or None for those it was trained on), ``seed``, ``declarations``.
 
-    Result: the diagnosis document, ``model`` and ``takes`` (id and name).
+    Result: ``DiagnosisResult``.
     """
 
     def plan(self, store: Store, job: JobRecord) -> JobPlan:
@@ -47,8 +47,9 @@ class DiagnoseJob:
         key = task_key("diagnose", {"model": on.id, "takes": list(on.take_hashes), **facts})
 
         def finish(results: Sequence[TaskResult]) -> dict[str, Any]:
-            told = [{"id": take.id, "name": take.name} for take in takes]
-            return {**results[0].facts, "model": record.id, "takes": told}
+            named = [{"id": take.id, "name": take.name} for take in takes]
+            facts = {**results[0].facts, "model": record.id, "takes": named}
+            return DiagnosisResult.model_validate(facts).document()
 
         return JobPlan(
             tasks=[Task(key, f"diagnosis of model {record.id[:12]}", run, work)],
@@ -77,7 +78,7 @@ def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> T
             cancelled=cancelled,
             report=report,
         )
-    return TaskResult({}, plain(found.to_document()))
+    return TaskResult({}, DiagnosisView.of(found).document())
 
 
 def floors_deg(model: CalibrationModel, takes: Sequence[Take], seed: int) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Job kind ``improve``: takes in; out the walk from the base model to the last effect, each step stored."""
+"""Job kind ``improve``: takes in; out every model from the base to the last effect, each step stored."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from glovecal_service.jobs.job_kind import JobPlan, Report, Task, TaskResult
 from glovecal_service.jobs.job_kind import Step as JobStep
 from glovecal_service.jobs.model_work import is_short, text_in
 from glovecal_service.jobs.task_key import task_key
-from glovecal_service.plain import plain
 from glovecal_service.store import Store
 from glovecal_service.store.records import JobRecord, TakeRecord, incomplete_sentences
+from glovecal_service.views.improvement import ImprovementView
 
 MOST_STEPS = 6
 
@@ -41,8 +41,7 @@ class ImproveJob:
     """Payload: ``subject``, ``layout``, ``takes`` and ``holdout`` (ids), ``method``, ``samples``,
     ``max_steps``, ``seed``, ``activate`` (the last model).
 
-    Result: the JSON contract of ``glovecal improve``; every step's model is stored, each the next one's
-    parent.
+    Result: ``ImprovementView``; every step's model is stored, each the next one's parent.
     """
 
     def plan(self, store: Store, job: JobRecord) -> JobPlan:
@@ -66,7 +65,7 @@ class ImproveJob:
             activate = bool(payload.get("activate"))
             kept = _keep(store, results[0], layout, takes, work.settings, activate)
             sentences = [*incomplete_sentences([*takes, *holdout]), *kept["sentences"]]
-            return {**kept, "sentences": sentences}
+            return ImprovementView.model_validate({**kept, "sentences": sentences}).document()
 
         return JobPlan(
             tasks=[Task(task_key("improve", facts), f"improving {work.subject}", run, work)],
@@ -95,7 +94,7 @@ def run(work: ImprovementWork, cancelled: Callable[[], bool], report: Report) ->
     arrays = {
         f"model{number}": np.frombuffer(dump(model), np.uint8) for number, model in enumerate(found.models)
     }
-    return TaskResult(arrays, plain(found.to_document()))
+    return TaskResult(arrays, ImprovementView.of(found).document())
 
 
 def _work(
@@ -122,7 +121,7 @@ def _keep(
     settings: TrainingSettings,
     activate: bool,
 ) -> dict[str, Any]:
-    """Store each step's model under the one before it; the contract with their ids."""
+    """Store each step's model under the one before it; the result with their ids."""
     steps: list[dict[str, Any]] = []
     parent: str | None = None
     for number, step in enumerate(result.facts["steps"]):

@@ -1,10 +1,10 @@
-"""Whatever finite takes hold, a diagnosis and an improvement end in a document or in a refusal."""
+"""Whatever finite takes hold, a diagnosis and an improvement end in sentences or in a refusal."""
 
 from __future__ import annotations
 
-import json
+from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from hypothesis import HealthCheck, Phase, given, settings
@@ -13,10 +13,10 @@ from scipy.signal import lfilter
 
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.diagnosis.diagnose import diagnose
-from glovecal_models.diagnosis.diagnosis import Diagnosis
+from glovecal_models.diagnosis.text import diagnosis_sentences
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.improve import improve
-from glovecal_models.improvement.improvement import Improvement
+from glovecal_models.improvement.text import improvement_sentences
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
@@ -109,24 +109,26 @@ def any_takes(most_frames: int) -> st.SearchStrategy[AnyTakes]:
 LAYOUT = Layout.from_columns("any", NAMES, NAMES[:2])
 
 
-def document_of(found: Diagnosis | Improvement) -> str:
-    """Raises ValueError for NaN and infinity, which are no JSON."""
-    return json.dumps(found.to_document(), allow_nan=False)
+def is_finite(numbers: Iterable[float | None]) -> bool:
+    return all(number is None or np.isfinite(number) for number in numbers)
 
 
 @given(any_takes(400))
 @settings(SHAPES, max_examples=25)
-def test_a_diagnosis_ends_in_a_document(found: AnyTakes):
+def test_a_diagnosis_ends_in_sentences_and_finite_errors(found: AnyTakes):
     with suppress(BadInput):
         diagnosis = diagnose(found.takes(), LAYOUT)
-        assert document_of(diagnosis)
-        for each in (*diagnosis.left.lasting.values(), *diagnosis.left.within_takes.values()):
-            assert 0 <= each.at_least_deg <= each.size_deg
+        assert diagnosis_sentences(diagnosis)
+        assert is_finite(diagnosis.rmse_deg.values())
+        assert is_finite(value for item in diagnosis.assessments for value in astuple(item.rmse_deg))
+        for each in (*diagnosis.residual.slow.values(), *diagnosis.residual.within_takes.values()):
+            assert 0 <= each.lower_bound_deg <= each.size_deg
 
 
 @given(any_takes(150))
 @settings(SHAPES, max_examples=6)
-def test_an_improvement_ends_in_a_document(found: AnyTakes):
+def test_an_improvement_ends_in_sentences_and_finite_errors(found: AnyTakes):
     with suppress(BadInput):
         improvement = improve(found.takes(), LAYOUT, "anna", TrainingSettings(method="linear", samples=60))
-        assert document_of(improvement)
+        assert improvement_sentences(improvement)
+        assert is_finite(step.rmse_deg for step in improvement.steps)

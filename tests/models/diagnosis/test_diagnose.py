@@ -1,12 +1,12 @@
 """The whole question on simulated sessions: names, silence, delays told apart, refusals."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.diagnosis.text import diagnosis_sentences
 from glovecal_models.effects.base.assessment import block_starts
 from glovecal_models.errors import BadInput, Cancelled
 from glovecal_models.layout import Layout
@@ -31,22 +31,25 @@ def clean() -> tuple[Take, ...]:
 
 def test_a_clean_glove_is_left_alone(clean):
     found = diagnose(clean, LAYOUT)
-    document = json.loads(json.dumps(found.to_document()))
-    assert document["named"] is None
-    assert not document["something_left"]["is_left"]
-    assert document["next_take"] is None
-    assert set(document["rotations"]) == set(SENSORS)
-    assert found.to_document() == diagnose(clean, LAYOUT).to_document(), "the same takes, the same answer"
+    assert found.named is None
+    assert not found.residual.is_significant
+    assert found.next_take is None
+    assert set(found.rmse_deg) == set(SENSORS)
+    again = diagnose(clean, LAYOUT)
+    assert diagnosis_sentences(found) == diagnosis_sentences(again), "the same takes, the same answer"
+    assert [item.rmse_deg for item in found.assessments] == [item.rmse_deg for item in again.assessments]
 
 
 @pytest.mark.parametrize(
     ("cause", "form"), [("hysteresis", "single_play"), ("lag", "one_pole"), ("donning_shift", "offset")]
 )
 def test_a_strong_cause_is_named_with_its_evidence(cause, form):
-    named = diagnose(session(12, Cause(cause, form, strength_deg=2.0)), LAYOUT).to_document()["named"]
-    assert named["effect"] == cause
-    assert named["verdict"] == "named"
-    assert named["saved_deg"] > 2 * max(named["decoy_saved_deg"], 0.0)
+    named = diagnose(session(12, Cause(cause, form, strength_deg=2.0)), LAYOUT).named
+    assert named is not None
+    assert (named.effect, named.verdict) == (cause, "named")
+    assert named.saved_deg is not None
+    assert named.control_saved_deg is not None
+    assert named.saved_deg > 2 * max(named.control_saved_deg, 0.0)
 
 
 def test_a_reference_ahead_of_its_sensor_is_no_lag(clean):
@@ -58,7 +61,7 @@ def test_a_reference_ahead_of_its_sensor_is_no_lag(clean):
 
 def test_what_cannot_be_judged_is_said(clean):
     bare = [replace(take, context={}, wearing="one") for take in clean]
-    why = {item.effect: item.why for item in diagnose(bare, LAYOUT).not_judgeable}
+    why = {item.effect: item.why for item in diagnose(bare, LAYOUT).not_identifiable}
     assert why["warmup_drift"] == "no context column c.power_on_s was recorded"
     assert why["donning_shift"] == "all takes are of one wearing"
 
@@ -95,8 +98,8 @@ def test_a_few_seconds_are_too_little(clean):
         reference_time_s=clean[0].time_s[:300], reference=clean[0].reference[:300],
         context={name: values[:300] for name, values in clean[0].context.items()},
     )  # fmt: skip
-    told = diagnose([short], LAYOUT).to_document()["sentences"]
-    assert any(sentence.startswith("Too little was recorded") for sentence in told)
+    sentences = diagnosis_sentences(diagnose([short], LAYOUT))
+    assert any(sentence.startswith("Too few data to judge any effect") for sentence in sentences)
 
 
 def test_a_take_without_a_row_of_a_joint_has_no_block() -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.not_identifiable import Undecidable, undecidable
+from glovecal_models.diagnosis.text import residual_sentence
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.layout import Layout
@@ -50,8 +51,8 @@ def shifted() -> tuple[Take, ...]:
 def test_two_wearings_of_four_motions_ask_for_a_third():
     found = why_not(signals("aaaabbbb", motions="klmnklmn"), "donning_shift")
     assert found.why == (
-        "two wearings cannot tell a donning shift from chance (8 ways to deal the takes, 25 are needed):"
-        " record a third wearing, 4 takes each"
+        "two wearings allow 8 permutations of their takes, a donning shift needs 25 to be significant: record"
+        " a third wearing with 4 takes"
     )
     assert found.record.seconds == 120
     assert found.record.separates == ("donning_shift", "chance")
@@ -62,7 +63,7 @@ def test_what_is_asked_for_is_enough():
     three = signals("aaaabbbbcccc", motions="klmnklmnklmn")
     assert undecidable(three, catalogue()["donning_shift"]) is None
     assert undecidable(signals("aaabbbccc"), catalogue()["donning_shift"]) is None
-    assert "a third wearing, 3 takes each" in why_not(signals("aabb"), "donning_shift").why
+    assert "a third wearing with 3 takes" in why_not(signals("aabb"), "donning_shift").why
 
 
 @pytest.mark.parametrize(
@@ -72,7 +73,7 @@ def test_what_is_asked_for_is_enough():
 def test_few_takes_of_a_context_ask_for_other_values(degrees, ways, more):
     takes = signals("a" * len(degrees), degrees)
     found = why_not(takes, "temperature")
-    assert f"({ways} ways to deal them, 40 are needed)" in found.why
+    assert f"allow {ways} permutations, temperature needs 40" in found.why
     assert f"record {more} more take" in found.why
     added = [*degrees, *(40.0 + 5 * number for number in range(more))]
     assert undecidable(signals("a" * len(added), added), catalogue()["temperature"]) is None
@@ -80,20 +81,21 @@ def test_few_takes_of_a_context_ask_for_other_values(degrees, ways, more):
 
 def test_a_shift_between_two_wearings_is_no_verdict_but_a_next_take(shifted):
     found = diagnose(shifted[:6], LAYOUT)
-    document = found.to_document()
-    assert document["named"] is None
-    assert "donning_shift" not in {item["effect"] for item in document["candidates"]}
-    why = {item["effect"]: item["why"] for item in document["not_judgeable"]}["donning_shift"]
-    assert why.startswith("two wearings cannot tell a donning shift from chance (10 ways")
-    assert document["next_take"]["separates"] == ["donning_shift", "chance"]
-    assert document["next_take"]["seconds"] == 60
-    assert "It may be donning_shift." in document["something_left"]["sentence"]
+    assert found.named is None
+    assert "donning_shift" not in {item.effect for item in found.assessments}
+    why = {item.effect: item.why for item in found.not_identifiable}["donning_shift"]
+    assert why.startswith("two wearings allow 10 permutations of their takes, a donning shift needs 25")
+    assert found.next_take is not None
+    assert found.next_take.separates == ("donning_shift", "chance")
+    assert found.next_take.seconds == 60
+    sentence = residual_sentence(found.residual)
+    assert sentence.endswith("Possible cause that these takes cannot decide: donning_shift.")
 
 
 def test_the_third_wearing_decides(shifted):
     found = diagnose(shifted, LAYOUT)
     assert found.naming.confidence_set == ("donning_shift",)
-    assert "donning_shift" not in {item.effect for item in found.not_judgeable}
+    assert "donning_shift" not in {item.effect for item in found.not_identifiable}
 
 
 def test_a_constant_column_says_what_to_record(shifted):
@@ -101,5 +103,5 @@ def test_a_constant_column_says_what_to_record(shifted):
         replace(take, context={**take.context, "temperature_c": np.full(len(take.time_s), 21.0)})
         for take in shifted[:2]
     ]
-    why = {item.effect: item.why for item in diagnose(takes, LAYOUT).not_judgeable}
+    why = {item.effect: item.why for item in diagnose(takes, LAYOUT).not_identifiable}
     assert why["temperature"].endswith("never changes (21); record takes in which it differs")

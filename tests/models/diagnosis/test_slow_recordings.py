@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glovecal_models.diagnosis.diagnose import SINGLE_POSES, diagnose
+from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.diagnosis.not_identifiable import SINGLE_POSES
 from glovecal_models.diagnosis.resampled import SHORTEST_BRIDGE_S, bridge_s
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
@@ -57,8 +58,8 @@ def sticky() -> Sequence[Take]:
 def test_a_slow_recording_is_diagnosed_like_a_fast_one(sticky, rate_hz):
     found = diagnose([at_rate(take, rate_hz) for take in sticky], LAYOUT)
     assert found.naming.confidence_set == ("hysteresis",)
-    assert found.left.not_judgeable is None
-    assert SINGLE_POSES not in [item.why for item in found.not_judgeable]
+    assert found.residual.obstacle is None
+    assert SINGLE_POSES not in [item.why for item in found.not_identifiable]
 
 
 def test_a_hand_that_holds_still_in_one_take_makes_no_single_poses(sticky):
@@ -71,8 +72,8 @@ def test_a_hand_that_holds_still_in_one_take_makes_no_single_poses(sticky):
 def test_unordered_poses_are_single_whatever_their_time_stamps_say(sticky):
     poses = [shuffled(at_rate(take, 9)) for take in sticky]
     found = diagnose(poses, LAYOUT)
-    assert found.left.not_judgeable == SINGLE_POSES
-    assert "lag" in [item.effect for item in found.not_judgeable if item.why == SINGLE_POSES]
+    assert found.residual.obstacle == "single poses"
+    assert "lag" in [item.effect for item in found.not_identifiable if item.why == SINGLE_POSES]
 
 
 @pytest.mark.needs_shared_data

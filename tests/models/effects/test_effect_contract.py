@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from glovecal_models.effects.base.columnless_effect import ColumnlessEffect
-from glovecal_models.effects.base.decoy import decoy_columns
+from glovecal_models.effects.base.control import control_columns
 from glovecal_models.effects.base.effect import Effect
-from glovecal_models.effects.base.facts import Decoy, Kind, Settings, Stage
+from glovecal_models.effects.base.facts import Control, Kind, Settings, Stage
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.catalogue import catalogue, stored_effect
 from glovecal_models.effects.declared.expression_effect import ExpressionEffect
@@ -26,7 +26,7 @@ DECLARED = [
     ),
     ExpressionEffect.parse(
         "name = glue; columns = lowpass(own_deg, tau) - own_deg, tanh(I_PIP) * own - previous(own);"
-        "parameter tau s 0.1 5 = 1; decoy = reversed in time"
+        "parameter tau s 0.1 5 = 1; control = reversed in time"
     ),
     ExpressionEffect.parse(
         "name = two-shapes; columns = exp(-t / rate) * abs(own_deg) ^ power;"
@@ -96,7 +96,7 @@ def test_it_says_what_it_is(effect: Effect) -> None:
     assert effect.explanation.endswith(".")
     assert "\n" not in effect.explanation
     assert effect.source
-    assert effect.decoy in get_args(Decoy)
+    assert effect.control in get_args(Control)
     assert effect.kind in get_args(Kind)
     assert effect.stage in get_args(Stage)
     assert effect.has_columns == (effect.kind == "correction")
@@ -295,7 +295,7 @@ def test_the_twin_has_the_same_freedom_and_other_columns(
 ) -> None:
     shape = effect.grid(signals, settings)[0]
     true = [effect.columns(take, settings, shape) for take in signals]
-    twin = decoy_columns(effect, signals, settings, shape, np.random.default_rng(3))
+    twin = control_columns(effect, signals, settings, shape, np.random.default_rng(3))
     assert [columns.shape for columns in twin] == [columns.shape for columns in true]
     assert all(np.isfinite(columns).all() for columns in twin)
     for column in range(true[0].shape[2]):

@@ -135,7 +135,7 @@ def test_unknown_names_are_answered_with_the_known_ones():
         ("name = a; columns = own; range strap 0 1", "write range c.NAME LOW HIGH"),
         ("name = a; columns = own; range c.strap 0 1", "a range is given for c.strap, which no column reads"),
         ("name = a; columns = c.x; range c.x 2 1", "the range of c.x must rise, not 2 to 1"),
-        ("name = a; columns = own; decoy = lies", "no decoy 'lies'; there are reversed in time"),
+        ("name = a; columns = own; control = lies", "no control 'lies'; there are reversed in time"),
         ("name = a; columns = own; unit = very long unit", "a unit is a short word"),
         ("name = a; columns = lowpass(own, own)", "time constant 'own' of a low pass may hold numbers"),
         ("name = a; columns = own,own,own,own,own,own,own,own,own", "at most 8 columns, not 9"),
@@ -152,14 +152,14 @@ def test_text_and_document_say_the_same():
         name = strap
         columns = c.strap_n * own, lowpass(c.strap_n, tau) + INDEX
         unit = deg/N; parameter tau s 0.1 5 = 1; range c.strap_n 0 50
-        decoy = context of other takes; explanation = The strap presses.
+        control = context of other takes; explanation = The strap presses.
     """
     declared = Declaration.parse(text)
     assert declared.signals == ("INDEX",)
     assert declared.context == ("strap_n",)
     assert declared.ranges == (("strap_n", 0.0, 50.0),)
     assert declared.starts == (1.0,)
-    assert declared.decoy == "context of other takes"
+    assert declared.control == "context of other takes"
     again = Declaration.from_document(declared.to_document())
     assert again.to_document() == declared.to_document()
     assert again == declared

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from glovecal_models.effects.base.interval_effect import LeftOutErrors
+from glovecal_models.effects.base.interval_effect import ClaimedErrors
 from glovecal_models.effects.garment_slip.garment_slip import GarmentSlip
 from glovecal_models.effects.garment_slip.slip_growth import GROWS_S, SlipGrowth, SlipInterval, slip_growth
 from glovecal_models.effects.garment_slip.slip_walk import slip_walk
@@ -118,7 +118,7 @@ def test_the_claimed_variance_grows_in_proportion_to_the_time():
 def test_the_rate_of_the_growth_is_that_of_the_walk(glove):
     takes = glove.takes(count=6, seconds=60, shape_counts=slipping(4.0))
     left_out = [
-        LeftOutErrors(
+        ClaimedErrors(
             take.name, "M_PIP", take.time_s, error[:, 1], take.reference[:, 1], np.full(len(error), 2.0), 2.0,
             take.sensors, take.readings,
         )

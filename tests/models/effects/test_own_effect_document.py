@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from glovecal_models.effects import catalogue as catalogue_module
-from glovecal_models.effects.base.decoy import decoy_columns
+from glovecal_models.effects.base.control import control_columns
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
@@ -71,7 +71,7 @@ def test_it_is_an_effect_like_the_others(signals: list[Signals]) -> None:
     ]
     settings = strap.settle(takes)
     shape = strap.grid(takes, settings)[0]
-    twins = decoy_columns(strap, takes, settings, shape, generator)
+    twins = control_columns(strap, takes, settings, shape, generator)
     true = [strap.columns(take, settings, shape) for take in takes]
     assert all(not np.allclose(a, b) for a, b in zip(true, twins, strict=True))
     assert np.isfinite(strap.columns(signals[0], settings, shape)).all()

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glovecal_models.effects.base.interval_effect import LeftOutErrors
+from glovecal_models.effects.base.interval_effect import ClaimedErrors
 from glovecal_models.effects.saturation.saturated_band import SaturatedBand
 from glovecal_models.effects.saturation.saturation import Saturation, saturated_bands
 from glovecal_models.errors import BadInput
@@ -47,14 +47,14 @@ def test_before_anything_is_learned_the_band_counts_as_unsure_as_the_reference_s
     assert SaturatedBand.of(json.loads(json.dumps(band.to_settings()))) == band
 
 
-def left_out(takes: list[Take]) -> list[LeftOutErrors]:
+def left_out(takes: list[Take]) -> list[ClaimedErrors]:
     """Errors of a straight line that claims 2 degrees everywhere, on the second rotation."""
     found = []
     for take in takes:
         error = (take.readings[:, 1] - 40.0) / 2.0 - take.reference[:, 1]
         four = np.full(len(error), 4.0)
         found.append(
-            LeftOutErrors(
+            ClaimedErrors(
                 take.name, "M_PIP", take.time_s, error, take.reference[:, 1], four, 4.0, take.sensors,
                 take.readings,
             )

@@ -9,6 +9,7 @@ import pytest
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.improvement.improve import improve
+from glovecal_models.improvement.text import improvement_sentences
 from glovecal_models.layout import Layout
 from glovecal_models.takes.table import read_takes
 from glovecal_models.takes.take import Take
@@ -28,9 +29,9 @@ def test_an_ankle_is_put_right_by_its_clocks(placement):
     found = improve(takes, layout, placement, TrainingSettings(method="linear"), max_steps=1)
     added = found.steps[1].added
     assert added is not None
-    assert (added["effect"], added["verdict"]) == ("clock_offset", "named")
-    assert all(-3 < offset < -0.15 for offset in added["parameters"]["offset_s"].values())
-    assert len(set(added["parameters"]["offset_s"].values())) == 4, "each take has its own"
+    assert (added.effect, added.verdict) == ("clock_offset", "named")
+    assert all(-3 < offset < -0.15 for offset in added.parameters["offset_s"].values())
+    assert len(set(added.parameters["offset_s"].values())) == 4, "each take has its own"
     assert found.steps[0].rmse_deg > 10
     assert found.steps[1].rmse_deg < 4
 
@@ -40,29 +41,29 @@ def test_known_angles_leave_curve_and_jump_open():
     found = improve(takes, layout, "bench", TrainingSettings(method="linear"))
     added = found.steps[1].added
     assert added is not None
-    assert added["verdict"] == "ambiguous"
-    assert added["confidence_set"] == ["nonlinearity", "sensor_fault"]
+    assert added.verdict == "ambiguous"
+    assert added.confidence_set == ("nonlinearity", "sensor_fault")
     assert found.steps[0].rmse_deg == pytest.approx(10.5, abs=0.5)
     assert found.steps[1].rmse_deg < 6.0
     assert found.stopped == "ambiguous"
-    following = found.to_document()["next_take"]
-    assert "another order" in following["what"]
+    assert found.next_take is not None
+    assert "another order" in found.next_take.what
 
 
 @pytest.mark.parametrize("walker", ["P002-*-L", "P002-*-R", "P003-*-L", "P003-*-R"])
 def test_a_few_strides_give_nothing_a_name(walker):
     takes, layout = recorded(f"gait/{walker}-*.csv")
     found = diagnose(takes, layout)
-    assert found.to_document()["named"] is None
-    assert "creep" in {item.effect for item in found.not_judgeable}
+    assert found.named is None
+    assert "creep" in {item.effect for item in found.not_identifiable}
 
 
 def test_single_poses_of_a_robot_thumb_judge_nothing_that_lasts():
     takes, _ = recorded("cyberglove-robot-thumb/*.csv")
     alive = [name for name in takes[0].sensors if name not in ("G08", "G16")]
     found = diagnose(takes, Layout.from_columns("thumb", alive, takes[0].rotations))
-    assert found.to_document()["named"] is None
-    why = {item.effect: item.why for item in found.not_judgeable}
+    assert found.named is None
+    why = {item.effect: item.why for item in found.not_identifiable}
     assert {"lag", "clock_offset", "creep", "hysteresis"} <= set(why)
     assert why["creep"] == "the frames are single poses; record the movement from one to the next"
 
@@ -71,25 +72,26 @@ def test_single_poses_of_a_robot_thumb_judge_nothing_that_lasts():
 def test_three_placements_of_an_ankle_are_a_donning_shift(person):
     takes, layout = recorded(f"ankle/{person}-placement?-*.frames.csv")
     found = improve(takes, layout, person, TrainingSettings(method="linear"), max_steps=2)
-    document = found.to_document()
-    added = [step["added"] for step in document["steps"] if step["added"]]
-    assert [item["effect"] for item in added] == ["clock_offset", "donning_shift"]
-    assert added[1]["verdict"] == "named"
-    assert document["something_left"]
+    added = [step.added for step in found.steps if step.added is not None]
+    assert [item.effect for item in added] == ["clock_offset", "donning_shift"]
+    assert added[1].verdict == "named"
+    assert found.diagnosis is not None
+    assert found.diagnosis.residual.is_significant
 
 
 @pytest.mark.parametrize("person", ["P300", "P301"])
 def test_two_placements_cannot_decide(person):
     takes, layout = recorded(f"ankle/{person}-placement[23]-*.frames.csv")
     found = improve(takes, layout, person, TrainingSettings(method="linear"), max_steps=2)
-    document = found.to_document()
-    added = {step["added"]["effect"] for step in document["steps"] if step["added"]}
+    added = {step.added.effect for step in found.steps if step.added is not None}
     assert added <= {"clock_offset", "nonlinearity"}
     assert any(
-        sentence.startswith("donning_shift cannot be judged: two wearings cannot tell")
-        and "record a third wearing, 4 takes each" in sentence
-        for sentence in document["sentences"]
+        sentence.startswith("Not identifiable: donning_shift. Reason: two wearings allow")
+        and "record a third wearing with 4 takes" in sentence
+        for sentence in improvement_sentences(found)
     )
-    assert document["next_take"]["separates"] == ["donning_shift", "chance"]
-    assert "put it on again" in document["next_take"]["what"]
-    assert document["something_left"]
+    assert found.next_take is not None
+    assert found.next_take.separates == ("donning_shift", "chance")
+    assert "put it on again" in found.next_take.what
+    assert found.diagnosis is not None
+    assert found.diagnosis.residual.is_significant

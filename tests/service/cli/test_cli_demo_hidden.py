@@ -54,9 +54,9 @@ def test_a_hidden_effect_is_compared_placed_named_added_and_revealed(service, tm
     assert 0 < figures["noise_floor_deg"] < fall["with_effect"]
     assert found.child is not None
     text = "\n".join(said)
-    for part in ("noise floor", "Where: ", "Diagnosis: hysteresis on", "its decoy", "Confidence set: hys"):
+    for part in ("noise floor", "Where: ", "Diagnosis: hysteresis on", "control: ", "Confidence set: hys"):
         assert part in text
-    assert "so far" in text, "the error on takes left out is told while it is measured"
+    assert "so far" in text, "the held-out error is reported while it is measured"
     assert "Added: hysteresis" in text
     assert "Right: hysteresis was named." in ending
     assert any(line.strip().startswith("+ hysteresis") for line in ending)
@@ -70,7 +70,7 @@ def test_a_cause_without_a_name_is_said_to_be_left(service, tmp_path):
     assert any("no known effect beats its control" in sentence for sentence in said)
     assert figures["hidden"]["truth"].startswith("unknown:")
     assert figures["hidden"]["right"] is True
-    assert any("Something is left" in sentence for sentence in said)
+    assert any("No known effect explains the residual" in sentence for sentence in said)
     assert any("an unexplained residual was reported" in sentence for sentence in ending)
 
 
@@ -84,7 +84,7 @@ def test_a_wrong_name_is_called_wrong():
     assert verdict(hidden, found)[-1] == "Wrong: creep was named."
     assert hidden_contract(hidden, found)["hidden"]["right"] is False
     assert verdict(healthy, found)[-1] == "Wrong: creep was named."
-    found.diagnosis = {"named": None, "something_left": {"is_left": False}}
+    found.diagnosis = {"named": None, "unexplained_residual": {"is_significant": False}}
     assert verdict(hidden, found)[-1] == "Wrong: nothing was named."
     assert verdict(healthy, found)[-1] == "Right: nothing was named."
     assert hidden_contract(healthy, found)["hidden"]["truth"] == "none"

@@ -42,7 +42,7 @@ def test_poses_alone_show_what_readings_do_while_they_are_held(run: Run, tmp_pat
     assert answer.code == 0, answer.err
     said = " ".join(answer.out.split())
     assert VERDICT in said
-    assert "To decide record 180 s: Close the hand around a rigid form" in said
+    assert "To decide, record 180 s: Close the hand around a rigid form" in said
     found = run("take", "holds", "t0", "t1", "--json").json
     assert (found["verdict"], found["confidence_set"]) == ("ambiguous", ["creep", "hand_relaxing"])
     assert found["poses"][0]["sensors"]["I_FLEX"]["change_pct"] < -3

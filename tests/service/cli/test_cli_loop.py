@@ -32,7 +32,7 @@ def test_the_catalogue_in_words_and_one_effect_in_full(anna: Run) -> None:
     assert "hysteresis" in answer.out
     assert "c.temperature_c" in answer.out
     one = anna("effects", "hysteresis")
-    assert "reversed in time" in one.out
+    assert "time-reversed" in one.out
     assert "widest_play" in one.out
     assert anna("effects", "hysteresis", "--json").json["name"] == "hysteresis"
     unknown = anna("effects", "glue")
@@ -63,7 +63,7 @@ def test_an_effect_is_added_shown_and_taken_out(loop: tuple[Run, str, Path]) -> 
     run, model, _ = loop
     answer = run("add-effect", model, CAUSE, "-r", "I_PIP", "--activate")
     assert answer.code == 0, answer.err
-    assert "the error on takes left out falls from" in answer.out
+    assert "reduces the held-out error from" in answer.out
     assert f", made from {model[:12]}. Active." in answer.out
     child = answer.out.split("Model ")[1].split(",")[0]
     shown = run("model", "show", child).out
@@ -107,7 +107,7 @@ def test_improve_on_files_prints_the_contract_and_nothing_else(run: Run, tmp_pat
     answer = run("improve", *files, *options, "--json")
     found = answer.json
     assert answer.err == ""
-    wanted = {"steps", "noise_floor_deg", "stopped", "something_left", "next_take", "sentences"}
+    wanted = {"steps", "noise_floor_deg", "stopped", "unexplained_residual", "next_take", "sentences"}
     assert wanted <= set(found)
     for step in found["steps"]:
         assert {"model", "added", "rmse_deg", "per_rotation"} <= set(step)

@@ -10,6 +10,7 @@ import json
 import tarfile
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +22,8 @@ from glovecal_models.takes.table import read_takes
 from glovecal_service.rest.in_process import in_process_client
 from glovecal_service.rest.job.jobs import WITH_PAGES
 from glovecal_service.settings import Settings
+from glovecal_service.views.job_result import VIEW_OF
+from glovecal_service.views.renamed_keys import RENAMED
 
 STORED = Path(__file__).parents[1] / "stored_example"
 EXPECTED = json.loads((STORED / "expected.json").read_text(encoding="utf-8"))
@@ -67,7 +70,20 @@ def test_each_model_predicts_what_it_predicted(folder: Path, name: str):
 def test_each_job_is_shown(run, job: str):
     shown = run("job", "show", job)
     assert shown.code == 0, shown.err
-    assert run("job", "show", job, "--json").json["state"] == "done"
+    found = run("job", "show", job, "--json").json
+    assert found["state"] == "done"
+    if found["kind"] in VIEW_OF:
+        assert set(VIEW_OF[found["kind"]].model_fields) == set(found["result"]), "with the keys of today"
+        assert not set(RENAMED) & keys_in(found["result"])
+
+
+def keys_in(value: Any) -> set[str]:
+    """Of all JSON objects."""
+    if isinstance(value, list):
+        return set().union(*(keys_in(item) for item in value))
+    if not isinstance(value, dict):
+        return set()
+    return set(value) | set().union(*(keys_in(item) for item in value.values()))
 
 
 @pytest.mark.parametrize("job", EXPECTED["jobs"])

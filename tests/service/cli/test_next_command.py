@@ -6,12 +6,12 @@ MODEL = "0123456789abcdef"
 
 
 def test_where_nothing_could_be_judged_a_movement_is_recorded():
-    left = {"is_left": False, "not_judgeable": "the frames are single poses"}
-    said = next_command(MODEL, {"named": None, "next_take": None, "something_left": left})
-    assert said == "glovecal record GLOVE free-motion --seconds 60"
+    residual = {"is_significant": False, "not_identifiable": "the frames are single poses"}
+    command = next_command(MODEL, {"named": None, "next_take": None, "unexplained_residual": residual})
+    assert command == "glovecal record GLOVE free-motion --seconds 60"
 
 
-def test_where_nothing_is_left_the_model_is_used():
-    left = {"is_left": False, "not_judgeable": None}
-    found = {"named": None, "next_take": None, "something_left": left}
+def test_where_nothing_is_unexplained_the_model_is_used():
+    residual = {"is_significant": False, "not_identifiable": None}
+    found = {"named": None, "next_take": None, "unexplained_residual": residual}
     assert next_command(MODEL, found) == "glovecal model activate 0123456789ab"

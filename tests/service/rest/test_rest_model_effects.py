@@ -62,7 +62,7 @@ def test_the_catalogue_tells_every_effect_in_full(walk: Walk) -> None:
     for row in rows:
         assert row["explanation"].endswith(".")
         assert row["source"]
-        assert row["decoy"]
+        assert row["control"]
         assert not row["own"]
     one = walk.client.get("/effects/hysteresis")
     assert one in rows
@@ -80,11 +80,11 @@ def test_a_diagnosis_names_the_hidden_cause_and_has_a_page(walk: Walk) -> None:
     assert found["named"]["effect"] == CAUSE
     assert found["named"]["verdict"] == "named"
     assert set(found["named"]["where"]) == set(ROTATIONS)
-    assert found["named"]["saved_deg"] > 10 * max(found["named"]["decoy_saved_deg"], 0.05)
+    assert found["named"]["saved_deg"] > 10 * max(found["named"]["control_saved_deg"], 0.05)
     assert [take["name"] for take in found["takes"]] == [take["name"] for take in walk.takes]
     for values in found["rotations"].values():
         assert values["noise_floor_deg"] < values["rmse_deg"]
-    assert {"contact_pressure"} <= {item["effect"] for item in found["not_judgeable"]}
+    assert {"contact_pressure"} <= {item["effect"] for item in found["not_identifiable"]}
     page = walk.client.download(f"/jobs/{job['id']}/report").decode()
     assert page.startswith("<!doctype html>")
     assert "hysteresis is missing." in page
@@ -114,7 +114,7 @@ def test_an_added_effect_is_a_child_and_comes_out_again(walk: Walk) -> None:
     lineage = walk.client.get(f"/models/{child['id']}/lineage")
     assert [row["id"] for row in lineage] == [child["id"], walk.model]
     told = walk.client.download(f"/jobs/{job['id']}/events").decode()
-    assert "the error on takes left out falls from" in told
+    assert "reduces the held-out error from" in told
     assert f'"after":{{"M_PIP":{result["after"]["M_PIP"]:.3f}'[:-2] in told.replace(" ", "")
 
     with pytest.raises(Refused, match="has hysteresis on all of these rotations already") as refused:
@@ -202,7 +202,7 @@ def test_effects_that_cannot_be_are_refused_before_any_work(
 def test_a_single_take_says_what_it_cannot_show(walk: Walk) -> None:
     body = {"takes": [walk.takes[0]["id"]]}
     found = walk.result(walk.client.post(f"/models/{walk.model}/diagnose", body))
-    why = {item["effect"]: item["why"] for item in found["not_judgeable"]}
+    why = {item["effect"]: item["why"] for item in found["not_identifiable"]}
     assert "one wearing" in why["donning_shift"]
     with pytest.raises(ServiceError, match="cannot be learned from these 1 takes: all takes are of one"):
         walk.add("donning_shift", takes=[walk.takes[0]["name"]])

@@ -1,4 +1,4 @@
-"""How much one effect explains, joint by joint, beside its decoy, and whether that can be chance."""
+"""How much one effect explains, joint by joint, beside its control, with the p value."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ def saved_share(before: np.ndarray, after: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class JointErrors:
-    """Squared errors of one joint in each block of time, on takes left out of the fit."""
+    """Held-out squared errors of one joint in each block of time."""
 
     base: np.ndarray
     """(B,), degrees squared, without the effect."""
     added: np.ndarray
     """(B,), with it."""
-    decoy: np.ndarray
-    """(B,), with its decoy."""
+    control: np.ndarray
+    """(B,), with its control."""
     rows: int
     take: np.ndarray
     """(B,), the take each block lies in."""
@@ -41,18 +41,30 @@ class JointErrors:
         return saved_share(self.base, self.added)
 
     @property
-    def decoy_saved(self) -> float:
-        return saved_share(self.base, self.decoy)
+    def control_saved(self) -> float:
+        return saved_share(self.base, self.control)
 
     @property
     def contrast(self) -> float:
-        """Share of the squared error saved beyond what the decoy saves."""
-        return self.saved - max(self.decoy_saved, 0.0)
+        """Share of the squared error saved beyond what the control saves."""
+        return self.saved - max(self.control_saved, 0.0)
 
     @property
-    def beyond_decoy(self) -> np.ndarray:
-        """(B,): what each block saves against the better of base and decoy."""
-        return (self.base if self.decoy_saved <= 0 else self.decoy) - self.added
+    def beyond_control(self) -> np.ndarray:
+        """(B,): what each block saves against the better of base and control."""
+        return (self.base if self.control_saved <= 0 else self.control) - self.added
+
+
+@dataclass(frozen=True)
+class HeldOutRmse:
+    """Degrees."""
+
+    before: float
+    """Without the effect."""
+    after: float
+    """With it."""
+    control: float
+    """With its control instead."""
 
 
 @dataclass(frozen=True)
@@ -66,12 +78,12 @@ class Assessment:
     """(P,) best shape of each joint."""
     weights: tuple[np.ndarray, ...]
     """(C,) of each joint."""
-    probability: float | None = None
-    """Of a session effect, from takes dealt in other ways; None: judged block by block."""
+    p_value: float | None = None
+    """Of a session effect, by permuting takes; None: tested block by block."""
     numbers: tuple[str, ...] = ()
     """Names of the shape's numbers, units included."""
     certainty: Certainty = BETWEEN_TAKES
-    """Asked of ``probability``."""
+    """Limits of ``p_value``."""
     limits: SignificanceLimits = SIGNIFICANCE_LIMITS
 
     def shape_described(self, joint: int) -> dict[str, float]:
@@ -79,43 +91,60 @@ class Assessment:
         return dict(zip(self.numbers, map(float, self.shapes[joint]), strict=False))
 
     @cached_property
-    def touched(self) -> tuple[int, ...]:
-        """Joints on which the effect saves error beyond chance."""
-        if self.probability is not None:
-            return self._touched_by_session(self.probability)
+    def significant_joints(self) -> tuple[int, ...]:
+        """Joints on which the effect beats its control significantly."""
+        if self.p_value is not None:
+            return self._significant_in_session(self.p_value)
         limits = self.limits
         fewest, least = limits.fewest_blocks, limits.least_share
         some = {
             i
             for i, item in enumerate(self.errors)
             if item.contrast >= least
-            and signed_rank(item.beyond_decoy, fewest) <= limits.joint_p_value / max(1, len(self.errors) / 5)
+            and signed_rank(item.beyond_control, fewest)
+            <= limits.joint_p_value / max(1, len(self.errors) / 5)
         }
         together = [i for i, item in enumerate(self.errors) if item.contrast >= 0.5 * least]
         if len(together) > 1:
             pooled = pooled_errors(self.errors)
-            chance = signed_rank(pooled.beyond_decoy, fewest)
-            if pooled.contrast >= least and chance <= limits.pooled_p_value:
+            p_value = signed_rank(pooled.beyond_control, fewest)
+            if pooled.contrast >= least and p_value <= limits.pooled_p_value:
                 some.update(together)
         return tuple(sorted(some))
 
-    def _touched_by_session(self, probability: float) -> tuple[int, ...]:
+    def _significant_in_session(self, p_value: float) -> tuple[int, ...]:
         largest = max((item.contrast for item in self.errors), default=0.0)
         is_clear = largest >= self.limits.clear_share
-        if probability > (self.certainty.clear if is_clear else self.certainty.faint):
+        if p_value > (self.certainty.clear if is_clear else self.certainty.faint):
             return ()
         least = self.limits.least_session_share
         return tuple(i for i, item in enumerate(self.errors) if item.contrast >= least)
 
     @property
     def saved_square(self) -> float:
-        """Squared degrees that the effect saves on the joints it touches, per row, summed over joints."""
+        """Squared degrees that the effect saves on its significant joints, per row, summed over joints."""
         return float(
             sum(
                 (self.errors[i].base.sum() - self.errors[i].added.sum()) / self.errors[i].rows
-                for i in self.touched
+                for i in self.significant_joints
             )
         )
+
+    @property
+    def rmse_deg(self) -> HeldOutRmse:
+        """Over the significant joints, or over all when there are none."""
+        joints = self.significant_joints or tuple(range(len(self.errors)))
+        rows = max(sum(self.errors[i].rows for i in joints), 1)
+        parts = [
+            sum(getattr(self.errors[i], name).sum() for i in joints) for name in ("base", "added", "control")
+        ]
+        before, after, control = (float(np.sqrt(max(part, 0.0) / rows)) for part in parts)
+        return HeldOutRmse(before, after, control)
+
+    @property
+    def largest_contrast_joint(self) -> str:
+        """Where it saves most beyond its control."""
+        return self.joints[max(range(len(self.errors)), key=lambda i: self.errors[i].contrast)]
 
 
 def block_starts(lengths: Sequence[int], block_rows: int = BLOCK_ROWS) -> np.ndarray:
@@ -135,7 +164,7 @@ def squared_in_blocks(residual: Sequence[np.ndarray], starts: np.ndarray) -> np.
 
 
 def signed_rank(values: np.ndarray, fewest: int = SIGNIFICANCE_LIMITS.fewest_blocks) -> float:
-    """One-sided Wilcoxon: the probability that values symmetric about zero are so positive; 1 for fewer than
+    """One-sided Wilcoxon: the p value of positive values against symmetry about zero; 1 for fewer than
     ``fewest``."""
     if len(values) < fewest or not np.any(values):
         return 1.0
@@ -171,7 +200,7 @@ def pooled_errors(errors: Sequence[JointErrors]) -> JointErrors:
     return JointErrors(
         *(
             over_joints([getattr(item, part) / s for item, s in zip(errors, scale, strict=True)], takes)
-            for part in ("base", "added", "decoy")
+            for part in ("base", "added", "control")
         ),
         rows=sum(item.rows for item in errors),
         take=takes[0] if _are_in_step(takes) else np.unique(np.concatenate(takes)),

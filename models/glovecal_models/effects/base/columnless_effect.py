@@ -8,14 +8,14 @@ from typing import ClassVar
 import numpy as np
 
 from glovecal_models.effects.base.effect import InstantEffect
-from glovecal_models.effects.base.facts import Decoy, Settings
+from glovecal_models.effects.base.facts import Control, Settings
 from glovecal_models.effects.base.signals import Signals
 
 
 class ColumnlessEffect(InstantEffect):
     """Zero columns, one shape of zeros."""
 
-    decoy: ClassVar[Decoy] = "none"
+    control: ClassVar[Control] = "none"
 
     def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
         return np.zeros((1, takes[0].own.shape[1], len(self.parameters)))

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from glovecal_models.effects.base.effect import InstantEffect
-from glovecal_models.effects.base.facts import Decoy, Settings
+from glovecal_models.effects.base.facts import Control, Settings
 from glovecal_models.effects.base.joint_units import in_joint_units, settle_joint_units
 from glovecal_models.effects.base.signals import Signals
 
@@ -24,7 +24,7 @@ class ContextEffect(InstantEffect):
     Well outside the range seen in training the column is held: no far extrapolation.
     """
 
-    decoy: ClassVar[Decoy] = "context of other takes"
+    control: ClassVar[Control] = "context of other takes"
 
     @property
     def column(self) -> str:

@@ -14,7 +14,9 @@ Stage = Literal["first", "compared", "last", "never"]
 """When a diagnosis asks for it: by its signature in the recording before anything else is judged, because it
 would mislead the others; by held-out error beside its control; by its signature once nothing that was
 compared explains the error; or not at all."""
-Decoy = Literal["reversed in time", "rolled in time", "context of other takes", "dealt wearings", "none"]
+Control = Literal[
+    "time-reversed", "circularly shifted", "context of other takes", "permuted wearings", "none"
+]
 HoldDrift = Literal["begins anew with each hold", "slows down", "goes on"]
 """How readings drift while a pose is held."""
 
@@ -66,7 +68,7 @@ BETWEEN_TAKES = Certainty(
     faint=0.005,
     why="context columns have many names, and one of them goes along with the takes by chance",
 )
-CHANGES_BETWEEN_TAKES: tuple[Decoy, ...] = ("context of other takes", "dealt wearings")
+CHANGES_BETWEEN_TAKES: tuple[Control, ...] = ("context of other takes", "permuted wearings")
 
 
 class EffectFacts:
@@ -86,8 +88,8 @@ class EffectFacts:
     """The shape, in the order of its last axis."""
     context: ClassVar[tuple[str, ...]] = ()
     """Context columns it needs, all of them."""
-    decoy: ClassVar[Decoy] = "reversed in time"
-    """The twin with the same freedom that cannot be right."""
+    control: ClassVar[Control] = "time-reversed"
+    """Columns with the same freedom made of inputs that cannot be right."""
     has_memory: ClassVar[bool] = False
     one_joint_at_a_time: ClassVar[bool] = False
     """Whether each joint has inputs of its own: signals that the joint's base reads already are left out."""
@@ -129,7 +131,7 @@ class EffectFacts:
     @property
     def changes_between_takes(self) -> bool:
         """Whether it differs between takes, not inside them: only whole takes are witnesses for it."""
-        return self.decoy in CHANGES_BETWEEN_TAKES
+        return self.control in CHANGES_BETWEEN_TAKES
 
     @property
     def spoken(self) -> str:

@@ -1,6 +1,6 @@
 """Effects that stay in a model as a wider interval: no correction brings back what the sensor does not say.
 
-How wide is learned from errors on takes left out of training, never from the fit's own residuals: those of a
+How wide is learned from errors on held-out takes of training, never from the fit's own residuals: those of a
 flexible base are too small.
 """
 
@@ -18,7 +18,7 @@ from glovecal_models.effects.base.signature_effect import SignatureEffect
 
 
 @dataclass(frozen=True)
-class LeftOutErrors:
+class ClaimedErrors:
     """The n measured frames of one rotation in one take; the calibration that predicted them never saw it."""
 
     take: str
@@ -58,8 +58,8 @@ class IntervalEffect(SignatureEffect):
     """Whether it grows beyond what takes of usual length show: it stays if the claim on them is no worse."""
 
     @abstractmethod
-    def learned(self, left_out: Sequence[LeftOutErrors], found: Settings) -> Settings:
-        """Constants for the rotations of ``left_out``; ``found`` are those that the takes themselves gave."""
+    def learned(self, held_out: Sequence[ClaimedErrors], found: Settings) -> Settings:
+        """Constants for the rotations of ``held_out``; ``found`` are those that the takes themselves gave."""
 
     @abstractmethod
     def interval(

@@ -1,7 +1,7 @@
 """How a user declares an effect of his own: a line of text, or the same as a JSON document.
 
     name = strap; columns = c.strap_n * own, c.strap_n; unit = deg;
-    parameter tau s 0.1 5 = 1; range c.strap_n 0 50; decoy = rolled in time
+    parameter tau s 0.1 5 = 1; range c.strap_n 0 50; control = circularly shifted
 
 Parts are separated by semicolons or line ends. ``name`` and ``columns`` are needed, the rest is not.
 """
@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
 
-from glovecal_models.effects.base.facts import Decoy, Parameter
+from glovecal_models.effects.base.facts import Control, Parameter
 from glovecal_models.errors import BadInput
 from glovecal_models.expression import FUNCTIONS, Node, check_names, parse_expressions
 from glovecal_models.names import check_channel_name, check_identifier
@@ -24,7 +24,14 @@ MOST_COLUMNS = 8
 RESERVED: tuple[str, ...] = ("own", "own_deg", "t")
 """The joint's signal in its standard deviations and in degrees, and the seconds since the take began."""
 _UNIT = re.compile(r"[A-Za-z0-9/%^_-]{1,20}\Z")
-_KEYS = ("name", "columns", "unit", "parameters", "ranges", "decoy", "explanation")
+_KEYS = ("name", "columns", "unit", "parameters", "ranges", "control", "explanation")
+_OLD_KEY = "decoy"
+_OLD_CONTROLS = {
+    "reversed in time": "time-reversed",
+    "rolled in time": "circularly shifted",
+    "dealt wearings": "permuted wearings",
+}
+"""The key and its values before they were renamed: stored declarations have them."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +48,7 @@ class Declaration:
     """A value to be tried for each parameter: what the user believes."""
     ranges: tuple[tuple[str, float, float], ...] = ()
     """Context column (without ``c.``), lowest and highest value; others keep the range of training."""
-    decoy: Decoy = "rolled in time"
+    control: Control = "circularly shifted"
     explanation: str = ""
 
     @property
@@ -72,6 +79,8 @@ class Declaration:
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> Declaration:
         """Inverse of ``to_document``; also what REST is sent. Raises BadInput."""
+        if "control" not in document:
+            document = {"control" if key == _OLD_KEY else key: value for key, value in document.items()}
         unknown = [key for key in document if key not in _KEYS]
         if unknown:
             raise BadInput(f"effect: unknown part {unknown[0]!r}; known are {', '.join(_KEYS)}")
@@ -86,7 +95,7 @@ class Declaration:
         parameters, starts = _parameters(document.get("parameters", []), source)
         declared = cls(
             name, columns, document["columns"], _unit(document.get("unit", "deg"), source), parameters,
-            starts, _ranges(document.get("ranges", {}), source), _decoy(document, source),
+            starts, _ranges(document.get("ranges", {}), source), _control(document, source),
             str(document.get("explanation", "")).strip(),
         )  # fmt: skip
         _check_time_constants(columns, [item.name for item in parameters], source)
@@ -106,7 +115,7 @@ class Declaration:
                 for item, start in zip(self.parameters, self.starts, strict=True)
             ],
             "ranges": {name: [low, high] for name, low, high in self.ranges},
-            "decoy": self.decoy,
+            "control": self.control,
             "explanation": self.explanation,
         }
 
@@ -133,9 +142,10 @@ def _read_part(part: str, document: dict[str, Any]) -> None:
         document.setdefault("ranges", {})[words[1][2:]] = words[2:4]
     else:
         key, equals, value = (piece.strip() for piece in part.partition("="))
-        if not equals or key not in ("name", "columns", "unit", "decoy", "explanation"):
+        key = "control" if key == _OLD_KEY else key
+        if not equals or key not in ("name", "columns", "unit", "control", "explanation"):
             raise BadInput(
-                f"cannot read {part!r}; write name = ..., columns = ..., unit = ..., decoy = ..., "
+                f"cannot read {part!r}; write name = ..., columns = ..., unit = ..., control = ..., "
                 "explanation = ..., parameter ... or range ..."
             )
         if key in document:
@@ -208,10 +218,11 @@ def _unit(value: Any, source: str) -> str:
     return value
 
 
-def _decoy(document: Mapping[str, Any], source: str) -> Decoy:
-    value = document.get("decoy", "rolled in time")
-    for known in get_args(Decoy):
+def _control(document: Mapping[str, Any], source: str) -> Control:
+    value = document.get("control", "circularly shifted")
+    value = _OLD_CONTROLS.get(value, value) if isinstance(value, str) else value
+    for known in get_args(Control):
         if value == known and known != "none":
             return known
-    allowed = ", ".join(item for item in get_args(Decoy) if item != "none")
-    raise BadInput(f"{source}: no decoy {value!r}; there are {allowed}")
+    allowed = ", ".join(item for item in get_args(Control) if item != "none")
+    raise BadInput(f"{source}: no control {value!r}; there are {allowed}")

@@ -50,7 +50,7 @@ class ExpressionEffect(Effect):
             explanation=shown,
             parameters=declaration.parameters,
             context=declaration.context,
-            decoy=declaration.decoy,
+            control=declaration.control,
             has_memory=any(node.has_memory for node in declaration.columns),
         )
 

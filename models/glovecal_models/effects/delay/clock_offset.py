@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from glovecal_models.effects.base.assessment import Assessment
-from glovecal_models.effects.base.facts import Decoy, Kind, Parameter, Rival, Settings, Stage
+from glovecal_models.effects.base.facts import Control, Kind, Parameter, Rival, Settings, Stage
 from glovecal_models.effects.base.motions import FAST
 from glovecal_models.effects.base.problem import Problem
 from glovecal_models.effects.base.signals import Signals
@@ -65,7 +65,7 @@ class ClockOffsetEffect(SignatureEffect):
     source = "two recorders without a common clock; real ankle recordings: -2.0 to 0.6 s, each take its own"
     kind: ClassVar[Kind] = "repair"
     stage: ClassVar[Stage] = "compared"
-    decoy: ClassVar[Decoy] = "reversed in time"
+    control: ClassVar[Control] = "time-reversed"
     alike: ClassVar = (LAG,)
     shown_by: ClassVar = FAST
     rivals: ClassVar = (Rival("hysteresis", FAST), Rival("creep", FAST))

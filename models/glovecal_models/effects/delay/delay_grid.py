@@ -2,7 +2,7 @@
 
 A lag delays and smooths; clocks that disagree only delay, or advance. In the direction sensor-from-angle a
 grid of (pure delay d) x (low pass tau) is tried on all joints; negative tau is the low pass run backwards in
-time, which no sensor can do: the decoy. The base bends with the angle: a delayed angle enters by the base's
+time, which no sensor can do: the control. The base bends with the angle: a delayed angle enters by the base's
 slope. All cells are compared at once by projecting them off the base.
 """
 

@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 
 from glovecal_models.effects.base.facts import Rival, Settings, Stage
-from glovecal_models.effects.base.interval_effect import IntervalEffect, LeftOutErrors
+from glovecal_models.effects.base.interval_effect import ClaimedErrors, IntervalEffect
 from glovecal_models.effects.base.motions import CROSSED
 from glovecal_models.effects.base.signature_effect import Finding, Proposal, Recorded, check_signature_input
 from glovecal_models.effects.garment_slip.slip_growth import GROWS_S, SlipGrowth, SlipInterval, slip_growth
@@ -86,10 +86,10 @@ class GarmentSlip(IntervalEffect):
     def needs_time(self) -> bool:
         return True
 
-    def learned(self, left_out: Sequence[LeftOutErrors], found: Settings) -> Settings:
-        rotations = dict.fromkeys(item.rotation for item in left_out)
+    def learned(self, held_out: Sequence[ClaimedErrors], found: Settings) -> Settings:
+        rotations = dict.fromkeys(item.rotation for item in held_out)
         growths = {
-            name: slip_growth([item for item in left_out if item.rotation == name]) for name in rotations
+            name: slip_growth([item for item in held_out if item.rotation == name]) for name in rotations
         }
         fresh = {name: growth.to_settings() for name, growth in growths.items()}
         return {"rotations": dict(found.get("rotations", {})) | fresh}

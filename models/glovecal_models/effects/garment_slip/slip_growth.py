@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from glovecal_models.effects.base.facts import Settings
-from glovecal_models.effects.base.interval_effect import Interval, LeftOutErrors
+from glovecal_models.effects.base.interval_effect import ClaimedErrors, Interval
 from glovecal_models.effects.garment_slip.slip_walk import slip_walk
 
 GROWS_S = 1800.0
@@ -42,10 +42,10 @@ class SlipInterval(Interval):
         return np.clip(since_start_s, 0.0, GROWS_S)[:, None] / 60.0 * self._a_minute
 
 
-def slip_growth(left_out: Sequence[LeftOutErrors]) -> SlipGrowth:
-    """From the errors of one rotation on takes left out; a rate of zero where they are too short to say."""
+def slip_growth(held_out: Sequence[ClaimedErrors]) -> SlipGrowth:
+    """From the errors of one rotation on held-out takes; a rate of zero where they are too short to say."""
     times, errors, angles = zip(
-        *((item.since_start_s, item.error, item.measured) for item in left_out), strict=True
+        *((item.since_start_s, item.error, item.measured) for item in held_out), strict=True
     )
     walk = slip_walk(times, errors, angles)
     return SlipGrowth(0.0 if walk is None else walk.rate_deg_per_sqrt_min)

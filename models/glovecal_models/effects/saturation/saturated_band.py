@@ -1,7 +1,7 @@
 """The end of a sensor's range in which it no longer says where the joint is, and how unsure that leaves it.
 
 Before anything is learned the whole band counts as unsure as the reference spreads in it. From errors on
-takes left out the band and its neighbours get a standard deviation for each narrow step of readings: a sensor
+held-out takes the band and its neighbours get a standard deviation for each narrow step of readings: a sensor
 that flattens loses little at first and all at its end.
 """
 
@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from glovecal_models.effects.base.facts import Settings
-from glovecal_models.effects.base.interval_effect import Interval, LeftOutErrors
+from glovecal_models.effects.base.interval_effect import ClaimedErrors, Interval
 
 STEPS_A_BAND, BANDS = 4, 3
 """Narrow steps in the band, and in each of its two neighbours."""
@@ -63,14 +63,14 @@ class SaturatedBand:
         """(N,) whether in the band or its neighbours."""
         return self.depth(readings) < BANDS * self.width
 
-    def learned(self, left_out: Sequence[LeftOutErrors], noise_share: float) -> SaturatedBand:
+    def learned(self, held_out: Sequence[ClaimedErrors], noise_share: float) -> SaturatedBand:
         """With steps from the errors of its rotation; ``noise_share`` of the noise is claimed elsewhere.
 
         Each step covers 95 % of its errors with 1.96 standard deviations, and is no smaller than their RMS.
         """
-        readings = np.concatenate([item.readings[:, item.sensors.index(self.sensor)] for item in left_out])
-        error = np.concatenate([item.error for item in left_out])
-        claimed = np.concatenate([item.variance + (noise_share - 1.0) * item.noise for item in left_out])
+        readings = np.concatenate([item.readings[:, item.sensors.index(self.sensor)] for item in held_out])
+        error = np.concatenate([item.error for item in held_out])
+        claimed = np.concatenate([item.variance + (noise_share - 1.0) * item.noise for item in held_out])
         step = self._step(readings)
         found: list[float] = []
         for number in range(STEPS_A_BAND * BANDS):

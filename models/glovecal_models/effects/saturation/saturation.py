@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 from glovecal_models.effects.base.facts import Rival, Settings
-from glovecal_models.effects.base.interval_effect import IntervalEffect, LeftOutErrors
+from glovecal_models.effects.base.interval_effect import ClaimedErrors, IntervalEffect
 from glovecal_models.effects.base.motions import RAMPS
 from glovecal_models.effects.base.signature_effect import Finding, Proposal, Recorded, check_signature_input
 from glovecal_models.effects.saturation.saturated_band import SaturatedBand, SaturationInterval
@@ -53,12 +53,12 @@ class Saturation(IntervalEffect):
         where = tuple(dict.fromkeys(band.rotation for band in bands))
         return Proposal({"bands": [band.to_settings() for band in bands]}, where) if bands else None
 
-    def learned(self, left_out: Sequence[LeftOutErrors], found: Settings) -> Settings:
+    def learned(self, held_out: Sequence[ClaimedErrors], found: Settings) -> Settings:
         bands = [SaturatedBand.of(item) for item in found["bands"]]
         shares, learned = {}, []
         for name in dict.fromkeys(band.rotation for band in bands):
             own = [band for band in bands if band.rotation == name]
-            errors = [item for item in left_out if item.rotation == name]
+            errors = [item for item in held_out if item.rotation == name]
             shares[name] = _noise_share(own, errors)
             learned += [band.learned(errors, shares[name]).to_settings() for band in own]
         return {"bands": learned, "noise_share": shares}
@@ -89,14 +89,14 @@ class Saturation(IntervalEffect):
         return told
 
 
-def _near(band: SaturatedBand, left_out: LeftOutErrors) -> np.ndarray:
-    return band.is_near(left_out.readings[:, left_out.sensors.index(band.sensor)])
+def _near(band: SaturatedBand, held_out: ClaimedErrors) -> np.ndarray:
+    return band.is_near(held_out.readings[:, held_out.sensors.index(band.sensor)])
 
 
-def _noise_share(bands: Sequence[SaturatedBand], left_out: Sequence[LeftOutErrors]) -> float:
+def _noise_share(bands: Sequence[SaturatedBand], held_out: Sequence[ClaimedErrors]) -> float:
     """How much of the noise that training found is there far from the bands: it took the loss for noise."""
     square, known, noise = 0.0, 0.0, 0.0
-    for item in left_out:
+    for item in held_out:
         far = ~np.any([_near(band, item) for band in bands], axis=0)
         square += float(np.sum(item.error[far] ** 2))
         known += float(np.sum(item.variance[far] - item.noise))

@@ -61,16 +61,18 @@ def live_check(
 def _sentence(evidence: Mapping[str, float], is_served: bool) -> str:
     share = 100 * evidence["faulty_frames"] / max(evidence["frames"], 1)
     excluded = (
-        f"{evidence['faulty_frames']} faulty readings ({share:.1f} % of the failing sensors') are left out"
-        " of training and of the comparison"
+        f"{evidence['faulty_frames']} faulty readings ({share:.1f} % of the failing sensors') are"
+        " excluded from training and comparison"
     )
-    told = (
+    flagged = (
         f"{100 * evidence['live_seen_share']:.0f} % of the faulty readings and "
         f"{100 * evidence['live_false_share']:.2f} % of the sound ones"
     )
     if not is_served:
-        return f"{excluded}. Live they are not flagged: that would flag {told}."
-    return f"{excluded}. Live poses hold the last good angle there, with a flag: {told} on takes left out."
+        return f"{excluded}. They are not flagged live: that would flag {flagged}."
+    return (
+        f"{excluded}. Live poses hold the last good angle there, with a flag ({flagged} on held-out takes)."
+    )
 
 
 def _marked(take: Take, sensors: Sequence[str], found: Sequence[Finding]) -> np.ndarray:

@@ -62,7 +62,7 @@ def _print_one(item: dict[str, Any]) -> None:
             "what it does": DOES.get(item["kind"], item["kind"]),
             "needs": [f"c.{name}" for name in item["context"]],
             "remembers": item["has_memory"],
-            "decoy": item["decoy"],
+            "control": item["control"],
             "source": item["source"],
             "comes with": f"{item['package']} (your own)" if item["own"] else item["package"],
         }

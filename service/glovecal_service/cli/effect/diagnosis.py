@@ -1,4 +1,4 @@
-"""``glovecal diagnose``: which physical effect a model lacks, with evidence, and what to do next."""
+"""``glovecal diagnose``: missing effects of a model, with evidence, and what to do next."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ CANDIDATES = {
     "where": "where",
     "rmse_before_deg": "error",
     "rmse_after_deg": "with it",
-    "rmse_decoy_deg": "with its decoy",
-    "passes": "beyond chance",
+    "rmse_control_deg": "with control",
+    "passes": "significant",
 }
-GOES_WITH = {
-    "phrase": "what is left goes with",
+ASSOCIATIONS = {
+    "phrase": "residual is associated with",
     "rotation": "rotation",
-    "size_deg": "explains, degrees",
-    "probability": "chance, all columns counted",
+    "size_deg": "explains (°)",
+    "p_value": "p, corrected",
 }
 LEGEND = (
-    "Degrees, on takes left out, readings and reference smoothed alike. A decoy has the same freedom as its "
-    "effect and cannot be right: what it saves, flexibility saves."
+    "Held-out error in degrees, readings and reference identically smoothed. A control has the same freedom "
+    "as its effect and cannot be right: what it saves, flexibility saves."
 )
 Expressions = Annotated[
     list[str] | None,
@@ -54,12 +54,12 @@ def diagnose(
         typer.Option("--take", "-t", help="Take to look at; repeat. Default: those it was trained on."),
     ] = None,
     expression: Expressions = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the decoys.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the controls.")] = 0,
     report: Report = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
-    """Find which physical effect a model lacks, or say why that cannot be known from these takes."""
+    """Find which physical effect a model is missing, or why these takes cannot tell."""
     if report is not None:
         require_place(report, overwrite=overwrite)
     with connect() as service:
@@ -83,8 +83,8 @@ def diagnose(
 
 def print_diagnosis(found: Mapping[str, Any]) -> None:
     """For people, the measurement itself first."""
-    _say("The reference first:", found.get("reference_problems"))
-    _say("Found in the recording:", [item["sentence"] for item in found.get("findings") or ()])
+    _print_sentences("Check the reference first:", found.get("reference_problems"))
+    _print_sentences("Found in the recording:", [item["sentence"] for item in found.get("findings") or ()])
     rotations = found.get("rotations") or {}
     out.print()
     rows = [{"rotation": name, **values} for name, values in rotations.items()]
@@ -94,22 +94,22 @@ def print_diagnosis(found: Mapping[str, Any]) -> None:
     else:
         _print_named(found.get("named"))
     _print_candidates(found.get("candidates") or ())
-    why = reasons(found.get("not_judgeable") or ())
-    _say("Cannot be judged from these takes:", why)
-    left, following = found.get("something_left") or {}, found.get("next_take")
-    if left.get("sentence"):
-        out.print(f"\n{left['sentence']}")
-    if left.get("goes_with"):
-        print_table(left["goes_with"], GOES_WITH, empty="")
+    why = reasons(found.get("not_identifiable") or ())
+    _print_sentences("Not identifiable from these takes:", why)
+    residual, following = found.get("unexplained_residual") or {}, found.get("next_take")
+    if residual.get("sentence"):
+        out.print(f"\n{residual['sentence']}")
+    if residual.get("associations"):
+        print_table(residual["associations"], ASSOCIATIONS, empty="")
     if following:
         rivals = " and ".join(following.get("separates") or ())
-        out.print(f"\nTo tell {rivals} apart record {following['seconds']} s: {following['what']}")
+        out.print(f"\nTo separate {rivals}, record {following['seconds']} s: {following['what']}")
 
 
-def reasons(not_judgeable: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Effects and why they cannot be judged, those with the same reason together."""
+def reasons(not_identifiable: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Effects and why they are not identifiable, those with the same reason together."""
     by_why: dict[str, list[str]] = {}
-    for item in not_judgeable:
+    for item in not_identifiable:
         by_why.setdefault(item["why"], []).append(item["effect"])
     return [f"{', '.join(effects)}: {why}" for why, effects in by_why.items()]
 
@@ -117,9 +117,7 @@ def reasons(not_judgeable: Sequence[Mapping[str, Any]]) -> list[str]:
 def _print_named(named: Mapping[str, Any] | None) -> None:
     out.print()
     if named is None:
-        out.print(
-            "Missing: nothing that can be named. No known effect saves more than its decoy and chance do."
-        )
+        out.print("Missing: no known effect beats its control significantly.")
         return
     out.print(f"Missing: {named['sentence']}")
     for rotation, values in (named.get("parameters") or {}).items():
@@ -132,12 +130,12 @@ def _print_candidates(candidates: Sequence[Mapping[str, Any]]) -> None:
         return
     passing = sum(bool(item.get("passes")) for item in candidates)
     shown = candidates[: max(CANDIDATES_SHOWN, passing)]
-    out.print("\nWhat was tried:" if len(shown) == len(candidates) else "\nWhat was tried, the best:")
+    out.print("\nEffects tried:" if len(shown) == len(candidates) else "\nEffects tried, the best:")
     print_table(shown, CANDIDATES, empty="", folds="where")
     err.print(LEGEND)
 
 
-def _say(heading: str, sentences: Sequence[str] | None) -> None:
+def _print_sentences(heading: str, sentences: Sequence[str] | None) -> None:
     if sentences:
         out.print(f"\n{heading}")
         for sentence in sentences:

@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 MANY = ("--takes", "--holdout", "--take", "-t")
 STOPPED = {
     "noise_floor": "the error is at its noise floor",
-    "nothing_named": "no known effect saves more than its decoy and chance do",
+    "nothing_named": "no known effect beats its control significantly",
     "ambiguous": "these takes cannot tell the causes apart",
-    "not_better": "the next effect did not pay on takes left out and was undone",
+    "not_better": "the next effect did not reduce the held-out error enough and was undone",
 }
 STEPS = {"model": "model", "added": "added", "rmse_deg": "error (°)"}
 Method = Literal["lmc_gpr", "linear", "spgp", "auto", "polynomial_gpr", "general_gpr"]
@@ -93,11 +93,11 @@ def improve(
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
-    """Train a model, then add what the diagnosis names, as long as the error on takes left out falls.
+    """Train a model, then add what the diagnosis names, as long as the held-out error falls.
 
     Files are imported under the subject and stay there with every model on the way, so that each can be
     looked at, activated or continued; the same files again are not imported twice. Without --holdout errors
-    are on takes left out of each fit.
+    are on takes held out of each fit.
     """
     if report is not None:
         require_place(report, overwrite=overwrite)
@@ -182,7 +182,7 @@ def _print(subject: str, method: str, result: Mapping[str, Any], *, active: bool
     following = result["next_take"]
     if following:
         rivals = " and ".join(following["separates"])
-        out.print(f"To tell {rivals} apart record {following['seconds']} s: {following['what']}")
+        out.print(f"To separate {rivals}, record {following['seconds']} s: {following['what']}")
     last = result["steps"][-1]["model"][:12]
     out.print(f"The models are kept for subject {subject}.")
     out.print("The last is active." if active else f"Next: glovecal model activate {last}")

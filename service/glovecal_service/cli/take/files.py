@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from glovecal_client.errors import ServiceError
-from glovecal_models.improvement.take_warnings import kind_of
+from glovecal_models.takes.take_warnings import kind_of
 from glovecal_service.cli.terminal.printing import err
 from glovecal_service.cli.terminal.refusal import Refusal, exit_code_of, sentence_of
 

@@ -51,7 +51,7 @@ def holds(
     out.print(found["sentence"])
     following = found["next_take"]
     if following:
-        out.print(f"\nTo decide record {following['seconds']} s: {following['what']}")
+        out.print(f"\nTo decide, record {following['seconds']} s: {following['what']}")
 
 
 def _rows(found: dict[str, Any]) -> list[dict[str, Any]]:

@@ -43,7 +43,9 @@ class CatalogueEffect(BaseModel):
     parameters: list[ParameterView] = Field(description="What is searched for beside weights.")
     context: list[str] = Field(description="Context columns (`c.NAME`) it needs.")
     has_memory: bool
-    decoy: str = Field(description="The twin with the same freedom that cannot be right.")
+    control: str = Field(
+        description="How its negative control is made: columns with the same freedom that cannot be right."
+    )
     source: str
     own: bool = Field(description="Brought by a package of the user's own.")
     package: str
@@ -91,7 +93,7 @@ def _row(item: Effect, package: str) -> dict[str, Any]:
             "parameters": parameters,
             "context": item.context,
             "has_memory": item.has_memory,
-            "decoy": item.decoy,
+            "control": item.control,
             "source": item.source,
             "own": package not in ("", OURS),
             "package": package,

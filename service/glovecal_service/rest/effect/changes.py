@@ -18,10 +18,11 @@ from glovecal_service.rest.effect.declarations import Declared, checked_declarat
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import PartsNeeded
 from glovecal_service.rest.http.request_types import ONE_LINE, Channel, ModelInPath, StrictBody
-from glovecal_service.rest.job.jobs import Job, new_job
+from glovecal_service.rest.job.jobs import Job, JobFacts, new_job
 from glovecal_service.rest.model.model_takes import TakesNamed, model_takes
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import JobRecord, TakeRecord
+from glovecal_service.views.addition import AdditionResult
 
 router = APIRouter(prefix="/models", tags=["models"])
 
@@ -34,7 +35,11 @@ WHY_NOT = {
 EffectName = Annotated[str, StringConstraints(min_length=1, max_length=64, pattern=ONE_LINE)]
 
 
-class EffectWanted(StrictBody):
+class AdditionJob(JobFacts):
+    result: AdditionResult | None
+
+
+class AdditionRequest(StrictBody):
     effect: EffectName | Declared = Field(
         description="A name of the catalogue, or your own effect as a text."
     )
@@ -48,12 +53,12 @@ class EffectWanted(StrictBody):
 @router.post(
     "/{id}/effects",
     status_code=202,
-    response_model=Job,
+    response_model=AdditionJob,
     summary="Add an effect",
     responses=change_problems(409),
 )
-def add_effect(id: ModelInPath, body: EffectWanted, parts: PartsNeeded, response: Response) -> JobRecord:
-    """A child model is stored if the error on takes left out falls; else the job's result says why not."""
+def add_effect(id: ModelInPath, body: AdditionRequest, parts: PartsNeeded, response: Response) -> JobRecord:
+    """A child model is stored if the held-out error falls; else the job's result says why not."""
     record = parts.store.models.get(id)
     model, _ = parts.predictors.get(record.id)
     takes = model_takes(parts.store, record, body.takes)

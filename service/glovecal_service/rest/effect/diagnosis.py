@@ -11,18 +11,23 @@ from glovecal_service.rest.effect.declarations import Declared, checked_declarat
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
 from glovecal_service.rest.http.request_types import ModelInPath, StrictBody
-from glovecal_service.rest.job.jobs import Job, new_job
+from glovecal_service.rest.job.jobs import JobFacts, new_job
 from glovecal_service.rest.model.model_takes import TakesNamed, model_takes
 from glovecal_service.store.records import JobRecord
+from glovecal_service.views.diagnosis import DiagnosisResult
 
 router = APIRouter(prefix="/models", tags=["models"])
 
 MOST_DECLARATIONS = 8
 
 
-class DiagnosisWanted(StrictBody):
+class DiagnosisJob(JobFacts):
+    result: DiagnosisResult | None
+
+
+class DiagnosisRequest(StrictBody):
     takes: TakesNamed | None = Field(None, description="Ids or names; null: those it was trained on.")
-    seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(0, description="Of the decoys.")
+    seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(0, description="Of the controls.")
     effects: Annotated[list[Declared], Field(max_length=MOST_DECLARATIONS)] = Field(
         default=[], description="Effects of your own, tried beside the catalogue's."
     )
@@ -31,12 +36,12 @@ class DiagnosisWanted(StrictBody):
 @router.post(
     "/{id}/diagnose",
     status_code=202,
-    response_model=Job,
+    response_model=DiagnosisJob,
     summary="Find which physical effect the model lacks",
     responses=change_problems(409),
 )
 def diagnose_model(
-    id: ModelInPath, body: DiagnosisWanted, store: StoreNeeded, response: Response
+    id: ModelInPath, body: DiagnosisRequest, store: StoreNeeded, response: Response
 ) -> JobRecord:
     """The job's result is the diagnosis; `GET /v1/jobs/{id}/report` shows it with pictures."""
     record = store.models.get(id)

@@ -11,36 +11,41 @@ from glovecal_models.errors import BadInput
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
 from glovecal_service.rest.http.request_types import Identifier, StrictBody, SubjectName
-from glovecal_service.rest.job.jobs import Job, new_job
+from glovecal_service.rest.job.jobs import JobFacts, new_job
 from glovecal_service.rest.model.model_takes import TakesNamed, takes_named
 from glovecal_service.store.records import JobRecord
+from glovecal_service.views.improvement import ImprovementView
 
 router = APIRouter(prefix="/improve", tags=["models"])
 
 
-class ImprovementWanted(StrictBody):
+class ImprovementJob(JobFacts):
+    result: ImprovementView | None
+
+
+class ImprovementRequest(StrictBody):
     subject: SubjectName
     layout: Identifier
     takes: TakesNamed = Field(description="Ids or names of the takes to learn from.")
     holdout: TakesNamed | None = Field(
-        None, description="Errors are on these; null: on takes left out of each fit."
+        None, description="Errors are on these; null: on takes held out of each fit."
     )
     method: Literal["linear", "lmc_gpr", "spgp", "auto", "polynomial_gpr", "general_gpr"] = "lmc_gpr"
     samples: Annotated[int, Field(ge=10, le=5000)] = Field(2000, description="At most, for one rotation.")
     max_steps: Annotated[int, Field(ge=0, le=20)] = Field(6, description="Effects to add at most.")
-    seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(0, description="Of decoys and floors.")
+    seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(0, description="Of controls and floors.")
     activate: bool = Field(False, description="Predict live with the last model.")
 
 
 @router.post(
     "",
     status_code=202,
-    response_model=Job,
+    response_model=ImprovementJob,
     summary="Train, and add what the diagnosis names while it pays",
     responses=change_problems(409),
 )
-def improve(body: ImprovementWanted, store: StoreNeeded, response: Response) -> JobRecord:
-    """The job's result: `steps` (model, effect added, errors), noise floors, why it stopped, what is left.
+def improve(body: ImprovementRequest, store: StoreNeeded, response: Response) -> JobRecord:
+    """The job's result: `steps` (model, effect added, errors), noise floors, why it stopped, what remains.
 
     Each step's model is stored, with the one before it as its parent. `GET /v1/jobs/{id}/report` shows the
     fall of the error.

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Header, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, ValidationInfo, field_validator
 
 from glovecal_service.plain import plain
 from glovecal_service.rest.http.answers import change_problems, problems
@@ -20,6 +20,7 @@ from glovecal_service.rest.http.request_types import IdInPath, SubjectFilter
 from glovecal_service.store.errors import Conflict
 from glovecal_service.store.records import FINISHED_JOB_STATES, JobEvent, JobRecord, JobState
 from glovecal_service.store.store import Store
+from glovecal_service.views.job_result import current_result
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 
@@ -30,7 +31,7 @@ LONGEST_STREAM_S = 3600.0
 """After this the stream ends without ``done``; listeners connect again with ``Last-Event-ID``."""
 
 
-class Job(BaseModel):
+class JobFacts(BaseModel):
     id: str
     kind: str
     subject: str | None
@@ -41,7 +42,6 @@ class Job(BaseModel):
     fraction: float = Field(description="Done so far, 0 to 1.")
     sentence: str
     detail: dict[str, Any]
-    result: dict[str, Any] | None
     error: str | None
     traceback: str | None = Field(
         description="Python's, of a job that failed by an error in Glovecal itself; at most 8,000 characters."
@@ -50,6 +50,15 @@ class Job(BaseModel):
     started_at: datetime | None
     finished_at: datetime | None
     updated_at: datetime
+
+
+class Job(JobFacts):
+    result: dict[str, Any] | None = Field(description="Of a job of its kind: see where it is begun.")
+
+    @field_validator("result", mode="before")
+    @classmethod
+    def _current_keys(cls, result: Any, info: ValidationInfo) -> Any:
+        return current_result(info.data.get("kind", ""), result)
 
 
 @router.get("", response_model=list[Job], summary="Jobs, newest first", responses=problems())
@@ -143,18 +152,19 @@ def report_on_job(id: IdInPath, store: StoreNeeded) -> Response:
         raise Conflict(
             f"job {id} is of kind {job.kind!r}; there are pages of {' and '.join(WITH_PAGES)} jobs"
         )
-    if job.result is None:
+    result = current_result(job.kind, job.result)
+    if result is None:
         raise Conflict(f"job {id} is {job.state}; it has a page once it is done")
     from glovecal_service.report.caption import caption_of  # pages draw: few requests need them
 
     if job.kind == "diagnose":
         from glovecal_service.report.diagnosis_page import diagnosis_page
 
-        caption = caption_of(store, str(job.result.get("model", "")))
-        page = diagnosis_page(job.result, caption, job.payload.get("declarations") or ())
+        caption = caption_of(store, str(result.get("model", "")))
+        page = diagnosis_page(result, caption, job.payload.get("declarations") or ())
     else:
         from glovecal_service.report.improvement_page import improvement_page
 
-        caption = caption_of(store, str(job.result["steps"][-1].get("model") or ""))
-        page = improvement_page(job.result, job.payload["method"], job.payload["subject"], caption)
+        caption = caption_of(store, str(result["steps"][-1].get("model") or ""))
+        page = improvement_page(result, job.payload["method"], job.payload["subject"], caption)
     return Response(page, media_type="text/html; charset=utf-8")

@@ -11,6 +11,7 @@ from glovecal_models.regression.kernel_candidates import CANDIDATE
 from glovecal_models.regression.kernel_scores import choice_of
 from glovecal_models.regression.regressor import Regressor
 from glovecal_service.plain import plain
+from glovecal_service.views.renamed_keys import current_evidence
 
 
 class EffectView(BaseModel):
@@ -40,7 +41,7 @@ def effect_view(added: AddedEffect) -> dict[str, Any]:
         "context": list(effect.context),
         "has_memory": effect.has_memory,
         "settling_s": effect.settling_s(added.shape[[name in added.active for name in added.rotations]]),
-        "evidence": plain(dict(added.evidence)),
+        "evidence": plain(current_evidence(added.evidence)),
         "declaration": plain(added.settings.get("declaration")),
     }
 

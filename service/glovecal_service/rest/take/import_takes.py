@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 from glovecal_models.calibration.samples import require_layout
 from glovecal_models.errors import BadInput
-from glovecal_models.improvement.take_warnings import take_warnings
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.take_warnings import take_warnings
 from glovecal_service.store.errors import Conflict, DamagedRows
 from glovecal_service.store.records import TakeRecord
 from glovecal_service.store.store import Store

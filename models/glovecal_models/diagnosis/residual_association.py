@@ -1,10 +1,10 @@
-"""What an unexplained error goes with: every recorded column held against it, corrected for how many.
+"""Association of an unexplained error with every recorded column, corrected for multiple testing.
 
-Columns that change within takes are judged by shifting the error in time, as ``glovecal where`` does; those
-that change from take to take, and the wearing, by dealing the takes in other ways. Each shift and deal is
-the same for all columns and joints, so that the largest of them by chance is known too (Westfall and Young
-1993, single-step maxT). The two kinds are corrected apart, each at half the probability: the few ways to deal
-takes would be lost among the many to shift them.
+Columns that change within takes are tested by circular shifts of the error, as in ``glovecal where``; those
+that change from take to take, and the wearing, by permuting takes. Each shift and permutation is the same for
+all columns and joints, which gives the null distribution of the largest (Westfall and Young 1993, single-step
+maxT). The two kinds are corrected apart (Bonferroni): the few permutations of takes would be lost among the
+many shifts.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ STEPS_AT_MOST = 1000
 """Of a take; what lasts for seconds needs no more."""
 MOST = 5
 MOSTLY_WITHIN = 0.5
-"""Share of a column's variance inside takes above which takes need not be dealt to test it."""
+"""Share of a column's variance inside takes above which it is tested by shifts within takes."""
 TAKES_PER_BIN = 3
 KINDS = 2
 
 
 @dataclass(frozen=True)
-class GoesWith:
+class ResidualAssociation:
     """A column that an unexplained error of one rotation depends on."""
 
     rotation: str
@@ -43,82 +43,77 @@ class GoesWith:
     """As in ``glovecal where``: "angle", "sensor I_PIP", "context grip_n", "wearing"."""
     phrase: str
     size_deg: float
-    """Root mean square that the column explains, beyond what chance does."""
-    probability: float
-    """That chance makes any column of any rotation stand out so far."""
-
-    def told(self) -> str:
-        """Such as "c.grip_n (0.8 degrees of I_PIP, chance 1 in 200)"."""
-        chance = f"chance 1 in {round(1 / self.probability)}"
-        return f"{self.phrase} ({self.size_deg:.1f} degrees of {self.rotation}, {chance})"
+    """Root mean square that the column explains, beyond its mean under the null hypothesis."""
+    p_value: float
+    """Corrected for all columns and rotations tested."""
 
 
-def goes_with(
+def residual_associations(
     design: ForwardDesign,
     even: Sequence[ResampledTake],
     layout: Layout,
     joints: Sequence[int],
     means: Sequence[Sequence[SecondMeans]],
     generator: np.random.Generator,
-) -> tuple[GoesWith, ...]:
-    """Up to five columns that the errors of ``joints`` go with, the one that explains most first.
+) -> tuple[ResidualAssociation, ...]:
+    """Up to five columns associated with the errors of ``joints``, the one that explains most first.
 
     ``even``: the takes of the design, for their readings; ``means``: of all joints.
     """
     shares = generator.random((DRAWS, len(even)))
-    deals = np.array([generator.permutation(len(even)) for _ in range(DRAWS)])
+    permutations = np.array([generator.permutation(len(even)) for _ in range(DRAWS)])
     tried: list[_Tried] = []
     for joint in joints:
         errors = _errors(design, joint, means[joint])
         square = float(np.nanmean(np.concatenate(errors) ** 2))
         for column in _columns(design, even, layout, joint):
-            is_dealt = column.name == "wearing" or not _changes_within_takes(column)
+            is_permuted = column.name == "wearing" or not _changes_within_takes(column)
             found = (
-                _explained_when_dealt(errors, column, deals)
-                if is_dealt
+                _explained_when_permuted(errors, column, permutations)
+                if is_permuted
                 else explained_when_shifted(errors, column, shares, STEPS_AT_MOST)
             )
             if found is not None:
-                tried.append(_Tried(design.rotations[joint], column, square, is_dealt, found))
+                tried.append(_Tried(design.rotations[joint], column, square, is_permuted, found))
     listed = [
-        *_listed([each for each in tried if each.is_dealt], design.limits),
-        *_listed([each for each in tried if not each.is_dealt], design.limits),
+        *_listed([each for each in tried if each.is_permuted], design.limits),
+        *_listed([each for each in tried if not each.is_permuted], design.limits),
     ]
     return tuple(sorted(listed, key=lambda item: -item.size_deg)[:MOST])
 
 
 @dataclass(frozen=True)
 class _Tried:
-    """One column held against the error of one rotation."""
+    """One column tested against the error of one rotation."""
 
     rotation: str
     column: Covariate
     square: float
     """Mean squared error, degrees squared."""
-    is_dealt: bool
+    is_permuted: bool
     explained: np.ndarray
-    """(1 + D,), degrees: as it is, then by chance."""
+    """(1 + D,), degrees: as it is, then under each draw."""
 
     @property
     def size_deg(self) -> float:
-        """What it explains beyond chance."""
+        """What it explains beyond the mean of the draws."""
         return float(np.sqrt(max(self.explained[0] ** 2 - np.mean(self.explained[1:] ** 2), 0.0)))
 
 
-def _listed(tried: Sequence[_Tried], limits: DiagnosisLimits) -> Iterator[GoesWith]:
+def _listed(tried: Sequence[_Tried], limits: DiagnosisLimits) -> Iterator[ResidualAssociation]:
     if not tried:
         return
     corrected = _corrected(np.array([item.explained for item in tried]))
-    for item, probability in zip(tried, np.minimum(KINDS * corrected, 1.0), strict=True):
+    for item, p_value in zip(tried, np.minimum(KINDS * corrected, 1.0), strict=True):
         matters = item.size_deg**2 >= limits.association_share * item.square
-        if probability <= limits.association_p_value and matters:
-            yield GoesWith(
-                item.rotation, item.column.name, _phrase(item.column), item.size_deg, float(probability)
+        if p_value <= limits.association_p_value and matters:
+            yield ResidualAssociation(
+                item.rotation, item.column.name, _phrase(item.column), item.size_deg, float(p_value)
             )
 
 
 def _corrected(explained: np.ndarray) -> np.ndarray:
-    """(K,): for each row (1 + D,) the share of draws in which the largest of all rows stands out so far.
+    """(K,): for each row (1 + D,) the share of draws in which the largest of all rows is as large.
 
     The two-thirds power makes a mean of squares nearly normal (Wilson and Hilferty 1931), so that rows of
     different freedom can be compared.
@@ -141,10 +136,10 @@ def _changes_within_takes(column: Covariate) -> bool:
     return within > MOSTLY_WITHIN * float(np.sum((every - every.mean()) ** 2))
 
 
-def _explained_when_dealt(
-    errors: tuple[np.ndarray, ...], column: Covariate, deals: np.ndarray
+def _explained_when_permuted(
+    errors: tuple[np.ndarray, ...], column: Covariate, permutations: np.ndarray
 ) -> np.ndarray | None:
-    """Mean errors of takes in bins of the column's mean, as they are and dealt in other ways."""
+    """Mean errors of takes in bins of the column's mean, as they are and permuted."""
     if any(not np.isfinite(values).any() for values in column.values):
         return None
     level = np.array([np.nanmean(values) for values in column.values])
@@ -160,7 +155,7 @@ def _explained_when_dealt(
     centre = float(np.concatenate(known).mean())
     total = np.array([np.sum(values - centre) for values in known])
     count = np.array([len(values) for values in known], dtype=float)
-    member = np.eye(bins)[bin_of[np.concatenate([np.arange(len(level))[None, :], deals])]]
+    member = np.eye(bins)[bin_of[np.concatenate([np.arange(len(level))[None, :], permutations])]]
     sums, counts = (np.einsum("t,dtb->db", values, member) for values in (total, count))
     return np.sqrt(np.sum(sums**2 / np.maximum(counts, 1.0), axis=1) / count.sum())
 

@@ -1,4 +1,4 @@
-"""Decoys: each twin does what its name says."""
+"""Controls: each twin does what its name says."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glovecal_models.effects.base.decoy import decoy_columns
+from glovecal_models.effects.base.control import control_columns
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.errors import BadInput
 
@@ -16,7 +16,7 @@ def test_reversed_in_time_is_the_operator_run_backwards(signals):
     creep = catalogue()["creep"]
     shape = np.tile([1.0, 4.0, 16.0], (3, 1))
     take = signals[0]
-    [twin] = decoy_columns(creep, [take], {}, shape, np.random.default_rng(0))
+    [twin] = control_columns(creep, [take], {}, shape, np.random.default_rng(0))
     turned = replace(take, time_s=-take.time_s[::-1], own=take.own[::-1])
     np.testing.assert_allclose(twin[::-1], creep.columns(turned, {}, shape), atol=1e-9)
 
@@ -25,7 +25,7 @@ def test_rolled_in_time_keeps_the_values_and_moves_them(signals):
     coupling = catalogue()["cross_coupling"]
     settings, shape = coupling.settle(signals), np.zeros((3, 0))
     for seed in range(5):
-        twins = decoy_columns(coupling, signals, settings, shape, np.random.default_rng(seed))
+        twins = control_columns(coupling, signals, settings, shape, np.random.default_rng(seed))
         for take, twin in zip(signals, twins, strict=True):
             true = coupling.columns(take, settings, shape)
             [shift] = [n for n in range(len(take)) if np.array_equal(np.roll(true, n, axis=0), twin)]
@@ -40,45 +40,45 @@ def test_context_comes_from_another_wearing(signals):
     brief = replace(signals[3], time_s=time, own=own, others={}, context=context)
     takes = [*signals[:3], brief]
     for seed in range(8):
-        twins = decoy_columns(temperature, takes, settings, shape, np.random.default_rng(seed))
+        twins = control_columns(temperature, takes, settings, shape, np.random.default_rng(seed))
         level = [twin[:, 0, 0].mean() for twin in twins]
         true = [temperature.columns(take, settings, shape)[:, 0, 0].mean() for take in takes]
         givers = [int(np.argmin(np.abs(np.array(true) - value))) for value in level]
         assert sorted(givers) == [0, 1, 2, 3]
         assert all(takes[giver].wearing != take.wearing for giver, take in zip(givers, takes, strict=True))
-    [alone] = decoy_columns(temperature, takes[:1], settings, shape, np.random.default_rng(0))
+    [alone] = control_columns(temperature, takes[:1], settings, shape, np.random.default_rng(0))
     assert not np.allclose(alone, temperature.columns(takes[0], settings, shape))
 
 
-def dealt(takes, seed):
+def permuted(takes, seed):
     """The wearing each take got."""
     donning = catalogue()["donning_shift"]
     settings = donning.settle(takes)
-    twins = decoy_columns(donning, takes, settings, np.zeros((3, 0)), np.random.default_rng(seed))
+    twins = control_columns(donning, takes, settings, np.zeros((3, 0)), np.random.default_rng(seed))
     wearings = settings["wearings"]
     return [wearings[int(np.argmax(twin[0, 0, : len(wearings)]))] for twin in twins]
 
 
 def test_wearings_are_dealt_within_the_same_motion_and_never_as_they_were(signals):
     for seed in range(20):
-        free_a, fast_a, free_b, fast_b = dealt(signals, seed)
+        free_a, fast_a, free_b, fast_b = permuted(signals, seed)
         assert {free_a, free_b} == {fast_a, fast_b} == {"a", "b"}
         assert free_a != fast_a
 
 
 def test_names_that_do_not_tell_the_motion_do_not_hinder(signals):
     takes = [replace(take, take=f"take{number}") for number, take in enumerate(signals)]
-    found = {tuple(dealt(takes, seed)) for seed in range(30)}
+    found = {tuple(permuted(takes, seed)) for seed in range(30)}
     assert ("a", "a", "b", "b") not in found
     assert ("b", "b", "a", "a") not in found
     assert len(found) == 4
     different = [
         replace(take, take=word) for word, take in zip(["up", "down", "left", "right"], signals, strict=True)
     ]
-    assert sorted(dealt(different, 1)) == ["a", "a", "b", "b"]
+    assert sorted(permuted(different, 1)) == ["a", "a", "b", "b"]
 
 
 def test_wearings_that_cannot_be_dealt_otherwise_are_refused(signals):
     takes = [replace(take, wearing=str(number)) for number, take in enumerate(signals)]
     with pytest.raises(BadInput, match="in one way only; record two takes in a wearing"):
-        dealt(takes, 0)
+        permuted(takes, 0)

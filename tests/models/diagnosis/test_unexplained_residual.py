@@ -1,4 +1,4 @@
-"""Something is left: told with its size and its column, silent on healthy gloves and on a few seconds."""
+"""Unexplained residuals: their size and their column; none on healthy gloves and on a few seconds."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import pytest
 from scipy.signal import lfilter
 
 from glovecal_models.diagnosis.diagnose import diagnose
-from glovecal_models.diagnosis.shared_error import shared_error
-from glovecal_models.diagnosis.slow_error import SecondMeans, slow_error, without_drift
-from glovecal_models.diagnosis.something_left import Left
+from glovecal_models.diagnosis.slow_error import SecondMeans, shared_error, slow_error, without_drift
+from glovecal_models.diagnosis.text import residual_obstacle, residual_sentence
+from glovecal_models.diagnosis.unexplained_residual import UnexplainedResidual
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
@@ -51,9 +51,9 @@ def with_error(takes: Sequence[Take], column: str | None, seed: int, size: float
     return changed
 
 
-def left_of(takes: Sequence[Take]) -> Left:
+def residual_of(takes: Sequence[Take]) -> UnexplainedResidual:
     """Without an effect that could take the column's part."""
-    return diagnose(takes, LAYOUT, effects=[]).left
+    return diagnose(takes, LAYOUT, effects=[]).residual
 
 
 def test_neighbouring_seconds_measure_what_lasts_and_not_the_noise():
@@ -63,7 +63,7 @@ def test_neighbouring_seconds_measure_what_lasts_and_not_the_noise():
     without, with_it = (slow_error(means(*parts), noise) for parts in (noise, lasting))
     assert without.size_deg < 0.25
     assert with_it.size_deg == pytest.approx(0.66, abs=0.12)
-    assert with_it.at_least_deg < with_it.size_deg
+    assert with_it.lower_bound_deg < with_it.size_deg
 
 
 def test_the_lower_bound_holds_nineteen_times_in_twenty():
@@ -71,7 +71,7 @@ def test_the_lower_bound_holds_nineteen_times_in_twenty():
     random = np.random.default_rng(2)
     true = np.exp(-1 / (2 * 5.0))
     above = [
-        slow_error(means(*(wander(random, 40, 5.0) for _ in range(12))), []).at_least_deg > true
+        slow_error(means(*(wander(random, 40, 5.0) for _ in range(12))), []).lower_bound_deg > true
         for _ in range(200)
     ]
     assert np.mean(above) <= 0.09
@@ -95,8 +95,8 @@ def test_the_lower_bound_holds_beside_noise(takes, length, size, noise):
         )
         for _ in range(150)
     ]
-    assert np.mean([item.at_least_deg > true for item in found]) <= 0.10
-    assert all(0 <= item.at_least_deg <= item.size_deg for item in found)
+    assert np.mean([item.lower_bound_deg > true for item in found]) <= 0.10
+    assert all(0 <= item.lower_bound_deg <= item.size_deg for item in found)
 
 
 @pytest.mark.parametrize("offset", [1e-9, 1e-3, 0.1])
@@ -106,8 +106,8 @@ def test_a_bound_is_never_above_its_estimate(offset):
     values = [10.0 * np.cumprod(np.append(1.0, signs)) for _ in range(4)]
     values[0][0] *= 1.0 + offset
     found = slow_error(means(*values), [])
-    assert np.isfinite(found.at_least_deg)
-    assert found.at_least_deg <= found.size_deg
+    assert np.isfinite(found.lower_bound_deg)
+    assert found.lower_bound_deg <= found.size_deg
 
 
 def test_drift_of_a_take_does_not_count_as_wandering_within_it():
@@ -124,39 +124,40 @@ def test_errors_of_several_joints_are_shared_or_by_chance_alike():
     together, apart = (
         shared_error([means(*takes) for takes in each], np.random.default_rng(4)) for each in (joints, alone)
     )
-    assert together.probability <= 0.01
+    assert together.p_value <= 0.01
     assert together.size_deg == pytest.approx(1.0, abs=0.25)
-    assert apart.probability > 0.01 or apart.size_deg < 0.35
+    assert apart.p_value > 0.01 or apart.size_deg < 0.35
 
 
 def test_a_healthy_glove_is_silent(healthy):
-    found = left_of(healthy)
-    assert not found.is_left
-    assert found.goes_with == ()
-    assert found.sentence.startswith("What is left looks like noise")
+    found = residual_of(healthy)
+    assert not found.is_significant
+    assert found.associations == ()
+    assert residual_sentence(found).startswith("The residual looks like noise")
 
 
-def test_what_is_left_is_called_by_the_column_it_goes_with(healthy):
-    found = left_of(with_error(healthy, "strap_n", 5, 3.0))
-    assert found.is_left
-    first = found.goes_with[0]
+def test_the_residual_is_associated_with_its_column(healthy):
+    found = residual_of(with_error(healthy, "strap_n", 5, 3.0))
+    assert found.is_significant
+    first = found.associations[0]
     assert (first.rotation, first.column, first.phrase) == ("I_PIP", "context strap_n", "c.strap_n")
-    assert first.probability <= 0.02
-    lasting = found.lasting["I_PIP"]
-    assert lasting.at_least_deg < first.size_deg < 2 * lasting.size_deg
-    assert "it goes with c.strap_n (" in found.sentence
-    assert "degrees of I_PIP, chance 1 in" in found.sentence
+    assert first.p_value <= 0.02
+    lasting = found.slow["I_PIP"]
+    assert lasting.lower_bound_deg < first.size_deg < 2 * lasting.size_deg
+    sentence = residual_sentence(found)
+    assert "it is associated with c.strap_n (" in sentence
+    assert "degrees of I_PIP, p = 0.0" in sentence
 
 
 def test_without_its_column_the_cause_was_not_recorded(healthy):
-    found = left_of(with_error(healthy, None, 5, 3.0))
-    assert found.is_left
-    assert found.goes_with == ()
-    assert found.sentence.endswith("it goes with none of the recorded columns.")
+    found = residual_of(with_error(healthy, None, 5, 3.0))
+    assert found.is_significant
+    assert found.associations == ()
+    assert residual_sentence(found).endswith("it is associated with none of the recorded columns.")
 
 
 def test_a_column_that_wanders_by_itself_is_not_accused(healthy):
-    """Of eight sessions, at a corrected probability of 1 in 50, none should list a column; one may."""
+    """Of eight sessions, at a corrected p value of 0.02, none should list a column; one may."""
     accused = 0
     for seed in range(8):
         takes = with_error(healthy, None, 100 + seed, 3.0)
@@ -165,7 +166,7 @@ def test_a_column_that_wanders_by_itself_is_not_accused(healthy):
             replace(take, context={**take.context, "c": wander(random, len(take.time_s), 240.0)})
             for take in takes
         ]
-        accused += bool(left_of(takes).goes_with)
+        accused += bool(residual_of(takes).associations)
     assert accused <= 1
 
 
@@ -174,7 +175,7 @@ def test_the_wearing_is_named_when_the_error_goes_with_it(healthy):
     takes = [
         replace(take, readings=take.readings + shift[take.wearing] * np.array([0.0, 1.0])) for take in healthy
     ]
-    columns = {item.column for item in left_of(takes).goes_with}
+    columns = {item.column for item in residual_of(takes).associations}
     assert "wearing" in columns
 
 
@@ -187,7 +188,7 @@ def test_a_few_seconds_do_not_tell(healthy):
         )
         for number, take in enumerate(healthy)
     ]  # fmt: skip
-    found = left_of(short)
-    assert not found.is_left
-    assert found.not_judgeable == "0 stretches of 4 s or more were measured, 5 are needed"
-    assert found.sentence.startswith("Whether something is left that lasts cannot be judged")
+    found = residual_of(short)
+    assert not found.is_significant
+    assert residual_obstacle(found) == "0 stretches of 4 s or more were measured, 5 are needed"
+    assert residual_sentence(found).startswith("An unexplained residual cannot be judged")

@@ -1,6 +1,6 @@
-"""Decoys: an effect's twin with the same freedom that cannot be right.
+"""Negative controls: the effect's columns with the same freedom, made of inputs that cannot be right.
 
-What a twin gains on held-out takes, flexibility alone gains; only what an effect gains beyond it counts.
+What a control saves on held-out takes, flexibility alone saves; only what an effect saves beyond it counts.
 """
 
 from __future__ import annotations
@@ -17,35 +17,35 @@ from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.errors import BadInput
 
-ROLLED_SHARE = (0.2, 0.8)
+SHIFT_SHARE = (0.2, 0.8)
 """Of a take's length."""
-MOST_DEALS = 200
+MOST_PERMUTATIONS = 200
 
 
-def decoy_columns(
+def control_columns(
     effect: Effect,
     takes: Sequence[Signals],
     settings: Settings,
     shape: np.ndarray,
     generator: np.random.Generator,
 ) -> list[np.ndarray]:
-    """Columns (N, L, C) of the effect's twin for each take, for the same settings and shape (L, P).
+    """Columns (N, L, C) of the effect's control for each take, for the same settings and shape (L, P).
 
-    Raises BadInput when the takes allow no twin: wearings that can only be dealt as they were.
+    Raises BadInput when the takes allow no control: wearings with no other permutation.
     """
-    if effect.decoy == "reversed in time":
-        return [effect.columns(_backwards(take), settings, shape)[::-1] for take in takes]
-    if effect.decoy == "rolled in time":
-        return [effect.columns(_rolled(take, generator), settings, shape) for take in takes]
-    if effect.decoy == "context of other takes":
+    if effect.control == "time-reversed":
+        return [effect.columns(_reversed(take), settings, shape)[::-1] for take in takes]
+    if effect.control == "circularly shifted":
+        return [effect.columns(_shifted(take, generator), settings, shape) for take in takes]
+    if effect.control == "context of other takes":
         swapped = _with_other_context(takes, generator)
         return [effect.columns(take, settings, shape) for take in swapped]
-    if effect.decoy == "dealt wearings":
-        return [effect.columns(take, settings, shape) for take in _dealt(takes, generator)]
+    if effect.control == "permuted wearings":
+        return [effect.columns(take, settings, shape) for take in _with_permuted_wearings(takes, generator)]
     return [np.zeros_like(effect.columns(take, settings, shape)) for take in takes]
 
 
-def _backwards(take: Signals) -> Signals:
+def _reversed(take: Signals) -> Signals:
     return replace(
         take,
         time_s=take.time_s[0] + take.time_s[-1] - take.time_s[::-1],
@@ -55,9 +55,9 @@ def _backwards(take: Signals) -> Signals:
     )
 
 
-def _rolled(take: Signals, generator: np.random.Generator) -> Signals:
+def _shifted(take: Signals, generator: np.random.Generator) -> Signals:
     """Own, others and context shifted together, so that no column stays where it was right."""
-    shift = round(generator.uniform(*ROLLED_SHARE) * len(take))
+    shift = round(generator.uniform(*SHIFT_SHARE) * len(take))
     return replace(
         take,
         own=np.roll(take.own, shift, axis=0),
@@ -69,10 +69,10 @@ def _rolled(take: Signals, generator: np.random.Generator) -> Signals:
 def _with_other_context(takes: Sequence[Signals], generator: np.random.Generator) -> list[Signals]:
     """Each take with the context of another one, of another wearing where possible.
 
-    A single take has no other: its context is rolled in time.
+    A single take has no other: its context is circularly shifted.
     """
     if len(takes) < 2:
-        return [replace(take, context=_rolled(take, generator).context) for take in takes]
+        return [replace(take, context=_shifted(take, generator).context) for take in takes]
     cost = generator.uniform(0.0, 1e-3, (len(takes), len(takes)))
     for row, take in enumerate(takes):
         cost[row] += [1.0 if take.wearing == other.wearing else 0.0 for other in takes]
@@ -95,24 +95,24 @@ def _stretched(context: Mapping[str, np.ndarray], length: int) -> dict[str, np.n
     return result
 
 
-def _dealt(takes: Sequence[Signals], generator: np.random.Generator) -> list[Signals]:
-    """The takes dealt to other wearings, within the same motion where names tell; never as they were."""
+def _with_permuted_wearings(takes: Sequence[Signals], generator: np.random.Generator) -> list[Signals]:
+    """Wearings permuted among takes, within the same motion where names tell; never the true partition."""
     true = _partition([take.wearing for take in takes])
     for motions in (motions_of(takes), [""] * len(takes)):
-        for _ in range(MOST_DEALS):
-            dealt = _permuted([take.wearing for take in takes], motions, generator)
-            if _partition(dealt) != true:
-                return [replace(take, wearing=wearing) for take, wearing in zip(takes, dealt, strict=True)]
-    raise BadInput("these takes can be dealt to wearings in one way only; record two takes in a wearing")
+        for _ in range(MOST_PERMUTATIONS):
+            permuted = _permuted_names([take.wearing for take in takes], motions, generator)
+            if _partition(permuted) != true:
+                return [replace(take, wearing=wearing) for take, wearing in zip(takes, permuted, strict=True)]
+    raise BadInput("the wearings of these takes have no other permutation; record two takes in a wearing")
 
 
-def _permuted(wearings: list[str], motions: list[str], generator: np.random.Generator) -> list[str]:
-    dealt = wearings.copy()
+def _permuted_names(wearings: list[str], motions: list[str], generator: np.random.Generator) -> list[str]:
+    permuted = wearings.copy()
     for motion in dict.fromkeys(motions):
         members = [index for index, other in enumerate(motions) if other == motion]
         for index, source in zip(members, map(int, generator.permutation(members)), strict=True):
-            dealt[index] = wearings[source]
-    return dealt
+            permuted[index] = wearings[source]
+    return permuted
 
 
 def _partition(wearings: Sequence[str]) -> frozenset[frozenset[int]]:

@@ -1,7 +1,7 @@
-"""Could a cause that changes from take to take explain so much by chance? Takes are dealt in other ways.
+"""Permutation test of a cause that changes from take to take: the takes are the exchangeable units.
 
-Blocks of one take share its context, so they are no independent witnesses: only the takes are. The context of
-each take (or its wearing) is given to another one, and the same columns are fitted; base and rows stay.
+Blocks of one take share its context, so they are not independent: only the takes are. The context of each
+take (or its wearing) is given to another one, and the same columns are fitted; base and rows stay.
 """
 
 from __future__ import annotations
@@ -13,23 +13,23 @@ import numpy as np
 
 from glovecal_models.comparison.wearings import other_deals, partition_of
 from glovecal_models.diagnosis.forward_design import ForwardDesign
-from glovecal_models.effects.base.decoy import motions_of, with_context
+from glovecal_models.effects.base.control import motions_of, with_context
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
 from glovecal_models.effects.base.signals import Signals
 
-DEALS = 299
+PERMUTATIONS = 299
 ROWS_PER_TAKE = 80
 
 
-def session_probability(design: ForwardDesign, effect: Effect, generator: np.random.Generator) -> float:
-    """Share of deals that explain as much, of all joints together or of one.
+def session_p_value(design: ForwardDesign, effect: Effect, generator: np.random.Generator) -> float:
+    """Share of permutations that explain as much, over all joints together or on one.
 
-    The smaller of the two shares is held against the smaller of each deal's own, so that choosing between
-    them gains nothing.
+    The smaller of the two shares is compared with the smaller of each permutation's own, which corrects for
+    the choice between them.
     """
     joints = range(len(design.rotations))
-    deals = _deals(design, effect, generator)
+    permutations = _permutations(design, effect, generator)
     settings = effect.settle(design.signals)
     grid = effect.grid(design.signals, settings)
     rows = [_thinned(take.time_s) for take in design.signals]
@@ -46,7 +46,9 @@ def session_probability(design: ForwardDesign, effect: Effect, generator: np.ran
             ]
         )
 
-    every = np.array([explained(thin), *(explained(_dealt(thin, deal, effect)) for deal in deals)])
+    every = np.array(
+        [explained(thin), *(explained(_permuted(thin, order, effect)) for order in permutations)]
+    )
     shares = np.minimum(_shares_as_large(every.sum(axis=1)), _shares_as_large(every.max(axis=1)))
     return float(np.mean(shares <= shares[0] * (1 + 1e-9)))
 
@@ -56,51 +58,51 @@ def _shares_as_large(values: np.ndarray) -> np.ndarray:
     return np.mean(values[None, :] >= values[:, None] * (1 - 1e-9), axis=1)
 
 
-def wearing_deals(takes: Sequence[Signals], generator: np.random.Generator) -> list[np.ndarray]:
-    """Other ways to deal takes to wearings, among takes of the same motion where names tell motions."""
+def wearing_permutations(takes: Sequence[Signals], generator: np.random.Generator) -> list[np.ndarray]:
+    """Other assignments of takes to wearings, among takes of the same motion where names tell motions."""
     names = [take.wearing for take in takes]
     order = list(dict.fromkeys(names))
     owners = np.array([order.index(name) for name in names])
     groups = _motion_groups(owners, motions_of(takes))
     if groups:
         return _within_motions(owners, groups, generator)
-    return other_deals(owners, DEALS, generator)
+    return other_deals(owners, PERMUTATIONS, generator)
 
 
-def _deals(design: ForwardDesign, effect: Effect, generator: np.random.Generator) -> list[np.ndarray]:
-    if effect.decoy == "dealt wearings":
-        return wearing_deals(design.signals, generator)
-    return [generator.permutation(len(design.signals)) for _ in range(DEALS)]
+def _permutations(design: ForwardDesign, effect: Effect, generator: np.random.Generator) -> list[np.ndarray]:
+    if effect.control == "permuted wearings":
+        return wearing_permutations(design.signals, generator)
+    return [generator.permutation(len(design.signals)) for _ in range(PERMUTATIONS)]
 
 
 def _motion_groups(owners: np.ndarray, motions: Sequence[str]) -> list[np.ndarray]:
     """Takes of one motion each that was done in several wearings; none when names tell few such motions."""
     groups = [np.flatnonzero([m == motion for m in motions]) for motion in dict.fromkeys(motions)]
-    dealt = [group for group in groups if len(set(owners[group].tolist())) > 1]
-    if len(groups) < 2 or 2 * sum(map(len, dealt)) < len(owners):
+    permuted = [group for group in groups if len(set(owners[group].tolist())) > 1]
+    if len(groups) < 2 or 2 * sum(map(len, permuted)) < len(owners):
         return []
-    return dealt
+    return permuted
 
 
 def _within_motions(
     owners: np.ndarray, groups: Sequence[np.ndarray], generator: np.random.Generator
 ) -> list[np.ndarray]:
-    """Distinct deals that move takes only within their group."""
+    """Distinct permutations that move takes only within their group."""
     found: dict[tuple[int, ...], np.ndarray] = {}
-    for _ in range(20 * DEALS):
-        dealt = owners.copy()
+    for _ in range(20 * PERMUTATIONS):
+        permuted = owners.copy()
         for group in groups:
-            dealt[group] = owners[generator.permutation(group)]
-        found[partition_of(dealt)] = dealt
+            permuted[group] = owners[generator.permutation(group)]
+        found[partition_of(permuted)] = permuted
     found.pop(partition_of(owners), None)
-    return list(found.values())[:DEALS]
+    return list(found.values())[:PERMUTATIONS]
 
 
-def _dealt(takes: Sequence[Signals], deal: np.ndarray, effect: Effect) -> list[Signals]:
-    if effect.decoy == "dealt wearings":
-        order = list(dict.fromkeys(take.wearing for take in takes))
-        return [replace(take, wearing=order[int(to)]) for take, to in zip(takes, deal, strict=True)]
-    return [with_context(take, takes[int(to)]) for take, to in zip(takes, deal, strict=True)]
+def _permuted(takes: Sequence[Signals], order: np.ndarray, effect: Effect) -> list[Signals]:
+    if effect.control == "permuted wearings":
+        names = list(dict.fromkeys(take.wearing for take in takes))
+        return [replace(take, wearing=names[int(to)]) for take, to in zip(takes, order, strict=True)]
+    return [with_context(take, takes[int(to)]) for take, to in zip(takes, order, strict=True)]
 
 
 def _thinned(time_s: np.ndarray) -> np.ndarray:
@@ -141,7 +143,7 @@ def _projected(
 
 
 def _explained(columns: np.ndarray, base: np.ndarray, target: np.ndarray, prior: np.ndarray) -> float:
-    """Share of the target's square that columns save beside the base, weights held by their prior."""
+    """Share of the target's square that columns explain beside the base, weights shrunk by their prior."""
     left = columns - base @ (base.T @ columns)
     square = float(target @ target)
     if square <= 0:

@@ -1,4 +1,4 @@
-"""What looks wrong about takes before anything is learned from them; likes are told once."""
+"""What looks wrong about takes before anything is learned from them; like warnings are counted."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def take_warnings(takes: Sequence[Take]) -> list[str]:
             continue
         for sentence in check_take(take).sentences:
             alike.setdefault(kind_of(sentence), []).append(sentence)
-    return [_told(sentences) for sentences in alike.values()]
+    return [_summarized(sentences) for sentences in alike.values()]
 
 
 def kind_of(sentence: str) -> str:
@@ -28,18 +28,7 @@ def kind_of(sentence: str) -> str:
     return _NUMBER.sub("#", _NAME.sub("", sentence)).replace("gaps", "gap").replace("takes", "take")
 
 
-def only_take_sentence(takes: Sequence[Take]) -> str | None:
-    """What a single take means for the errors."""
-    if len(takes) != 1:
-        return None
-    seconds = takes[0].duration_s
-    return (
-        f"There is only one take, of {seconds:.0f} s: errors are on pieces of it left out, and nothing tells"
-        " how the model does in another take or wearing. Record a second one."
-    )
-
-
-def _told(sentences: Sequence[str]) -> str:
+def _summarized(sentences: Sequence[str]) -> str:
     more = len(sentences) - 1
     return (
         sentences[0] if not more else f"{sentences[0]} The same in {more} more take{'s' if more > 1 else ''}."

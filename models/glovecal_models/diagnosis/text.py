@@ -1,0 +1,223 @@
+"""What a diagnosis found in sentences for people, from its results alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from glovecal_models.diagnosis.diagnosis import Diagnosis
+from glovecal_models.diagnosis.hold_drift import HAND, HoldDrift, PoseDrift, drifting
+from glovecal_models.diagnosis.next_take import NextTake
+from glovecal_models.diagnosis.not_identifiable import SINGLE_POSES, NotIdentifiable
+from glovecal_models.diagnosis.residual_association import ResidualAssociation
+from glovecal_models.diagnosis.unexplained_residual import SlowExcess, UnexplainedResidual
+from glovecal_models.effects.base.assessment import Assessment
+from glovecal_models.effects.catalogue import effect
+
+MOST_ASSOCIATIONS = 3
+MOST_SENSORS = 3
+UNITS = "The reference only names poses: errors are shares of the step from 0 to 1, not degrees."
+
+
+def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
+    """What a mocap engineer should know, the most important first."""
+    sentences = [*diagnosis.reference_problems, *(item.sentence for item in diagnosis.findings)]
+    if diagnosis.naming.ranked:
+        sentences.append(ranked_sentence(diagnosis))
+    elif diagnosis.hold_drift is not None:
+        sentences += [hold_sentence(diagnosis.hold_drift), UNITS]
+    elif not diagnosis.findings:
+        sentences.append(nothing_named_sentence(diagnosis))
+    if diagnosis.next_take is not None:
+        sentences.append(next_take_sentence(diagnosis.next_take))
+    sentences.append(residual_sentence(diagnosis.residual))
+    return sentences + not_identifiable_sentences(diagnosis.not_identifiable)
+
+
+def named_sentence(diagnosis: Diagnosis) -> str | None:
+    """Of the named effect; None when there is none."""
+    if diagnosis.signature:
+        return diagnosis.signature[0].sentence
+    if diagnosis.naming.ranked:
+        return ranked_sentence(diagnosis)
+    held = diagnosis.hold_drift
+    return None if held is None or not held.confidence_set else hold_sentence(held)
+
+
+def ranked_sentence(diagnosis: Diagnosis) -> str:
+    """The first of the ranking, with its evidence and its confidence set."""
+    item = diagnosis.naming.ranked[0]
+    rmse, where = item.rmse_deg, ", ".join(item.joints[i] for i in item.significant_joints)
+    p_value = "" if item.p_value is None else f", p = {item.p_value:.2g}"
+    start = (
+        f"{item.effect} on {where} reduces the held-out error from {rmse.before:.2f} to {rmse.after:.2f}"
+        f" degrees (control: {rmse.control:.2f}{p_value})"
+    )
+    rivals = diagnosis.naming.confidence_set[1:]
+    if rivals:
+        return f"{start}; ambiguous with {', '.join(rivals)}."
+    caveat = diagnosis.effects[item.effect].caveat
+    return f"{start}; {caveat}." if caveat else f"{start}."
+
+
+def nothing_named_sentence(diagnosis: Diagnosis) -> str:
+    """Because nothing beats its control, or because the takes are too short."""
+    blocks = max((len(e.base) for item in diagnosis.assessments for e in item.errors), default=0)
+    fewest = diagnosis.limits.fewest_blocks
+    if blocks < fewest:
+        return f"Too few data to judge any effect: {blocks} blocks of 5 s, {fewest} are needed."
+    return "No known effect beats its control significantly."
+
+
+def candidate_sentence(item: Assessment) -> str:
+    """The held-out error without an effect, with it and with its control."""
+    rmse = item.rmse_deg
+    return (
+        f"{item.effect}: {rmse.before:.2f} to {rmse.after:.2f} degrees (control: {rmse.control:.2f}); largest"
+        f" on {item.largest_contrast_joint}."
+    )
+
+
+def next_take_sentence(take: NextTake) -> str:
+    """What to record, and why."""
+    return f"To separate {' and '.join(take.separates)}, record {take.seconds} s: {take.what}"
+
+
+def not_identifiable_sentences(items: Sequence[NotIdentifiable]) -> list[str]:
+    """One for each reason."""
+    reasons: dict[str, list[str]] = {}
+    for item in items:
+        reasons.setdefault(item.why, []).append(item.effect)
+    return [f"Not identifiable: {', '.join(effects)}. Reason: {why}." for why, effects in reasons.items()]
+
+
+def residual_sentence(residual: UnexplainedResidual) -> str:
+    """Whether the residual is significant, and what it is associated with."""
+    obstacle = residual_obstacle(residual)
+    if obstacle is not None:
+        return f"An unexplained residual cannot be judged: {obstacle}."
+    if not residual.is_significant:
+        largest = max(item.size_deg for item in residual.judged)
+        return f"The residual looks like noise: slow errors (over 1 s) of at most {largest:.1f} degrees RMS."
+    parts = [] if residual.excess is None else [_excess(residual.excess)]
+    if residual.is_shared:
+        shared = residual.shared
+        parts.append(f"joints share an error of {shared.size_deg:.1f} degrees (p = {shared.p_value:.2g})")
+    known = "identifiable effect" if residual.undecided else "known effect"
+    sentence = (
+        f"No {known} explains the residual: {' and '.join(parts)}; {_associated(residual.associations)}."
+    )
+    undecided = " or ".join(residual.undecided)
+    return (
+        f"{sentence} Possible cause that these takes cannot decide: {undecided}." if undecided else sentence
+    )
+
+
+def residual_obstacle(residual: UnexplainedResidual) -> str | None:
+    """Why the residual cannot be judged, as the end of a sentence; None where it can."""
+    if residual.obstacle == "single poses":
+        return SINGLE_POSES
+    if residual.obstacle == "no measured angle":
+        return "no angle was measured"
+    if residual.obstacle == "few stretches":
+        most = max((item.stretches for item in residual.slow.values()), default=0)
+        limits = residual.limits
+        return (
+            f"{most} stretches of {limits.slow_shortest_s} s or more were measured,"
+            f" {limits.slow_fewest_stretches} are needed"
+        )
+    excess = residual.excess
+    if residual.obstacle is None or excess is None:
+        return None
+    return (
+        f"the slow error of {excess.joint} (over 1 s) is {excess.error.size_deg:.1f} degrees RMS, lower 95 %"
+        f" bound {excess.error.lower_bound_deg:.1f} from {excess.error.stretches} stretches; healthy gloves"
+        f" have up to {excess.healthy_deg:.1f}; record longer takes"
+    )
+
+
+def _excess(item: SlowExcess) -> str:
+    where = " within takes" if item.is_within_takes else ""
+    return (
+        f"slow error (over 1 s) of {item.joint}{where} {item.error.size_deg:.2f} degrees RMS (lower 95 %"
+        f" bound {item.error.lower_bound_deg:.2f}; healthy gloves: at most {item.healthy_deg:.2f})"
+    )
+
+
+def _associated(columns: Sequence[ResidualAssociation]) -> str:
+    if not columns:
+        return "it is associated with none of the recorded columns"
+    each = [
+        f"{item.phrase} ({item.size_deg:.1f} degrees of {item.rotation}, p = {item.p_value:.2g})"
+        for item in columns[:MOST_ASSOCIATIONS]
+    ]
+    return f"it is associated with {', '.join(each)}"
+
+
+def hold_sentence(drift: HoldDrift) -> str:
+    """What drifts within held poses, how much, and what it is consistent with."""
+    if drift.why_not is not None:
+        return f"Drift within held poses cannot be judged: {drift.why_not}."
+    if not drift.confidence_set:
+        return (
+            f"While a pose is held the readings do not drift significantly ({drift.holds} holds, p = "
+            f"{drift.p_value:.2g} by flipping the sign of whole holds)."
+        )
+    poses = [pose for pose in drift.poses if drift.consistent(pose)] or [drift.poses[0]]
+    each = "; ".join(_pose(drift, pose) for pose in poses)
+    return f"{_headline(drift)}: {each}. {_reason(drift)} {_limits(drift)}".strip()
+
+
+def _headline(drift: HoldDrift) -> str:
+    causes = ["the hand relaxing" if name == HAND else effect(name).spoken for name in drift.confidence_set]
+    if len(causes) == 1:
+        return f"While a pose is held the readings drift: {causes[0]}"
+    return (
+        f"While a pose is held the readings drift, consistent with {', '.join(causes[:-1])}, or {causes[-1]}"
+    )
+
+
+def _pose(drift: HoldDrift, pose: PoseDrift) -> str:
+    largest = drift.consistent(pose)
+    parts = [_change(drift, name, share) for name, share in largest[:MOST_SENSORS]]
+    more = len(largest) - len(parts)
+    sensors = ", ".join(parts) + (f" ({more} more by less)" if more > 0 else "")
+    tau = f"more than {pose.duration_s:.0f} s" if pose.tau_is_long else f"about {pose.tau_s:.2g} s"
+    return (
+        f"in {pose.holds} holds of {pose.pose}, within {pose.duration_s:.0f} s each, and with a time constant"
+        f" of {tau}, the reading of {sensors} of {'their spans' if len(largest) > 1 else 'its span'}"
+    )
+
+
+def _change(drift: HoldDrift, name: str, share: float) -> str:
+    degrees = drift.change_deg(name, share)
+    also = "" if degrees is None else f" ({abs(degrees):.1f} degrees)"
+    return f"{name} {'rises' if share > 0 else 'falls'} by {100 * abs(share):.1f} %{also}"
+
+
+def _reason(drift: HoldDrift) -> str:
+    p_value = f"p = {drift.p_value:.2g} by flipping the sign of whole holds"
+    if drift.recovery is not None:
+        gone = 100 * min(max(drift.recovery, 0.0), 1.0)
+        return f"{gone:.0f} % of it has recovered when the pose comes back ({p_value})."
+    if drift.elsewhere is not None:
+        speed, where = 100 * drift.elsewhere, ", ".join(drift.far)
+        if speed < 0:
+            return f"In {where} they drift in the opposite direction, unlike warm-up ({p_value})."
+        like = "unlike warm-up" if speed < 50 else "like warm-up"
+        return f"In {where} they drift at {speed:.0f} % of this speed, {like} ({p_value})."
+    return f"The drift is significant ({p_value})."
+
+
+def _limits(drift: HoldDrift) -> str:
+    if drift.confidence_set == drifting("begins anew with each hold"):
+        return "It is there around a rigid form too, where the hand cannot relax: the sensors creep."
+    if drift.confidence_set == (HAND,):
+        return "Around a rigid form, where the hand cannot relax, it is not there: the sensors do not creep."
+    if HAND in drift.confidence_set and drift.deg_of_span:
+        return "With measured angles glovecal diagnose separates them; without, hold a rigid form."
+    if HAND in drift.confidence_set:
+        return (
+            "Without a measured angle these cannot be separated; hold a rigid form for 20 s, several times,"
+            " to decide."
+        )
+    return "It goes on in one direction and does not begin anew with each hold, so it is not creep."

@@ -1,0 +1,169 @@
+"""Is a residual significant that no known effect explains, and what is it associated with?
+
+Slow errors, and errors that joints share, are no noise. A healthy glove has them too: it slips a little while
+it is worn, and its calibration is unsure where training data are few. Significant is what exceeds both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from glovecal_models.diagnosis.forward_design import ForwardDesign
+from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
+from glovecal_models.diagnosis.resampled import ResampledTake
+from glovecal_models.diagnosis.residual_association import ResidualAssociation, residual_associations
+from glovecal_models.diagnosis.slow_error import (
+    NOTHING_SHARED,
+    SecondMeans,
+    SharedError,
+    SlowError,
+    second_means,
+    shared_error,
+    slow_error,
+    without_drift,
+)
+from glovecal_models.layout import Layout
+
+MOST_JOINTS = 6
+"""So many of the worst are tested against every column."""
+Obstacle = Literal["single poses", "no measured angle", "few stretches", "wide interval"]
+"""Why takes cannot tell: their frames are single poses, their reference only names poses, too little was
+measured, or the estimate exceeds a healthy glove's and its lower bound does not."""
+
+
+@dataclass(frozen=True)
+class SlowExcess:
+    """The slow error of one joint beside the most that a healthy glove has."""
+
+    joint: str
+    error: SlowError
+    healthy_deg: float
+    is_within_takes: bool = False
+    """Whether each take's mean and straight line were taken out."""
+
+
+@dataclass(frozen=True)
+class UnexplainedResidual:
+    """Whether held-out residuals exceed a healthy glove's, and the evidence."""
+
+    is_significant: bool = False
+    obstacle: Obstacle | None = None
+    """Why these takes cannot tell; None where they can."""
+    slow: Mapping[str, SlowError] = field(default_factory=dict)
+    """For each joint."""
+    within_takes: Mapping[str, SlowError] = field(default_factory=dict)
+    """The same without each take's mean and straight line."""
+    excess: SlowExcess | None = None
+    """Of the joint that exceeds a healthy glove most; None where none does, or where one may."""
+    shared: SharedError = NOTHING_SHARED
+    is_shared: bool = False
+    """Whether joints share significantly more than in a healthy glove."""
+    associations: tuple[ResidualAssociation, ...] = ()
+    """Recorded columns that it depends on, the one that explains most first."""
+    undecided: tuple[str, ...] = ()
+    """Effects that these takes cannot decide and that may explain it."""
+    limits: DiagnosisLimits = DIAGNOSIS_LIMITS
+
+    @property
+    def judged(self) -> tuple[SlowError, ...]:
+        """Slow errors of the joints that were measured for long enough."""
+        return tuple(item for item in self.slow.values() if _is_judgeable(item, self.limits))
+
+
+def unexplained_residual(
+    design: ForwardDesign,
+    even: Sequence[ResampledTake],
+    layout: Layout,
+    seed: int = 0,
+    *,
+    undecided: Sequence[str] = (),
+) -> UnexplainedResidual:
+    """Judge the held-out residuals of ``design``, known effects included in its base.
+
+    ``even``: its takes, for their readings. ``undecided``: effects that save much and that these takes cannot
+    decide; they are not in the base.
+    """
+    generator, limits = np.random.default_rng(seed), design.limits
+    means = [second_means(design, joint) for joint in range(len(design.rotations))]
+    slow = _slow(design, means)
+    within = _slow(design, [[without_drift(take) for take in takes] for takes in means])
+    found = UnexplainedResidual(
+        slow=dict(zip(design.rotations, slow, strict=True)),
+        within_takes=dict(zip(design.rotations, within, strict=True)),
+        undecided=tuple(undecided),
+        limits=limits,
+    )
+    if not found.judged:
+        return replace(found, obstacle="few stretches")
+    found = replace(found, shared=shared_error(means, generator, limits))
+    ratios = [_ratio(*items, limits) for items in zip(slow, within, strict=True)]
+    exceeding = sorted((i for i, ratio in enumerate(ratios) if ratio > 1), key=lambda i: -ratios[i])
+    is_shared = _is_shared(found)
+    if not exceeding and not is_shared:
+        possible = _possible_excess(found)
+        return replace(found, excess=possible, obstacle="wide interval") if possible else found
+    chosen = (exceeding or list(range(len(slow))))[:MOST_JOINTS]
+    return replace(
+        found,
+        is_significant=True,
+        excess=_excess(found, design.rotations[exceeding[0]]) if exceeding else None,
+        is_shared=is_shared,
+        associations=residual_associations(design, even, layout, chosen, means, generator),
+    )
+
+
+def _slow(design: ForwardDesign, means: Sequence[Sequence[SecondMeans]]) -> list[SlowError]:
+    return [
+        slow_error(takes, products.residual, design.limits)
+        for takes, products in zip(means, design.products, strict=True)
+    ]
+
+
+def _is_judgeable(item: SlowError, limits: DiagnosisLimits) -> bool:
+    return item.stretches >= limits.slow_fewest_stretches
+
+
+def _is_shared(found: UnexplainedResidual) -> bool:
+    limits = found.limits
+    noise = float(np.median([item.noise_deg for item in found.judged]))
+    healthy = max(limits.healthy_shared_deg, limits.healthy_within_noises * noise)
+    return found.shared.p_value <= limits.shared_p_value and found.shared.size_deg > healthy
+
+
+def _ratio(item: SlowError, within: SlowError, limits: DiagnosisLimits) -> float:
+    """How many times more than in a healthy glove, at the lower bound; 0 where it cannot be judged."""
+    if not _is_judgeable(item, limits):
+        return 0.0
+    overall = item.lower_bound_deg / _healthy(item, limits)
+    return max(overall, within.lower_bound_deg / _healthy_within(within, limits))
+
+
+def _excess(found: UnexplainedResidual, joint: str) -> SlowExcess:
+    """The error as it is where that exceeds a healthy glove's, else within takes."""
+    item, within, limits = found.slow[joint], found.within_takes[joint], found.limits
+    if item.lower_bound_deg > _healthy(item, limits):
+        return SlowExcess(joint, item, _healthy(item, limits))
+    return SlowExcess(joint, within, _healthy_within(within, limits), is_within_takes=True)
+
+
+def _possible_excess(found: UnexplainedResidual) -> SlowExcess | None:
+    """The largest error, where it may exceed a healthy glove's and there is too little of it to tell."""
+    limits = found.limits
+    judged = [(joint, item) for joint, item in found.slow.items() if _is_judgeable(item, limits)]
+    joint, worst = max(judged, key=lambda pair: pair[1].size_deg)
+    healthy = _healthy(worst, limits)
+    if worst.size_deg <= healthy or worst.stretches >= limits.enough_stretches:
+        return None
+    return SlowExcess(joint, worst, healthy)
+
+
+def _healthy(item: SlowError, limits: DiagnosisLimits) -> float:
+    return max(limits.healthy_deg, limits.healthy_noises * item.noise_deg)
+
+
+def _healthy_within(item: SlowError, limits: DiagnosisLimits) -> float:
+    return max(limits.healthy_within_deg, limits.healthy_within_noises * item.noise_deg)

@@ -1,0 +1,136 @@
+"""What became of additions and improvements in sentences for people, from their results alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_models.diagnosis.diagnosis import Diagnosis
+from glovecal_models.diagnosis.text import (
+    UNITS,
+    hold_sentence,
+    not_identifiable_sentences,
+    nothing_named_sentence,
+    ranked_sentence,
+    residual_sentence,
+)
+from glovecal_models.effects.base.interval_effect import IntervalEffect
+from glovecal_models.improvement.addition import Addition, ClaimCheck, total_rmse_deg
+from glovecal_models.improvement.improvement import Improvement, Step, Trial
+
+MOST_NAMED = 4
+
+
+def addition_sentence(addition: Addition) -> str:
+    """The held-out error, or the claim of the interval, before and after, and whether the effect stays."""
+    if addition.claim is not None:
+        return _interval_sentence(addition, addition.claim)
+    name, gain = _on(addition.effect, addition.judged), 100 * addition.gain
+    before, after = (total_rmse_deg(item, addition.judged) for item in (addition.before, addition.after))
+    sentence = (
+        f"{name} reduces the held-out error from {before:.2f} to {after:.2f} degrees ({gain:.0f} %)."
+        if addition.added
+        else f"{name} was undone: held-out error {before:.2f} degrees before, {after:.2f} after"
+        f" ({gain:+.0f} % saved, {100 * addition.least_gain:.0f} % needed)."
+    )
+    return sentence if addition.live is None else f"{sentence} {addition.live.sentence}"
+
+
+def _interval_sentence(addition: Addition, claim: ClaimCheck) -> str:
+    name, before, after = _on(addition.effect, addition.rotations), claim.before, claim.after
+    if not addition.added:
+        least = claim.limits.claim_least_fall_nats
+        return (
+            f"{name} was undone: the claimed standard deviation does not become truer (held-out NLPD"
+            f" {before.nlpd:.3f} nats before, {after.nlpd:.3f} after; {least} less is needed)."
+        )
+    short = "" if claim.is_truer else "; the takes are too short to show what a longer session does"
+    return (
+        f"{name}: {_what_widens(addition)}. Held-out NLPD {before.nlpd:.2f} nats before, {after.nlpd:.2f}"
+        f" after{short}; the 95 % interval covers {100 * after.coverage_95:.0f} % of the measurements"
+        f" (before: {100 * before.coverage_95:.0f} %); the error stays at"
+        f" {total_rmse_deg(addition.before, addition.rotations):.2f} degrees."
+    )
+
+
+def _what_widens(addition: Addition) -> str:
+    added = next(item for item in addition.model.effects if item.name == addition.effect)
+    effect = added.effect
+    assert isinstance(effect, IntervalEffect)
+    return effect.sentence(added.settings, addition.rotations)
+
+
+def _on(effect: str, rotations: Sequence[str]) -> str:
+    where = ", ".join(rotations) if len(rotations) <= MOST_NAMED else f"{len(rotations)} rotations"
+    return f"{effect} on {where}"
+
+
+def improvement_sentences(improvement: Improvement) -> list[str]:
+    """What happened in order, and what remains."""
+    last, living = improvement.diagnosis, improvement.living_sensors
+    sentences = [*(last.reference_problems if last else ()), *improvement.take_warnings]
+    if living is not None:
+        sentences += living.sentences(living.layout.rotations)
+    if improvement.only_take_s is not None:
+        sentences.append(
+            f"There is only one take, of {improvement.only_take_s:.0f} s: errors are on held-out pieces"
+            " of it and say nothing about another take or wearing. Record a second one."
+        )
+    for trial in improvement.trials:
+        sentences += [item for item in _trial_sentences(trial) if item not in sentences]
+    if last is not None:
+        sentences += _closing_sentences(last, improvement.steps[-1], improvement.noise_floor)
+    return sentences
+
+
+def _trial_sentences(trial: Trial) -> list[str]:
+    effect, found = trial.addition.effect, trial.diagnosis
+    sentences = [*trial.reasons, addition_sentence(trial.addition)]
+    sentences += [f"{name} is redundant beside {effect} and was removed." for name in trial.removed]
+    ranked = found.naming.ranked if found is not None else ()
+    if found is not None and trial.addition.added and ranked and ranked[0].effect == effect:
+        sentences.append(ranked_sentence(found))
+    return sentences
+
+
+def _closing_sentences(diagnosis: Diagnosis, last: Step, floors: Mapping[str, NoiseFloor]) -> list[str]:
+    """What was found beside the added effects, what could not be judged, and what remains."""
+    held = diagnosis.hold_drift
+    sentences = [] if held is None else [hold_sentence(held), UNITS]
+    sentences += [item.sentence for item in diagnosis.findings]
+    if held is None and not diagnosis.findings and not diagnosis.naming.ranked:
+        sentences.append(nothing_named_sentence(diagnosis))
+    sentences += not_identifiable_sentences(diagnosis.not_identifiable)
+    sentences.append(residual_sentence(diagnosis.residual))
+    if held is None:
+        sentences += [*_repeatability_sentences(floors), _remaining_sentence(last.per_rotation, floors)]
+    return sentences
+
+
+def _remaining_sentence(per_rotation: Mapping[str, float], floors: Mapping[str, NoiseFloor]) -> str:
+    """``per_rotation``: errors (deg) of the last step; the largest first."""
+    worst = sorted(per_rotation, key=lambda name: -per_rotation[name])
+    each = ", ".join(
+        f"{per_rotation[name]:.2f} on {name} ({_floor(floors.get(name))})" for name in worst[:MOST_NAMED]
+    )
+    more = f" and less on {len(worst) - MOST_NAMED} more" if len(worst) > MOST_NAMED else ""
+    return f"Remaining held-out error in degrees: {each}{more}."
+
+
+def _floor(floor: NoiseFloor | None) -> str:
+    if floor is None:
+        return "noise floor unknown"
+    return f"noise floor {'at least ' if floor.is_lower_bound else ''}{floor.floor_deg:.2f}"
+
+
+def _repeatability_sentences(floors: Mapping[str, NoiseFloor]) -> list[str]:
+    """How well single poses repeat; none where that was measured in another way."""
+    found = {name: floor for name, floor in floors.items() if floor.how == "near readings"}
+    if not found:
+        return []
+    worst = sorted(found, key=lambda name: -found[name].floor_deg)[:MOST_NAMED]
+    each = ", ".join(f"{found[name].floor_deg:.1f} on {name}" for name in worst)
+    return [
+        f"Repeatability of the reference in degrees: {each}. Frames with nearly the same readings differ"
+        " by so much, and no model of these takes can have a smaller error."
+    ]

@@ -1,0 +1,200 @@
+"""A diagnosis: errors in degrees, on held-out takes, readings and reference identically smoothed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field
+
+from glovecal_models.diagnosis.diagnosis import Diagnosis, Verdict
+from glovecal_models.diagnosis.text import (
+    candidate_sentence,
+    diagnosis_sentences,
+    named_sentence,
+    residual_obstacle,
+    residual_sentence,
+)
+from glovecal_models.diagnosis.unexplained_residual import UnexplainedResidual
+from glovecal_models.effects.base.assessment import Assessment
+from glovecal_models.effects.base.signature_effect import Finding
+from glovecal_service.views.hold_drift import HoldDriftView
+from glovecal_service.views.next_take import NextTakeView
+from glovecal_service.views.view import View
+
+
+class RotationErrorView(View):
+    rmse_deg: float | None
+    noise_floor_deg: float | None = None
+
+
+class NamedEffectView(View):
+    effect: str
+    where: list[str] = Field(description="Rotations; sensors or takes where it is a fault of those.")
+    kind: str | None = Field(None, description="As in the catalogue; null: named by drift in held poses.")
+    verdict: Verdict
+    confidence_set: list[str] = Field(description="It, and all that these takes cannot tell from it.")
+    parameters: dict[str, Any] = Field(description="Learned numbers, units in their names.")
+    saved_deg: float | None = Field(description="Held-out error saved; null: found by its signature.")
+    control_saved_deg: float | None = Field(None, description="The same of its control.")
+    sentence: str
+
+    @classmethod
+    def of(cls, diagnosis: Diagnosis) -> NamedEffectView | None:
+        named = diagnosis.named
+        if named is None:
+            return None
+        return cls(
+            effect=named.effect,
+            where=list(named.where),
+            kind=named.kind,
+            verdict=named.verdict,
+            confidence_set=list(named.confidence_set),
+            parameters=dict(named.parameters),
+            saved_deg=named.saved_deg,
+            control_saved_deg=named.control_saved_deg,
+            sentence=named_sentence(diagnosis) or "",
+        )
+
+
+class CandidateView(View):
+    effect: str
+    where: list[str] = Field(description="Rotations on which it beats its control significantly.")
+    rmse_before_deg: float | None = Field(description="Held-out error without it.")
+    rmse_after_deg: float | None = Field(description="With it.")
+    rmse_control_deg: float | None = Field(None, description="With its control instead.")
+    saved_share: dict[str, float | None] = Field({}, description="Of the squared error, for each rotation.")
+    control_saved_share: dict[str, float | None] = Field({}, description="The same of its control.")
+    p_value: float | None = Field(None, description="By permuting takes; null: tested block by block.")
+    passes: bool = Field(description="Whether it is significant on any rotation.")
+    sentence: str = ""
+
+    @classmethod
+    def of(cls, item: Assessment) -> CandidateView:
+        rmse = item.rmse_deg
+        errors = list(zip(item.joints, item.errors, strict=True))
+        return cls(
+            effect=item.effect,
+            where=[item.joints[i] for i in item.significant_joints],
+            rmse_before_deg=rmse.before,
+            rmse_after_deg=rmse.after,
+            rmse_control_deg=rmse.control,
+            saved_share={name: error.saved for name, error in errors},
+            control_saved_share={name: error.control_saved for name, error in errors},
+            p_value=item.p_value,
+            passes=bool(item.significant_joints),
+            sentence=candidate_sentence(item),
+        )
+
+
+class NotIdentifiableView(View):
+    effect: str
+    why: str
+
+
+class StretchView(View):
+    take: str
+    start_s: float | None
+    end_s: float | None
+
+
+class FindingView(View):
+    """What is known by a signature in the recording."""
+
+    effect: str
+    kind: str = Field("", description='Which of the effect\'s signatures, such as "stuck".')
+    where: list[str]
+    sentence: str
+    stretches: list[StretchView] = Field([])
+
+    @classmethod
+    def of(cls, item: Finding) -> FindingView:
+        return cls(
+            effect=item.effect,
+            kind=item.kind,
+            where=list(item.where),
+            sentence=item.sentence,
+            stretches=[
+                StretchView(take=part.take, start_s=part.start_s, end_s=part.end_s) for part in item.stretches
+            ],
+        )
+
+
+class AssociationView(View):
+    """A recorded column that the residual depends on."""
+
+    rotation: str
+    column: str = Field(description='As in `where`: "angle", "sensor NAME", "context NAME", "wearing".')
+    phrase: str
+    size_deg: float | None = Field(description="Root mean square that it explains beyond chance.")
+    p_value: float | None = Field(description="Corrected for all columns and rotations tested.")
+
+
+class UnexplainedResidualView(View):
+    is_significant: bool
+    sentence: str
+    not_identifiable: str | None = Field(None, description="Why these takes cannot tell.")
+    associations: list[AssociationView] = Field([])
+
+    @classmethod
+    def of(cls, residual: UnexplainedResidual) -> UnexplainedResidualView:
+        return cls(
+            is_significant=residual.is_significant,
+            sentence=residual_sentence(residual),
+            not_identifiable=residual_obstacle(residual),
+            associations=[
+                AssociationView(
+                    rotation=item.rotation,
+                    column=item.column,
+                    phrase=item.phrase,
+                    size_deg=item.size_deg,
+                    p_value=item.p_value,
+                )
+                for item in residual.associations
+            ],
+        )
+
+
+class DiagnosisView(View):
+    rotations: dict[str, RotationErrorView]
+    named: NamedEffectView | None
+    candidates: list[CandidateView] = Field(description="Every effect that was compared, the best first.")
+    not_identifiable: list[NotIdentifiableView]
+    findings: list[FindingView] = Field([])
+    reference_problems: list[str] = Field([])
+    hold_drift: HoldDriftView | None = None
+    unexplained_residual: UnexplainedResidualView | None
+    next_take: NextTakeView | None
+    sentences: list[str] = Field(description="What to know, the most important first.")
+
+    @classmethod
+    def of(cls, diagnosis: Diagnosis) -> DiagnosisView:
+        held = diagnosis.hold_drift
+        return cls(
+            rotations={
+                name: RotationErrorView(rmse_deg=value, noise_floor_deg=diagnosis.noise_floor_deg.get(name))
+                for name, value in diagnosis.rmse_deg.items()
+            },
+            named=NamedEffectView.of(diagnosis),
+            candidates=[CandidateView.of(item) for item in diagnosis.ranked_assessments],
+            not_identifiable=[
+                NotIdentifiableView(effect=item.effect, why=item.why) for item in diagnosis.not_identifiable
+            ],
+            findings=[FindingView.of(item) for item in diagnosis.findings],
+            reference_problems=list(diagnosis.reference_problems),
+            hold_drift=None if held is None else HoldDriftView.of(held),
+            unexplained_residual=UnexplainedResidualView.of(diagnosis.residual),
+            next_take=NextTakeView.of(diagnosis.next_take),
+            sentences=diagnosis_sentences(diagnosis),
+        )
+
+
+class TakeNamed(View):
+    id: str
+    name: str
+
+
+class DiagnosisResult(DiagnosisView):
+    """Of a ``diagnose`` job."""
+
+    model: str
+    takes: list[TakeNamed] = Field([])

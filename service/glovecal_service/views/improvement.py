@@ -1,0 +1,95 @@
+"""The improvement loop: every step, what was undone, and why it stopped."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field
+
+from glovecal_models.diagnosis.diagnosis import Verdict
+from glovecal_models.improvement.improvement import AddedInStep, Improvement, Step
+from glovecal_models.improvement.text import improvement_sentences
+from glovecal_service.views.addition import AdditionView, ClaimView
+from glovecal_service.views.diagnosis import UnexplainedResidualView
+from glovecal_service.views.hold_drift import HoldDriftView
+from glovecal_service.views.next_take import NextTakeView
+from glovecal_service.views.renamed_keys import current_residual
+from glovecal_service.views.view import View
+
+
+class AddedInStepView(View):
+    effect: str
+    where: list[str]
+    verdict: Verdict
+    confidence_set: list[str] = Field(description="It, and all that the takes could not tell from it.")
+    parameters: dict[str, Any] = Field(description="Learned numbers, units in their names.")
+    claim: ClaimView | None = None
+    next_take: NextTakeView | None = None
+
+    @classmethod
+    def of(cls, added: AddedInStep | None) -> AddedInStepView | None:
+        if added is None:
+            return None
+        return cls(
+            effect=added.effect,
+            where=list(added.where),
+            verdict=added.verdict,
+            confidence_set=list(added.confidence_set),
+            parameters=dict(added.parameters),
+            claim=ClaimView.of(added.claim),
+            next_take=NextTakeView.of(added.next_take),
+        )
+
+
+class StepView(View):
+    model: str | None = Field(description="Its id.")
+    added: AddedInStepView | None = Field(description="Null: the base alone.")
+    rmse_deg: float | None = Field(description="Over all rotations.")
+    per_rotation: dict[str, float | None]
+    control_rmse_deg: float | None = Field(None, description="With the control of the effect instead.")
+
+    @classmethod
+    def of(cls, step: Step, model: str | None) -> StepView:
+        return cls(
+            model=model,
+            added=AddedInStepView.of(step.added),
+            rmse_deg=step.rmse_deg,
+            per_rotation=dict(step.per_rotation),
+            control_rmse_deg=step.control_rmse_deg,
+        )
+
+
+class ImprovementView(View):
+    steps: list[StepView]
+    baselines: dict[str, float | None] = Field({}, description="Errors of simpler calibrations, degrees.")
+    noise_floor_deg: dict[str, float | None]
+    noise_floor_interval_deg: dict[str, list[float | None]] = Field({})
+    stopped: str = Field(description="noise_floor, nothing_named, ambiguous or not_better.")
+    undone: list[AdditionView]
+    hold_drift: HoldDriftView | None = None
+    unexplained_residual: Annotated[UnexplainedResidualView | None, BeforeValidator(current_residual)] = (
+        Field(None, description="Of the last diagnosis.")
+    )
+    next_take: NextTakeView | None
+    sentences: list[str]
+
+    @classmethod
+    def of(cls, found: Improvement, models: Sequence[str | None] | None = None) -> ImprovementView:
+        """``models``: the ids under which the steps' models were stored."""
+        last = found.diagnosis
+        ids = [None] * len(found.steps) if models is None else models
+        held = None if last is None else last.hold_drift
+        floors = found.noise_floor.items()
+        return cls(
+            steps=[StepView.of(step, id) for step, id in zip(found.steps, ids, strict=True)],
+            baselines=dict(found.baselines),
+            noise_floor_deg={name: floor.floor_deg for name, floor in floors},
+            noise_floor_interval_deg={name: [floor.low_deg, floor.high_deg] for name, floor in floors},
+            stopped=found.stopped,
+            undone=[AdditionView.of(item) for item in found.undone],
+            hold_drift=None if held is None else HoldDriftView.of(held),
+            unexplained_residual=None if last is None else UnexplainedResidualView.of(last.residual),
+            next_take=NextTakeView.of(found.next_take),
+            sentences=improvement_sentences(found),
+        )
