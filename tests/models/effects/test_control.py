@@ -78,7 +78,7 @@ def test_names_that_do_not_tell_the_motion_do_not_hinder(signals):
     assert sorted(permuted(different, 1)) == ["a", "a", "b", "b"]
 
 
-def test_wearings_that_cannot_be_dealt_otherwise_are_refused(signals):
+def test_wearings_that_have_no_other_permutation_are_refused(signals):
     takes = [replace(take, wearing=str(number)) for number, take in enumerate(signals)]
-    with pytest.raises(BadInput, match="in one way only; record two takes in a wearing"):
+    with pytest.raises(BadInput, match="have no other permutation; record two takes in a wearing"):
         permuted(takes, 0)

@@ -135,7 +135,7 @@ def test_unknown_names_are_answered_with_the_known_ones():
         ("name = a; columns = own; range strap 0 1", "write range c.NAME LOW HIGH"),
         ("name = a; columns = own; range c.strap 0 1", "a range is given for c.strap, which no column reads"),
         ("name = a; columns = c.x; range c.x 2 1", "the range of c.x must rise, not 2 to 1"),
-        ("name = a; columns = own; control = lies", "no control 'lies'; there are reversed in time"),
+        ("name = a; columns = own; control = lies", "no control 'lies'; there are time-reversed"),
         ("name = a; columns = own; unit = very long unit", "a unit is a short word"),
         ("name = a; columns = lowpass(own, own)", "time constant 'own' of a low pass may hold numbers"),
         ("name = a; columns = own,own,own,own,own,own,own,own,own", "at most 8 columns, not 9"),

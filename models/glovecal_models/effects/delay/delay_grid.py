@@ -143,6 +143,8 @@ def _slope(base: np.ndarray, coefficients: np.ndarray, own: np.ndarray) -> np.nd
 
 def _moved(time: np.ndarray, own: np.ndarray, rows: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """(rows, K): delayed and low-passed angle minus the angle itself."""
+    if len(time) < 2:
+        return np.zeros((len(rows), len(cells)))
     result = np.empty((len(rows), len(cells)))
     factor = max(1, round(float(np.median(np.diff(time))) / STEP_S)) if len(time) > 1 else 1
     fine_time = time[0] + STEP_S * np.arange((len(time) - 1) * factor + 1)
