@@ -109,7 +109,7 @@ def add_effect(
     and ``seed`` as for ``train``. The model given stays as it is. Raises BadInput when the effect or a
     rotation is unknown, or when the takes cannot carry it; Cancelled.
     """
-    from glovecal_models.calibration.declared_effects import declared_in
+    from glovecal_models.calibration.model_recipe import declared_effects
     from glovecal_models.effects.catalogue import known_by_name
     from glovecal_models.improvement.add_effect import add_effect as add_inner
 
@@ -117,7 +117,7 @@ def add_effect(
     own = declared([effect]) if is_declaration(effect) else []
     name = own[0].name if own else effect
     asked = None if rotations is None else tuple(rotations)
-    with library_call(progress) as report, known_by_name([*declared_in(inner), *own]):
+    with library_call(progress) as report, known_by_name([*declared_effects(inner), *own]):
         report(f"looking at the takes for {name}", 0.0)
         found = add_inner(
             inner,
@@ -147,12 +147,12 @@ def remove_effect(
 
     ``samples`` and ``seed`` as for ``train``. Raises BadInput when it has no such effect; Cancelled.
     """
-    from glovecal_models.calibration.declared_effects import declared_in
+    from glovecal_models.calibration.model_recipe import declared_effects
     from glovecal_models.effects.catalogue import known_by_name
     from glovecal_models.improvement.remove_effect import remove_effect as remove_inner
 
     inner = inner_model(model)
-    with library_call(progress) as report, known_by_name(declared_in(inner)):
+    with library_call(progress) as report, known_by_name(declared_effects(inner)):
         report(f"learning without {effect}", 0.0)
         child = remove_inner(
             inner,

@@ -39,12 +39,12 @@ class Comparison(Shown):
     @property
     def rmse_deg(self) -> float:
         """Over all rotations and frames, degrees."""
-        return self.inner.over_all.rmse_deg
+        return self.inner.overall.rmse_deg
 
     @property
     def noise_floor_deg(self) -> float | None:
         """How small the error can get on these measurements, degrees; None where it is unknown."""
-        floor = self.inner.over_all.floor
+        floor = self.inner.overall.floor
         return None if floor is None else floor.floor_deg
 
     @property
@@ -55,13 +55,13 @@ class Comparison(Shown):
     @property
     def coverage(self) -> float:
         """Share of measurements within one claimed standard deviation; 0.68 is expected."""
-        return self.inner.over_all.coverage
+        return self.inner.overall.coverage
 
     @property
     def fingertip_rmse_mm(self) -> float | None:
         """How far the fingertips are off, mm; None where no finger was predicted and measured as a whole."""
         tips = self.inner.fingertips
-        return None if tips is None else tips.over_all.rmse_mm
+        return None if tips is None else tips.overall.rmse_mm
 
     def table(self) -> Table:
         """One row for each rotation, and one for all of them."""
@@ -69,12 +69,12 @@ class Comparison(Shown):
         after, tips = [], self.inner.fingertips
         if tips is not None:
             hand = f"{tips.hand_length_mm:.0f} mm{' (assumed)' if tips.is_assumed else ''}"
-            after.append(f"Fingertips: {tips.over_all.rmse_mm:.1f} mm (RMSE), for a hand length of {hand}.")
+            after.append(f"Fingertips: {tips.overall.rmse_mm:.1f} mm (RMSE), for a hand length of {hand}.")
         if self.inner.not_measured:
             after.append(f"Not measured in these takes: {', '.join(self.inner.not_measured)}.")
         if self.inner.not_predicted:
             after.append(f"Not predicted by this model: {', '.join(self.inner.not_predicted)}.")
-        return Table.of(COLUMNS, [*rows, _row(OVERALL, self.inner.over_all)], after=after)
+        return Table.of(COLUMNS, [*rows, _row(OVERALL, self.inner.overall)], after=after)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Error of each rotation beside its noise floor with a 95 % interval; gives the axes back."""

@@ -111,21 +111,20 @@ def diagnose(
     ``also``: effects of your own as text, such as ``"name = strap; columns = c.strap_n * own"``. ``seed`` is
     of the controls. Raises BadInput, Cancelled.
     """
-    from glovecal_models.calibration.declared_effects import declared_in
-    from glovecal_models.calibration.had_already import repaired_takes, wanted_of
+    from glovecal_models.calibration.model_recipe import declared_effects, repaired_takes, requested_effects
+    from glovecal_models.comparison.noise_floor import rotation_noise
     from glovecal_models.comparison.residuals import residuals
-    from glovecal_models.comparison.rotation_noise import rotation_noise
     from glovecal_models.diagnosis.diagnose import diagnose as diagnose_inner
     from glovecal_models.diagnosis.known_effect import known_effects
     from glovecal_models.effects.catalogue import known_by_name
 
     inner, takes = inner_model(model), takes_in(takes)
     own = declared(also)
-    with library_call(progress) as report, known_by_name([*declared_in(inner), *own]):
+    with library_call(progress) as report, known_by_name([*declared_effects(inner), *own]):
         report("measuring the noise floors", 0.0)
         noise = rotation_noise(residuals(inner, takes), seed=seed)
         found = diagnose_inner(
-            repaired_takes(takes, wanted_of(inner)),
+            repaired_takes(takes, requested_effects(inner)),
             inner.layout,
             linear=inner.method in ("raw", "linear"),
             known=known_effects(inner),

@@ -20,7 +20,7 @@ from glovecal_models.takes.take import Take
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from glovecal_models.comparison.structure import Dependence
+    from glovecal_models.comparison.dependence import Dependence
     from glovecal_models.comparison.where_it_fails import RotationFindings
     from glovecal_models.comparison.where_it_fails import WhereItFails as InnerWhere
 
@@ -45,7 +45,9 @@ class WhereItFails(Shown):
     @property
     def sentences(self) -> tuple[str, ...]:
         """One for each rotation."""
-        return tuple(item.sentence for item in self.inner.rotations)
+        from glovecal_models.comparison.text import rotation_sentence
+
+        return tuple(rotation_sentence(item) for item in self.inner.rotations)
 
     def depends_on(self, rotation: str) -> tuple[str, ...]:
         """Columns on which the rotation's error depends significantly, the strongest first."""
@@ -60,7 +62,7 @@ class WhereItFails(Shown):
             explained = (
                 (None, None, None, False)
                 if first is None
-                else (first.covariate, first.explained_deg, first.probability, first in item.structure)
+                else (first.covariate, first.explained_deg, first.p_value, first in item.structure)
             )
             rows.append((item.rotation, item.rmse_deg, floor, item.bias_deg, *explained))
         return Table.of(COLUMNS, rows, after=self.sentences)
@@ -82,7 +84,7 @@ class WhereItFails(Shown):
             middle, mean - item.chance_deg, mean + item.chance_deg, color=FLOOR, alpha=0.3,
             label="95 % of circular shifts",
         )  # fmt: skip
-        axes.plot(middle, item.mean_deg, "o-", color=MODEL, label=f"mean error (p = {item.probability:.3f})")
+        axes.plot(middle, item.mean_deg, "o-", color=MODEL, label=f"mean error (p = {item.p_value:.3f})")
         axes.axhline(0.0, color="black", linewidth=0.6)
         axes.set_xlabel(f"{item.covariate} ({item.unit})" if item.unit else item.covariate)
         axes.set_ylabel(f"error of {found.rotation} (degrees)")

@@ -26,10 +26,9 @@ from unknown_sensors import (
     sleeve_takes,
 )
 
-from glovecal_models.calibration.kernel_choice import try_candidates
-from glovecal_models.calibration.representative import representative_index
+from glovecal_models.calibration.kernel_choice import score_candidates
 from glovecal_models.calibration.sample_weight import Recorded, fit_weighted
-from glovecal_models.calibration.samples import gather_samples
+from glovecal_models.calibration.samples import gather_samples, representative_index
 from glovecal_models.errors import NotTrainable
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.regression.kernel_candidates import CANDIDATES
@@ -154,7 +153,7 @@ def study(split: Split) -> Iterator[Row]:
         try:
             start = time.perf_counter()
             base = fit_weighted(recorded)
-            tried = try_candidates(recorded, CANDIDATES, sample_weight=base.weight)
+            tried = score_candidates(recorded, CANDIDATES, sample_weight=base.weight)
             seconds = time.perf_counter() - start
         except NotTrainable as error:
             print(f"{name} {rotation}: {error}")

@@ -37,7 +37,7 @@ def main(path: str) -> None:
     test = simulate_take(second, evaluation_segment(SEED), seed=SEED, reference_noise_deg=0.0).take
     settings = {method: TrainingSettings(method=method, samples=1000, folds=0) for method in METHODS}
     models = {method: train(takes, layout, SUBJECT, settings[method]) for method in METHODS}
-    errors = {method: compare(model, [test]).over_all.rmse_deg for method, model in models.items()}
+    errors = {method: compare(model, [test]).overall.rmse_deg for method, model in models.items()}
     angles = {method: GlovePredictor(models[method]).predict(test.readings) for method in DRAWN}
     draw(path, test, {m: (a.mean, a.sd) for m, a in angles.items()}, models["raw"].rotation_names, errors)
 

@@ -86,7 +86,7 @@ def test_the_rule_is_two_thirds_of_the_calibrated_pip(model, takes):
 def test_lmc_gpr_beats_the_straight_line_on_a_take_it_has_not_seen(model, takes):
     linear = train(takes, LAYOUT, "anna", TrainingSettings(method="linear"))
     unseen = [make_take(77, "unseen")]
-    assert compare(model, unseen).over_all.rmse_deg < 0.6 * compare(linear, unseen).over_all.rmse_deg
+    assert compare(model, unseen).overall.rmse_deg < 0.6 * compare(linear, unseen).overall.rmse_deg
 
 
 def test_comparison_says_how_far_off_and_whether_the_model_knows(model):

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glovecal_models.calibration.left_out import first_measured, pieces
+from glovecal_models.calibration.folds import first_measured, pieces
 from glovecal_models.calibration.samples import gather_samples
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.comparison.covariates import covariates
+from glovecal_models.comparison.dependence import covariates
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.resampled import resampled

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 
 import glovecal_models
-from glovecal_models.comparison.at_floor import is_at_floor
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.limits import ComparisonLimits
+from glovecal_models.comparison.noise_floor import is_at_floor
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.effects.base.limits import SignificanceLimits
 from glovecal_models.errors import BadInput

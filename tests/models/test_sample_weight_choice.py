@@ -3,8 +3,12 @@
 import numpy as np
 import pytest
 
-from glovecal_models.calibration.independent_share import independent_share
-from glovecal_models.calibration.sample_weight import Recorded, fit_weighted, weight_sentence
+from glovecal_models.calibration.sample_weight import (
+    Recorded,
+    effective_sample_ratio,
+    fit_weighted,
+)
+from glovecal_models.calibration.text import weight_sentence
 from glovecal_models.errors import Cancelled
 from glovecal_models.regression import exact_profiled_likelihood
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
@@ -28,7 +32,7 @@ def test_share_is_that_of_an_autoregressive_process(memory: float) -> None:
     takes = 20
     error = np.concatenate([lasting(1000, memory, generator) for _ in range(takes)])
     take = np.repeat(np.arange(takes), 1000)
-    share = independent_share(error, take, np.arange(len(error)))
+    share = effective_sample_ratio(error, take, np.arange(len(error)))
     assert share == pytest.approx((1 - memory) / (1 + memory), rel=0.25)
 
 
@@ -36,25 +40,25 @@ def test_frames_held_five_times_count_a_fifth() -> None:
     fresh = np.random.default_rng(2).normal(size=2000)
     held = np.repeat(fresh, 5)
     one_take = np.zeros(len(held), dtype=int)
-    assert independent_share(held, one_take, np.arange(len(held))) == pytest.approx(0.2, rel=0.15)
+    assert effective_sample_ratio(held, one_take, np.arange(len(held))) == pytest.approx(0.2, rel=0.15)
 
 
 def test_samples_far_apart_are_independent_though_neighbours_are_not() -> None:
     generator = np.random.default_rng(3)
     error, position = lasting(40_000, 0.9, generator), np.arange(40_000)
     one_take = np.zeros(len(error), dtype=int)
-    assert independent_share(error[::100], one_take[::100], position[::100]) > 0.8
+    assert effective_sample_ratio(error[::100], one_take[::100], position[::100]) > 0.8
     chosen = np.sort(generator.choice(len(error), 8000, replace=False))
-    part = independent_share(error[chosen], one_take[chosen], position[chosen])
+    part = effective_sample_ratio(error[chosen], one_take[chosen], position[chosen])
     assert 1.5 * 0.053 < part < 0.5  # one in five: neighbours are five frames apart on average
 
 
 def test_errors_do_not_last_from_one_take_to_the_next_and_no_error_is_no_trouble() -> None:
     take = np.repeat(np.arange(500), 2)
     error = np.tile([1.0, -1.0], 500)
-    assert independent_share(error, take, np.arange(1000)) == 1.0
-    assert independent_share(np.zeros(4), np.zeros(4, dtype=int), np.arange(4)) == 1.0
-    assert independent_share(np.ones(1), np.zeros(1, dtype=int), np.zeros(1, dtype=int)) == 1.0
+    assert effective_sample_ratio(error, take, np.arange(1000)) == 1.0
+    assert effective_sample_ratio(np.zeros(4), np.zeros(4, dtype=int), np.arange(4)) == 1.0
+    assert effective_sample_ratio(np.ones(1), np.zeros(1, dtype=int), np.zeros(1, dtype=int)) == 1.0
 
 
 def strides(hidden_degrees: float, seed: int) -> Recorded:
@@ -83,12 +87,12 @@ def test_where_errors_last_samples_count_less_and_new_takes_are_predicted_better
     evidence = chosen.regressor.evidence
     assert chosen.weight < 1
     assert evidence["sample_weight"] == chosen.weight
-    assert evidence["independent_share"] < 0.5
+    assert evidence["effective_sample_ratio"] < 0.5
     tried = evidence["held_out_rmse_deg"]
     assert tried[f"{chosen.weight:g}"] == min(tried.values()) < max(tried.values())
     sentence = weight_sentence("I_PIP", evidence)
     assert sentence is not None
-    assert f"count {chosen.weight:g}, which does best" in sentence
+    assert f"Samples weighted {chosen.weight:g}: smallest held-out error" in sentence
     believing = fit_lmc_gpr(samples.inputs, samples.target)
     assert error_on_others(chosen.regressor, 4.0) < 0.95 * error_on_others(believing, 4.0)
 

@@ -6,9 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glovecal_models.calibration.folds import folds_over_takes
-from glovecal_models.calibration.linear_samples import linear_correspondence, linear_samples
-from glovecal_models.calibration.representative import representative_index
-from glovecal_models.calibration.samples import Samples
+from glovecal_models.calibration.samples import (
+    Samples,
+    linear_correspondence,
+    linear_samples,
+    representative_index,
+)
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout

@@ -33,7 +33,7 @@ from glovecal_models.inverse_kinematics.tip_chains import TipChains
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.catalogue import Equipment, make_protocol
 from glovecal_models.sampling.guided.guided_calibration import GuidedSamples, guided_samples
-from glovecal_models.sampling.guided.taught_samples import TaughtTake
+from glovecal_models.sampling.guided.labelled_takes import LabelledTake
 from glovecal_models.sampling.sampled_takes import sampled_takes
 from glovecal_models.simulation.protocol import Segment, cross_couple_segment, evaluation_segment
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
@@ -60,7 +60,7 @@ class PaperSession:
     seed: int
     layout: Layout
     skeleton: Skeleton
-    takes: tuple[TaughtTake, ...]
+    takes: tuple[LabelledTake, ...]
     """As the sampling recorded them."""
     capture_s: float
     """What the sampling took, in the protocol's own clock."""
@@ -155,7 +155,7 @@ def paper_session(seed: int = 1, *, rate_hz: float = SAMPLING_HZ, samples: int =
         protocol, SimulatedGlove(seed, LAYOUT), seed=seed, rate_hz=rate_hz, skeleton=SKELETON
     )
     cut = sampled_takes(session.state, {RECORDING: session.take}, name="sampling")
-    takes = tuple(TaughtTake.of(each) for each in cut)
+    takes = tuple(LabelledTake.of(each) for each in cut)
     taught = guided_samples(takes, LAYOUT, SKELETON)
     return PaperSession(seed, LAYOUT, SKELETON, takes, session.state.capture_s, taught, samples)
 

@@ -16,6 +16,7 @@ from still_take import still_take
 
 from glovecal_models.independence.examination import RotationExamination
 from glovecal_models.independence.independence import Independence, examine_independence
+from glovecal_models.independence.text import not_examined_sentence
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.simulation.stretch import TABLE_1
 
@@ -55,7 +56,8 @@ def table_1(seed: int = 1) -> list[Table1Row]:
     for rotation in TABLE_1:
         item = found.of(rotation)
         if item is None:
-            raise RuntimeError(f"{rotation} was not examined: {'; '.join(found.not_told)}")
+            why = "; ".join(map(not_examined_sentence, found.not_examined))
+            raise RuntimeError(f"{rotation} was not examined: {why}")
         paper = PAPER_IN_ALL[rotation]
         rows.append(Table1Row(rotation, None, *paper, item.std_pct, item.max_pct, None, item.is_coupled))
         rows += _own_shares(item)
@@ -79,7 +81,7 @@ def examined(seed: int) -> Independence:
 
 
 def _own_shares(item: RotationExamination) -> list[Table1Row]:
-    shares = {share.sensor: share for share in item.taken_apart.shares}
+    shares = {share.sensor: share for share in item.coupling.shares}
     rows = []
     for other, (std, largest) in TABLE_1[item.rotation].items():
         share = shares.get(other)

@@ -24,7 +24,7 @@ def test_the_controls_line_is_drawn_at_its_share_of_the_error_before(key: str) -
     take = Take("t", "w", LAYOUT.sensors, time_s, readings, LAYOUT.sensors, time_s, reference)
     base, evidence = model_with(), {"rmse_before_deg": 2.0, key: 1.5, "rmse_after_deg": 0.5}
     child = model_with(replace(added("hysteresis", (5.0,), (0.1,)), evidence=evidence))
-    before = compare(base, [take]).over_all
+    before = compare(base, [take]).overall
     picture, sentence = lineage_fall([base, child], {}, [take], before)
     assert f"(control of the last effect: {0.75 * before.rmse_deg:.2f})" in sentence
     assert "control in the effect" in picture

@@ -65,7 +65,7 @@ def held_out_errors(run: Run, person: str, side: str, method: str) -> dict[str, 
     ).json
     model = trained["result"]["model"]
     if method == "lmc_gpr":
-        assert any("errs alike for many frames" in said for said in trained["result"]["sentences"])
+        assert any("errors are autocorrelated" in said for said in trained["result"]["sentences"])
     against = [word for name in left_out for word in ("--take", name)]
     result = run("compare", model, *against, "--json").json[model]
     assert result["trained_on"] == []
@@ -97,7 +97,7 @@ def test_lmc_gpr_is_better_than_linear_on_walks_it_has_not_seen(run: Run, person
     for rotation, measured in zip((FLEXION, INVERSION), LMC_GPR_DEG[person, side], strict=True):
         assert process[rotation]["rmse_deg"] < 0.97 * linear[rotation]["rmse_deg"]
         assert process[rotation]["rmse_deg"] == pytest.approx(measured, abs=0.2)
-        assert 0.6 < process[rotation]["coverage"] < 0.9  # 0.68 is truthful
+        assert 0.6 < process[rotation]["coverage"] < 0.9  # 0.68 is expected
     shown = run("model", "list", "--subject", "walker", "--json").json
     assert {row["method"] for row in shown} == {"linear", "lmc_gpr"}
 
@@ -111,7 +111,7 @@ def test_sensors_that_never_move_are_named_and_a_layout_of_the_others_works(run:
     assert "G08" in refused.said
     without = run("train", "--subject", "hand", "--method", "linear")
     assert without.code == 0
-    assert "left out of training, rotations are read from the others" in without.said
+    assert "Not used in training; rotations are read from the others" in without.said
 
     quoted = ", ".join(f'"{name}"' for name in LIVE)
     layout = tmp_path / "live.toml"
@@ -140,4 +140,4 @@ def test_a_robot_thumb_read_within_one_gesture_and_not_across_gestures(run: Run,
     assert within["lmc_gpr"]["held_out_rmse_deg"] <= within["linear"]["held_out_rmse_deg"]
     across = run("train", "-s", "hand", "--method", "linear", "--leave-out", "base", "--json").json["result"]
     compared = run("compare", across["model"], "--take", "base", "--json").json[across["model"]]
-    assert compared["over_all"]["rmse_deg"] > compared["over_all"]["baseline_deg"]
+    assert compared["overall"]["rmse_deg"] > compared["overall"]["baseline_deg"]

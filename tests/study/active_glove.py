@@ -19,7 +19,7 @@ from glovecal_models.sampling.active.known_readings import known_from_takes
 from glovecal_models.sampling.active.next_step import NextStep, candidate_steps
 from glovecal_models.sampling.catalogue import make_protocol
 from glovecal_models.sampling.guided.guided_calibration import guided_calibration
-from glovecal_models.sampling.guided.taught_samples import TaughtTake
+from glovecal_models.sampling.guided.labelled_takes import LabelledTake
 from glovecal_models.sampling.protocol import Protocol
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.sampled_takes import sampled_takes
@@ -112,13 +112,13 @@ def _until(choose: Choose, most_s: float) -> Choose:
     return lambda state: NextSteps((), True, "") if state.capture_s > most_s else choose(state)
 
 
-def _taught(session: AskedSession, state: SamplingState) -> list[TaughtTake]:
-    return [TaughtTake.of(each) for each in sampled_takes(state, {RECORDING: session.take}, name="s")]
+def _taught(session: AskedSession, state: SamplingState) -> list[LabelledTake]:
+    return [LabelledTake.of(each) for each in sampled_takes(state, {RECORDING: session.take}, name="s")]
 
 
 def _errors(
     worn: SimulatedGlove,
-    taught: list[TaughtTake],
+    taught: list[LabelledTake],
     tests: list[SimulatedTake],
     session: AskedSession,
     loosen: Any,
@@ -144,7 +144,7 @@ def _errors(
     return answer
 
 
-def _trained(taught: list[TaughtTake], layout: Layout) -> GlovePredictor | None:
+def _trained(taught: list[LabelledTake], layout: Layout) -> GlovePredictor | None:
     """As ``glovecal train`` does it."""
     try:
         return GlovePredictor(guided_calibration(taught, layout, "s", None).model)

@@ -25,7 +25,7 @@ def pair_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_LIMIT
     settings = training_settings(glove)
     prepared = PreparedTakes.of(glove.clean_takes, glove.layout)
     twin = held_out_errors(prepared, glove.layout.rotations, (), settings)
-    return walk_answer(glove, limits) | {"twin_deg": round(twin.over_all_deg, 4)}
+    return walk_answer(glove, limits) | {"twin_deg": round(twin.overall_deg, 4)}
 
 
 def walk(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_LIMITS) -> dict[str, Any]:

@@ -17,8 +17,7 @@ import safetensors
 import safetensors.numpy
 
 from glovecal_models.calibration.added_effect import AddedEffect
-from glovecal_models.calibration.model import CalibrationModel, RotationModel
-from glovecal_models.calibration.regressor_kinds import restore_regressor
+from glovecal_models.calibration.model import CalibrationModel, RotationModel, restore_regressor
 from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.layout import Layout
 from glovecal_models.regression.kernel_scores import choice_of

@@ -1,4 +1,4 @@
-"""The calibration model of a fit with effects."""
+"""The calibration model of a fit with effects, and which effects stay when rotations are trained again."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.effect_fit import EffectFit, correspondence_for
+from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.held_out_check import HeldOutErrors
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.calibration.prepared_takes import PreparedTakes
@@ -34,7 +35,7 @@ def child_model(
     estimate: Mapping[str, Any] = {
         "how": "whole takes left out" if len(takes.takes) > 1 else "stretches of the only take left out",
         "folds": max(settings.folds, 2),
-        "rmse_deg": errors.over_all_deg,
+        "rmse_deg": errors.overall_deg,
     }
     return replace(
         parent,
@@ -74,3 +75,32 @@ def _rotation_model(
         held_out_rmse_deg=errors.rmse_deg(name) if name in errors.square else None,
         samples=min(len(inputs), settings.samples),
     )
+
+
+def kept_lanes(effects: Sequence[AddedEffect], relearned: Sequence[str]) -> list[AddedEffect]:
+    """``effects`` without weight on the rotations learned anew; those left without any are dropped."""
+    kept = []
+    for item in effects:
+        stays = np.array([name not in relearned for name in item.rotations])
+        weights = np.where(stays[:, None], item.weights, 0.0)
+        if weights.any():
+            kept.append(replace(item, weights=weights))
+    return kept
+
+
+def columnless_effects(
+    wanted: Sequence[EffectRequest], before: Sequence[AddedEffect] = ()
+) -> list[AddedEffect]:
+    """The effects among ``wanted`` that have settings only: repairs of the measurement, wider intervals.
+
+    Those there were ``before`` keep their evidence.
+    """
+    evidence = {item.name: item.evidence for item in before}
+    found = []
+    for item in wanted:
+        if not item.has_columns:
+            nothing = np.zeros((len(item.rotations), 0))
+            zero = np.zeros(len(item.rotations))
+            known = evidence.get(item.name, {})
+            found.append(AddedEffect(item.name, item.rotations, item.settings, nothing, nothing, zero, known))
+    return found

@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect
-from glovecal_models.calibration.doubt import Doubt
-from glovecal_models.calibration.widening import Widening
+from glovecal_models.calibration.interval_inflation import IntervalInflation, VarianceInflation
 from glovecal_models.effects.base.effect import Effect, Stream, Uncertainty
 from glovecal_models.effects.base.signals import GloveFrames, Signals
 from glovecal_models.effects.base.signature_effect import Hold, SignatureEffect
@@ -53,7 +52,7 @@ class Correction(NamedTuple):
 
     degrees: np.ndarray
     """(N, R), to be added to the base's prediction."""
-    doubt: Doubt | None
+    inflation: VarianceInflation | None
     """Of all N frames; None: the claims stay as they are."""
 
 
@@ -64,7 +63,7 @@ class Corrections(NamedTuple):
     """(G, R), to be added to the base's prediction; NaN where an effect raised an error."""
     undefined: np.ndarray | None
     """(G, R) True where an effect had no value and was left out; None: nowhere."""
-    doubt: Doubt | None
+    inflation: VarianceInflation | None
     """Of all G frames; None: the claims stay as they are."""
     problems: Mapping[int, str]
     """Errors by the number of the glove; its states are no longer those of its frames."""
@@ -95,7 +94,7 @@ class EffectCorrection:
         self._uncertain: tuple[str, list[tuple[np.ndarray | slice, Uncertainty]]] | None = None
         """Of the wearing asked about last."""
         measured = np.zeros(len(rotations)) if noise is None else noise
-        self._widening = Widening(effects, rotations, scale.sensors, measured)
+        self._intervals = IntervalInflation(effects, rotations, scale.sensors, measured)
         self._holds = _holds(effects, rotations, scale.sensors)
         self._started_s: float | None = None
         self.faulty_sensors: tuple[str, ...] = ()
@@ -113,17 +112,17 @@ class EffectCorrection:
 
     @property
     def is_empty(self) -> bool:
-        return not self._lanes and not self._doubts
+        return not self._lanes and not self._inflates
 
     @property
-    def _doubts(self) -> bool:
-        return bool(self._holds) or not self._widening.is_empty
+    def _inflates(self) -> bool:
+        return bool(self._holds) or not self._intervals.is_empty
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Effects that act on poses: those that correct something, in their order, then those that doubt."""
+        """Effects that act on poses: corrections in their order, then those of the interval, then faults."""
         correcting = tuple(item.name for item, _ in self._lanes)
-        return (*correcting, *self._widening.names, *(name for name, _ in self._holds))
+        return (*correcting, *self._intervals.names, *(name for name, _ in self._holds))
 
     @property
     def rows(self) -> np.ndarray:
@@ -136,7 +135,7 @@ class EffectCorrection:
     @property
     def needing_time(self) -> tuple[str, ...]:
         """Names of the effects whose columns depend on when the frames were."""
-        effects = (*self._effects, *self._widening.effects)
+        effects = (*self._effects, *self._intervals.effects)
         names = tuple(effect.name for effect in effects if effect.needs_time)
         return (*names, *(name for name, _ in self._holds))
 
@@ -160,9 +159,9 @@ class EffectCorrection:
         wearing: str,
     ) -> Correction:
         """For the base's prediction ``base`` (N, R), degrees, and ``readings`` (N, S), raw counts."""
-        first, doubt = base, None
-        if self._doubts and len(base):
-            base, readings, doubt = self._doubted(time_s, base, readings)
+        first, inflation = base, None
+        if self._inflates and len(base):
+            base, readings, inflation = self._inflated(time_s, base, readings)
         total = base - first
         others = self._scale.others(readings) if self._lanes else {}
         for item, lanes in self._lanes:
@@ -170,7 +169,7 @@ class EffectCorrection:
             columns = item.effect.columns(take, item.settings, item.shape)
             total[:, lanes] += np.einsum("nlc,lc->nl", columns, item.weights)
         unknown = self._unknown_variance(base, wearing)
-        return Correction(total, doubt if unknown is None else Doubt.more(doubt, unknown))
+        return Correction(total, inflation if unknown is None else VarianceInflation.more(inflation, unknown))
 
     @staticmethod
     def of_frames(
@@ -185,12 +184,12 @@ class EffectCorrection:
 
         ``time_s`` is (G,), ``base`` (G, R), ``readings`` (G, S). Raises nothing.
         """
-        of_all, first, doubt = gloves[0], base, None
-        if of_all._doubts:
-            base, readings, doubt = _doubted_frames(gloves, time_s, base, readings)
+        of_all, first, inflation = gloves[0], base, None
+        if of_all._inflates:
+            base, readings, inflation = _inflated_frames(gloves, time_s, base, readings)
         total = base - first
         if not of_all._lanes:
-            return Corrections(total, None, doubt, {})
+            return Corrections(total, None, inflation, {})
         others = _Others(of_all._scale, readings)
         problems: dict[int, str] = {}
         undefined: np.ndarray | None = None
@@ -209,9 +208,11 @@ class EffectCorrection:
         for row, glove in enumerate(gloves):
             unknown = glove._unknown_variance(base[row : row + 1], wearing[row])
             if unknown is not None:
-                doubt = doubt or Doubt(np.zeros_like(base), np.zeros(base.shape, dtype=bool))
-                doubt.variance[row] += unknown[0]
-        return Corrections(total, undefined, doubt, problems)
+                inflation = inflation or VarianceInflation(
+                    np.zeros_like(base), np.zeros(base.shape, dtype=bool)
+                )
+                inflation.variance[row] += unknown[0]
+        return Corrections(total, undefined, inflation, problems)
 
     def _unknown_variance(self, base: np.ndarray, wearing: str) -> np.ndarray | None:
         """(N, R), degrees squared: what is not known of the corrections of ``base`` (N, R); None: nothing."""
@@ -231,11 +232,11 @@ class EffectCorrection:
         ]
         return [(lanes, variance) for lanes, variance in found if variance is not None]
 
-    def _doubted(
+    def _inflated(
         self, time_s: np.ndarray, base: np.ndarray, readings: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, Doubt]:
-        """The take without what failing sensors say, and the doubt of all its frames."""
-        variance = self._widening.added_variance(time_s - time_s[0], readings)
+    ) -> tuple[np.ndarray, np.ndarray, VarianceInflation]:
+        """The take without what failing sensors read, and the variance inflation of all its frames."""
+        variance = self._intervals.added_variance(time_s - time_s[0], readings)
         is_faulty = np.zeros(base.shape, dtype=bool)
         for _, hold in self._holds:
             hold.reset()
@@ -243,7 +244,7 @@ class EffectCorrection:
             base, readings = np.stack([item.base for item in held]), np.stack([i.readings for i in held])
             variance += np.stack([item.variance for item in held])
             is_faulty |= np.stack([item.is_faulty for item in held])
-        return base, readings, Doubt(variance, is_faulty)
+        return base, readings, VarianceInflation(variance, is_faulty)
 
     def reset(self) -> None:
         """A new wearing, or frames were lost: effects with a memory start anew."""
@@ -277,32 +278,32 @@ def _columns(
     return columns
 
 
-def _doubted_frames(
+def _inflated_frames(
     gloves: Sequence[EffectCorrection], time_s: np.ndarray, base: np.ndarray, readings: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, Doubt]:
-    """The next frames without what failing sensors say, and the doubt."""
+) -> tuple[np.ndarray, np.ndarray, VarianceInflation]:
+    """The next frames without what failing sensors read, and the variance inflation."""
     starts = []
     for glove, time in zip(gloves, time_s.tolist(), strict=True):
         if glove._started_s is None:
             glove._started_s = time
         starts.append(glove._started_s)
-    doubt = Doubt(
-        gloves[0]._widening.added_variance(time_s - np.array(starts), readings),
+    inflation = VarianceInflation(
+        gloves[0]._intervals.added_variance(time_s - np.array(starts), readings),
         np.zeros(base.shape, dtype=bool),
     )
     if not gloves[0]._holds:
-        return base, readings, doubt
+        return base, readings, inflation
     base, readings = base.copy(), readings.copy()
     for row, glove in enumerate(gloves):
         failing: list[str] = []
         for _, hold in glove._holds:
             held = hold.frame(float(time_s[row]), base[row], readings[row])
             base[row], readings[row] = held.base, held.readings
-            doubt.variance[row] += held.variance
-            doubt.is_faulty[row] |= held.is_faulty
+            inflation.variance[row] += held.variance
+            inflation.is_faulty[row] |= held.is_faulty
             failing += held.sensors
         glove.faulty_sensors = tuple(dict.fromkeys(failing))
-    return base, readings, doubt
+    return base, readings, inflation
 
 
 def _holds(

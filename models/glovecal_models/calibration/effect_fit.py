@@ -14,17 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect
-from glovecal_models.calibration.base_features import BaseFeatures
+from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.effect_shape import EffectGroup, best_shape
 from glovecal_models.calibration.fit_task import FitResult, run_task
-from glovecal_models.calibration.held_out import BaseProducts, Rows, held_out
-from glovecal_models.calibration.linear_samples import linear_correspondence
+from glovecal_models.calibration.held_out import BaseFeatures, BaseProducts, Rows, held_out
+from glovecal_models.calibration.model import restore_regressor
 from glovecal_models.calibration.prepared_takes import PreparedTakes
-from glovecal_models.calibration.regressor_kinds import restore_regressor
-from glovecal_models.calibration.samples import Samples
+from glovecal_models.calibration.samples import Samples, linear_correspondence
 from glovecal_models.calibration.training_plan import task_for
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.calibration.wanted_effect import WantedEffect
 from glovecal_models.errors import Cancelled
 from glovecal_models.layout import Correspondence
 from glovecal_models.regression.regressor import Regressor
@@ -48,7 +46,7 @@ class EffectFit:
 def fit_with_effects(
     takes: PreparedTakes,
     rotations: Sequence[str],
-    wanted: Sequence[WantedEffect],
+    wanted: Sequence[EffectRequest],
     settings: TrainingSettings,
     *,
     cancelled: Callable[[], bool] | None = None,
@@ -122,7 +120,7 @@ def _fitted_effects(
     takes: PreparedTakes,
     columns: Mapping[str, Correspondence],
     regressors: Mapping[str, Regressor],
-    wanted: Sequence[WantedEffect],
+    wanted: Sequence[EffectRequest],
     settings: TrainingSettings,
     cancelled: Callable[[], bool] | None,
 ) -> tuple[AddedEffect, ...]:
@@ -159,7 +157,7 @@ def _fitted_effects(
 
 def _groups(
     takes: PreparedTakes,
-    item: WantedEffect,
+    item: EffectRequest,
     columns: Mapping[str, Correspondence],
     own: Mapping[str, tuple[list[np.ndarray], float]],
 ) -> list[EffectGroup]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.held_out import BaseProducts, Rows, held_out
-from glovecal_models.calibration.wanted_effect import WantedEffect
 from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.signals import Signals
 
@@ -20,7 +20,7 @@ REFINEMENTS = 2
 class EffectGroup:
     """Lanes of one effect that share settings."""
 
-    wanted: WantedEffect
+    wanted: EffectRequest
     lanes: tuple[str, ...]
     signals: list[Signals]
     settings: Settings

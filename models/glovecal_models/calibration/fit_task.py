@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.calibration.chosen_kernel import fit_chosen
+from glovecal_models.calibration.kernel_choice import fit_best_kernel
 from glovecal_models.calibration.sample_weight import Recorded, fit_weighted
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
@@ -89,7 +89,7 @@ def _fit(task: FitTask, cancelled: Callable[[], bool] | None, report: Report | N
     samples = Recorded(task.inputs, task.target, task.take, task.position)
     if settings.method in CHOOSING:
         thorough = task.fold is None  # what a user is shown; a fold only repeats the choice
-        return fit_chosen(
+        return fit_best_kernel(
             samples, task.rotation, settings, thorough=thorough, cancelled=cancelled, report=report
         )
     start = fit_weighted(samples, seed=settings.seed, cancelled=cancelled, report=report)

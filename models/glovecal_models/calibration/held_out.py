@@ -1,13 +1,20 @@
-"""What columns save on takes left out of the fit, for a whole grid of shapes at once.
+"""The held-out error that columns save, for a whole grid of nonlinear parameters at once.
 
 Sums of squares and products are formed once for each unit (a take, or a stretch of one); every fold is then
-the total without one unit, solved in closed form. The shape is chosen inside each fold by its training error.
+the total without one unit, solved in closed form. The parameters are chosen inside each fold by its training
+error.
+
+The base is a static map of a joint's inputs, flexible enough to stand for its regressor and linear in its
+coefficients: the first input in Legendre polynomials, further inputs with products (total degree), because a
+missing product is mistaken for another effect.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations_with_replacement
+from math import comb
 
 import numpy as np
 
@@ -20,6 +27,11 @@ LEAST_RIDGE = 1e-9
 """Of a column's own square: folds of a perfect fit stay solvable in spite of rounding."""
 LEAST_VARIANCE_DEG2 = 1e-12
 """Of what is left: without it nothing would hold the weights of columns that are zero."""
+OWN_DEGREE = 7
+TOTAL_DEGREE = {1: 0, 2: 4, 3: 4, 4: 3, 5: 2}
+"""Of products, by the number of inputs; 2 above."""
+ROWS_PER_COLUMN = 10
+"""Fewer rows do not carry so many products."""
 
 
 @dataclass(frozen=True)
@@ -149,3 +161,45 @@ def _solved(gram: np.ndarray, right: np.ndarray) -> np.ndarray:
 def _quadratic(gram: np.ndarray, right: np.ndarray, beta: np.ndarray) -> np.ndarray:
     """Squared error of ``beta`` without the target's own square."""
     return np.einsum("...i,...ij,...j->...", beta, gram, beta) - 2 * np.einsum("...i,...i->...", beta, right)
+
+
+@dataclass(frozen=True)
+class BaseFeatures:
+    """Scales inputs to -1..1 over the training takes and expands them."""
+
+    centre: np.ndarray
+    half: np.ndarray
+    linear: bool
+    degree: int = 0
+    """Of products."""
+
+    @classmethod
+    def settle(cls, inputs: Sequence[np.ndarray], *, linear: bool = False) -> BaseFeatures:
+        """``inputs``: for each take (N, D), the measuring sensor first."""
+        low = np.min([part.min(axis=0) for part in inputs if len(part)], axis=0)
+        high = np.max([part.max(axis=0) for part in inputs if len(part)], axis=0)
+        rows, dimensions = sum(map(len, inputs)), len(low)
+        degree = TOTAL_DEGREE.get(dimensions, 2)
+        while degree > 1 and comb(dimensions + degree, degree) > rows / ROWS_PER_COLUMN:
+            degree -= 1
+        return cls((low + high) / 2, np.maximum((high - low) / 2, 1e-9), linear, degree)
+
+    def columns(self, inputs: np.ndarray) -> np.ndarray:
+        """(N, P), the first column ones."""
+        x = np.clip((inputs - self.centre) / self.half, -1.5, 1.5)
+        if self.linear:
+            return np.column_stack([np.ones(len(x)), x])
+        own = np.polynomial.legendre.legvander(x[:, 0], OWN_DEGREE)
+        dimensions = x.shape[1]
+        degree = self.degree
+        powers = [np.polynomial.legendre.legvander(x[:, d], max(degree, 1)) for d in range(dimensions)]
+        extra = []
+        for total in range(1, degree + 1):
+            for chosen in combinations_with_replacement(range(dimensions), total):
+                if set(chosen) == {0}:
+                    continue
+                product = np.ones(len(x))
+                for d in set(chosen):
+                    product = product * powers[d][:, chosen.count(d)]
+                extra.append(product)
+        return np.column_stack([own, *extra])

@@ -14,11 +14,10 @@ from glovecal_models.calibration.effect_fit import (
     fit_with_effects,
     own_signals,
 )
-from glovecal_models.calibration.folds import folds_over_takes
-from glovecal_models.calibration.left_out import are_short, first_measured, pieces
+from glovecal_models.calibration.effect_request import EffectRequest
+from glovecal_models.calibration.folds import are_short, first_measured, folds_over_takes, pieces
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.calibration.wanted_effect import WantedEffect
 from glovecal_models.errors import NotTrainable
 
 Report = Callable[[str, float], None]
@@ -46,7 +45,7 @@ class HeldOutErrors:
         )
 
     @property
-    def over_all_deg(self) -> float:
+    def overall_deg(self) -> float:
         """RMSE over all rotations and frames."""
         return float(np.sqrt(sum(self.square.values()) / max(sum(self.count.values()), 1)))
 
@@ -54,7 +53,7 @@ class HeldOutErrors:
 def held_out_errors(
     takes: PreparedTakes,
     rotations: Sequence[str],
-    wanted: Sequence[WantedEffect],
+    wanted: Sequence[EffectRequest],
     settings: TrainingSettings,
     *,
     cancelled: Callable[[], bool] | None = None,

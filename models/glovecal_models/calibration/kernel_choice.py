@@ -1,8 +1,8 @@
-"""Which process serves a rotation, chosen by evidence and by the error on takes left out.
+"""Which kernel serves a rotation, chosen by evidence and by the held-out error; and training with it.
 
 All candidates are trained on the same few hundred samples, so that their likelihoods are of the same data in
-the same units, and again without each fold of whole takes. Samples whose errors last count for less, by what
-``fit_weighted`` found for LMC-GPR, in every candidate alike.
+the same units, and again without each fold of whole takes. Autocorrelated samples have the weight that
+``fit_weighted`` found for LMC-GPR, in every candidate.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from glovecal_models.calibration.folds import folds_over_takes
-from glovecal_models.calibration.representative import representative_index
-from glovecal_models.calibration.sample_weight import Recorded
-from glovecal_models.calibration.samples import Samples
-from glovecal_models.errors import NotTrainable
-from glovecal_models.regression.kernel_candidates import KernelCandidate
-from glovecal_models.regression.kernel_scores import CandidateScore, KernelScores
+from glovecal_models.calibration.sample_weight import Recorded, fit_weighted
+from glovecal_models.calibration.samples import Samples, representative_index
+from glovecal_models.calibration.training_settings import Report, TrainingSettings
+from glovecal_models.errors import BadInput, NotTrainable
+from glovecal_models.regression.kernel_candidates import CANDIDATE, LMC, KernelCandidate, candidates_of
+from glovecal_models.regression.kernel_scores import CandidateScore, KernelScores, with_choice
 from glovecal_models.regression.linear_regressor import fit_linear
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.regression.training_samples import check_samples
@@ -30,6 +30,8 @@ FOLD_ITERATIONS = 25
 """From the optimum of all tried samples, that without a fold is near."""
 Cancel = Callable[[], bool] | None
 Say = Callable[[str, float], None]
+LAST_ITERATIONS = 15
+"""On all samples, from the optimum of some: more would move the hyperparameters by less than their doubt."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class Tried:
     optimum: dict[str, list[float]]
 
 
-def try_candidates(
+def score_candidates(
     samples: Recorded,
     candidates: Sequence[KernelCandidate],
     *,
@@ -170,3 +172,50 @@ def _usable_folds(samples: Recorded, chosen: np.ndarray) -> list[np.ndarray]:
             continue
         found.append(fold.held_out)
     return found
+
+
+def fit_best_kernel(
+    samples: Recorded,
+    rotation: str,
+    settings: TrainingSettings,
+    *,
+    thorough: bool = True,
+    cancelled: Callable[[], bool] | None = None,
+    report: Report | None = None,
+) -> ProcessRegressor:
+    """Choose among the method's candidates and train the chosen one on all ``samples``.
+
+    LMC-GPR comes first: where it stays, the process is what method ``lmc_gpr`` trains; and it tells what
+    each sample counts in all others. Raises NotTrainable, Cancelled, BadInput (an unknown kernel).
+    """
+    kept = dict(settings.kernels).get(rotation)
+    if kept is not None and kept not in CANDIDATE:
+        raise BadInput(f"no kernel {kept!r} for {rotation}; there are {', '.join(CANDIDATE)}")
+    candidates = (CANDIDATE[kept],) if kept else candidates_of(settings.method)
+    base = fit_weighted(samples, seed=settings.seed, cancelled=cancelled, report=_part(report, 0.0, 0.2))
+    if kept == LMC:
+        return base.regressor
+    chosen, scores, search = candidates[0], None, {}
+    if len(candidates) > 1:
+        tried = score_candidates(
+            samples, candidates, sample_weight=base.weight, thorough=thorough, seed=settings.seed,
+            cancelled=cancelled, report=_part(report, 0.2, 0.7),
+        )  # fmt: skip
+        scores, chosen = tried.scores, CANDIDATE[tried.scores.chosen.name]
+        search = {"start": tried.optimum[chosen.name]}
+    process = base.regressor
+    if chosen.name != LMC:
+        if report:
+            report(f"training {chosen.words} on {len(samples.target)} samples", 0.7)
+        process = chosen.fit(
+            samples.inputs, samples.target, sample_weight=base.weight, seed=settings.seed,
+            cancelled=cancelled, iterations=LAST_ITERATIONS, **search,
+        )  # fmt: skip
+        process = replace(process, evidence=process.evidence | base.evidence)
+    return process if scores is None else with_choice(process, scores)
+
+
+def _part(report: Report | None, low: float, high: float) -> Report | None:
+    if report is None:
+        return None
+    return lambda sentence, share: report(sentence, low + (high - low) * share)

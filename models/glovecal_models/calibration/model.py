@@ -10,9 +10,29 @@ import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.effect_correction import EffectCorrection, SignalScale
-from glovecal_models.errors import BadInput
+from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.layout import Correspondence, Layout
+from glovecal_models.regression.linear_regressor import LinearRegressor
+from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.regression.regressor import Regressor, RuleRegressor
+
+_KINDS: dict[str, type[Regressor]] = {
+    "linear": LinearRegressor,
+    "lmc_gpr": ProcessRegressor,
+    "gpr": ProcessRegressor,
+    "polynomial_gpr": ProcessRegressor,
+    "general_gpr": ProcessRegressor,
+    "spgp": ProcessRegressor,
+    "rule": RuleRegressor,
+}
+
+
+def restore_regressor(arrays: Mapping[str, np.ndarray], settings: Mapping[str, Any]) -> Regressor:
+    """The regressor whose ``arrays`` and ``settings`` these are. Raises DamagedArtifact."""
+    method = settings.get("method")
+    if method not in _KINDS:
+        raise DamagedArtifact(f"unknown method {method!r}; known are {', '.join(_KINDS)}")
+    return _KINDS[method].restore(arrays, settings)
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glovecal_models.calibration.doubt import Doubt
 from glovecal_models.calibration.effect_correction import EffectCorrection, usable_correction
 from glovecal_models.calibration.fused_processes import FusedProcesses, grouped_by_nodes, is_fusible
+from glovecal_models.calibration.interval_inflation import VarianceInflation
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.errors import BadInput
 from glovecal_models.regression.process_regressor import ProcessRegressor
@@ -104,25 +104,25 @@ class GlovePredictor:
             return angles
         effects = self._model.correction()
         correction = effects.of_take(time_s, angles.mean, readings, context, wearing)
-        return self.corrected(angles, correction.degrees, doubt=correction.doubt)
+        return self.corrected(angles, correction.degrees, inflation=correction.inflation)
 
     def corrected(
         self,
         angles: GloveAngles,
         correction: np.ndarray,
-        doubtful: np.ndarray | None = None,
-        doubt: Doubt | None = None,
+        uncertain: np.ndarray | None = None,
+        inflation: VarianceInflation | None = None,
     ) -> GloveAngles:
         """``angles`` with the effects' ``correction`` (N, R) added; rules follow the rotations they read.
 
-        Where the correction is unusable the rotation stays as it was. There, and where ``doubtful`` (N, R)
-        says so, it is flagged too uncertain. ``doubt`` is of all N frames.
+        Where the correction is unusable the rotation stays as it was. There, and where ``uncertain`` (N, R)
+        says so, it is flagged too uncertain. ``inflation`` is of all N frames.
         """
-        if doubt is not None:
-            angles = self._doubted(angles, doubt)
+        if inflation is not None:
+            angles = self._inflated(angles, inflation)
         usable = usable_correction(correction)
         mean, flags = angles.mean + np.where(usable, correction, 0.0), angles.flags
-        bad = ~usable if doubtful is None else ~usable | doubtful
+        bad = ~usable if uncertain is None else ~usable | uncertain
         any_bad = bool(bad.any())
         if any_bad:
             flags = np.where(bad, flags | TOO_UNCERTAIN, flags).astype(np.uint8)
@@ -132,11 +132,11 @@ class GlovePredictor:
                 flags[:, row] |= np.bitwise_or.reduce(flags[:, sources] & TOO_UNCERTAIN, axis=1)
         return GloveAngles(mean, angles.sd, flags)
 
-    def _doubted(self, angles: GloveAngles, doubt: Doubt) -> GloveAngles:
-        """With the variance and the flags that the effects' doubt asks for."""
-        variance = np.maximum(angles.sd**2 + doubt.variance, LEAST_VARIANCE)
-        flags = np.where(doubt.is_faulty, angles.flags | FAULTY_SENSOR, angles.flags).astype(np.uint8)
-        is_old = doubt.is_faulty & (doubt.variance > self._largest_variance.T)
+    def _inflated(self, angles: GloveAngles, inflation: VarianceInflation) -> GloveAngles:
+        """With the variance and the flags that the effects' inflation asks for."""
+        variance = np.maximum(angles.sd**2 + inflation.variance, LEAST_VARIANCE)
+        flags = np.where(inflation.is_faulty, angles.flags | FAULTY_SENSOR, angles.flags).astype(np.uint8)
+        is_old = inflation.is_faulty & (inflation.variance > self._largest_variance.T)
         np.bitwise_or(flags, TOO_UNCERTAIN, out=flags, where=is_old)
         for row, sources, weights in self._rules:
             variance[:, row] = variance[:, sources] @ (weights * weights)

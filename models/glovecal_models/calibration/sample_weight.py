@@ -1,25 +1,27 @@
-"""How much each sample shall count in training a process: decided on takes left out.
+"""The weight of each sample in training a Gaussian process, chosen by the held-out error.
 
-The marginal likelihood takes errors for independent. Frames are not: on ankle sleeves walking at 200 Hz an
-error lasts for tens of frames, and a process that is trained as if each were news follows single strides
+The marginal likelihood assumes independent errors. Those of frames are autocorrelated: on ankle sleeves
+walking at 200 Hz over tens of frames. A process trained as if they were independent follows single strides
 (lengthscales of a fifth of the readings' spread) and can lose to a straight line on the next walk. A
-composite likelihood, in which each sample counts for less than one, mends that (Pauli, Racugno & Ventura
-2011); how much less is not told by the training errors, which the process has already bent to, so a few
-weights are tried on takes left out. That is done only where there is need: the process uses up a good part
-of the independent samples that there are. Weights are compared by rough processes, which miss the held-out
-error of thoroughly trained ones by 1 to 4 %; only the chosen one is trained thoroughly.
+weighted (composite) likelihood corrects that (Pauli, Racugno & Ventura 2011). Training errors do not show
+the best weight, as the process is already fitted to them, so a few weights are compared on held-out takes,
+and only where the process has many degrees of freedom for the effective sample size. They are compared by
+rough processes, whose held-out error is within 1 to 4 % of that of thoroughly trained ones; only the chosen
+one is trained thoroughly.
+
+Effective sample ratio: N samples are worth N / (1 + 2 sum_k rho_k) independent ones, rho_k the correlation of
+errors k frames apart (the integrated autocorrelation time; Kish's design effect in surveys).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from glovecal_models.calibration.folds import folds_over_takes
-from glovecal_models.calibration.independent_share import independent_share
 from glovecal_models.errors import NotTrainable
 from glovecal_models.regression.fast_lmc import finish_search, fit_lmc_gpr
 from glovecal_models.regression.lmc_search import LmcSearch, fit_roughly
@@ -36,6 +38,11 @@ CROWDED = 0.5
 FOLDS = 3
 Cancel = Callable[[], bool] | None
 Report = Callable[[str, float], None]
+FADED = 0.05
+"""Correlation at which errors are taken for independent: what follows is scatter of the estimate."""
+LEAST_PAIRS = 30
+WIDENING = 0.3
+"""Lags are looked at together in ranges this part of their start: 1, 2, 3, 4, 5, 6-7, 8-10 ... frames."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +77,7 @@ def fit_weighted(
 ) -> Weighted:
     """The LMC-GPR of ``samples``, each counting what serves takes left out best.
 
-    The regressor's evidence tells ``independent_share``, ``degrees_of_freedom`` and, where weights were
+    The regressor's evidence tells ``effective_sample_ratio``, ``degrees_of_freedom`` and, where weights were
     tried, ``held_out_rmse_deg`` of each. Raises NotTrainable, Cancelled.
     """
     say = report or (lambda sentence, share: None)
@@ -87,7 +94,7 @@ def fit_weighted(
         fitted = whole.predict(samples.inputs)
         freedom = np.minimum(fitted.variance / max(whole.noise_variance, 1e-12), 1.0).sum()
         need = _Need.of(samples, fitted.mean, float(freedom))
-    evidence: dict[str, Any] = {"independent_share": need.share, "degrees_of_freedom": need.freedom}
+    evidence: dict[str, Any] = {"effective_sample_ratio": need.share, "degrees_of_freedom": need.freedom}
     best = 1.0
     if need.is_there:
         trial = _Trial(samples, search, seed, cancelled, _part(report, 0.5, 0.8))
@@ -113,23 +120,8 @@ class _Need:
 
     @classmethod
     def of(cls, samples: Recorded, fitted: np.ndarray, freedom: float) -> _Need:
-        share = independent_share(samples.target - fitted, samples.take, samples.position)
+        share = effective_sample_ratio(samples.target - fitted, samples.take, samples.position)
         return cls(share, freedom, freedom > CROWDED * share * len(samples.target))
-
-
-def weight_sentence(rotation: str, evidence: Mapping[str, Any]) -> str | None:
-    """What a user should know of weights that were tried; None where there was no need to."""
-    errors = evidence.get("held_out_rmse_deg")
-    if not errors:
-        return None
-    weight = evidence["sample_weight"]
-    tried = ", ".join(f"{error:.2f} degrees at {name}" for name, error in errors.items())
-    return (
-        f"{rotation} errs alike for many frames in a row: a frame tells "
-        f"{evidence['independent_share']:.2f} as much as an independent sample would, so something that its "
-        f"sensors do not read may turn it. Each sample was made to count {weight:g}, which does best on "
-        f"takes left out ({tried})."
-    )
 
 
 class _Trial:
@@ -219,3 +211,40 @@ def _part(
     if report is None:
         return None
     return lambda sentence, share: report(sentence, low + (high - low) * share)
+
+
+def effective_sample_ratio(error: np.ndarray, take: np.ndarray, position: np.ndarray) -> float:
+    """Between 1 / N and 1, for errors (N,) at frames ``position`` (N,), whole numbers, of ``take`` (N,)."""
+    whole = float(error @ error)
+    if whole == 0.0:
+        return 1.0
+    products, pairs = _by_lag(error, take, position)
+    total, start = whole, 1
+    while start < len(pairs):
+        end = start + max(1, int(WIDENING * start))
+        while end < len(pairs) and pairs[start:end].sum() < LEAST_PAIRS:
+            end += 1
+        count, together = pairs[start:end].sum(), float(products[start:end].sum())
+        if count == 0 or together / count <= FADED * whole / len(error):
+            break
+        total += 2.0 * together
+        start = end
+    return float(np.clip(whole / total, 1.0 / len(error), 1.0))
+
+
+def _by_lag(error: np.ndarray, take: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sum of products of errors, and number of pairs, for each distance in frames within a take."""
+    owned = [np.flatnonzero(take == owner) for owner in np.unique(take)]
+    longest = max(int(np.ptp(position[rows])) + 1 for rows in owned)
+    products, pairs = np.zeros(longest), np.zeros(longest)
+    for rows in owned:
+        at = position[rows] - position[rows].min()
+        length = int(at.max()) + 1
+        frames = np.zeros((2, length))
+        frames[0, at], frames[1, at] = error[rows], 1.0
+        size = 1 << int(2 * length - 1).bit_length()
+        power = np.abs(np.fft.rfft(frames, size)) ** 2
+        correlated = np.fft.irfft(power, size)[:, :length]
+        products[:length] += correlated[0]
+        pairs[:length] += np.round(correlated[1])
+    return products, pairs

@@ -1,4 +1,13 @@
-"""Samples of one rotation: the paper's tuples (readings, observed rotation), gathered from takes."""
+"""Samples of one rotation: the paper's tuples (readings, observed rotation), gathered from takes.
+
+Takes are long and neighbours in time are alike, so a fit uses a representative set: the space of inputs and
+target is cut into cells, and samples are drawn cell by cell and take by take in turn.
+
+A linear model uses a rotation's own sensor at the key poses, the common baseline of Wang & Neff 2013,
+section 7.1 (key poses: section 5.1.1). Where a layout has no sensor of a rotation's name (an ankle sleeve),
+it uses all sensors of the correspondence; where no key poses were recorded, or a rotation hardly moves in
+them (the wrist), all samples: a line through noise would be no fair baseline.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +19,11 @@ import numpy as np
 from glovecal_models.errors import LayoutMismatch
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.takes.take import Take
+
+KEY_POSES = ("flat", "spread", "fist", "overbend")
+LEAST_SHARE_OF_RANGE = 0.25
+"""Key poses must span this share of a rotation's recorded range to carry its line."""
+DEFAULT_SAMPLES = 2000
 
 
 @dataclass(frozen=True)
@@ -59,3 +73,67 @@ def gather_samples(takes: Sequence[Take], correspondence: Correspondence) -> Sam
         np.concatenate(owners) if owners else np.empty(0, dtype=int),
         np.concatenate(poses) if poses else np.empty(0, dtype=object),
     )
+
+
+def linear_correspondence(correspondence: Correspondence) -> Correspondence:
+    """The rotation read from its measuring sensor alone, when it has one."""
+    if correspondence.simulated or correspondence.rotation not in correspondence.sensors:
+        return correspondence
+    return Correspondence(correspondence.rotation, "1S1R", (correspondence.rotation,))
+
+
+def linear_samples(samples: Samples) -> Samples:
+    """The samples at key poses, when these move the rotation enough; else all."""
+    at_key_pose = np.isin(samples.poses.astype(str), KEY_POSES)
+    if not at_key_pose.any():
+        return samples
+    chosen = samples.select(np.flatnonzero(at_key_pose))
+    spans = np.ptp(chosen.target) >= LEAST_SHARE_OF_RANGE * np.ptp(samples.target)
+    return chosen if spans and np.ptp(chosen.inputs, axis=0).min() > 0 else samples
+
+
+def representative_index(samples: Samples, count: int = DEFAULT_SAMPLES, *, seed: int = 0) -> np.ndarray:
+    """Indices of at most ``count`` samples, increasing; all of them when there are no more."""
+    if len(samples) <= count:
+        return np.arange(len(samples))
+    cells = _cells(samples, count)
+    order = np.random.default_rng(seed).permutation(len(samples))
+    turn = _turn_within(cells[order])
+    first = order[np.argsort(turn, kind="stable")][:count]
+    return np.sort(first)
+
+
+def _cells(samples: Samples, count: int) -> np.ndarray:
+    """A cell number for each sample, with the finest grid that has at most ``count`` occupied cells."""
+    space = np.column_stack([samples.inputs, samples.target])
+    low, high = space.min(axis=0), space.max(axis=0)
+    unit = (space - low) / np.where(high > low, high - low, 1.0)
+    cells = samples.take
+    for divisions in (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 128):
+        finer = _numbered(samples.take, np.floor(unit * divisions * (1 - 1e-12)), divisions)
+        if finer.max() >= count:
+            break
+        cells = finer
+    return cells
+
+
+def _numbered(take: np.ndarray, grid: np.ndarray, divisions: int) -> np.ndarray:
+    """A number for each row of (take, grid), in their order; by one integer key where it has room."""
+    columns = grid.astype(np.int64)
+    if (int(take.max()) + 1) * float(divisions) ** columns.shape[1] > 2**62:
+        return np.unique(np.column_stack([take, columns]), axis=0, return_inverse=True)[1].ravel()
+    key = take.astype(np.int64)
+    for column in columns.T:
+        key = key * divisions + column
+    return np.unique(key, return_inverse=True)[1].ravel()
+
+
+def _turn_within(cells: np.ndarray) -> np.ndarray:
+    """For each sample, how many samples of its cell come before it."""
+    by_cell = np.argsort(cells, kind="stable")
+    sorted_cells = cells[by_cell]
+    starts = np.flatnonzero(np.r_[True, sorted_cells[1:] != sorted_cells[:-1]])
+    lengths = np.diff(np.r_[starts, len(cells)])
+    turn = np.empty(len(cells), dtype=int)
+    turn[by_cell] = np.arange(len(cells)) - np.repeat(starts, lengths)
+    return turn

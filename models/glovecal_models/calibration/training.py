@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from glovecal_models.calibration.fit_task import FitResult, run_task
-from glovecal_models.calibration.model import CalibrationModel, RotationModel
-from glovecal_models.calibration.regressor_kinds import restore_regressor
+from glovecal_models.calibration.model import CalibrationModel, RotationModel, restore_regressor
 from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
 from glovecal_models.layout import Correspondence, Layout

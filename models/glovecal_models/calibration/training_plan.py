@@ -9,11 +9,15 @@ import numpy as np
 
 from glovecal_models.calibration.fit_task import FitTask
 from glovecal_models.calibration.folds import folds_over_takes
-from glovecal_models.calibration.linear_samples import linear_correspondence, linear_samples
-from glovecal_models.calibration.living_sensors import LivingSensors, living_sensors
-from glovecal_models.calibration.representative import representative_index
-from glovecal_models.calibration.samples import Samples, gather_samples
+from glovecal_models.calibration.samples import (
+    Samples,
+    gather_samples,
+    linear_correspondence,
+    linear_samples,
+    representative_index,
+)
 from glovecal_models.calibration.training_settings import METHODS, TrainingSettings
+from glovecal_models.calibration.usable_sensors import UsableSensors, usable_sensors
 from glovecal_models.errors import NotTrainable
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.regression.regressor import RuleRegressor
@@ -23,7 +27,7 @@ from glovecal_models.takes.take import Take
 
 @dataclass(frozen=True)
 class TrainingPlan:
-    """What will be fitted, and the sentences that say how the samples were chosen."""
+    """What will be fitted, and which rotations cannot be."""
 
     layout: Layout
     subject: str
@@ -33,8 +37,14 @@ class TrainingPlan:
     """Of each trained rotation; for a linear model its measuring sensor alone."""
     rules: Mapping[str, RuleRegressor]
     ranges: Mapping[str, tuple[np.ndarray, np.ndarray]]
-    sentences: tuple[str, ...]
+    usable: UsableSensors
+    unreadable: tuple[str, ...]
+    """Measured rotations that no working sensor reads."""
+    unmeasured: tuple[str, ...]
+    only_angle_deg: Mapping[str, float]
+    """Rotations that were measured at a single angle."""
     take_count: int
+    frame_count: int
     simulated: bool
 
 
@@ -45,16 +55,15 @@ def plan_training(
 
     A rotation that no take measured is left out of the model, unless the layout gives it a rule whose
     rotations are trained; so is one that was held at a single angle, as when a sampling was stopped early.
-    Sensors that are dead or clipped are not read, and a rotation that has no other is left out. The plan's
-    sentences say which.
+    Sensors that are dead or clipped are not read, and a rotation that has no other is left out.
     """
     settings = settings or TrainingSettings()
     if settings.method not in METHODS:
         raise NotTrainable(f"unknown method {settings.method!r}; known are {', '.join(METHODS)}")
-    living = living_sensors(layout, takes)
+    usable = usable_sensors(layout, takes)
     if settings.keep_dead:
-        living = LivingSensors(layout, (), ())
-    layout = living.layout
+        usable = UsableSensors(layout, (), ())
+    layout = usable.layout
     tasks: list[FitTask] = []
     chosen: dict[str, Correspondence] = {}
     ranges: dict[str, tuple[np.ndarray, np.ndarray]] = {}
@@ -68,7 +77,7 @@ def plan_training(
         if len(samples) == 0:
             unmeasured.append(correspondence)
             continue
-        if correspondence.rotation in living.unreadable:
+        if correspondence.rotation in usable.unreadable:
             unreadable.append(correspondence.rotation)
             continue
         if np.ptp(samples.target) == 0:
@@ -80,9 +89,11 @@ def plan_training(
         tasks.extend(_tasks(correspondence, samples, settings))
     for correspondence, samples in at_one_angle if not tasks else ():
         check_samples(samples.inputs, samples.target, correspondence.inputs)
-    lost = living.sentences(unreadable)
     if not tasks and unreadable:
-        raise NotTrainable(" ".join(lost))
+        raise NotTrainable(
+            f"no working sensor measures {', '.join(unreadable)}; dead in these takes: "
+            f"{', '.join(map(str, usable.dead))}. Is a wire broken?"
+        )
     if not tasks:
         raise NotTrainable(
             f"no reference angle for any rotation of layout {layout.name!r} in {len(takes)} takes; "
@@ -97,8 +108,12 @@ def plan_training(
         correspondences=chosen,
         rules=rules,
         ranges=ranges,
-        sentences=(*_sentences(takes, tasks, unmeasured, rules), *_one_angle_sentences(at_one_angle), *lost),
+        usable=usable,
+        unreadable=tuple(unreadable),
+        unmeasured=tuple(item.rotation for item in unmeasured),
+        only_angle_deg={item.rotation: float(samples.target[0]) for item, samples in at_one_angle},
         take_count=len(takes),
+        frame_count=sum(len(take.time_s) for take in takes),
         simulated=any(take.simulated for take in takes),
     )
 
@@ -150,31 +165,3 @@ def _rules(
             weights = expression.weights(expression.sensors)
             rules[correspondence.rotation] = RuleRegressor(expression.sensors, weights)
     return rules
-
-
-def _sentences(
-    takes: Sequence[Take],
-    tasks: Sequence[FitTask],
-    unmeasured: Sequence[Correspondence],
-    rules: Mapping[str, RuleRegressor],
-) -> list[str]:
-    largest = max(len(task.target) for task in tasks if task.fold is None)
-    frames = sum(len(take.time_s) for take in takes)
-    sentences = [
-        f"Trained from {len(takes)} takes with {frames} frames; at most {largest} samples a rotation were "
-        "chosen, spread evenly over readings, angles and takes."
-    ]
-    if rules:
-        sentences.append(f"No take measured {', '.join(rules)}: computed by the layout's rule.")
-    left_out = [item.rotation for item in unmeasured if item.rotation not in rules]
-    if left_out:
-        sentences.append(f"No take measured {', '.join(left_out)}: left out of the model.")
-    return sentences
-
-
-def _one_angle_sentences(at_one_angle: Sequence[tuple[Correspondence, Samples]]) -> list[str]:
-    return [
-        f"{correspondence.rotation} was measured at {samples.target[0]:g} degrees only: left out of the "
-        "model until there is another angle."
-        for correspondence, samples in at_one_angle
-    ]

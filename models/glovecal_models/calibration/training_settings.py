@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from glovecal_models.calibration.representative import DEFAULT_SAMPLES
+from glovecal_models.calibration.samples import DEFAULT_SAMPLES
 from glovecal_models.errors import BadInput
 
 Method = Literal["raw", "linear", "lmc_gpr", "spgp", "auto", "polynomial_gpr", "general_gpr"]
@@ -32,7 +32,7 @@ class TrainingSettings:
     seed: int = 0
     keep_dead: bool = False
     """Whether sensors that are dead or clipped in the takes are kept, so that one that never changes is
-    refused; else they are left out (``living_sensors``)."""
+    refused; else they are left out (``usable_sensors``)."""
     kernels: tuple[tuple[str, str], ...] = ()
     """(rotation, candidate kernel) already chosen: when a model is trained again, with an effect for example,
     its kernels stay, so that a change of the error is the effect's."""

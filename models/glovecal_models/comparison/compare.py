@@ -1,23 +1,22 @@
-"""A calibration model held against takes with reference: how far is it off, where, and does it know?"""
+"""Errors of a calibration model on takes with reference, and whether its standard deviations are right."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.fingertips import FingertipErrors, fingertip_errors
 from glovecal_models.comparison.floor_estimate import NoiseFloor, joined
+from glovecal_models.comparison.noise_floor import RotationNoise, rotation_noise
 from glovecal_models.comparison.residuals import Residuals, residuals
-from glovecal_models.comparison.rotation_noise import RotationNoise, rotation_noise
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.takes.take import Take
 
 WITHIN_ONE_SD = 0.6827
-"""Share of errors a truthful standard deviation covers (normal distribution)."""
+"""Share of errors that a correct standard deviation covers (normal distribution)."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,7 @@ class RotationErrors:
     percentile_95_deg: float
     """95 % of the absolute errors are at or below this."""
     coverage: float
-    """Share of measurements within one claimed standard deviation; 0.68 is truthful."""
+    """Share of measurements within one claimed standard deviation; 0.68 is expected."""
     nlpd: float | None
     """Mean negative log predictive density, nats: the mean of ln(sd sqrt(2 pi)) + 1/2 (error / sd)^2.
 
@@ -58,7 +57,7 @@ class PoseErrors:
 class Comparison:
     """Model against measurements."""
 
-    over_all: RotationErrors
+    overall: RotationErrors
     rotations: dict[str, RotationErrors]
     poses: tuple[PoseErrors, ...]
     not_measured: tuple[str, ...]
@@ -67,18 +66,14 @@ class Comparison:
     """Rotations the takes measured that the model does not predict."""
     fingertips: FingertipErrors | None
     """None where no finger's chain was predicted and measured."""
-    left_out: dict[str, int] = field(default_factory=dict)
+    excluded: dict[str, int] = field(default_factory=dict)
     """Measured frames, by rotation, that are not compared: faulty sensors, repeated frames."""
-
-    def to_document(self) -> dict[str, Any]:
-        """Plain JSON-able data."""
-        return asdict(self)
 
 
 def compare(
     model: CalibrationModel, takes: Sequence[Take], *, dimensions: HandDimensions | None = None
 ) -> Comparison:
-    """Hold ``model`` against ``takes``. Raises LayoutMismatch, and BadInput when nothing was measured.
+    """Errors of ``model`` on ``takes``. Raises LayoutMismatch, and BadInput when nothing was measured.
 
     ``dimensions`` of the subject's hand, for the errors of fingertips.
     """
@@ -98,7 +93,7 @@ def summed_up(
     columns = {name: [found.column(name)] for name in measured}
     in_takes = {name for item in found.takes for name in item.take.rotations}
     return Comparison(
-        over_all=_errors(error, spread, reference, _floor_of_all(found, noise)),
+        overall=_errors(error, spread, reference, _floor_of_all(found, noise)),
         rotations={
             name: _errors(error[:, column], spread[:, column], reference[:, column], noise[name].floor)
             for name, column in columns.items()
@@ -107,7 +102,7 @@ def summed_up(
         not_measured=tuple(name for name in found.rotations if name not in measured),
         not_predicted=tuple(sorted(in_takes - set(found.rotations))),
         fingertips=fingertip_errors(found, {name: noise[name].floor for name in measured}, dimensions),
-        left_out=found.left_out,
+        excluded=found.excluded,
     )
 
 

@@ -1,22 +1,95 @@
-"""How far fingertips are off, in mm: what rotations in degrees come to where the hand touches the world."""
+"""Errors of fingertip positions in mm, and their noise floor.
+
+Each joint's noise floor moves the tip by its column of the Jacobian; the joints' noises are assumed
+independent, so their squares add up. Neighbours that share a sensor's noise are not quite independent.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from glovecal_models.comparison.fingertip_floor import CarriedFloors, FingertipFloor
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.hand_poses import HandPoses, hand_poses, tips_mm
 from glovecal_models.comparison.residuals import Residuals
 from glovecal_models.hand.dimensions import HandDimensions
+from glovecal_models.hand.forward_kinematics import forward_kinematics, tip_jacobian
 from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS
 from glovecal_models.hand.skeleton import Skeleton, hand_skeleton
 
+MOST_FRAMES = 3000
+"""Frames that the floor is averaged over, spread over all."""
+_ENDS = ("floor_deg", "low_deg", "high_deg")
 TIPS = tuple(FINGERS.values())
 THUMB, INDEX = 0, 1
+
+
+@dataclass(frozen=True)
+class FingertipFloor:
+    """With the interval that the ends of the joints' 95 % intervals give."""
+
+    floor_mm: float
+    low_mm: float
+    high_mm: float
+    is_lower_bound: bool
+    """That of some joint is one: noise with a memory is not in it."""
+
+
+class CarriedFloors:
+    """The joints' floors, carried to the tips of some of the measured hands."""
+
+    def __init__(self, skeleton: Skeleton, poses: HandPoses, floors: Mapping[str, NoiseFloor | None]) -> None:
+        poses = poses.every(MOST_FRAMES)
+        self._frames = forward_kinematics(skeleton, poses.measured)
+        slopes = tip_jacobian(skeleton, self._frames)
+        self._slopes = slopes * poses.compared[:, None, None, :]
+        self._counts = poses.counts
+        self._floors = [floors.get(name) for name in HAND_ROTATIONS]
+
+    def of_tips(self, tips: list[int]) -> FingertipFloor | None:
+        """Of some fingertips together; None when some joint's floor is unknown."""
+        squares = (self._slopes[:, tips] ** 2).sum(axis=2)[self._counts[:, tips]]
+        return self._floor(squares, lambda sizes: float(np.mean(squares @ sizes**2)))
+
+    def of_distance(self, first: int, second: int) -> FingertipFloor | None:
+        """Of the distance between two fingertips. Touching tips can only move apart, so noise is drawn."""
+        both = self._counts[:, first] & self._counts[:, second]
+        slopes = (self._slopes[:, first] - self._slopes[:, second])[both]
+        gaps = (self._frames.tips_mm[:, first] - self._frames.tips_mm[:, second])[both]
+        drawn = np.random.default_rng(0).standard_normal((len(gaps), len(HAND_ROTATIONS)))
+
+        def mean_square(sizes: np.ndarray) -> float:
+            moved = gaps + np.einsum("nar,nr->na", slopes, drawn * sizes)
+            change = np.linalg.norm(moved, axis=1) - np.linalg.norm(gaps, axis=1)
+            return float(np.mean(change**2))
+
+        return self._floor((slopes**2).sum(axis=1), mean_square)
+
+    def _floor(
+        self, squares: np.ndarray, mean_square: Callable[[np.ndarray], float]
+    ) -> FingertipFloor | None:
+        """``squares`` (K, R): which rotations move it at all; ``mean_square`` of the joints' floors (R,)."""
+        if not len(squares):
+            return None
+        moving = squares.max(axis=0) > 0
+        known = [floor for floor, moves in zip(self._floors, moving, strict=True) if moves]
+        if not known or None in known:
+            return None
+        floor, low, high = (np.sqrt(mean_square(self._sizes(end, moving))) for end in _ENDS)
+        return FingertipFloor(
+            float(floor),
+            float(low),
+            float(high),
+            any(one is not None and one.is_lower_bound for one in known),
+        )
+
+    def _sizes(self, end: str, moving: np.ndarray) -> np.ndarray:
+        pairs = zip(self._floors, moving, strict=True)
+        return np.array(
+            [getattr(floor, end) if moves and floor is not None else 0.0 for floor, moves in pairs]
+        )
 
 
 @dataclass(frozen=True)
@@ -32,7 +105,7 @@ class TipErrors:
     """The error (RMSE) of always answering each rotation's mean angle."""
     floor: FingertipFloor | None
     """How small the RMSE can get; None where some joint's floor is unknown."""
-    taken_equal: tuple[str, ...]
+    assumed_equal: tuple[str, ...]
     """Rotations of the chain that were not compared in all of these frames: there they do not count."""
 
 
@@ -56,13 +129,12 @@ class FingertipErrors:
     hand_length_mm: float
     is_assumed: bool
     """Nobody measured this hand: the errors are those of a hand of this length."""
-    over_all: TipErrors
+    overall: TipErrors
     fingers: dict[str, TipErrors]
     """``thumb`` to ``pinky``, those whose chain was predicted and measured."""
     thumb_index: TipErrors | None
     """Of the distance between the tips of thumb and index finger; None where one of them does not count."""
     worst: WorstTip
-    sentence: str
 
 
 def fingertip_errors(
@@ -84,16 +156,15 @@ def fingertip_errors(
     off, mean_off = (_distances(answer, tips[0], poses) for answer in tips[1:])
 
     def errors(chosen: list[int]) -> TipErrors:
-        equal = _taken_equal(skeleton, poses, chosen)
+        equal = _assumed_equal(skeleton, poses, chosen)
         return _errors(off[:, chosen], mean_off[:, chosen], carried.of_tips(chosen), equal)
 
     counting = [tip for tip in range(len(TIPS)) if poses.counts[:, tip].any()]
     fingers = {TIPS[tip]: errors([tip]) for tip in counting}
-    over_all, thumb_index = errors(counting), _thumb_index(skeleton, poses, tips, carried)
+    overall, thumb_index = errors(counting), _thumb_index(skeleton, poses, tips, carried)
     sizes = skeleton.dimensions
     return FingertipErrors(
-        sizes.hand_length_mm, sizes.is_assumed, over_all, fingers, thumb_index, _worst(off, poses, found),
-        _sentence(sizes, over_all, fingers, thumb_index),
+        sizes.hand_length_mm, sizes.is_assumed, overall, fingers, thumb_index, _worst(off, poses, found),
     )  # fmt: skip
 
 
@@ -106,7 +177,7 @@ def _thumb_index(
         return None
     gap, *answers = (np.linalg.norm(one[both, THUMB] - one[both, INDEX], axis=1) for one in tips)
     off, mean_off = (np.abs(answer - gap) for answer in answers)
-    equal = _taken_equal(skeleton, poses, (THUMB, INDEX))
+    equal = _assumed_equal(skeleton, poses, (THUMB, INDEX))
     return _errors(off, mean_off, carried.of_distance(THUMB, INDEX), equal)
 
 
@@ -123,7 +194,7 @@ def _always_mean(poses: HandPoses) -> np.ndarray:
 
 
 def _errors(
-    off: np.ndarray, mean_off: np.ndarray, floor: FingertipFloor | None, taken_equal: tuple[str, ...]
+    off: np.ndarray, mean_off: np.ndarray, floor: FingertipFloor | None, assumed_equal: tuple[str, ...]
 ) -> TipErrors:
     known = off[np.isfinite(off)]
     return TipErrors(
@@ -132,11 +203,11 @@ def _errors(
         percentile_95_mm=float(np.percentile(known, 95)),
         baseline_mm=float(np.sqrt(np.nanmean(mean_off**2))),
         floor=floor,
-        taken_equal=taken_equal,
+        assumed_equal=assumed_equal,
     )
 
 
-def _taken_equal(skeleton: Skeleton, poses: HandPoses, tips: Sequence[int]) -> tuple[str, ...]:
+def _assumed_equal(skeleton: Skeleton, poses: HandPoses, tips: Sequence[int]) -> tuple[str, ...]:
     found = set()
     for tip in tips:
         rows = poses.counts[:, tip]
@@ -155,35 +226,3 @@ def _worst(off: np.ndarray, poses: HandPoses, found: Residuals) -> WorstTip:
     )
     error, time = float(off[frame, tip]), float(poses.time_s[frame])
     return WorstTip(TIPS[tip], error, take, time, measured, predicted)
-
-
-def _sentence(
-    sizes: HandDimensions,
-    over_all: TipErrors,
-    fingers: Mapping[str, TipErrors],
-    thumb_index: TipErrors | None,
-) -> str:
-    whose = f"for a hand of {sizes.hand_length_mm:.0f} mm"
-    whose += ", a size nobody measured" if sizes.is_assumed else ""
-    worst = max(fingers, key=lambda name: fingers[name].rmse_mm)
-    said = f"Fingertips are off by {over_all.rmse_mm:.1f} mm (RMSE, {whose}{_scale(over_all)})"
-    if len(fingers) > 1:
-        said += f", most at the {worst} with {fingers[worst].rmse_mm:.1f} mm"
-    if thumb_index is not None:
-        said += f"; the distance between thumb and index fingertip by {thumb_index.rmse_mm:.1f} mm"
-    equal = over_all.taken_equal
-    if equal:
-        were = "was" if len(equal) == 1 else "were"
-        said += f". {_listed(equal)} {were} not measured throughout and taken equal in both"
-    return f"{said}."
-
-
-def _scale(errors: TipErrors) -> str:
-    if errors.floor is None:
-        return f"; always answering the mean angles {errors.baseline_mm:.1f}"
-    least = "at least " if errors.floor.is_lower_bound else ""
-    return f"; noise floor {least}{errors.floor.floor_mm:.1f}"
-
-
-def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -12,28 +12,29 @@ that holds the least a better model could still take away:
   not in it.
 * frame to frame: second differences, a lower bound likewise, from the shortest recordings.
 * near readings: only for a table of single poses without their names, which has none of the others: how far
-  the reference differs between frames that read nearly the same.
+  the reference differs between frames with nearly the same readings, the half of all frames with the nearest
+  neighbours. Rough, and from above: what the readings still differ by is included.
 
-The floor is that of this model: one that follows its sensors too closely magnifies their noise. How much of
-the floor is the prediction's own jitter is told beside it.
+The floor is that of this model: one that follows its sensors too closely amplifies their noise. The
+prediction's own jitter is reported beside it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from glovecal_models.comparison.error_spectrum import ErrorSpectrum, error_spectrum
 from glovecal_models.comparison.floor_estimate import How, NoiseFloor, pooled
-from glovecal_models.comparison.holds import Hold, holds
+from glovecal_models.comparison.holds import Hold, from_repeated_poses, holds
 from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
-from glovecal_models.comparison.near_readings import from_near_readings
-from glovecal_models.comparison.repeated_poses import from_repeated_poses
-from glovecal_models.comparison.residuals import Residuals
+from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 
 CHI_SQUARED_MEDIAN = 0.4549
 """With one degree of freedom."""
+MOST_FRAMES = 1500
 
 
 def noise_floor(found: Residuals, rotation: str, generator: np.random.Generator) -> NoiseFloor | None:
@@ -101,3 +102,85 @@ def _white_variances(second: Sequence[np.ndarray]) -> np.ndarray:
     values = joined[np.isfinite(joined)] ** 2
     blocks = np.array_split(values, min(40, len(values))) if len(values) else []
     return np.array([np.median(block) for block in blocks]) / CHI_SQUARED_MEDIAN / 6.0
+
+
+@dataclass(frozen=True)
+class RotationNoise:
+    floors: tuple[NoiseFloor, ...]
+    """Every estimate that the takes allow, the best first."""
+    spectrum: ErrorSpectrum | None
+
+    @property
+    def floor(self) -> NoiseFloor | None:
+        """The best estimate."""
+        return self.floors[0] if self.floors else None
+
+
+def rotation_noise(
+    found: Residuals, *, seed: int = 0, limits: ComparisonLimits = COMPARISON_LIMITS
+) -> dict[str, RotationNoise]:
+    """Of every measured rotation. A rotation's intervals do not depend on which others were measured."""
+    result = {}
+    for rotation in found.measured_rotations:
+        generator = np.random.default_rng([seed, *rotation.encode()])
+        spectrum = error_spectrum(found, rotation, generator, limits)
+        floors = noise_floors(found, rotation, generator, spectrum, limits)
+        result[rotation] = RotationNoise(floors, spectrum)
+    return result
+
+
+def from_near_readings(
+    takes: Sequence[TakeResiduals],
+    column: int,
+    generator: np.random.Generator,
+    limits: ComparisonLimits = COMPARISON_LIMITS,
+) -> NoiseFloor | None:
+    """From pairs of frames of any take; None with fewer than ``fewest_pairs``."""
+    error = np.concatenate([item.error[:, column] for item in takes])
+    predicted = np.concatenate([item.predicted[:, column] for item in takes])
+    names = takes[0].take.sensors
+    if any(set(item.take.sensors) != set(names) for item in takes):
+        return None
+    readings = np.concatenate(
+        [item.take.readings[:, [item.take.sensors.index(name) for name in names]] for item in takes]
+    )
+    rows = np.flatnonzero(np.isfinite(error))
+    if len(rows) > MOST_FRAMES:
+        rows = np.sort(generator.choice(rows, MOST_FRAMES, replace=False))
+    first, second = _nearest_pairs(readings[rows])
+    if len(first) < limits.fewest_pairs:
+        return None
+    first, second = rows[first], rows[second]
+    jitter = float(np.sqrt(np.mean((predicted[first] - predicted[second]) ** 2) / 2))
+    squares = (error[first] - error[second]) ** 2 / 2
+    return pooled(squares, np.ones(len(squares)), jitter, "near readings", generator)
+
+
+def _nearest_pairs(readings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both members of each pair: a frame and the one nearest to it, where that is nearer than for most."""
+    spread = readings.std(axis=0) if len(readings) else np.zeros(0)
+    scaled = readings[:, spread > 0] / spread[spread > 0]
+    if len(scaled) < 2 or not scaled.shape[1]:
+        return np.empty(0, dtype=int), np.empty(0, dtype=int)
+    squares = np.sum(scaled**2, axis=1)
+    distance = squares[:, None] + squares[None] - 2 * scaled @ scaled.T
+    np.fill_diagonal(distance, np.inf)
+    nearest = distance.argmin(axis=1)
+    closest = distance[np.arange(len(scaled)), nearest]
+    chosen = np.flatnonzero(closest <= np.median(closest))
+    pairs = np.unique(np.sort(np.column_stack([chosen, nearest[chosen]]), axis=1), axis=0)
+    return pairs[:, 0], pairs[:, 1]
+
+
+def is_at_floor(
+    rmse_deg: float, floor: NoiseFloor | None, limits: ComparisonLimits = COMPARISON_LIMITS
+) -> bool:
+    """False where no floor is known, or only a lower bound of one."""
+    if floor is None or floor.is_lower_bound:
+        return False
+    return reaches_floor(rmse_deg, floor.high_deg, limits)
+
+
+def reaches_floor(rmse_deg: float, high_deg: float, limits: ComparisonLimits = COMPARISON_LIMITS) -> bool:
+    """``high_deg``: the upper end of the floor's 95 % interval."""
+    return rmse_deg <= limits.at_floor_times * high_deg

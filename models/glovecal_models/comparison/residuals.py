@@ -26,7 +26,7 @@ class TakeResiduals:
     """Claimed standard deviation of a measurement, (N, R), degrees."""
     measured: np.ndarray
     """Reference at the frames, (N, R), degrees."""
-    left_out: tuple[int, ...] = ()
+    excluded: tuple[int, ...] = ()
     """For each rotation the measured frames that are not compared: its sensor failed. Empty: none."""
 
     @property
@@ -50,11 +50,11 @@ class Residuals:
         return tuple(name for name, is_measured in zip(self.rotations, some, strict=True) if is_measured)
 
     @property
-    def left_out(self) -> dict[str, int]:
+    def excluded(self) -> dict[str, int]:
         """Measured frames that are not compared, by rotation; only those that have some."""
         counts = dict.fromkeys(self.rotations, 0)
         for item in self.takes:
-            for name, count in zip(self.rotations, item.left_out, strict=False):
+            for name, count in zip(self.rotations, item.excluded, strict=False):
                 counts[name] += count
         return {name: count for name, count in counts.items() if count}
 
@@ -78,13 +78,13 @@ def residuals(model: CalibrationModel, takes: Sequence[Take]) -> Residuals:
         for effect, settings in repairs:
             if isinstance(effect, SignatureEffect) and not effect.needs_prediction:
                 take = effect.repaired([take], settings)[0]
-        left_out = () if take is given else _left_out(given, take, names)
+        excluded = () if take is given else _excluded(given, take, names)
         index = [take.sensors.index(name) for name in model.layout.sensors]
         angles = predictor.predict_take(take.time_s, take.readings[:, index], take.context, take.wearing)
         for effect, settings in repairs:
             if isinstance(effect, SignatureEffect) and effect.needs_prediction:
                 take = effect.repaired_to(take, settings, names, angles.mean)
-        found.append(TakeResiduals(take, angles.mean, angles.sd, take.reference_at_frames(names), left_out))
+        found.append(TakeResiduals(take, angles.mean, angles.sd, take.reference_at_frames(names), excluded))
     result = Residuals(names, tuple(found))
     if not found or not result.measured_rotations:
         raise BadInput(
@@ -93,6 +93,6 @@ def residuals(model: CalibrationModel, takes: Sequence[Take]) -> Residuals:
     return result
 
 
-def _left_out(given: Take, kept: Take, rotations: Sequence[str]) -> tuple[int, ...]:
+def _excluded(given: Take, kept: Take, rotations: Sequence[str]) -> tuple[int, ...]:
     counts = [np.isfinite(take.reference_at_frames(rotations)).sum(axis=0) for take in (given, kept)]
     return tuple(int(count) for count in np.maximum(counts[0] - counts[1], 0))

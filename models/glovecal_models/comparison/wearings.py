@@ -24,15 +24,14 @@ class WearingErrors:
     takes: tuple[int, ...]
     spread_deg: float
     """Root mean square of the wearings' means about their mean."""
-    probability: float | None
-    """Share of other ways to deal the takes to wearings that spread as widely; None: too few takes to say."""
-    sentence: str
+    p_value: float | None
+    """Share of permutations of the takes over the wearings that spread as widely; None: too few takes."""
     limits: ComparisonLimits = COMPARISON_LIMITS
 
     @property
-    def is_no_noise(self) -> bool:
+    def is_significant(self) -> bool:
         """Whether the error changes with the wearing by more than from take to take."""
-        return self.probability is not None and self.probability <= self.limits.wearing_p_value
+        return self.p_value is not None and self.p_value <= self.limits.wearing_p_value
 
 
 def wearing_errors(
@@ -55,36 +54,23 @@ def wearing_errors(
     values, owners = np.array(means), np.array([names.index(label) for label in labels])
     each = tuple(float(values[owners == i].mean()) for i in range(len(names)))
     counts = tuple(int((owners == i).sum()) for i in range(len(names)))
-    probability = _probability(values, owners, counts, generator, limits.wearing_fewest_deals)
+    p_value = _p_value(values, owners, counts, generator, limits.wearing_fewest_deals)
     spread = float(np.std(each))
-    sentence = _sentence(names, each, probability, limits.wearing_p_value)
-    return WearingErrors(rotation, names, each, counts, spread, probability, sentence, limits)
+    return WearingErrors(rotation, names, each, counts, spread, p_value, limits)
 
 
-def _sentence(
-    names: tuple[str, ...], each: tuple[float, ...], probability: float | None, seldom: float
-) -> str:
-    low, high = int(np.argmin(each)), int(np.argmax(each))
-    ends = f"from {each[low]:+.1f} degrees in wearing {names[low]} to {each[high]:+.1f} in {names[high]}"
-    if probability is None:
-        return f"The mean error goes {ends}; these are too few takes to say whether that is the wearing."
-    if probability <= seldom:
-        return f"The mean error changes with the wearing, {ends}."
-    return f"The mean error goes {ends}, no more than it changes from take to take."
-
-
-def _probability(
+def _p_value(
     values: np.ndarray,
     owners: np.ndarray,
     counts: tuple[int, ...],
     generator: np.random.Generator,
     fewest: int,
 ) -> float | None:
-    """Over distinct ways to deal the takes, the true one left out: random draws would repeat it."""
+    """Over distinct permutations without the true one, which random draws would repeat."""
     if _partitions(counts) < fewest or min(counts) < 2:
         return None
     true = _spread(values, owners)
-    others = [_spread(values, dealt) for dealt in _deals(owners, counts, generator)]
+    others = [_spread(values, permuted) for permuted in _permutations(owners, counts, generator)]
     return (1 + sum(other >= true - 1e-12 for other in others)) / (1 + len(others))
 
 
@@ -107,28 +93,30 @@ def _partitions(counts: tuple[int, ...]) -> int:
     return ways
 
 
-def _deals(owners: np.ndarray, counts: tuple[int, ...], generator: np.random.Generator) -> list[np.ndarray]:
+def _permutations(
+    owners: np.ndarray, counts: tuple[int, ...], generator: np.random.Generator
+) -> list[np.ndarray]:
     """All other partitions when they are few, else many random ones, each at most once."""
     true = partition_of(owners)
     found: dict[tuple[int, ...], np.ndarray] = {}
     if len(counts) == 2 and _partitions(counts) <= MOST_PARTITIONS:
         for chosen in combinations(range(len(owners)), counts[0]):
-            dealt = np.ones(len(owners), dtype=int)
-            dealt[list(chosen)] = 0
-            found[partition_of(dealt)] = dealt
+            permuted = np.ones(len(owners), dtype=int)
+            permuted[list(chosen)] = 0
+            found[partition_of(permuted)] = permuted
     else:
         for _ in range(2 * MOST_PARTITIONS):
-            dealt = generator.permutation(owners)
-            found[partition_of(dealt)] = dealt
+            permuted = generator.permutation(owners)
+            found[partition_of(permuted)] = permuted
     found.pop(true, None)
     return list(found.values())[:MOST_PARTITIONS]
 
 
-def other_deals(owners: np.ndarray, most: int, generator: np.random.Generator) -> list[np.ndarray]:
+def permuted_sessions(owners: np.ndarray, most: int, generator: np.random.Generator) -> list[np.ndarray]:
     """Up to ``most`` other ways to deal takes to wearings of the same sizes, each at most once."""
     counts = tuple(np.bincount(owners).tolist())
-    deals = _deals(owners, counts, generator)
-    return [deals[i] for i in generator.permutation(len(deals))[:most]]
+    permutations = _permutations(owners, counts, generator)
+    return [permutations[i] for i in generator.permutation(len(permutations))[:most]]
 
 
 def partition_of(owners: np.ndarray) -> tuple[int, ...]:

@@ -1,23 +1,22 @@
-"""Where a model fails: noise floor, what the error depends on, wearings, worst stretches; with sentences."""
+"""Where a model fails: noise floor, what the error depends on, wearings, worst stretches."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
-from glovecal_models.comparison.at_floor import is_at_floor
-from glovecal_models.comparison.covariates import covariates
+from glovecal_models.comparison.dependence import Dependence, covariates, dependence
 from glovecal_models.comparison.error_spectrum import ErrorSpectrum
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
-from glovecal_models.comparison.residuals import Residuals
-from glovecal_models.comparison.rotation_noise import RotationNoise, rotation_noise
-from glovecal_models.comparison.stretches import Stretch, worst_stretches
-from glovecal_models.comparison.structure import Dependence, dependence
+from glovecal_models.comparison.noise_floor import RotationNoise, is_at_floor, rotation_noise
+from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 from glovecal_models.comparison.wearings import WearingErrors, wearing_errors
+
+STRETCH_S = 1.0
+MOST = 5
 
 
 @dataclass(frozen=True)
@@ -44,22 +43,30 @@ class RotationFindings:
     dependences: tuple[Dependence, ...]
     """Every column tested, the one that explains most first."""
     wearings: WearingErrors | None
-    sentence: str
     limits: ComparisonLimits = COMPARISON_LIMITS
 
     @property
+    def is_near_floor(self) -> bool:
+        """The error is no larger than the noise floor, within its interval."""
+        return is_at_floor(self.rmse_deg, self.floor, self.limits)
+
+    @property
+    def is_jittery(self) -> bool:
+        """The prediction jitters by more than the reference's noise accounts for."""
+        return _is_jittery(self.floor, self.limits)
+
+    @property
     def is_at_floor(self) -> bool:
-        """Nothing is left to gain: noise is all there is, and it is not the prediction's own."""
-        near = is_at_floor(self.rmse_deg, self.floor, self.limits)
-        return near and not _is_restless(self.floor, self.limits)
+        """Only noise remains, and it is not the prediction's own."""
+        return self.is_near_floor and not self.is_jittery
 
     def is_structure(self, item: Dependence) -> bool:
-        """Whether one of them is no noise, and large enough to matter."""
+        """Whether one of them is significant, and large enough to matter."""
         return is_structure(item, self.rmse_deg, self.limits)
 
     @property
     def structure(self) -> tuple[Dependence, ...]:
-        """Dependences that are no noise, the largest first."""
+        """Significant dependences, the largest first."""
         return tuple(item for item in self.dependences if self.is_structure(item))
 
 
@@ -70,27 +77,11 @@ class WhereItFails:
     rotations: tuple[RotationFindings, ...]
     stretches: tuple[Stretch, ...]
 
-    def to_document(self) -> dict[str, Any]:
-        """Plain JSON-able data; every dependence says whether it is structure."""
-        rotations = []
-        for item in self.rotations:
-            document = asdict(item)
-            for part in (document, document["wearings"] or {}):
-                part.pop("limits", None)  # the same for all; nothing that was measured
-            for name in ("dependences", "other_floors"):
-                document[name] = list(document[name])
-            for held, given in zip(document["dependences"], item.dependences, strict=True):
-                held["is_structure"] = item.is_structure(given)
-                for name in ("edges", "mean_deg", "count", "chance_deg"):
-                    held[name] = getattr(given, name).tolist()
-            rotations.append(document)
-        return {"rotations": rotations, "stretches": [asdict(item) for item in self.stretches]}
-
 
 def is_structure(item: Dependence, rmse_deg: float, limits: ComparisonLimits = COMPARISON_LIMITS) -> bool:
-    """Whether a dependence is no noise, and large enough to matter."""
+    """Whether a dependence is significant, and large enough to matter."""
     matters = item.explained_deg**2 >= limits.structure_share * rmse_deg**2
-    return item.probability <= limits.structure_p_value and matters
+    return item.p_value <= limits.structure_p_value and matters
 
 
 def where_it_fails(
@@ -123,9 +114,8 @@ def _findings(
     rmse, bias = float(np.sqrt(np.nanmean(every**2))), float(np.nanmean(every))
     floor, slow = noise.floor, _slow_share(noise.spectrum)
     wearings = wearing_errors(found, rotation, generator, limits)
-    sentence = _sentence(rotation, rmse, bias, floor, ranked, slow, limits)
     return RotationFindings(
-        rotation, rmse, bias, floor, noise.floors[1:], slow, tuple(ranked), wearings, sentence, limits
+        rotation, rmse, bias, floor, noise.floors[1:], slow, tuple(ranked), wearings, limits
     )
 
 
@@ -140,38 +130,7 @@ def _above_floor(item: RotationFindings) -> float:
     return item.rmse_deg**2 - floor**2
 
 
-def _sentence(
-    rotation: str,
-    rmse: float,
-    bias: float,
-    floor: NoiseFloor | None,
-    ranked: list[Dependence],
-    slow: SlowShare | None,
-    limits: ComparisonLimits,
-) -> str:
-    structure = [item for item in ranked if is_structure(item, rmse, limits)]
-    start = f"{rotation} is off by {rmse:.1f} degrees"
-    if floor is not None:
-        least = "at least " if floor.is_lower_bound else ""
-        start += f" (noise floor {least}{floor.floor_deg:.1f})"
-        if is_at_floor(rmse, floor, limits):
-            return f"{start}: {_at_floor(floor, limits)}."
-    if abs(bias) >= limits.mostly_bias_share * rmse:
-        start += f", mostly by a constant {bias:+.1f}"
-    if not structure:
-        slowly = "" if slow is None else f", and {100 * slow.share:.0f} % of its variance is slower than 1 Hz"
-        return f"{start}; no recorded column explains it{slowly}."
-    first = structure[0]
-    low, high = float(np.min(first.mean_deg)), float(np.max(first.mean_deg))
-    rest = len(structure) - 1
-    also = f"; {rest} other column{'s' if rest > 1 else ''} too" if rest else ""
-    return (
-        f"{start}. It depends on {first.phrase}: from {low:+.1f} to {high:+.1f} degrees, "
-        f"{first.explained_deg:.1f} in all{also}."
-    )
-
-
-def _is_restless(floor: NoiseFloor | None, limits: ComparisonLimits) -> bool:
+def _is_jittery(floor: NoiseFloor | None, limits: ComparisonLimits) -> bool:
     """Whether the prediction jitters by more than the reference's noise accounts for."""
     if floor is None:
         return False
@@ -179,10 +138,70 @@ def _is_restless(floor: NoiseFloor | None, limits: ComparisonLimits) -> bool:
     return bool(floor.prediction_deg > limits.restless_times * reference)
 
 
-def _at_floor(floor: NoiseFloor, limits: ComparisonLimits) -> str:
-    if _is_restless(floor, limits):
-        return (
-            f"no more than the prediction's own jitter of {floor.prediction_deg:.1f} while the hand is "
-            "still; the model follows its sensors too closely"
+@dataclass(frozen=True)
+class Stretch:
+    """One stretch of a take; errors over the rotations measured in it, degrees."""
+
+    take: str
+    start_s: float
+    end_s: float
+    """Seconds on the take's own clock."""
+    rmse_deg: float
+    rotation: str
+    """The rotation that is worst in it."""
+    rotation_rmse_deg: float
+    pose: str
+    """What the take calls the pose in its middle, "" for nothing."""
+
+
+def worst_stretches(found: Residuals, most: int = MOST) -> tuple[Stretch, ...]:
+    """Up to ``most`` stretches of about a second that do not overlap, worst first."""
+    candidates = [stretch for item in found.takes for stretch in _stretches(item, found.rotations)]
+    candidates.sort(key=lambda stretch: -stretch.rmse_deg)
+    chosen: list[Stretch] = []
+    for stretch in candidates:
+        if len(chosen) == most:
+            break
+        if all(
+            stretch.take != other.take or stretch.end_s <= other.start_s or stretch.start_s >= other.end_s
+            for other in chosen
+        ):
+            chosen.append(stretch)
+    return tuple(chosen)
+
+
+def windows(time: np.ndarray, length_s: float) -> Iterator[slice]:
+    """Frames of windows that overlap by half; the last one ends with the recording, so that none is short."""
+    if not len(time):
+        return
+    last = max(float(time[-1]) - length_s, float(time[0]))
+    for begin in (*np.arange(time[0], last, 0.5 * length_s), last):
+        first, end = np.searchsorted(time, [begin, begin + length_s])
+        if end > first:
+            yield slice(int(first), int(end))
+
+
+def _stretches(item: TakeResiduals, rotations: tuple[str, ...]) -> list[Stretch]:
+    """Stretches that overlap by half."""
+    time, squared = item.take.time_s, item.error**2
+    found = []
+    for rows in windows(time, STRETCH_S):
+        part = squared[rows]
+        counted = np.isfinite(part)
+        if not counted.any():
+            continue
+        each = np.where(counted, part, 0.0).sum(axis=0) / np.maximum(counted.sum(axis=0), 1)
+        worst = int(np.argmax(each))
+        middle = (rows.start + rows.stop - 1) // 2
+        found.append(
+            Stretch(
+                take=item.take.name,
+                start_s=float(time[rows.start]),
+                end_s=float(time[rows.stop - 1]),
+                rmse_deg=float(np.sqrt(part[counted].mean())),
+                rotation=rotations[worst],
+                rotation_rmse_deg=float(np.sqrt(each[worst])),
+                pose=item.take.poses[middle] if item.take.poses is not None else "",
+            )
         )
-    return "nothing is left to gain"
+    return found

@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.calibration.base_features import BaseFeatures
-from glovecal_models.calibration.held_out import BaseProducts, Rows
-from glovecal_models.calibration.left_out import are_short, first_measured, pieces
+from glovecal_models.calibration.folds import are_short, first_measured, pieces
+from glovecal_models.calibration.held_out import BaseFeatures, BaseProducts, Rows
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.resampled import ResampledTake

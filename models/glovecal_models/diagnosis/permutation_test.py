@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from glovecal_models.comparison.wearings import other_deals, partition_of
+from glovecal_models.comparison.wearings import partition_of, permuted_sessions
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.effects.base.control import motions_of, with_context
 from glovecal_models.effects.base.effect import Effect
@@ -66,7 +66,7 @@ def wearing_permutations(takes: Sequence[Signals], generator: np.random.Generato
     groups = _motion_groups(owners, motions_of(takes))
     if groups:
         return _within_motions(owners, groups, generator)
-    return other_deals(owners, PERMUTATIONS, generator)
+    return permuted_sessions(owners, PERMUTATIONS, generator)
 
 
 def _permutations(design: ForwardDesign, effect: Effect, generator: np.random.Generator) -> list[np.ndarray]:

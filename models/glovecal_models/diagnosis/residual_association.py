@@ -14,9 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glovecal_models.comparison.covariates import Covariate, covariates
+from glovecal_models.comparison.dependence import Covariate, covariates, explained_when_shifted
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
-from glovecal_models.comparison.structure import explained_when_shifted
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.limits import DiagnosisLimits
 from glovecal_models.diagnosis.resampled import ResampledTake

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from glovecal_models.calibration.left_out import held_levels
+from glovecal_models.calibration.folds import held_levels
 from glovecal_models.diagnosis.naming import Naming
 from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.effect import Effect

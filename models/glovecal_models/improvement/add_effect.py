@@ -8,20 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.calibration.child_model import child_model
+from glovecal_models.calibration.child_model import child_model, columnless_effects, kept_lanes
 from glovecal_models.calibration.effect_fit import fit_with_effects
-from glovecal_models.calibration.had_already import (
-    repaired_takes,
-    settings_of,
-    trained_rotations,
-    wanted_of,
-)
+from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.model_recipe import (
+    repaired_takes,
+    requested_effects,
+    settings_of,
+    trained_rotations,
+)
 from glovecal_models.calibration.prepared_takes import PreparedTakes
-from glovecal_models.calibration.relearned import columnless_effects, kept_lanes
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
-from glovecal_models.calibration.wanted_effect import WantedEffect
 from glovecal_models.diagnosis.signatures import own_sensors
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.interval_effect import IntervalEffect
@@ -68,12 +67,12 @@ def add_effect(
     effect = known_effect(name)
     settings = settings_of(model, settings)
     least_gain = limits.least_gain if least_gain is None else least_gain
-    has = wanted_of(model)
+    has = requested_effects(model)
     if constants is None and isinstance(effect, SignatureEffect):
         proposal = proposed(model, takes, effect, rotations, cancelled, limits.diagnosis)
         constants, rotations = proposal.constants, proposal.rotations or rotations
     chosen = _chosen(model, effect, rotations)
-    fresh, live = WantedEffect(name, chosen, dict(constants or {})), None
+    fresh, live = EffectRequest(name, chosen, dict(constants or {})), None
     if isinstance(effect, SignatureEffect):
         fresh, live = _acting_live(model, takes, has, fresh, effect, cancelled)
     wanted = (*(item for item in has if item.name != name), _joined(has, fresh))
@@ -127,11 +126,11 @@ def _chosen(model: CalibrationModel, effect: Effect, rotations: Sequence[str] | 
 def _acting_live(
     model: CalibrationModel,
     takes: Sequence[Take],
-    has: Sequence[WantedEffect],
-    fresh: WantedEffect,
+    has: Sequence[EffectRequest],
+    fresh: EffectRequest,
     effect: SignatureEffect,
     cancelled: Callable[[], bool] | None,
-) -> tuple[WantedEffect, LiveCheck | None]:
+) -> tuple[EffectRequest, LiveCheck | None]:
     """The effect with what it needs to act on live frames, where it can."""
     others = repaired_takes(takes, [item for item in has if item.name != fresh.name])
     trained = trained_rotations(model)
@@ -152,12 +151,12 @@ def _evidence(
     return found if control_share is None else found | {"rmse_control_deg": control_share * rmse_before}
 
 
-def _joined(has: Sequence[WantedEffect], fresh: WantedEffect) -> WantedEffect:
+def _joined(has: Sequence[EffectRequest], fresh: EffectRequest) -> EffectRequest:
     """The effect on the rotations that have it already, too."""
     before = next((item for item in has if item.name == fresh.name), None)
     if before is None:
         return fresh
-    return WantedEffect(
+    return EffectRequest(
         fresh.name,
         tuple(dict.fromkeys((*before.rotations, *fresh.rotations))),
         fresh.settings or before.settings,

@@ -12,16 +12,16 @@ from dataclasses import asdict, replace
 import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect
+from glovecal_models.calibration.child_model import columnless_effects
 from glovecal_models.calibration.effect_correction import EffectCorrection
 from glovecal_models.calibration.effect_fit import EffectFit, correspondence_for, fit_with_effects
+from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.folds import folds_over_takes
 from glovecal_models.calibration.held_out_check import HeldOutErrors
+from glovecal_models.calibration.interval_inflation import IntervalInflation
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.prepared_takes import PreparedTakes
-from glovecal_models.calibration.relearned import columnless_effects
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.calibration.wanted_effect import WantedEffect
-from glovecal_models.calibration.widening import Widening
 from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.interval_effect import ClaimedErrors, IntervalEffect
 from glovecal_models.errors import BadInput
@@ -34,8 +34,8 @@ PARTS = 3
 def add_interval(
     model: CalibrationModel,
     effect: IntervalEffect,
-    fresh: WantedEffect,
-    has: Sequence[WantedEffect],
+    fresh: EffectRequest,
+    has: Sequence[EffectRequest],
     takes: PreparedTakes,
     settings: TrainingSettings,
     *,
@@ -66,7 +66,7 @@ def add_interval(
     )
     kept = tuple(item for item in model.effects if item.name != fresh.name)
     child = replace(model, effects=(*kept, added), parent=parent_id, takes=tuple(take_hashes) or model.takes)
-    wanted = (*others, WantedEffect(fresh.name, rotations, learned))
+    wanted = (*others, EffectRequest(fresh.name, rotations, learned))
     return Addition(
         fresh.name, fresh.rotations, True, errors, errors, child, wanted, added.described(), claim=claim
     )
@@ -129,7 +129,7 @@ def _claim(error: np.ndarray, variance: np.ndarray) -> Claim:
 def claimed_errors(
     takes: PreparedTakes,
     rotations: Sequence[str],
-    wanted: Sequence[WantedEffect],
+    wanted: Sequence[EffectRequest],
     settings: TrainingSettings,
     *,
     limits: ImprovementLimits = IMPROVEMENT_LIMITS,
@@ -155,14 +155,14 @@ def _errors_of(
     fit: EffectFit,
     takes: PreparedTakes,
     rotations: Sequence[str],
-    wanted: Sequence[WantedEffect],
+    wanted: Sequence[EffectRequest],
     settings: TrainingSettings,
 ) -> list[ClaimedErrors]:
     correction = EffectCorrection(fit.effects, list(rotations), takes.scale)
     regressors = [fit.regressor(name) for name in rotations]
     noise = np.array([regressor.noise_variance for regressor in regressors])
     inputs = [takes.inputs(correspondence_for(takes, name, settings)) for name in rotations]
-    widening = Widening(columnless_effects(wanted), rotations, takes.layout.sensors, noise)
+    inflation = IntervalInflation(columnless_effects(wanted), rotations, takes.layout.sensors, noise)
     found = []
     for number, take in enumerate(takes.takes):
         parts = [regressor.predict(each[number]) for regressor, each in zip(regressors, inputs, strict=True)]
@@ -170,7 +170,7 @@ def _errors_of(
         readings, since = takes.readings[number], take.time_s - take.time_s[0]
         mean = base + correction.of_take(take.time_s, base, readings, take.context, take.wearing).degrees
         variance = np.column_stack([part.variance for part in parts]) + noise
-        variance += widening.added_variance(since, readings)
+        variance += inflation.added_variance(since, readings)
         for column, name in enumerate(rotations):
             target = takes.target(name)[number]
             known = np.isfinite(target)

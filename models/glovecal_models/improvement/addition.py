@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.held_out_check import HeldOutErrors
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.wanted_effect import WantedEffect
 from glovecal_models.effects.base.signature_effect import LiveCheck
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 
@@ -54,7 +54,7 @@ class Addition:
     after: HeldOutErrors
     model: CalibrationModel
     """The child; the parent itself when the effect was undone."""
-    wanted: tuple[WantedEffect, ...]
+    wanted: tuple[EffectRequest, ...]
     """All effects of ``model``."""
     parameters: dict[str, dict[str, float]] = field(default_factory=dict)
     """For each rotation, units in the names."""

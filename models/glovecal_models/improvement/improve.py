@@ -6,16 +6,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from glovecal_models.calibration.had_already import repaired_takes, settings_of, trained_rotations, wanted_of
 from glovecal_models.calibration.held_out_check import HeldOutErrors, held_out_errors
-from glovecal_models.calibration.living_sensors import living_sensors
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.model_recipe import (
+    repaired_takes,
+    requested_effects,
+    settings_of,
+    trained_rotations,
+)
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import Report, TrainingSettings
+from glovecal_models.calibration.usable_sensors import usable_sensors
 from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_models.comparison.noise_floor import rotation_noise
 from glovecal_models.comparison.residuals import residuals
-from glovecal_models.comparison.rotation_noise import rotation_noise
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.known_effect import known_effects
@@ -87,8 +92,8 @@ class _Loop:
         report: Report | None,
     ) -> None:
         self.takes, self.subject, self.settings = list(takes), subject, settings
-        self.living = living_sensors(layout, takes)
-        self.layout = self.living.layout
+        self.usable = usable_sensors(layout, takes)
+        self.layout = self.usable.layout
         self.holdout, self.seed, self.hashes = holdout, seed, hashes
         self.limits, self.cancelled, self.report = limits, cancelled, report
         self.steps: list[Step] = []
@@ -159,7 +164,7 @@ class _Loop:
         self._say("done", 1.0)
         return Improvement(
             tuple(self.steps), self.floors, stopped, self.diagnosis, tuple(self.trials), scale,
-            tuple(take_warnings(self.takes)), self.living,
+            tuple(take_warnings(self.takes)), self.usable,
             self.takes[0].duration_s if len(self.takes) == 1 and not self.holdout else None,
         )  # fmt: skip
 
@@ -220,14 +225,14 @@ class _Loop:
 
     @property
     def _has(self) -> set[str]:
-        return {item.name for item in wanted_of(self.steps[-1].model)}
+        return {item.name for item in requested_effects(self.steps[-1].model)}
 
     @property
     def _tried(self) -> set[str]:
         return {trial.addition.effect for trial in self.trials if not trial.addition.added}
 
     def _repaired(self) -> list[Take]:
-        return repaired_takes(self.takes, wanted_of(self.steps[-1].model))
+        return repaired_takes(self.takes, requested_effects(self.steps[-1].model))
 
     def _held_out(self, model: CalibrationModel) -> HeldOutErrors:
         prepared = PreparedTakes.of(self.takes, self.layout)

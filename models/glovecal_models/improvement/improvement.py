@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from glovecal_models.calibration.living_sensors import LivingSensors
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.usable_sensors import UsableSensors
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.diagnosis.diagnosis import Diagnosis, Verdict
 from glovecal_models.diagnosis.next_take import NextTake
@@ -90,7 +90,7 @@ class Improvement:
     baselines: dict[str, float] = field(default_factory=dict)
     """Errors (deg) of simpler calibrations on the same takes, for scale."""
     take_warnings: tuple[str, ...] = ()
-    living_sensors: LivingSensors | None = None
+    usable_sensors: UsableSensors | None = None
     only_take_s: float | None = None
     """Length of the only take, where errors are on held-out pieces of it."""
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence, Set
 from typing import NamedTuple
 
-from glovecal_models.calibration.had_already import repaired_takes, trained_rotations, wanted_of
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.model_recipe import repaired_takes, requested_effects, trained_rotations
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.known_effect import known_effects
@@ -62,7 +62,7 @@ def proposed(
     found). Raises BadInput when nothing is found, Cancelled."""
     if effect.learns_unfound and rotations is not None:
         return Proposal({}, tuple(rotations))
-    others = [item for item in wanted_of(model) if item.name != effect.name]
+    others = [item for item in requested_effects(model) if item.name != effect.name]
     repaired = repaired_takes(takes, others)
     found = effect.proposed(recorded(model, repaired))
     if found is None and effect.stage == "compared":

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from glovecal_models.calibration.child_model import child_model
+from glovecal_models.calibration.child_model import child_model, columnless_effects
 from glovecal_models.calibration.effect_fit import fit_with_effects
-from glovecal_models.calibration.had_already import repaired_takes, settings_of, trained_rotations, wanted_of
 from glovecal_models.calibration.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.model_recipe import (
+    repaired_takes,
+    requested_effects,
+    settings_of,
+    trained_rotations,
+)
 from glovecal_models.calibration.prepared_takes import PreparedTakes
-from glovecal_models.calibration.relearned import columnless_effects
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.addition import Addition
@@ -29,10 +33,10 @@ def errors_if_redundant(
 ) -> HeldOutErrors | None:
     """The errors without effect ``name`` where it is redundant on the rotations of ``now``, else None."""
     settings = settings_of(model, settings)
-    wanted = [item for item in wanted_of(model) if item.name != name]
+    wanted = [item for item in requested_effects(model) if item.name != name]
     prepared = PreparedTakes.of(repaired_takes(takes, wanted), model.layout)
     without = held_out_errors(prepared, tuple(now.square), wanted, settings, cancelled=cancelled)
-    return without if without.over_all_deg <= limits.needless_times * now.over_all_deg else None
+    return without if without.overall_deg <= limits.needless_times * now.overall_deg else None
 
 
 def remove_effect(
@@ -46,7 +50,7 @@ def remove_effect(
     cancelled: Callable[[], bool] | None = None,
 ) -> CalibrationModel:
     """The model without effect ``name``. Raises BadInput when it has none of that name, Cancelled."""
-    has = wanted_of(model)
+    has = requested_effects(model)
     if name not in {item.name for item in has}:
         there = ", ".join(item.name for item in has) or "none"
         raise BadInput(f"the model has no effect {name!r}; it has {there}")

@@ -11,9 +11,9 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import Method, TrainingSettings
-from glovecal_models.comparison.at_floor import is_at_floor as is_one_at_floor
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
+from glovecal_models.comparison.noise_floor import is_at_floor as is_one_at_floor
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.improvement.improvement import Step, Stop
@@ -28,7 +28,7 @@ def step_errors(
 ) -> tuple[dict[str, float], float]:
     """RMSE, degrees, of each rotation and overall: on ``holdout`` when there is one, else ``held_out``."""
     if not holdout:
-        return {name: held_out.rmse_deg(name) for name in held_out.square}, held_out.over_all_deg
+        return {name: held_out.rmse_deg(name) for name in held_out.square}, held_out.overall_deg
     found = residuals(model, holdout)
     error = found.stacked("error")
     each = {
@@ -67,7 +67,7 @@ def baselines(
         else:
             plain = TrainingSettings(method=method, folds=settings.folds)
             prepared = PreparedTakes.of(takes, layout)
-            found[method] = held_out_errors(prepared, rotations, [], plain).over_all_deg
+            found[method] = held_out_errors(prepared, rotations, [], plain).overall_deg
     return found
 
 

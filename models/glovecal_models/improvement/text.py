@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from glovecal_models.calibration.text import dead_sensor_sentences
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.text import (
@@ -67,10 +68,10 @@ def _on(effect: str, rotations: Sequence[str]) -> str:
 
 def improvement_sentences(improvement: Improvement) -> list[str]:
     """What happened in order, and what remains."""
-    last, living = improvement.diagnosis, improvement.living_sensors
+    last, usable = improvement.diagnosis, improvement.usable_sensors
     sentences = [*(last.reference_problems if last else ()), *improvement.take_warnings]
-    if living is not None:
-        sentences += living.sentences(living.layout.rotations)
+    if usable is not None:
+        sentences += dead_sensor_sentences(usable, usable.layout.rotations)
     if improvement.only_take_s is not None:
         sentences.append(
             f"There is only one take, of {improvement.only_take_s:.0f} s: errors are on held-out pieces"

@@ -1,8 +1,8 @@
 """How far each sensor reads while its own joint goes through its active range: the scale of every per cent.
 
-A sensor that its neighbours pull reads farther than its own joint alone makes it. So the best source is a
+Crosstalk of its neighbours lets a sensor read farther than its own joint alone. So the best source is a
 take in which that joint moved alone; then the sensor's slope over measured angles, times the angles seen;
-then all that was read in range takes, the neighbours' pull included; at last what the hardware can send.
+then all that was read in range takes, the neighbours' crosstalk included; at last what the hardware can send.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from typing import Literal
 
 import numpy as np
 
-from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.independence.smooth_readings import SmoothTake, span
 from glovecal_models.independence.still_rotation import rotation_in_name
 from glovecal_models.layout import Layout
@@ -31,8 +30,8 @@ class ActiveRange:
     source: RangeSource
     angle_deg: float | None
     """How far the joint went, degrees, where it was measured."""
-    sentence: str | None
-    """What is wrong with it, or None."""
+    has_moved: bool
+    """False: the sensor read nothing but noise in these takes."""
 
 
 def active_ranges(layout: Layout, takes: Sequence[SmoothTake]) -> dict[str, ActiveRange]:
@@ -76,7 +75,7 @@ def _active_range(sensor: str, layout: Layout, takes: Sequence[SmoothTake]) -> A
     if not moved and layout.counts is not None:
         readings, source = layout.counts[1] - layout.counts[0], "what the glove can send"
     readings = readings if moved or layout.counts is not None else 0.0
-    return ActiveRange(sensor, readings, source, angle, _doubt(sensor, source, moved, angle))
+    return ActiveRange(sensor, readings, source, angle, moved)
 
 
 def _by_slope(sensor: str, takes: Sequence[SmoothTake], layout: Layout) -> float:
@@ -92,27 +91,3 @@ def _by_slope(sensor: str, takes: Sequence[SmoothTake], layout: Layout) -> float
 def _all_read(sensor: str, takes: Sequence[SmoothTake]) -> float:
     """Widest of all takes: readings shift between wearings, so takes are not thrown together."""
     return max(span(item.reading(sensor)) for item in takes)
-
-
-def _doubt(sensor: str, source: str, moved: bool, angle: float | None) -> str | None:
-    how = f"record a take called range-{sensor} in which only that joint goes through its range"
-    if not moved and source == "what the glove can send":
-        return (
-            f"The range of {sensor} was not seen yet: per cents are of all the glove can send, so they are "
-            f"too small; {how}."
-        )
-    if not moved:
-        return f"The range of {sensor} was not seen yet: nothing can be told in per cent of it; {how}."
-    if sensor in ACTIVE_RANGE_DEG and angle is not None:
-        low, high = ACTIVE_RANGE_DEG[sensor]
-        if angle < SEEN_SHARE * (high - low):
-            return (
-                f"{sensor} went through {angle:.0f} degrees; a healthy hand goes through {high - low:.0f}: "
-                f"per cents of so short a range are too large; {how}."
-            )
-    if source == "all that was read":
-        return (
-            f"The range of {sensor} is all that it read, its neighbours' pull included, so per cents may be "
-            f"too small; {how}."
-        )
-    return None

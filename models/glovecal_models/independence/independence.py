@@ -4,7 +4,7 @@ Is it the glove of the other hand, or worn back to front? Its sensors' signs tel
 sensors read more as joints bend, the sensors between fingers read less as they spread (two laboratories'
 calibration files). Data of a left hand has abduction and wrist yaw of the other sign (VRJuggler's driver); a
 glove on the wrong hand bends the other way everywhere. Only measured angles tell, and a reference that counts
-angles the other way looks the same: the sentence says so.
+angles the other way looks the same.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from glovecal_models.independence.active_range import ActiveRange, active_ranges, measured_slope
-from glovecal_models.independence.affecting_shares import AffectingShare
-from glovecal_models.independence.examination import RotationExamination, examine_rotation
+from glovecal_models.independence.coupling import AffectingShare
+from glovecal_models.independence.examination import NotExamined, RotationExamination, examine_rotation
 from glovecal_models.independence.smooth_readings import SmoothTake, smooth_take
-from glovecal_models.independence.still_frames import KnownPulls
+from glovecal_models.independence.still_frames import KnownCrosstalk
 from glovecal_models.independence.still_rotation import still_rotations
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
@@ -27,49 +27,41 @@ CLEAR = 5.0
 """A slope of so many standard errors has a sign."""
 LEAST_SENSORS = 3
 SIDEWAYS = ("IM_ABD", "MR_ABD", "RP_ABD", "W_ABD")
-WornVerdict = Literal["as it should be", "other hand", "back to front", "not judgeable"]
+WornVerdict = Literal["as it should be", "other hand", "back to front", "not identifiable"]
 
 
 @dataclass(frozen=True)
 class WornSide:
     verdict: WornVerdict
-    probability: float | None
-    """That signs drawn by lot agree so well with the verdict; None where it is not judgeable."""
+    p_value: float | None
+    """That random signs agree so well with the verdict; None where it is not identifiable."""
     reversed_sensors: tuple[str, ...]
-    sentence: str
+    is_known_glove: bool
+    """Whether it is known which way each of its sensors reads: a CyberGlove."""
+    bending: str = ""
+    """How many bending sensors read the wrong way, as "1 of 9"."""
+    sideways: str = ""
 
 
 def worn_side(layout: Layout, takes: Sequence[SmoothTake]) -> WornSide:
     """Needs takes with measured angles of a CyberGlove."""
     if layout.counts is None or not set(layout.sensors) <= set(TYPICAL_COUNTS):
-        return _unknown("only of a CyberGlove it is known which way each sensor reads")
+        return WornSide("not identifiable", None, (), False)
     signs = {name: sign for name in layout.sensors if (sign := _sign(name, takes, layout)) is not None}
     bends = {name: sign for name, sign in signs.items() if name not in SIDEWAYS}
     sideways = {name: sign for name, sign in signs.items() if name in SIDEWAYS}
     turned = tuple(name for name, sign in signs.items() if sign < 0)
     if len(bends) < LEAST_SENSORS or len(sideways) < LEAST_SENSORS:
-        return _unknown(
-            f"it takes measured angles of {LEAST_SENSORS} bending and {LEAST_SENSORS} sideways joints that "
-            "moved"
-        )
+        return WornSide("not identifiable", None, (), True)
     wrong_bends, wrong_sideways = (sum(sign < 0 for sign in part.values()) for part in (bends, sideways))
-    chance = 0.5 ** len(signs)
-    count = f"{wrong_bends} of {len(bends)} bending and {wrong_sideways} of {len(sideways)} sideways sensors"
-    sure = f"By lot signs agree so well once in {1 / chance:.0f} times"
-    other = "a reference that counts angles the other way looks the same"
+    p_value = 0.5 ** len(signs)
+    verdict: WornVerdict = "as it should be"
     if wrong_bends * 4 >= 3 * len(bends):
-        sentence = (
-            f"Is this a left glove on a right hand (or the reverse), or worn back to front? {count} read the "
-            f"wrong way. {sure}; {other}."
-        )
-        return WornSide("back to front", chance, turned, sentence)
-    if wrong_sideways * 4 >= 3 * len(sideways) and wrong_bends * 4 <= len(bends):
-        sentence = f"Is this the glove of the other hand? {count} read the wrong way. {sure}; {other}."
-        return WornSide("other hand", chance, turned, sentence)
-    odd = f" {', '.join(turned)} read the wrong way: are they swapped with others?" if turned else ""
-    return WornSide(
-        "as it should be", chance, turned, f"The glove is of this hand: {count} read the wrong way.{odd}"
-    )
+        verdict = "back to front"
+    elif wrong_sideways * 4 >= 3 * len(sideways) and wrong_bends * 4 <= len(bends):
+        verdict = "other hand"
+    bending, across = f"{wrong_bends} of {len(bends)}", f"{wrong_sideways} of {len(sideways)}"
+    return WornSide(verdict, p_value, turned, True, bending, across)
 
 
 def _sign(sensor: str, takes: Sequence[SmoothTake], layout: Layout) -> int | None:
@@ -84,12 +76,8 @@ def _sign(sensor: str, takes: Sequence[SmoothTake], layout: Layout) -> int | Non
     return 1 if (best > 0) == (TYPICAL_COUNTS[sensor][1] > 0) else -1
 
 
-def _unknown(why: str) -> WornSide:
-    return WornSide("not judgeable", None, (), f"Which hand the glove is of cannot be judged: {why}.")
-
-
 PASSES = 3
-"""The first finds the pulls on sensors that others pull on, the next ones take them off."""
+"""The first finds the crosstalk on cross-coupled sensors, the next ones subtract it."""
 
 
 @dataclass(frozen=True)
@@ -102,8 +90,7 @@ class Independence:
     ranges: Mapping[str, ActiveRange]
     dead_sensors: tuple[str, ...]
     worn_side: WornSide
-    not_told: tuple[str, ...]
-    """Sentences on rotations that could not be examined."""
+    not_examined: tuple[NotExamined, ...]
 
     def of(self, rotation: str) -> RotationExamination | None:
         return next((item for item in self.rotations if item.rotation == rotation), None)
@@ -113,7 +100,7 @@ class Independence:
         """(affecting, affected) sensors that were examined both ways, of which only one affects the other."""
         pairs = []
         for item in self.rotations:
-            for share in item.taken_apart.shares:
+            for share in item.coupling.shares:
                 back = next((other for other in self.rotations if other.sensor == share.sensor), None)
                 if share.affects and back is not None and not _could_affect(back, item.sensor):
                     pairs.append((share.sensor, item.sensor))
@@ -143,7 +130,7 @@ def examine_independence(
         )[name]
         for name in layout.sensors
     }
-    examined: list[RotationExamination | str] = []
+    examined: list[RotationExamination | NotExamined] = []
     for _ in range(PASSES):
         known = _known(layout, [item for item in examined if isinstance(item, RotationExamination)])
         examined = []
@@ -161,22 +148,22 @@ def examine_independence(
         ranges,
         dead,
         side,
-        tuple(item for item in examined if isinstance(item, str)),
+        tuple(item for item in examined if isinstance(item, NotExamined)),
     )
 
 
-def _known(layout: Layout, examined: Sequence[RotationExamination]) -> KnownPulls:
-    """Besides what was examined the layout tells: a sensor of a movement of several rotations (the palm's)
-    follows others."""
+def _known(layout: Layout, examined: Sequence[RotationExamination]) -> KnownCrosstalk:
+    """From the examination and the layout: a sensor of a movement of several rotations (the palm's) follows
+    others."""
     palm = [item.measuring_sensor for item in layout.correspondences if item.kind == "MSMR"]
     coupled = [item.sensor for item in examined if item.is_coupled]
-    pulled = frozenset([*coupled, *filter(None, palm)])
-    return KnownPulls(
-        pulled,
+    coupled = frozenset([*coupled, *filter(None, palm)])
+    return KnownCrosstalk(
+        coupled,
         {
-            item.sensor: item.taken_apart
+            item.sensor: item.coupling
             for item in examined
-            if item.is_coupled and not pulled.intersection(item.taken_apart.curves)
+            if item.is_coupled and not coupled.intersection(item.coupling.curves)
         },
     )
 
@@ -192,7 +179,5 @@ def _moves(sensor: str, takes: Sequence[SmoothTake]) -> bool:
 
 def _could_affect(item: RotationExamination, sensor: str) -> bool:
     """Whether it does, or was not moved enough to tell."""
-    share: AffectingShare | None = next(
-        (one for one in item.taken_apart.shares if one.sensor == sensor), None
-    )
+    share: AffectingShare | None = next((one for one in item.coupling.shares if one.sensor == sensor), None)
     return sensor in item.not_moved or (share is not None and share.affects is not False)

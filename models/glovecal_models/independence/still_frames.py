@@ -8,28 +8,28 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.independence.active_range import ActiveRange
-from glovecal_models.independence.affecting_shares import TakenApart
-from glovecal_models.independence.pull_columns import BLOCK_S
+from glovecal_models.independence.coupling import Coupling
+from glovecal_models.independence.coupling_columns import BLOCK_S
 from glovecal_models.independence.smooth_readings import SmoothTake, span
 from glovecal_models.independence.still_rotation import moved_in_name
 
 START_S = 0.4
-"""Pulls are counted from where the joints were in the take's first moments."""
+"""Crosstalk is counted from where the joints were in the take's first moments."""
 LEAST_MOVED = 0.1
 """Of its own range; a joint that moved less can tell nothing."""
 
 
 @dataclass(frozen=True)
-class KnownPulls:
-    """What other examinations have told."""
+class KnownCrosstalk:
+    """Results of the examinations before."""
 
-    pulled: Set[str]
+    coupled: Set[str]
     """Sensors that are cross-coupled."""
-    pulls: Mapping[str, TakenApart]
-    """Those of them that only sensors pull on which are not: these pulls can be relied on."""
+    crosstalk: Mapping[str, Coupling]
+    """Those of them that only uncoupled sensors affect: these can be relied on."""
 
 
-NOTHING_KNOWN = KnownPulls(frozenset(), {})
+NO_CROSSTALK = KnownCrosstalk(frozenset(), {})
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def still_frames(
     rotation: str,
     sensor: str,
     ranges: Mapping[str, ActiveRange],
-    known: KnownPulls,
+    known: KnownCrosstalk,
 ) -> list[StillFrames]:
     """One of each take. Joints are counted from a beginning that all takes share.
 
@@ -130,7 +130,7 @@ def _frames(
     candidates: Set[str],
     moves_only: tuple[str, ...],
     began: Mapping[str, float],
-    known: KnownPulls,
+    known: KnownCrosstalk,
 ) -> StillFrames:
     everything = {name: _place(item, name, ranges[name]) - began[name] for name in began}
     moved = {}
@@ -148,7 +148,7 @@ def _frames(
 
 def _place(item: SmoothTake, name: str, known: ActiveRange) -> np.ndarray:
     """Where a joint is, in shares of its range: by its angle where that was measured, since its sensor may be
-    pulled by others itself; else by its sensor."""
+    cross-coupled itself; else by its sensor."""
     angle = item.angle(name)
     if angle is not None and known.angle_deg:
         measured = np.isfinite(angle)
@@ -158,9 +158,9 @@ def _place(item: SmoothTake, name: str, known: ActiveRange) -> np.ndarray:
 
 
 def _of_its_own(
-    name: str, everything: dict[str, np.ndarray], item: SmoothTake, known: KnownPulls
+    name: str, everything: dict[str, np.ndarray], item: SmoothTake, known: KnownCrosstalk
 ) -> np.ndarray:
-    """A sensor's movement without what is known to pull on it; a measured angle needs no such care."""
-    if item.angle(name) is not None or name not in known.pulls:
+    """A sensor's movement without its known crosstalk; a measured angle needs no such care."""
+    if item.angle(name) is not None or name not in known.crosstalk:
         return everything[name]
-    return everything[name] - known.pulls[name].pull(everything) / 100
+    return everything[name] - known.crosstalk[name].crosstalk(everything) / 100

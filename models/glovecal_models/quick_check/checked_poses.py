@@ -1,10 +1,9 @@
-"""Poses held against the prior and each other: those that contradict are left out, with the reason."""
+"""Poses compared with the prior and each other: those that contradict are excluded, with the reason."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -29,24 +28,13 @@ class CheckedPose:
     measured: int
     """Rotations whose angle was measured."""
     by_name: int
-    """Rotations whose angle the pose's name told."""
+    """Rotations whose angle is known by the pose's name."""
     saturated: tuple[str, ...]
     before_deg: float
     """RMS error of the pose with the model as it was."""
-    left_out_deg: float | None
-    """RMS error with the shift that the other poses alone tell; None: there are no others."""
+    held_out_deg: float | None
+    """RMS error with the shift learned from the other poses; None: there are no others."""
     witness: PoseError
-
-    def to_document(self) -> dict[str, Any]:
-        return {
-            "pose": self.label,
-            "seconds": self.seconds,
-            "measured": self.measured,
-            "by_name": self.by_name,
-            "saturated": list(self.saturated),
-            "before_deg": self.before_deg,
-            "left_out_deg": self.left_out_deg,
-        }
 
 
 @dataclass(frozen=True)

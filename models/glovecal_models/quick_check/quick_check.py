@@ -32,16 +32,12 @@ from glovecal_models.quick_check.shift_report import ShiftReport, shift_report
 from glovecal_models.quick_check.wearing_shift import WearingShift, prior_shift, scaled_to_poses
 from glovecal_models.takes.take import Take
 
-_SEEN = "wearing {!r} was in the model's training: whole takes tell more of it than a quick check could"
-_MIXED = (
-    "This model was trained on {} wearings without telling them apart: what differs between them stands in "
-    "its error, that of a full calibration included. Add the effect {} first, then check again."
-)
+_SEEN = "wearing {!r} was in the model's training: its takes are more informative than a quick check"
 
 
 @dataclass(frozen=True)
 class QuickCheck:
-    """What the poses of one wearing tell, and the model that knows it."""
+    """What was learned from the poses of one wearing, and the model with it."""
 
     wearing: str
     rotations: tuple[str, ...]
@@ -51,17 +47,10 @@ class QuickCheck:
     poses: tuple[CheckedPose, ...]
     refused: tuple[RefusedPose, ...]
     report: ShiftReport
+    mixed_wearings: int
+    """On how many wearings the model was trained without an effect that separates them; 0: it has one."""
     model: CalibrationModel
     """The child."""
-
-    def to_document(self) -> dict[str, Any]:
-        """Plain JSON-able data."""
-        return {
-            "wearing": self.wearing,
-            "poses": [item.to_document() for item in self.poses],
-            "refused": [{"pose": item.label, "reason": item.reason} for item in self.refused],
-            **self.report.to_document(),
-        }
 
 
 def quick_check(
@@ -110,13 +99,10 @@ def quick_check(
     shift = prior.after(item.witness for item in used)
     refused = (*(RefusedPose(item.label, item.reason) for item in missed), *contradicted)
     report = shift_report(before, sensitivity, prior, shift, used)
-    if len(set(trained_wearings)) > 1 and not any(item.name == _effect_name() for item in model.effects):
-        report = replace(
-            report,
-            sentences=(*report.sentences, _MIXED.format(len(set(trained_wearings)), _effect_name())),
-        )
+    count = len(set(trained_wearings))
+    mixed = count if count > 1 and not any(item.name == _effect_name() for item in model.effects) else 0
     child = _child(before, effect, wearing, prior, shift, parent_id, takes)
-    return QuickCheck(wearing, sensitivity.rotations, prior, shift, used, refused, report, child)
+    return QuickCheck(wearing, sensitivity.rotations, prior, shift, used, refused, report, mixed, child)
 
 
 def without_check(model: CalibrationModel, wearing: str) -> CalibrationModel:

@@ -1,10 +1,9 @@
-"""What a quick check found, in numbers and sentences, and how far that is from a full calibration."""
+"""The shift that a quick check found, and the error to expect with it, beside a full calibration."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,8 +13,7 @@ from glovecal_models.quick_check.checked_poses import CheckedPose
 from glovecal_models.quick_check.wearing_shift import WearingShift, sensor_shift
 
 UNINFORMED = 0.8
-"""Share of the prior's variance above which the poses said next to nothing."""
-MOST_NAMED = 6
+"""Share of the prior's variance above which the poses are uninformative."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +34,7 @@ class RotationShift:
     full_calibration_deg: float
     """The model's held-out error in the wearings it was trained on."""
     is_informed: bool
-    """False: no pose said anything, the prior stays."""
+    """False: no pose informs it, the prior stays."""
 
 
 @dataclass(frozen=True)
@@ -59,9 +57,8 @@ class ShiftReport:
     sensors: tuple[SensorShift, ...]
     poses_before_deg: float
     """RMS error of the poses used, with the model as it was."""
-    poses_left_out_deg: float | None
-    """RMS error of each pose with the shift that the others tell; None with a single pose."""
-    sentences: tuple[str, ...]
+    poses_held_out_deg: float | None
+    """RMS error of each pose with the shift learned from the others; None with a single pose."""
 
     @property
     def expected(self) -> dict[str, float]:
@@ -79,17 +76,6 @@ class ShiftReport:
     def uninformed(self) -> tuple[str, ...]:
         return tuple(item.rotation for item in self.rotations if not item.is_informed)
 
-    def to_document(self) -> dict[str, Any]:
-        return {
-            "expected": self.expected,
-            "poses_before_deg": self.poses_before_deg,
-            "poses_left_out_deg": self.poses_left_out_deg,
-            "rotations": [asdict(item) for item in self.rotations],
-            "sensors": [asdict(item) for item in self.sensors],
-            "uninformed": list(self.uninformed),
-            "sentences": list(self.sentences),
-        }
-
 
 def shift_report(
     model: CalibrationModel,
@@ -101,10 +87,9 @@ def shift_report(
     """``shift`` is what ``poses`` made of ``prior``."""
     rotations = _rotations(model, sensitivity, prior, shift)
     before = _rms([item.before_deg for item in poses])
-    left = [item.left_out_deg for item in poses if item.left_out_deg is not None]
+    left = [item.held_out_deg for item in poses if item.held_out_deg is not None]
     sensors = _sensors(sensitivity, prior, shift)
-    report = ShiftReport(rotations, sensors, before, _rms(left) if left else None, ())
-    return replace(report, sentences=tuple(_sentences(report, len(poses))))
+    return ShiftReport(rotations, sensors, before, _rms(left) if left else None)
 
 
 def _rotations(
@@ -158,28 +143,6 @@ def _sensors(
             )
         )
     return tuple(found)
-
-
-def _sentences(report: ShiftReport, poses: int) -> list[str]:
-    expected = report.expected
-    told = [
-        f"{poses} {'pose' if poses == 1 else 'poses'}: the error to expect in this wearing falls from "
-        f"{expected['now_deg']:.1f} to {expected['after_deg']:.1f} degrees; a full calibration has "
-        f"{expected['full_calibration_deg']:.1f}."
-    ]
-    if report.poses_left_out_deg is not None:
-        told.append(
-            f"Each pose predicted with what the others tell is off by {report.poses_left_out_deg:.1f} "
-            f"degrees; without the check by {report.poses_before_deg:.1f}."
-        )
-        if report.poses_left_out_deg > report.poses_before_deg:
-            told.append("They do not foretell each other: take one or two more, spread over the range.")
-    if report.uninformed:
-        names = ", ".join(report.uninformed[:MOST_NAMED])
-        more = len(report.uninformed) - MOST_NAMED
-        names += f" and {more} more" if more > 0 else ""
-        told.append(f"No pose tells anything of {names}: they stay as uncertain as a new wearing is.")
-    return told
 
 
 def _rms(values: Sequence[float]) -> float:

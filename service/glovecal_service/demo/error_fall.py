@@ -13,12 +13,12 @@ BAR_WIDTH = 48
 
 def errors_deg(found: Findings) -> dict[str, float]:
     """RMSE over all rotations of the takes not trained on, by method; ``with_effect`` is the child's."""
-    return {name: item["over_all"]["rmse_deg"] for name, item in found.comparisons.items()}
+    return {name: item["overall"]["rmse_deg"] for name, item in found.comparisons.items()}
 
 
 def floor_deg(found: Findings) -> float | None:
     """The noise floor as the service measured it on the same takes; None where it could not."""
-    floor = found.last["over_all"]["floor"]
+    floor = found.last["overall"]["floor"]
     return None if floor is None else floor["floor_deg"]
 
 
@@ -29,7 +29,7 @@ def chart(found: Findings) -> list[str]:
     rows = [(labels[name], value) for name, value in errors_deg(found).items()]
     floor = floor_deg(found)
     if floor is not None:
-        at_least = " >" if found.last["over_all"]["floor"]["is_lower_bound"] else ""
+        at_least = " >" if found.last["overall"]["floor"]["is_lower_bound"] else ""
         rows.append((f"noise floor{at_least}", floor))
     width, largest = max(len(label) for label, _ in rows), max(value for _, value in rows)
     return [

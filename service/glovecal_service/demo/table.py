@@ -30,14 +30,14 @@ def error_table(found: Walk) -> Table:
 
 def rmse_deg(found: Walk) -> dict[str, float]:
     """Root mean square error of each method over all rotations and frames of the second wearing."""
-    return {method: found.comparisons[method]["over_all"]["rmse_deg"] for method in found.models}
+    return {method: found.comparisons[method]["overall"]["rmse_deg"] for method in found.models}
 
 
 def sentences(found: Walk) -> list[str]:
     """What the figures say, with a scale for each."""
     rmse, frames = rmse_deg(found), contract(found)["frames"]
     lost = frames["sent"] - frames["received"] - frames["skipped"]
-    spread = found.comparisons["linear"]["over_all"]["baseline_deg"]
+    spread = found.comparisons["linear"]["overall"]["baseline_deg"]
     median, late = found.meter.latency_ms(50), found.meter.latency_ms(99)
     return [
         f"Scale: the error when predicting the mean is {spread:.1f} degrees; sensor noise and 8-bit steps "

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from glovecal_models.calibration.declared_effects import declared_in
+from glovecal_models.calibration.model_recipe import declared_effects
 from glovecal_models.effects.catalogue import known_by_name
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_service.jobs.child_record import artifact_array, keep_child
@@ -79,7 +79,7 @@ class AddEffectJob:
 def run(work: AdditionWork, cancelled: Callable[[], bool], report: Report) -> TaskResult:
     """In a worker. Raises BadInput, NotTrainable, Cancelled."""
     on, model = work.on, work.on.model
-    with known_by_name([*declared_in(model), *declared(work.declaration)]):
+    with known_by_name([*declared_effects(model), *declared(work.declaration)]):
         known = model.error_estimate.get("rmse_deg")
         error = "" if known is None else f", held-out error {known:.2f} degrees so far"
         report(f"looking at the takes for {work.effect}{error}", 0.0)

@@ -6,11 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from glovecal_models.calibration.declared_effects import declared_in
-from glovecal_models.calibration.had_already import repaired_takes, wanted_of
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.model_recipe import declared_effects, repaired_takes, requested_effects
+from glovecal_models.comparison.noise_floor import rotation_noise
 from glovecal_models.comparison.residuals import residuals
-from glovecal_models.comparison.rotation_noise import rotation_noise
 from glovecal_models.diagnosis.known_effect import known_effects
 from glovecal_models.effects.catalogue import effect_of_declaration, known_by_name
 from glovecal_models.takes.take import Take
@@ -67,9 +66,9 @@ def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> T
     report("measuring the noise floors", 0.0)
     floors = floors_deg(model, work.on.takes, work.seed)
     own = [effect_of_declaration(item) for item in work.declarations]
-    with known_by_name([*declared_in(model), *own]):
+    with known_by_name([*declared_effects(model), *own]):
         found = diagnose(
-            repaired_takes(work.on.takes, wanted_of(model)),
+            repaired_takes(work.on.takes, requested_effects(model)),
             model.layout,
             linear=model.method in ("raw", "linear"),
             known=known_effects(model),

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from glovecal_models.calibration.declared_effects import declared_in
+from glovecal_models.calibration.model_recipe import declared_effects
 from glovecal_models.effects.catalogue import known_by_name
 from glovecal_models.improvement.remove_effect import remove_effect
 from glovecal_service.jobs.child_record import artifact_array, keep_child
@@ -69,7 +69,7 @@ def run(work: RemovalWork, cancelled: Callable[[], bool], report: Report) -> Tas
     """In a worker. Raises BadInput, NotTrainable, Cancelled."""
     on, model = work.on, work.on.model
     report(f"learning again without {work.effect}", 0.1)
-    with known_by_name(declared_in(model)):
+    with known_by_name(declared_effects(model)):
         child = remove_effect(
             model,
             on.takes,

@@ -11,7 +11,7 @@ from glovecal_models.calibration.artifact import dump
 from glovecal_models.calibration.fit_task import FitResult, FitTask
 from glovecal_models.calibration.fit_task import run_task as run_fit
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.sample_weight import weight_sentence
+from glovecal_models.calibration.text import plan_sentences, weight_sentence
 from glovecal_models.calibration.training import assemble
 from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
 from glovecal_models.calibration.training_settings import TrainingSettings
@@ -156,7 +156,7 @@ def _facts(
         "held_out_rmse_deg": model.error_estimate.get("rmse_deg"),
         "held_out_how": model.error_estimate.get("how"),
         "per_rotation": {item.rotation: item.held_out_rmse_deg for item in model.rotations},
-        "sentences": [*said, *plan.sentences, *_kernel_sentences(model), *_weight_sentences(model)],
+        "sentences": [*said, *plan_sentences(plan), *_kernel_sentences(model), *_weight_sentences(model)],
         "simulated": model.simulated,
     }
 

@@ -1,4 +1,4 @@
-"""What a training job trains on: takes with measured angles, and the lessons of guided samplings."""
+"""What a training job trains on: takes with measured angles, and the labelled_samples of guided samplings."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.guided.guided_calibration import BASELINES, GuidedSamples, guided_samples
-from glovecal_models.sampling.guided.taught_samples import TaughtTake
+from glovecal_models.sampling.guided.labelled_takes import LabelledTake
 from glovecal_models.takes.take import Take
 from glovecal_service.store import Store
 from glovecal_service.store.records import SubjectRecord, TakeRecord, incomplete_sentences
@@ -47,7 +47,8 @@ class TrainingTakes:
         if not sampled:
             return cls(plain, layout, settings, tuple(incomplete))
         taught = [
-            TaughtTake.from_document(store.takes.load(record.id), record.sampling or {}) for record in sampled
+            LabelledTake.from_document(store.takes.load(record.id), record.sampling or {})
+            for record in sampled
         ]
         measured = subject.skeleton() if subject.dimensions else None
         guided = guided_samples(taught, layout, measured)

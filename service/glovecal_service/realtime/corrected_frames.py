@@ -13,8 +13,8 @@ import numpy as np
 
 from glovecal_client.wire.frame import Frame
 from glovecal_client.wire.pose import PoseFlag
-from glovecal_models.calibration.doubt import Doubt
 from glovecal_models.calibration.effect_correction import EffectCorrection, usable_correction
+from glovecal_models.calibration.interval_inflation import VarianceInflation
 from glovecal_models.calibration.predictor import GloveAngles
 from glovecal_service.realtime.glove_lane import GloveLane
 from glovecal_service.realtime.lane_effects import LaneEffects
@@ -50,10 +50,10 @@ def corrected(
         times = np.array([opened[row][1].monotonic_ns / 1e9 for row in rows])
         at = slice(None) if len(rows) == len(opened) else np.array(rows)
         turn.correct(at, gloves, times, readings[at])
-    if turn.doubt is not None:
-        for row in np.flatnonzero(turn.doubt.is_faulty.any(axis=1)).tolist():
+    if turn.inflation is not None:
+        for row in np.flatnonzero(turn.inflation.is_faulty.any(axis=1)).tolist():
             flags[row] |= _FAULTY_SENSOR
-    return model.predictor.corrected(angles, turn.correction, turn.undefined, turn.doubt), flags
+    return model.predictor.corrected(angles, turn.correction, turn.undefined, turn.inflation), flags
 
 
 def _successive(opened: Sequence[tuple[GloveLane, Frame, int]], is_wanted: np.ndarray) -> Sequence[list[int]]:
@@ -77,7 +77,7 @@ class _Turn:
         self._base = base
         self.correction = np.zeros_like(base)
         self.undefined: np.ndarray | None = None
-        self.doubt: Doubt | None = None
+        self.inflation: VarianceInflation | None = None
 
     def correct(
         self,
@@ -99,9 +99,9 @@ class _Turn:
         if found.undefined is not None:
             self.undefined = self._none() if self.undefined is None else self.undefined
             self.undefined[rows] = found.undefined
-        if found.doubt is not None:
-            self.doubt = self.doubt or Doubt(np.zeros_like(self._base), self._none())
-            self.doubt.variance[rows], self.doubt.is_faulty[rows] = found.doubt
+        if found.inflation is not None:
+            self.inflation = self.inflation or VarianceInflation(np.zeros_like(self._base), self._none())
+            self.inflation.variance[rows], self.inflation.is_faulty[rows] = found.inflation
         is_usable = usable_correction(found.degrees)
         if not found.problems and found.undefined is None and is_usable.all():
             for glove in gloves:

@@ -9,8 +9,9 @@ from markupsafe import Markup
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.compare import Comparison, summed_up
 from glovecal_models.comparison.floor_estimate import ORDER, NoiseFloor
+from glovecal_models.comparison.noise_floor import RotationNoise, rotation_noise
 from glovecal_models.comparison.residuals import Residuals, residuals
-from glovecal_models.comparison.rotation_noise import RotationNoise, rotation_noise
+from glovecal_models.comparison.text import rotation_sentence
 from glovecal_models.comparison.where_it_fails import RotationFindings, WhereItFails, where_it_fails
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.takes.take import Take
@@ -89,7 +90,7 @@ def report_page(
 
 
 def _summary(main: ReportedModel, numbers: Comparison, where: WhereItFails) -> list[Fact]:
-    overall, worst = numbers.over_all, where.rotations[0]
+    overall, worst = numbers.overall, where.rotations[0]
     done = sum(item.is_at_floor for item in where.rotations)
     floor = "" if overall.floor is None else f"; noise floor {_floor(overall.floor)}"
     is_done = done == len(where.rotations)
@@ -109,7 +110,7 @@ def _summary(main: ReportedModel, numbers: Comparison, where: WhereItFails) -> l
         Fact("Verdict", verdict),
         Fact("Size", size),
         Fact("Claimed SD", claimed),
-        Fact("Place", f"largest possible improvement at {worst.rotation}: {worst.sentence}"),
+        Fact("Place", f"largest possible improvement at {worst.rotation}: {rotation_sentence(worst)}"),
         Fact("Next", f"glovecal {verb} {main.id[:12]}", is_command=True),
     ]
 
@@ -146,7 +147,7 @@ def _fall(
     """The versions before this one; nothing for a first version."""
     if not ancestors:
         return []
-    return [figure(*lineage_fall([*ancestors, main.model], simpler, takes, numbers.over_all))]
+    return [figure(*lineage_fall([*ancestors, main.model], simpler, takes, numbers.overall))]
 
 
 def _effects(model: CalibrationModel) -> list[Markup]:
@@ -167,7 +168,7 @@ def _close_up(item: RotationFindings, found: Residuals, noise: RotationNoise) ->
     return Section(
         f"Rotation {item.rotation}",
         [
-            paragraph(item.sentence),
+            paragraph(rotation_sentence(item)),
             figure(*over_time(found, item.rotation)),
             beside([figure(*one) for one in figures]),
         ],
@@ -191,7 +192,7 @@ def _details(main: ReportedModel, others: Sequence[ReportedModel], takes: Sequen
 
 
 def _table(numbers: Comparison, where: WhereItFails) -> list[Markup]:
-    named = [("all", numbers.over_all)]
+    named = [("all", numbers.overall)]
     named += [(item.rotation, numbers.rotations[item.rotation]) for item in where.rotations]
     rows = [
         (

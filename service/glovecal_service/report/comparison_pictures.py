@@ -73,7 +73,7 @@ def _cells(item: RotationFindings) -> dict[str, tuple[float, bool]]:
     """For each column of the heat map: degrees explained, and whether that is significant."""
     cells = {one.covariate: (one.explained_deg, item.is_structure(one)) for one in item.dependences}
     if item.wearings is not None:
-        cells["wearing"] = (item.wearings.spread_deg, item.wearings.is_no_noise)
+        cells["wearing"] = (item.wearings.spread_deg, item.wearings.is_significant)
     return cells
 
 
@@ -135,7 +135,7 @@ def smallest_floor(models: Mapping[str, Comparison], rotation: str) -> NoiseFloo
 
 
 def _errors(comparison: Comparison, rotation: str) -> RotationErrors | None:
-    return comparison.over_all if rotation == ALL else comparison.rotations.get(rotation)
+    return comparison.overall if rotation == ALL else comparison.rotations.get(rotation)
 
 
 def _worst(models: Mapping[str, Comparison], rotation: str) -> float:
@@ -145,14 +145,14 @@ def _worst(models: Mapping[str, Comparison], rotation: str) -> float:
 
 def _compared_sentence(models: Mapping[str, Comparison], rotations: list[str]) -> str:
     names = list(models)
-    first, *others = sorted(names, key=lambda name: models[name].over_all.rmse_deg)
+    first, *others = sorted(names, key=lambda name: models[name].overall.rmse_deg)
     bests = [_best(models, rotation) for rotation in rotations]
     floor = smallest_floor(models, ALL)
-    rest = ", ".join(f"{models[name].over_all.rmse_deg:.2f} for {name}" for name in others)
+    rest = ", ".join(f"{models[name].overall.rmse_deg:.2f} for {name}" for name in others)
     least = "at least " if floor is not None and floor.is_lower_bound else ""
     beside = f"; smallest noise floor: {least}{floor.floor_deg:.2f}" if floor is not None else ""
     return (
-        f"{first} has the smallest error, {models[first].over_all.rmse_deg:.2f} degrees over all rotations "
+        f"{first} has the smallest error, {models[first].overall.rmse_deg:.2f} degrees over all rotations "
         f"({rest}){beside}. It is best in {bests.count(first)} of {len(rotations)} rotations."
     )
 

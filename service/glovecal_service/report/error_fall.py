@@ -13,8 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.comparison.at_floor import reaches_floor
 from glovecal_models.comparison.compare import RotationErrors
+from glovecal_models.comparison.noise_floor import reaches_floor
 from glovecal_models.comparison.residuals import Residuals, residuals
 from glovecal_models.takes.take import Take
 from glovecal_service.report.drawing import CONTROL, FLOOR, MODEL, QUIET, legend_above, svg

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from glovecal_models.comparison.fingertips import FingertipErrors, TipErrors
+from glovecal_models.comparison.text import fingertips_sentence
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.forward_kinematics import HandFrames, forward_kinematics
 from glovecal_models.hand.skeleton import Skeleton, hand_skeleton
@@ -37,7 +38,7 @@ def fingertips_part(errors: FingertipErrors | None, dimensions: HandDimensions |
     if errors is None:
         return []
     return [
-        paragraph(errors.sentence),
+        paragraph(fingertips_sentence(errors)),
         figure(*_picture(errors, dimensions)),
         _table(errors),
         paragraph(SCALES),
@@ -45,7 +46,7 @@ def fingertips_part(errors: FingertipErrors | None, dimensions: HandDimensions |
 
 
 def _rows(errors: FingertipErrors) -> dict[str, TipErrors]:
-    rows = {"all": errors.over_all, **errors.fingers}
+    rows = {"all": errors.overall, **errors.fingers}
     return rows if errors.thumb_index is None else {**rows, "thumb to index": errors.thumb_index}
 
 

@@ -7,12 +7,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from glovecal_models.comparison.dependence import Dependence
 from glovecal_models.comparison.error_spectrum import SLOW_HZ, ErrorSpectrum
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
-from glovecal_models.comparison.stretches import windows
-from glovecal_models.comparison.structure import Dependence
+from glovecal_models.comparison.text import wearings_sentence
 from glovecal_models.comparison.wearings import WearingErrors
-from glovecal_models.comparison.where_it_fails import RotationFindings
+from glovecal_models.comparison.where_it_fails import RotationFindings, windows
 from glovecal_service.report.drawing import (
     FLOOR,
     MEASURED,
@@ -74,7 +74,7 @@ def error_against(item: RotationFindings, one: Dependence) -> tuple[str, str]:
     sentence = (
         f"Against {one.phrase} the mean error of {item.rotation} goes from {np.min(one.mean_deg):+.1f} to "
         f"{np.max(one.mean_deg):+.1f} degrees; RMS contribution {one.explained_deg:.1f} degrees, "
-        f"p = {one.probability:.3f}: {_verdict(item, one)}."
+        f"p = {one.p_value:.3f}: {_verdict(item, one)}."
     )
     return svg(draw, WIDTH, HEIGHT), sentence
 
@@ -82,7 +82,7 @@ def error_against(item: RotationFindings, one: Dependence) -> tuple[str, str]:
 def _verdict(item: RotationFindings, one: Dependence) -> str:
     if item.is_structure(one):
         return "significant"
-    if one.probability <= item.limits.structure_p_value:
+    if one.p_value <= item.limits.structure_p_value:
         return f"significant, but a small part of {item.rmse_deg:.1f} degrees"
     return "not significant"
 
@@ -175,4 +175,4 @@ def error_by_wearing(item: WearingErrors) -> tuple[str, str]:
         axes.set_xticks(places, labels, rotation=60 if many else 0, ha="right" if many else "center")
         axes.set_ylabel(f"mean error of {item.rotation}, degrees")
 
-    return svg(draw, WIDTH, HEIGHT), item.sentence
+    return svg(draw, WIDTH, HEIGHT), wearings_sentence(item)

@@ -9,6 +9,7 @@ import pytest
 from asked_session import RECORDING, AskedSession, asked_session
 from assumed_angles import assumed_angles
 
+from glovecal_models.calibration.text import plan_sentences
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_plan import plan_training
 from glovecal_models.calibration.training_settings import TrainingSettings
@@ -269,7 +270,7 @@ def test_a_sampling_stopped_early_trains_what_it_can() -> None:
     )
     plan = plan_training([take], LAYOUT, "a", TrainingSettings(method="linear", folds=0))
     assert [task.rotation for task in plan.tasks] == ["I_PIP"]
-    assert "W_ABD was measured at 15 degrees only" in plan.sentences[-1]
+    assert "W_ABD was measured at 15 degrees only" in plan_sentences(plan)[-1]
     alone = replace(take, rotations=("W_ABD",), reference=take.reference[:, 1:])
     with pytest.raises(NotTrainable, match="is 15 degrees in all 60 samples"):
         plan_training([alone], LAYOUT, "a", TrainingSettings(method="linear", folds=0))

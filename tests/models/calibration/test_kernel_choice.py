@@ -15,9 +15,9 @@ from unknown_sensors import (
 )
 
 from glovecal_models.calibration.artifact import dump, load, model_id, read_manifest
-from glovecal_models.calibration.had_already import settings_of
-from glovecal_models.calibration.kernel_choice import try_candidates
+from glovecal_models.calibration.kernel_choice import score_candidates
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.model_recipe import settings_of
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.sample_weight import Recorded
 from glovecal_models.calibration.training import train
@@ -76,7 +76,7 @@ def test_polynomial_sensors_are_named_and_new_takes_are_predicted_no_worse(polyn
     plain = train(takes, FEW, "anna", TrainingSettings(method="lmc_gpr", folds=0))
     mine, theirs = compare(polynomial, new), compare(plain, new)
     assert mine.rotations["T_MCP"].rmse_deg < 0.96 * theirs.rotations["T_MCP"].rmse_deg
-    assert mine.over_all.rmse_deg < theirs.over_all.rmse_deg
+    assert mine.overall.rmse_deg < theirs.overall.rmse_deg
     for rotation in polynomial.rotations:
         assert 0.55 < mine.rotations[rotation.rotation].coverage < 0.85  # 0.68 is truthful
 
@@ -86,7 +86,7 @@ def test_a_product_of_four_sensors_learned_from_little_saves_a_third_of_the_erro
     model = train(every[:4], SLEEVE, "anna", AUTO)
     plain = train(every[:4], SLEEVE, "anna", TrainingSettings(method="lmc_gpr", folds=0))
     assert kernels(model) == {"BEND": "polynomial_2"}
-    assert compare(model, every[4:]).over_all.rmse_deg < 0.7 * compare(plain, every[4:]).over_all.rmse_deg
+    assert compare(model, every[4:]).overall.rmse_deg < 0.7 * compare(plain, every[4:]).overall.rmse_deg
 
 
 def test_steps_and_sigmoids_are_not_taken_for_polynomials() -> None:
@@ -145,7 +145,13 @@ def test_an_effect_is_added_to_the_kernels_that_were_chosen(polynomial) -> None:
     settings = settings_of(polynomial, TrainingSettings(method="auto", folds=2))
     assert dict(settings.kernels) == kernels(polynomial)
     found = add_effect(
-        polynomial, slower, "creep", rotations=["P_PIP"], settings=settings, least_gain=-9.0, decoy_share=1.0
+        polynomial,
+        slower,
+        "creep",
+        rotations=["P_PIP"],
+        settings=settings,
+        least_gain=-9.0,
+        control_share=1.0,
     )
     assert found.added
     assert kernels(found.model) == kernels(polynomial)
@@ -177,8 +183,8 @@ def recorded(takes: int = 4, frames: int = 30) -> Recorded:
 
 
 def test_errors_are_measured_only_where_they_matter_and_the_choice_is_the_same() -> None:
-    thorough = try_candidates(recorded(), CANDIDATES).scores
-    quick = try_candidates(recorded(), CANDIDATES, thorough=False).scores
+    thorough = score_candidates(recorded(), CANDIDATES).scores
+    quick = score_candidates(recorded(), CANDIDATES, thorough=False).scores
     assert quick.chosen == thorough.chosen
     assert [score.nlml for score in quick.scores] == [score.nlml for score in thorough.scores]
     assert all(score.held_out_rmse_deg is not None for score in thorough.scores)
@@ -186,18 +192,18 @@ def test_errors_are_measured_only_where_they_matter_and_the_choice_is_the_same()
 
 
 def test_a_few_samples_leave_nothing_to_judge_on_and_lmc_gpr_stays() -> None:
-    found = try_candidates(recorded(takes=1, frames=12), CANDIDATES).scores
+    found = score_candidates(recorded(takes=1, frames=12), CANDIDATES).scores
     assert found.chosen.name == "lmc_gpr"
     assert found.straight_line_deg is None
     assert "nothing to judge other kernels on" in found.sentence("I_PIP")
     with pytest.raises(NotTrainable):
-        try_candidates(recorded(takes=1, frames=4), CANDIDATES)
+        score_candidates(recorded(takes=1, frames=4), CANDIDATES)
 
 
 def test_cancelled_between_candidates_and_progress_is_told() -> None:
     said: list[str] = []
     with pytest.raises(Cancelled):
-        try_candidates(
+        score_candidates(
             recorded(), CANDIDATES,
             cancelled=lambda: any("degree 2" in item for item in said),
             report=lambda sentence, share: said.append(sentence),

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from glovecal_models.calibration.artifact import dump, load
-from glovecal_models.calibration.had_already import wanted_of
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.model_recipe import requested_effects
 from glovecal_models.calibration.predictor import GloveAngles, GlovePredictor
 from glovecal_models.calibration.sensor_sensitivity import sensor_sensitivity
 from glovecal_models.calibration.training import train
@@ -21,6 +21,7 @@ from glovecal_models.layout import Layout
 from glovecal_models.quick_check.held_poses import held_poses
 from glovecal_models.quick_check.pose_book import own_poses
 from glovecal_models.quick_check.quick_check import quick_check
+from glovecal_models.quick_check.text import quick_check_sentences
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
@@ -113,9 +114,9 @@ def test_the_curved_regressor_too() -> None:
     assert found.model.parent == "0" * 64
     expected = found.report.expected
     assert expected["full_calibration_deg"] < expected["after_deg"] < 0.75 * expected["now_deg"]
-    assert found.report.poses_left_out_deg is not None
-    assert found.report.poses_left_out_deg < 0.4 * found.report.poses_before_deg
-    assert "the error to expect in this wearing falls from" in found.report.sentences[0]
+    assert found.report.poses_held_out_deg is not None
+    assert found.report.poses_held_out_deg < 0.4 * found.report.poses_before_deg
+    assert "the expected error in this wearing falls from" in quick_check_sentences(found)[0]
 
 
 def test_without_the_effect_a_default_prior_is_taken() -> None:
@@ -125,9 +126,9 @@ def test_without_the_effect_a_default_prior_is_taken() -> None:
     found = quick_check(model, [it.poses])
     assert rmse(found.model, it.natural) < 0.6 * rmse(model, it.natural)
     assert [item.name for item in found.model.effects] == ["donning_shift"]
-    assert wanted_of(found.model) == (), "learned anew from the training takes it would be nothing"
+    assert requested_effects(found.model) == (), "learned anew from the training takes it would be nothing"
     mixed = quick_check(it.plain, [it.poses], trained_wearings=["wearing-1", "wearing-2"])
-    assert "2 wearings without telling them apart" in mixed.report.sentences[-1]
+    assert "2 wearings without separating them" in quick_check_sentences(mixed)[-1]
 
 
 def test_the_interval_is_as_wide_as_what_is_not_known() -> None:
@@ -206,7 +207,7 @@ def test_what_no_pose_measured_keeps_the_prior_and_says_so() -> None:
     take = replace(unmeasured(it.poses, ("I_MCP", "M_MCP")), poses=None)
     found = quick_check(it.model, [take])
     assert found.report.uninformed == ("I_PIP",)
-    assert "No pose tells anything of I_PIP" in " ".join(found.report.sentences)
+    assert "No pose informs I_PIP" in " ".join(quick_check_sentences(found))
     lane = found.rotations.index("I_PIP")
     assert found.shift.mean[lane] == 0.0
     assert found.shift.covariance[lane, lane] == found.prior.covariance[lane, lane]

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from glovecal_models.comparison.covariates import context_unit, covariates
+from glovecal_models.comparison.dependence import context_unit, covariates
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 
 

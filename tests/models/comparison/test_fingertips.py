@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 
 import numpy as np
@@ -13,6 +12,7 @@ from glovecal_models.comparison.fingertips import TIPS, fingertip_errors
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.hand_poses import hand_poses, tips_mm
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
+from glovecal_models.comparison.text import fingertips_sentence
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import HAND_ROTATIONS, completed
 from glovecal_models.hand.skeleton import hand_skeleton
@@ -90,16 +90,16 @@ def test_one_wrong_joint_moves_its_tip_along_a_circle(rotation: str, finger: str
     for name in TIPS:
         expected = chord(length, 7.0) if name == finger else 0.0
         assert errors.fingers[name].rmse_mm == pytest.approx(expected, abs=1e-9)
-    assert errors.over_all.rmse_mm == pytest.approx(chord(length, 7.0) / np.sqrt(5))
-    assert errors.over_all.count == 15
+    assert errors.overall.rmse_mm == pytest.approx(chord(length, 7.0) / np.sqrt(5))
+    assert errors.overall.count == 15
     assert (errors.worst.finger, errors.worst.take) == (finger, "one")
-    assert errors.over_all.taken_equal == ()
+    assert errors.overall.assumed_equal == ()
 
 
 def test_the_wrist_does_not_count() -> None:
     errors = fingertip_errors(found(still(), still(W_FLEX=30.0, W_ABD=10.0)), {}, HAND)
     assert errors is not None
-    assert errors.over_all.rmse_mm == 0.0
+    assert errors.overall.rmse_mm == 0.0
 
 
 def test_what_was_not_measured_is_taken_equal_and_named() -> None:
@@ -109,12 +109,12 @@ def test_what_was_not_measured_is_taken_equal_and_named() -> None:
     errors = fingertip_errors(found(measured, predicted), {}, HAND)
     assert errors is not None
     assert errors.fingers["thumb"].rmse_mm == 0.0
-    assert errors.fingers["thumb"].taken_equal == ("T_VIR",)
-    assert errors.fingers["index"].taken_equal == ("I_DIP",)
+    assert errors.fingers["thumb"].assumed_equal == ("T_VIR",)
+    assert errors.fingers["index"].assumed_equal == ("I_DIP",)
     straight = fingertip_errors(found(still(I_DIP=20.0), still(I_DIP=20.0, I_PIP=5.0)), {}, HAND)
     assert straight is not None
     assert errors.fingers["index"].rmse_mm == pytest.approx(straight.fingers["index"].rmse_mm)
-    assert "T_VIR and I_DIP were not measured throughout and taken equal in both." in errors.sentence
+    assert "T_VIR and I_DIP were not measured throughout and assumed equal." in fingertips_sentence(errors)
 
 
 def test_only_fingers_count_whose_chain_was_predicted_and_measured() -> None:
@@ -126,7 +126,7 @@ def test_only_fingers_count_whose_chain_was_predicted_and_measured() -> None:
     assert errors is not None
     assert {name: one.count for name, one in errors.fingers.items()} == {"index": 3, "ring": 1}
     assert errors.thumb_index is None
-    assert errors.fingers["index"].taken_equal == ("I_DIP", "IM_ABD")
+    assert errors.fingers["index"].assumed_equal == ("I_DIP", "IM_ABD")
     assert fingertip_errors(found(measured, everything, ("T_MCP", "I_MCP")), {}, HAND) is None
 
 
@@ -152,7 +152,7 @@ def test_predictions_that_are_no_number_and_takes_without_frames_do_not_count() 
     errors = fingertip_errors(both, {}, HAND)
     assert errors is not None
     assert {name: one.count for name, one in errors.fingers.items()} == {**dict.fromkeys(TIPS, 3), "index": 2}
-    assert errors.over_all.rmse_mm == 0.0
+    assert errors.overall.rmse_mm == 0.0
 
 
 def test_errors_grow_with_the_hand() -> None:
@@ -165,9 +165,9 @@ def test_errors_grow_with_the_hand() -> None:
     assert large is not None
     assert small.thumb_index is not None
     assert large.thumb_index is not None
-    assert large.over_all.rmse_mm == pytest.approx(2 * small.over_all.rmse_mm)
+    assert large.overall.rmse_mm == pytest.approx(2 * small.overall.rmse_mm)
     assert large.thumb_index.percentile_95_mm == pytest.approx(2 * small.thumb_index.percentile_95_mm)
-    assert small.over_all.percentile_95_mm > small.over_all.rmse_mm > 0
+    assert small.overall.percentile_95_mm > small.overall.rmse_mm > 0
 
 
 @pytest.mark.parametrize("touching", [False, True], ids=["apart", "touching"])
@@ -185,13 +185,13 @@ def test_noise_alone_is_at_the_floor(touching: bool) -> None:
     errors = fingertip_errors(found(measured, predicted), floors, HAND)
     assert errors is not None
     assert errors.thumb_index is not None
-    for one in (*errors.fingers.values(), errors.over_all, errors.thumb_index):
+    for one in (*errors.fingers.values(), errors.overall, errors.thumb_index):
         assert one.floor is not None
         assert one.rmse_mm == pytest.approx(one.floor.floor_mm, rel=0.06)
         assert not one.floor.is_lower_bound
-    assert errors.over_all.floor is not None
-    assert errors.over_all.floor.low_mm == pytest.approx(0.9 * errors.over_all.floor.floor_mm)
-    assert errors.over_all.floor.high_mm == pytest.approx(1.2 * errors.over_all.floor.floor_mm)
+    assert errors.overall.floor is not None
+    assert errors.overall.floor.low_mm == pytest.approx(0.9 * errors.overall.floor.floor_mm)
+    assert errors.overall.floor.high_mm == pytest.approx(1.2 * errors.overall.floor.floor_mm)
 
 
 def test_a_floor_is_unknown_or_a_lower_bound_when_that_of_a_joint_is() -> None:
@@ -201,22 +201,23 @@ def test_a_floor_is_unknown_or_a_lower_bound_when_that_of_a_joint_is() -> None:
     errors = fingertip_errors(found(moving(20), moving(20, seed=1)), floors, HAND)
     assert errors is not None
     assert errors.fingers["pinky"].floor is None
-    assert errors.over_all.floor is None
+    assert errors.overall.floor is None
     assert errors.fingers["index"].floor is not None
     assert errors.fingers["index"].floor.is_lower_bound
     assert errors.fingers["middle"].floor is not None
     assert not errors.fingers["middle"].floor.is_lower_bound
 
 
-def test_the_comparison_holds_them_as_plain_data_and_says_whose_hand_it_is() -> None:
+def test_the_sentence_says_whether_the_hand_was_measured() -> None:
     residuals = found(moving(200), moving(200, seed=1))
-    document = json.loads(json.dumps(summed_up(residuals).to_document()))["fingertips"]
-    assert (document["hand_length_mm"], document["is_assumed"]) == (190.0, True)
-    assert "(RMSE, for a hand of 190 mm, a size nobody measured; noise floor" in document["sentence"]
-    assert set(document["fingers"]) == set(TIPS)
+    assumed = summed_up(residuals).fingertips
+    assert assumed is not None
+    assert (assumed.hand_length_mm, assumed.is_assumed) == (190.0, True)
+    assert "(RMSE, for a hand of 190 mm, an assumed size; noise floor" in fingertips_sentence(assumed)
+    assert set(assumed.fingers) == set(TIPS)
     known = summed_up(residuals, dimensions=HAND).fingertips
     assert known is not None
     assert not known.is_assumed
-    assert "(RMSE, for a hand of 190 mm; noise floor" in known.sentence
+    assert "(RMSE, for a hand of 190 mm; noise floor" in fingertips_sentence(known)
     other = found({"A": np.zeros(5)}, {"A": np.ones(5)}, ("A",))
     assert summed_up(other).fingertips is None

@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glovecal_models.calibration.living_sensors import living_sensors
+from glovecal_models.calibration.text import dead_sensor_sentences
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.calibration.usable_sensors import usable_sensors
+from glovecal_models.comparison.noise_floor import rotation_noise
 from glovecal_models.comparison.residuals import Residuals, residuals
-from glovecal_models.comparison.rotation_noise import rotation_noise
 from glovecal_models.layout import Layout
 from glovecal_models.takes.table import read_takes
 from glovecal_models.takes.take import Take
@@ -47,10 +48,10 @@ def test_the_spread_of_like_poses_is_found(noise):
 def test_a_robot_thumb_repeats_only_to_about_six_degrees():
     takes = [take for path in sorted(DATA.glob("*.csv")) for take in read_takes(path)]
     layout = Layout.from_columns("thumb", takes[0].sensors, takes[0].rotations)
-    living = living_sensors(layout, takes)
-    assert [item.sensor for item in living.left_out] == ["G08", "G15", "G16"]
-    assert living.sentences(layout.rotations)[0].startswith("Sensors G08 (always ")
-    found = rotation_noise(fitted(takes, living.layout), seed=0)
+    usable = usable_sensors(layout, takes)
+    assert [item.sensor for item in usable.dead] == ["G08", "G15", "G16"]
+    assert dead_sensor_sentences(usable, layout.rotations)[0].startswith("Dead sensors in these takes: G08")
+    found = rotation_noise(fitted(takes, usable.layout), seed=0)
     floors = [found[name].floor for name in ("A12", "A13", "A14", "A15")]
     assert np.median([floor.floor_deg for floor in floors if floor is not None]) == pytest.approx(
         6.5, abs=1.5

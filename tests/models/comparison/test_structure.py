@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from glovecal_models.comparison.covariates import Covariate
-from glovecal_models.comparison.structure import _shifted_sums, dependence
+from glovecal_models.comparison.dependence import Covariate, _shifted_sums, dependence
 
 
 def test_all_shifts_at_once_are_the_shifts_one_by_one():
@@ -29,7 +28,7 @@ def test_unrelated_series_seem_related_no_more_often_than_claimed(slow):
         column = Covariate("x", "", "x", tuple(slow(generator, 1500, 1.0) for _ in range(4)))
         result = dependence(errors, column, generator)
         assert result is not None
-        found.append(result.probability)
+        found.append(result.p_value)
     rejected = np.mean(np.array(found) <= 0.05)
     assert 0.01 <= rejected <= 0.10  # 200 trials at a level of 0.05: 95 % of the time within 0.02 to 0.08
 
@@ -40,7 +39,7 @@ def test_a_planted_bend_is_found_with_its_size(slow):
     errors = tuple(0.7 * (value**2 - 1) + slow(generator, 1500, 1.5) for value in values)
     result = dependence(errors, Covariate("x", "", "x", values), generator)
     assert result is not None
-    assert result.probability == pytest.approx(0.001)
+    assert result.p_value == pytest.approx(0.001)
     assert result.explained_deg == pytest.approx(0.7 * np.sqrt(2), rel=0.25)
     assert result.mean_deg[0] > 0.5 < result.mean_deg[-1]
     assert result.mean_deg[len(result.mean_deg) // 2] < 0
@@ -55,4 +54,4 @@ def test_columns_that_cannot_tell():
     assert dependence(error, Covariate("x", "", "x", (np.full(100, np.nan),)), generator) is None
     few = dependence((error[0][:10],), Covariate("x", "", "x", (np.arange(10.0),)), generator)
     assert few is not None
-    assert few.probability == 1.0
+    assert few.p_value == 1.0

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -32,7 +31,7 @@ def claimed(
 def test_nlpd_is_that_of_the_normal_distribution_and_least_for_the_truth(
     claimed: Callable[[float], Residuals],
 ) -> None:
-    found = {sd: summed_up(claimed(sd)).over_all.nlpd for sd in (1.0, 2.0, 4.0)}
+    found = {sd: summed_up(claimed(sd)).overall.nlpd for sd in (1.0, 2.0, 4.0)}
     errors = claimed(2.0).stacked("error")
     assert found[2.0] == pytest.approx(-norm.logpdf(errors, 0, 2.0).mean())
     assert found[1.0] is not None
@@ -43,18 +42,20 @@ def test_nlpd_is_that_of_the_normal_distribution_and_least_for_the_truth(
 
 @pytest.mark.parametrize("sd", [0.0, np.nan])
 def test_without_a_claim_there_is_no_nlpd(claimed: Callable[[float], Residuals], sd: float) -> None:
-    document = summed_up(claimed(sd)).to_document()
-    assert document["over_all"]["nlpd"] is None
-    assert json.loads(json.dumps(document))["rotations"]["A"]["nlpd"] is None
+    found = summed_up(claimed(sd))
+    assert found.overall.nlpd is None
+    assert found.rotations["A"].nlpd is None
 
 
 def test_the_floor_stands_beside_the_rmse(claimed: Callable[[float], Residuals]) -> None:
-    document = summed_up(claimed(2.0)).to_document()
-    floor = document["rotations"]["A"]["floor"]
-    assert floor["low_deg"] <= floor["floor_deg"] <= floor["high_deg"]
-    assert floor["floor_deg"] == pytest.approx(2.0, rel=0.1)
-    assert (floor["how"], floor["is_lower_bound"]) == ("spectrum", True)
-    assert document["over_all"]["floor"] == pytest.approx(floor)
+    found = summed_up(claimed(2.0))
+    floor, overall = found.rotations["A"].floor, found.overall.floor
+    assert floor is not None
+    assert overall is not None
+    assert floor.low_deg <= floor.floor_deg <= floor.high_deg
+    assert floor.floor_deg == pytest.approx(2.0, rel=0.1)
+    assert (floor.how, floor.is_lower_bound) == ("spectrum", True)
+    assert asdict(overall) == pytest.approx(asdict(floor))
 
 
 def test_floors_are_joined_by_their_squares_and_are_as_good_as_the_weakest() -> None:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 
-from glovecal_models.comparison.stretches import worst_stretches
-from glovecal_models.comparison.wearings import _deals, _partitions, wearing_errors
-from glovecal_models.comparison.where_it_fails import where_it_fails
+from glovecal_models.comparison.text import rotation_sentence, wearings_sentence
+from glovecal_models.comparison.wearings import _partitions, _permutations, wearing_errors
+from glovecal_models.comparison.where_it_fails import where_it_fails, worst_stretches
 
 
 def test_the_neighbour_that_pulls_is_named(take_residuals, together, holds, slow):
@@ -20,14 +18,11 @@ def test_the_neighbour_that_pulls_is_named(take_residuals, together, holds, slow
         other = np.where(np.arange(len(angle)) < 600, 0.0, 20 * slow(generator, len(angle), 1.0))
         error = 0.1 * other + 0.5 * generator.normal(size=len(angle))
         takes.append(take_residuals(angle, error, other, name=f"take{number}"))
-    document = where_it_fails(together(*takes)).to_document()
-    [rotation] = document["rotations"]
-    assert rotation["dependences"][0]["covariate"] == "sensor B"
-    assert rotation["dependences"][0]["is_structure"]
-    assert "It depends on the reading of sensor B" in rotation["sentence"]
-    assert "noise floor 0.5" in rotation["sentence"]
-    assert not next(d for d in rotation["dependences"] if d["covariate"] == "time in take")["is_structure"]
-    assert json.loads(json.dumps(document)) == document
+    [rotation] = where_it_fails(together(*takes)).rotations
+    assert rotation.structure[0].covariate == rotation.dependences[0].covariate == "sensor B"
+    assert "It depends on the reading of sensor B" in rotation_sentence(rotation)
+    assert "noise floor 0.5" in rotation_sentence(rotation)
+    assert "time in take" not in {item.covariate for item in rotation.structure}
 
 
 def test_nothing_is_left_to_gain_at_the_floor_and_a_constant_is_said(take_residuals, together, holds):
@@ -38,17 +33,17 @@ def test_nothing_is_left_to_gain_at_the_floor_and_a_constant_is_said(take_residu
         where_it_fails(together(take_residuals(angle + noise, shift - noise, angle[::-1]))).rotations[0]
         for shift in (0.0, 4.0)
     )
-    assert "nothing is left to gain" in at_floor.sentence
-    assert "mostly by a constant +4.0" in shifted.sentence
-    assert "no recorded column explains it" in shifted.sentence
+    assert "at the noise floor" in rotation_sentence(at_floor)
+    assert "mostly a constant +4.0" in rotation_sentence(shifted)
+    assert "no recorded column explains it" in rotation_sentence(shifted)
 
 
 def test_a_prediction_that_jitters_is_not_called_a_floor(take_residuals, together, holds):
     angle = holds(12)
     jitter = 2.0 * np.random.default_rng(10).normal(size=len(angle))
     [found] = where_it_fails(together(take_residuals(angle, jitter, angle))).rotations
-    assert "the prediction's own jitter of 2.0" in found.sentence
-    assert "nothing is left" not in found.sentence
+    assert "the prediction's own jitter of 2.0" in rotation_sentence(found)
+    assert "at the noise floor" not in rotation_sentence(found)
 
 
 def test_the_worst_second_is_found_with_take_and_time(take_residuals, together):
@@ -81,17 +76,17 @@ def test_wearings_are_told_apart_by_dealing_their_takes(take_residuals, together
 
     shifted = wearing_errors(found(3.0, 4, 3), "A", generator)
     assert shifted is not None
-    assert shifted.probability is not None
-    assert shifted.probability <= 0.01
-    assert "changes with the wearing" in shifted.sentence
+    assert shifted.p_value is not None
+    assert shifted.p_value <= 0.01
+    assert "changes with the wearing" in wearings_sentence(shifted)
     same = wearing_errors(found(0.0, 4, 3), "A", generator)
     assert same is not None
-    assert same.probability is not None
-    assert same.probability > 0.05
+    assert same.p_value is not None
+    assert same.p_value > 0.05
     few = wearing_errors(found(3.0, 2, 2), "A", generator)
     assert few is not None
-    assert few.probability is None
-    assert "too few takes to say" in few.sentence
+    assert few.p_value is None
+    assert "too few takes to say" in wearings_sentence(few)
     assert wearing_errors(found(0.0, 4, 1), "A", generator) is None
 
 
@@ -99,5 +94,5 @@ def test_wearings_are_told_apart_by_dealing_their_takes(take_residuals, together
 def test_partitions_are_counted_and_each_is_dealt_once(counts, ways):
     owners = np.repeat(np.arange(len(counts)), counts)
     assert _partitions(counts) == ways
-    dealt = _deals(owners, counts, np.random.default_rng(0))
+    dealt = _permutations(owners, counts, np.random.default_rng(0))
     assert len(dealt) == ways - 1  # the true one is left out

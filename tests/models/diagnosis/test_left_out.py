@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from glovecal_models.calibration.left_out import are_short, held_levels, pieces
+from glovecal_models.calibration.folds import are_short, held_levels, pieces
 
 
 def test_angles_held_one_after_another_are_left_out_one_by_one():

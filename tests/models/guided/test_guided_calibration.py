@@ -29,7 +29,7 @@ from glovecal_models.sampling.guided.guided_calibration import (
     guided_calibration,
     guided_samples,
 )
-from glovecal_models.sampling.guided.taught_samples import TaughtTake
+from glovecal_models.sampling.guided.labelled_takes import LabelledTake
 from glovecal_models.sampling.protocol import Protocol
 from glovecal_models.sampling.sampled_takes import sampled_takes
 from glovecal_models.simulation.protocol import evaluation_segment
@@ -47,18 +47,18 @@ TAUGHT = ("T_TMC", "TI_ABD", "T_VIR", "T_MCP", "T_IP", "I_MCP", "I_PIP", "I_DIP"
 
 
 @cache
-def sampled() -> tuple[TaughtTake, ...]:
+def sampled() -> tuple[LabelledTake, ...]:
     """Poses, the thumb's widgets, touches of index and middle finger, a rod."""
     steps = make_protocol("new_subject", LAYOUT).steps
     wanted = tuple(s for s in steps if s.part in PARTS or s.name in ("touch-I", "touch-M", "rod-I-60"))
     session = asked_session(Protocol("some", wanted), GLOVE, seed=SEED, rate_hz=RATE_HZ, skeleton=HAND)
     cut = sampled_takes(session.state, {RECORDING: session.take}, name="s")
-    return tuple(TaughtTake.of(each) for each in cut)
+    return tuple(LabelledTake.of(each) for each in cut)
 
 
 @cache
 def calibrated(kinds: str = "all", method: Method = "lmc_gpr") -> GuidedCalibration:
-    wanted: dict[str, Callable[[TaughtTake], bool]] = {
+    wanted: dict[str, Callable[[LabelledTake], bool]] = {
         "all": lambda each: True,
         "fk": lambda each: not each.contacts,
         "ik": lambda each: not each.take.rotations,

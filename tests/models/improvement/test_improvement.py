@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from glovecal_models.calibration.artifact import dump, load
-from glovecal_models.calibration.had_already import wanted_of
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.model_recipe import requested_effects
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.comparison.residuals import residuals
@@ -126,7 +126,7 @@ def test_the_loop_adds_the_effect_that_was_simulated(sticky):
     assert any(
         sentence.startswith("hysteresis on I_PIP reduces") for sentence in improvement_sentences(found)
     )
-    assert [item.name for item in wanted_of(found.steps[1].model)] == ["hysteresis"]
+    assert [item.name for item in requested_effects(found.steps[1].model)] == ["hysteresis"]
 
 
 def test_a_clean_glove_is_not_improved(sticky):

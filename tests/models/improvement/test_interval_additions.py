@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from glovecal_models.calibration.artifact import dump, load
-from glovecal_models.calibration.had_already import trained_rotations
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.model_recipe import trained_rotations
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.comparison.compare import compare
@@ -79,7 +79,7 @@ def test_a_slip_makes_long_sessions_claim_what_is_true():
         assert added.claim.after.nlpd < added.claim.before.nlpd, "on held-out takes"
         assert all(numbers["rate_deg_per_sqrt_min"] > 0 for numbers in added.parameters.values())
         long = [session.also("natural", 300.0, wearing).take for wearing in (2, 3)]
-        pair = [compare(each, long).over_all for each in (model, load(dump(added.model)))]
+        pair = [compare(each, long).overall for each in (model, load(dump(added.model)))]
         assert pair[0].rmse_deg == pair[1].rmse_deg
         nlpd.append([one.nlpd for one in pair])
         coverage.append([one.coverage for one in pair])
@@ -115,7 +115,7 @@ def test_a_fault_is_left_out_told_and_served_live():
     assert evidence["live_false_share"] < 0.01
     new = session.also("natural", 40.0, 0)
     comparison = compare(model, [new.take])
-    assert 0 < comparison.left_out["I_PIP"] < 0.1 * len(new.take.time_s)
+    assert 0 < comparison.excluded["I_PIP"] < 0.1 * len(new.take.time_s)
     spiked = np.abs(new.take.readings - new.clean.readings)[:, 1] > 0.05 * np.ptp(new.clean.readings[:, 1])
     errors = []
     for each in (found.steps[0].model, model):

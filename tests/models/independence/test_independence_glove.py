@@ -10,6 +10,7 @@ from still_take import still_take
 
 from glovecal_models.independence.independence import SIDEWAYS, Independence, examine_independence
 from glovecal_models.independence.proposal import proposals
+from glovecal_models.independence.text import proposal_sentence, worn_side_sentence
 from glovecal_models.simulation.protocol import segments
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.simulation.simulated_take import simulate_take
@@ -48,8 +49,8 @@ def test_it_proposes_the_papers_correspondences(glove: SimulatedGlove, examined:
         assert set(offered[rotation].sensors) == set(now.sensors), rotation
         assert not offered[rotation].is_change
     assert offered["I_DIP"].kind == "0S1R"
-    assert "2/3 * I_PIP" in offered["I_DIP"].sentence
-    assert "more accurate with all thumb sensors" in offered["T_TMC"].sentence
+    assert "2/3 * I_PIP" in proposal_sentence(offered["I_DIP"])
+    assert "more accurate with all thumb sensors" in proposal_sentence(offered["T_TMC"])
     assert ("I_MCP", "IM_ABD") in examined.one_way
 
 
@@ -79,11 +80,11 @@ def test_the_glove_of_the_other_hand_is_seen_and_how_sure_it_is(glove: Simulated
     other = worn(SIDEWAYS)
     assert other.verdict == "other hand"
     assert set(other.reversed_sensors) <= set(SIDEWAYS)
-    assert other.probability is not None
-    assert other.probability < 1e-3
-    assert "looks the same" in other.sentence
+    assert other.p_value is not None
+    assert other.p_value < 1e-3
+    assert "looks the same" in worn_side_sentence(other)
     assert worn(glove.sensors).verdict == "back to front"
     swapped = worn(("I_PIP",))
     assert swapped.verdict == "as it should be"
     assert swapped.reversed_sensors == ("I_PIP",)
-    assert examine_independence(glove.layout, still, []).worn_side.verdict == "not judgeable"
+    assert examine_independence(glove.layout, still, []).worn_side.verdict == "not identifiable"

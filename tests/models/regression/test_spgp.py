@@ -208,11 +208,11 @@ def test_noise_collapse_happens_without_the_guard_and_is_refused_with_it(monkeyp
         assert collapsed.evidence["guard"]["loss_per_sample"] > 10
         assert np.sqrt(collapsed.noise_variance) < 0.2 < 0.7 < np.sqrt(kept.noise_variance)
 
-    def over_all(regressors: list[ProcessRegressor]) -> float:
+    def overall(regressors: list[ProcessRegressor]) -> float:
         pairs = zip(regressors, recordings, strict=True)
         return float(np.mean([later_density(model, s[later], r[later]) for model, (s, r) in pairs]))
 
-    assert over_all(guarded) < over_all(free) - 1.0
+    assert overall(guarded) < overall(free) - 1.0
 
 
 def test_start_is_used_in_its_own_units_and_other_covariances_are_refused() -> None:

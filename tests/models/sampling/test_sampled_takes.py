@@ -220,4 +220,4 @@ def test_the_second_wearing_is_a_quick_check(session: AskedSession) -> None:
     assert worn.state.capture_s <= 30
     checks = [each.take for each in sampled_takes(worn.state, {RECORDING: worn.take}, name="c")]
     found = quick_check(model, [take for take in checks if take.poses])
-    assert {pose.to_document()["pose"] for pose in found.poses}
+    assert {pose.label for pose in found.poses}

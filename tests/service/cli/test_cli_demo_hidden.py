@@ -77,7 +77,7 @@ def test_a_cause_without_a_name_is_said_to_be_left(service, tmp_path):
 def test_a_wrong_name_is_called_wrong():
     hidden, healthy = (hidden_session(name, 1, take_s=6.0) for name in ("lag", "none"))
     named = {"effect": "creep", "confidence_set": ["creep", "lag"]}
-    error = {"over_all": {"rmse_deg": 2.0, "floor": None}}
+    error = {"overall": {"rmse_deg": 2.0, "floor": None}}
     found = Findings(comparisons={"lmc_gpr": error}, diagnosis={"named": named})
     assert verdict(hidden, found)[-1].startswith("Partly right: creep was named first; lag is in")
     named["confidence_set"] = ["creep"]

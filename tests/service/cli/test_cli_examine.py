@@ -50,7 +50,7 @@ def test_from_still_takes_to_a_model_that_reads_the_neighbours(eve: Run, tmp_pat
     page = tmp_path / "page.html"
     told = eve("take", "examine", "-s", "eve", "--report", page)
     assert told.code == 0, told.err
-    assert "IM_ABD is stretched by I_MCP" in told.out
+    assert "IM_ABD is cross-coupled by I_MCP" in told.out
     assert "read it from IM_ABD, I_MCP and M_MCP (MS1R). (a change)" in told.out
     assert "I_PIP stays within" in told.out
     assert "--keep NAME" in told.out
@@ -82,7 +82,7 @@ def test_json_and_a_choice_of_proposals(eve: Run) -> None:
     assert item["active_range"]["source"] == "its own range take"
     assert {share["sensor"] for share in item["affecting"]} == {"I_MCP", "M_MCP"}
     assert all(share["std_low"] <= share["std_pct"] <= share["std_high"] for share in item["affecting"])
-    assert found["worn_side"]["verdict"] == "not judgeable"
+    assert found["worn_side"]["verdict"] == "not identifiable"
     options = ("--keep", "chosen", "--rotation", "IM_ABD")
     assert "IM_ABD otherwise" in eve("take", "examine", "still-IM_ABD", *options).out
     document = eve("glove", "show", "chosen").json

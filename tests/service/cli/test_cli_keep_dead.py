@@ -16,8 +16,8 @@ def test_a_dead_sensor_is_left_out_or_refused(run, tmp_path):
     assert run("take", "import", tmp_path / "dead.csv", "-s", "anna").code == 0
     trained = run("train", "-s", "anna", "--method", "linear")
     assert trained.code == 0, trained.err
-    assert "Sensor R_PIP (always 121) says nothing of the hand in these takes" in trained.said
-    assert "R_PIP, R_DIP: left out of the model" in trained.said
+    assert "Dead sensor in these takes: R_PIP (always 121)." in trained.said
+    assert "No working sensor measures R_PIP, R_DIP: not in the model." in trained.said
     refused = run("train", "-s", "anna", "--method", "linear", "--keep-dead")
     assert refused.code == 1
     assert "sensor R_PIP reads 121 in all" in refused.said

@@ -55,18 +55,18 @@ def test_models_are_compared_side_by_side_on_takes_they_have_not_seen(walked):
     ids = [models[method]["id"] for method in ("raw", "linear")]
     results = run("compare", *ids, "--json").json
     assert list(results) == ids
-    raw, linear = (results[id]["over_all"]["rmse_deg"] for id in ids)
+    raw, linear = (results[id]["overall"]["rmse_deg"] for id in ids)
     assert linear < 0.7 * raw
     beside = run("compare", *(id[:6] for id in ids))
     assert beside.out.splitlines()[0] == "Against second:"
     everywhere = next(line.split() for line in beside.out.splitlines() if line.startswith("all"))
     assert everywhere[1:3] == [f"{raw:.2f}", f"{linear:.2f}"]
     assert "Careful" not in beside.err
-    floors = [results[id]["over_all"]["floor"] for id in ids]
+    floors = [results[id]["overall"]["floor"] for id in ids]
     floor = min(floors, key=lambda one: (one["is_lower_bound"], one["floor_deg"]))
     interval = f"{floor['low_deg']:.2f}-{floor['high_deg']:.2f}"
     assert everywhere[3] == (f">{floor['floor_deg']:.2f}" if floor["is_lower_bound"] else interval)
-    tips = [results[id]["fingertips"]["over_all"]["rmse_mm"] for id in ids]
+    tips = [results[id]["fingertips"]["overall"]["rmse_mm"] for id in ids]
     assert tips[1] < 0.7 * tips[0]
     in_mm = beside.out[beside.out.index("fingertip RMSE (mm)") :].splitlines()
     assert in_mm[1].split()[:3] == ["all", f"{tips[0]:.2f}", f"{tips[1]:.2f}"]

@@ -42,7 +42,7 @@ def test_a_new_wearing_is_checked_from_the_command_line(tmp_path: Path) -> None:
     answer = run("quick-check", "--subject", "anna", "--take", "check", "--activate")
     assert answer.code == 0, answer.err
     assert "pose fist at 1.3 s of take check" in answer.out
-    assert "3 poses: the error to expect in this wearing falls from" in answer.out
+    assert "3 poses: the expected error in this wearing falls from" in answer.out
     assert f"made from {record.id[:12]}. Active.\n" in answer.out
     assert "full calibration (°)" in answer.out
     document = run("quick-check", "-s", "anna", "-t", "late", "--json").json

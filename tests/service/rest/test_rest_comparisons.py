@@ -122,7 +122,7 @@ def test_models_stand_side_by_side_in_one_report(
     assert "Models side by side" in page
     rmse = {f"raw {raw[:6]}": 0.0, f"linear {model[:6]}": 0.0}
     for name, id in zip(rmse, (raw, model), strict=True):
-        rmse[name] = client.post(f"/models/{id}/compare", {"takes": takes[1:]})["over_all"]["rmse_deg"]
+        rmse[name] = client.post(f"/models/{id}/compare", {"takes": takes[1:]})["overall"]["rmse_deg"]
     best, other = sorted(rmse, key=lambda name: rmse[name])
     assert f"{best} has the smallest error, {rmse[best]:.2f} degrees" in page
     assert f"({rmse[other]:.2f} for {other})" in page

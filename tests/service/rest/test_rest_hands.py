@@ -72,12 +72,12 @@ def test_errors_in_mm_are_those_of_the_subjects_hand(
     assumed = client.post(f"/models/{model}/compare", against)["fingertips"]
     assert (assumed["hand_length_mm"], assumed["is_assumed"]) == (190.0, True)
     assert set(assumed["fingers"]) == {"index"}
-    assert assumed["fingers"]["index"]["taken_equal"] == ["I_DIP", "IM_ABD"]
+    assert assumed["fingers"]["index"]["assumed_equal"] == ["I_DIP", "IM_ABD"]
     assert assumed["thumb_index"] is None
     client.put("/subjects/anna/hand", {"dimensions": {"hand_length": 95}, "hand": "left"})
     own = client.post(f"/models/{model}/compare", against)["fingertips"]
     assert own["is_assumed"] is False
-    assert own["over_all"]["rmse_mm"] == pytest.approx(assumed["over_all"]["rmse_mm"] / 2)
+    assert own["overall"]["rmse_mm"] == pytest.approx(assumed["overall"]["rmse_mm"] / 2)
     page = client.page(f"/models/{model}/report", against)
     assert ">Fingertips</h2>" in page
     assert own["sentence"] in page

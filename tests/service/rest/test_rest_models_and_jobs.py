@@ -102,7 +102,7 @@ def test_predict_compare_and_export_agree_with_the_artifact(client: RestClient) 
     assert client.post(f"/models/{model}/predict", swapped) == answer
     found = client.post(f"/models/{model}/compare", {"takes": takes})
     assert found["trained_on"] == takes[:1]
-    assert found["over_all"]["count"] == 480
+    assert found["overall"]["count"] == 480
     assert 0.45 < found["rotations"]["I_MCP"]["rmse_deg"] < 0.55
     assert found["rotations"]["I_PIP"]["rmse_deg"] < 1e-3
 

@@ -64,7 +64,7 @@ def test_a_check_stores_a_child_that_predicts_the_wearing_better(worn: Worn) -> 
     assert len(found["poses"]) == 5
     expected = found["expected"]
     assert expected["full_calibration_deg"] < expected["after_deg"] < expected["now_deg"]
-    assert "2 wearings without telling them apart" in found["sentences"][-1]
+    assert "2 wearings without separating them" in found["sentences"][-1]
     child = worn.client.get(f"/models/{found['model']}")
     assert child["effects"] == ["donning_shift"]
     assert child["facts"]["quick_check"]["wearing"] == TUESDAY
@@ -72,7 +72,7 @@ def test_a_check_stores_a_child_that_predicts_the_wearing_better(worn: Worn) -> 
     assert child["facts"]["takes"] == parent["facts"]["takes"]
     natural = next(row["id"] for row in worn.client.get("/takes") if row["name"] == "w3-natural-1")
     before, after = (
-        worn.client.post(f"/models/{model}/compare", {"takes": [natural]})["over_all"]["rmse_deg"]
+        worn.client.post(f"/models/{model}/compare", {"takes": [natural]})["overall"]["rmse_deg"]
         for model in (worn.model, child["id"])
     )
     assert after < 0.7 * before

@@ -124,9 +124,9 @@ def propose(
     ``trained`` has the processes by rotation that a current model holds. Raises BadInput where no candidate
     and no known reading says anything of any rotation.
     """
-    taught = {rotation for step in candidates for rotation in step.angles}
-    taught |= {rotation for block in known.blocks for rotation in block.angles}
-    wanted = [item for item in layout.correspondences if item.simulated is None and item.rotation in taught]
+    informed = {rotation for step in candidates for rotation in step.angles}
+    informed |= {rotation for block in known.blocks for rotation in block.angles}
+    wanted = [item for item in layout.correspondences if item.simulated is None and item.rotation in informed]
     if not wanted:
         raise BadInput(f"layout {layout.name!r}: no pose or widget is known for any of its rotations")
     expected = ExpectedReadings(known, wanted)

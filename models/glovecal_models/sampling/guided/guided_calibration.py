@@ -21,14 +21,15 @@ from glovecal_models.calibration.training_settings import Report, TrainingSettin
 from glovecal_models.errors import Cancelled, NotTrainable
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.layout import Layout
-from glovecal_models.sampling.guided.left_out import LeftOut, left_out
-from glovecal_models.sampling.guided.rotation_belief import first_beliefs, reading_ranges
+from glovecal_models.sampling.guided.held_out import HeldOutErrors, held_out_errors
+from glovecal_models.sampling.guided.labelled_takes import FK, LabelledTake, hold_sd_deg, labelled_takes
+from glovecal_models.sampling.guided.rotation_posterior import first_posteriors, reading_ranges
 from glovecal_models.sampling.guided.second_pass import (
-    Lesson,
+    LabelledSamples,
     SampleCount,
     counted,
     known_lessons,
-    taught_layout,
+    labelled_layout,
     touch_lessons,
     with_open_variance,
 )
@@ -41,7 +42,6 @@ from glovecal_models.sampling.guided.seen_touches import (
     nothing_left,
     seen_touches,
 )
-from glovecal_models.sampling.guided.taught_samples import FK, TaughtTake, hold_sd_deg, taught_samples
 from glovecal_models.sampling.guided.touch_posterior import TouchPosterior
 from glovecal_models.takes.take import Take
 
@@ -64,17 +64,19 @@ class GuidedSamples:
     samples: tuple[SampleCount, ...]
     refused: tuple[RefusedTouch, ...]
     sentences: tuple[str, ...]
-    lessons: tuple[Lesson, ...]
+    labelled_samples: tuple[LabelledSamples, ...]
     posterior: TouchPosterior
     """The likeliest calibration before any training."""
-    without: LeftOut
+    without: HeldOutErrors
 
     def finished(self, model: CalibrationModel) -> CalibrationModel:
         """A ``model`` trained on ``takes`` by ``layout``, as it is to be kept.
 
-        Where it has no error estimate it gets that of ``left_out.py``.
+        Where it has no error estimate it gets that of ``held_out.py``.
         """
-        model = with_open_variance(replace(model, layout=self.glove_layout), self.lessons, self.posterior)
+        model = with_open_variance(
+            replace(model, layout=self.glove_layout), self.labelled_samples, self.posterior
+        )
         return model if "rmse_deg" in model.error_estimate else self._with_estimate(model)
 
     def _with_estimate(self, model: CalibrationModel) -> CalibrationModel:
@@ -95,7 +97,7 @@ class GuidedCalibration:
 
 
 def guided_samples(
-    takes: Sequence[TaughtTake],
+    takes: Sequence[LabelledTake],
     layout: Layout,
     skeleton: Skeleton | None,
     *,
@@ -104,54 +106,54 @@ def guided_samples(
 ) -> GuidedSamples:
     """Both passes but for the training; see ``guided_calibration``. Raises as it does."""
     say = report or (lambda sentence, fraction: None)
-    for taught in takes:
-        require_layout(taught.take, layout)
-    used = [taught.in_order(layout) for taught in takes]
-    known = [taught for taught in used if taught.kind in FK]
-    touching = [taught for taught in used if taught.contacts]
+    for labelled in takes:
+        require_layout(labelled.take, layout)
+    used = [labelled.in_order(layout) for labelled in takes]
+    known = [labelled for labelled in used if labelled.kind in FK]
+    touching = [labelled for labelled in used if labelled.contacts]
     if not known and not touching:
         raise NotTrainable(nothing_left(skeleton is not None, 0, ()))
     say("what poses and widgets tell", 0.0)
-    samples = taught_samples(used)
-    readings = np.concatenate([taught.take.readings[taught.take.lead_in_frames :] for taught in used])
+    samples = labelled_takes(used)
+    readings = np.concatenate([labelled.take.readings[labelled.take.lead_in_frames :] for labelled in used])
     ranges = reading_ranges(layout.sensors, readings)
-    beliefs = first_beliefs(layout, samples, ranges)
+    priors = first_posteriors(layout, samples, ranges)
     seen: list[SeenTouch] = []
     refused: list[RefusedTouch] = []
     if touching and skeleton is not None:
-        say("first pass: which touches can be seen in what poses and widgets taught", 0.1)
-        first = TouchPosterior(beliefs, layout.sensors, skeleton, ())
+        say("first pass: which touches can be seen in what poses and widgets labelled", 0.1)
+        first = TouchPosterior(priors, layout.sensors, skeleton, ())
         seen, refused = seen_touches(touching, first, skeleton)
         _stop_if(cancelled)
     say("what all touches tell together", 0.5)
-    posterior = TouchPosterior(beliefs, layout.sensors, skeleton, (), cancelled)
+    posterior = TouchPosterior(priors, layout.sensors, skeleton, (), cancelled)
     if seen and skeleton is not None:
-        posterior, seen, strange = closing_touches(beliefs, layout.sensors, skeleton, seen, cancelled)
+        posterior, seen, strange = closing_touches(priors, layout.sensors, skeleton, seen, cancelled)
         refused += strange
     inferred, told = touch_lessons(seen, posterior, layout.rotations)
-    lessons = (*known_lessons(known, posterior, told), *inferred)
-    if not lessons:
+    labelled_samples = (*known_lessons(known, posterior, told), *inferred)
+    if not labelled_samples:
         raise NotTrainable(nothing_left(skeleton is not None, len(touching), refused))
     say("how well the session tells what is left out of it", 0.8)
-    without = left_out(layout, samples, ranges, skeleton, seen, posterior, cancelled)
+    without = held_out_errors(layout, samples, ranges, skeleton, seen, posterior, cancelled)
     said = [hold_sentence(len(samples.holds), hold_sd_deg(samples, layout))] if samples.holds else []
     said += [*guided_sentences(seen, refused, told, posterior, skeleton), *without.sentences()]
     say("second pass: all samples have their angles", 1.0)
     return GuidedSamples(
-        takes=tuple(lesson.take for lesson in lessons),
-        layout=taught_layout(layout, told),
+        takes=tuple(one.take for one in labelled_samples),
+        layout=labelled_layout(layout, told),
         glove_layout=layout,
-        samples=counted(lessons, told),
+        samples=counted(labelled_samples, told),
         refused=tuple(refused),
         sentences=tuple(said),
-        lessons=lessons,
+        labelled_samples=labelled_samples,
         posterior=posterior,
         without=without,
     )
 
 
 def guided_calibration(
-    takes: Sequence[TaughtTake],
+    takes: Sequence[LabelledTake],
     layout: Layout,
     subject: str,
     skeleton: Skeleton | None,
@@ -189,23 +191,23 @@ def guided_calibration(
 
 
 def _plain(
-    takes: Sequence[TaughtTake], layout: Layout, subject: str, settings: TrainingSettings, **how: Any
+    takes: Sequence[LabelledTake], layout: Layout, subject: str, settings: TrainingSettings, **how: Any
 ) -> GuidedCalibration:
     """A baseline: known angles as they are."""
-    known = [taught for taught in takes if taught.kind in FK and taught.take.rotations]
+    known = [labelled for labelled in takes if labelled.kind in FK and labelled.take.rotations]
     if not known:
         raise NotTrainable(f"method {settings.method} needs poses or widgets; touches are not used by it")
-    model = train([taught.take for taught in known], layout, subject, settings, **how)
-    samples = taught_samples(known)
+    model = train([labelled.take for labelled in known], layout, subject, settings, **how)
+    samples = labelled_takes(known)
     counts = [
         SampleCount(
             name,
             kind,
             sum(
                 len(rows)
-                for taught in known
-                if taught.kind == kind and name in taught.take.rotations
-                for rows in taught.steps()
+                for labelled in known
+                if labelled.kind == kind and name in labelled.take.rotations
+                for rows in labelled.steps()
             ),
         )
         for name in samples.rotations

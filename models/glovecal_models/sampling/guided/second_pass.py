@@ -20,8 +20,8 @@ from glovecal_models.inverse_kinematics.steadied import steadied
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.regression.linear_regressor import LinearRegressor
 from glovecal_models.regression.process_regressor import ProcessRegressor
+from glovecal_models.sampling.guided.labelled_takes import LabelledTake
 from glovecal_models.sampling.guided.seen_touches import SeenTouch
-from glovecal_models.sampling.guided.taught_samples import TaughtTake
 from glovecal_models.sampling.guided.touch_posterior import TouchPosterior
 from glovecal_models.sampling.protocol import Kind
 from glovecal_models.takes.take import Take
@@ -44,7 +44,7 @@ class SampleCount:
 
 
 @dataclass(frozen=True)
-class Lesson:
+class LabelledSamples:
     """A take to train on: readings without noise, angles of the likeliest calibration."""
 
     take: Take
@@ -54,34 +54,34 @@ class Lesson:
 
 
 def known_lessons(
-    takes: Iterable[TaughtTake], posterior: TouchPosterior, told: Iterable[str] = ()
-) -> list[Lesson]:
+    takes: Iterable[LabelledTake], posterior: TouchPosterior, told: Iterable[str] = ()
+) -> list[LabelledSamples]:
     """From takes with known angles. In held poses also joints without a sensor that touches ``told`` of: a
     straight finger is straight, and no touch shows that."""
-    ruled = tuple(name for name in told if posterior.beliefs[name].prior.follows)
-    lessons = []
-    for taught in takes:
-        if not taught.take.rotations or taught.kind not in ("fk_independent", "fk_cross_couple"):
+    ruled = tuple(name for name in told if posterior.priors[name].prior.follows)
+    labelled_samples = []
+    for labelled in takes:
+        if not labelled.take.rotations or labelled.kind not in ("fk_independent", "fk_cross_couple"):
             continue
-        take, smooth = taught.take, steadied(taught.take.time_s, taught.take.readings.astype(float))
+        take, smooth = labelled.take, steadied(labelled.take.time_s, labelled.take.readings.astype(float))
         reference = _as_read(take, posterior)
-        if taught.kind == "fk_independent" and ruled:
+        if labelled.kind == "fk_independent" and ruled:
             held = np.asarray(np.isfinite(reference).any(axis=1))
             column = np.full((len(held), len(ruled)), np.nan)
             for index, name in enumerate(ruled):
                 column[held, index] = posterior.angles(name, take.readings[held])
             names, reference = (*take.rotations, *ruled), np.hstack([reference, column])
-            lessons.append(_lesson(take, smooth, names, reference, taught.kind, ruled))
+            labelled_samples.append(_labelled_samples(take, smooth, names, reference, labelled.kind, ruled))
             continue
-        lessons.append(_lesson(take, smooth, take.rotations, reference, taught.kind))
-    return lessons
+        labelled_samples.append(_labelled_samples(take, smooth, take.rotations, reference, labelled.kind))
+    return labelled_samples
 
 
 def touch_lessons(
     seen: Sequence[SeenTouch], posterior: TouchPosterior, rotations: Sequence[str]
-) -> tuple[list[Lesson], dict[str, float]]:
+) -> tuple[list[LabelledSamples], dict[str, float]]:
     """From touches, those of ``rotations`` that each tells something of; and the share told of each."""
-    lessons: list[Lesson] = []
+    labelled_samples: list[LabelledSamples] = []
     told: dict[str, float] = {}
     for touch in seen:
         some = touch.some(LOOKED_AT).readings
@@ -94,18 +94,18 @@ def touch_lessons(
         smooth = touch.take.readings.astype(float)
         smooth[touch.rows] = touch.readings
         if names:
-            lessons.append(_lesson(touch.take, smooth, names, reference, "ik"))
-    return lessons, told
+            labelled_samples.append(_labelled_samples(touch.take, smooth, names, reference, "ik"))
+    return labelled_samples, told
 
 
-def counted(lessons: Iterable[Lesson], told: dict[str, float]) -> tuple[SampleCount, ...]:
+def counted(labelled_samples: Iterable[LabelledSamples], told: dict[str, float]) -> tuple[SampleCount, ...]:
     counts: dict[tuple[str, Kind], int] = {}
-    for lesson in lessons:
-        for column, name in enumerate(lesson.take.rotations):
-            if name in lesson.ruled:
+    for one in labelled_samples:
+        for column, name in enumerate(one.take.rotations):
+            if name in one.ruled:
                 continue
-            count = int(np.isfinite(lesson.take.reference[:, column]).sum())
-            counts[name, lesson.kind] = counts.get((name, lesson.kind), 0) + count
+            count = int(np.isfinite(one.take.reference[:, column]).sum())
+            counts[name, one.kind] = counts.get((name, one.kind), 0) + count
     return tuple(
         SampleCount(name, kind, count, told.get(name) if kind == "ik" else None)
         for (name, kind), count in counts.items()
@@ -113,7 +113,7 @@ def counted(lessons: Iterable[Lesson], told: dict[str, float]) -> tuple[SampleCo
     )
 
 
-def taught_layout(layout: Layout, told: Iterable[str]) -> Layout:
+def labelled_layout(layout: Layout, told: Iterable[str]) -> Layout:
     """A joint without a sensor that touches tell of is read from all sensors of its rule, not from one fixed
     mixture of them: nobody told the mixture."""
     items = [
@@ -126,21 +126,25 @@ def taught_layout(layout: Layout, told: Iterable[str]) -> Layout:
 
 
 def with_open_variance(
-    model: CalibrationModel, lessons: Sequence[Lesson], posterior: TouchPosterior
+    model: CalibrationModel, labelled_samples: Sequence[LabelledSamples], posterior: TouchPosterior
 ) -> CalibrationModel:
     """The model claiming, beside the noise of a frame, what the session left open."""
-    return replace(model, rotations=tuple(_claiming(item, lessons, posterior) for item in model.rotations))
+    return replace(
+        model, rotations=tuple(_claiming(item, labelled_samples, posterior) for item in model.rotations)
+    )
 
 
-def _claiming(item: RotationModel, lessons: Sequence[Lesson], posterior: TouchPosterior) -> RotationModel:
+def _claiming(
+    item: RotationModel, labelled_samples: Sequence[LabelledSamples], posterior: TouchPosterior
+) -> RotationModel:
     regressor = item.regressor
     if not isinstance(regressor, LinearRegressor | ProcessRegressor):
         return item  # a rule has the noise of what it follows
     left = [np.empty(0)]
-    for lesson in lessons:
-        if item.rotation in lesson.take.rotations:
-            angle = lesson.take.reference[:, lesson.take.rotations.index(item.rotation)]
-            some = lesson.take.readings[np.isfinite(angle)]
+    for one in labelled_samples:
+        if item.rotation in one.take.rotations:
+            angle = one.take.reference[:, one.take.rotations.index(item.rotation)]
+            some = one.take.readings[np.isfinite(angle)]
             left.append(posterior.variance(item.rotation, some[:: max(1, len(some) // LOOKED_AT)]))
     variance = regressor.noise_variance + float(np.concatenate(left).mean())
     claiming = replace(regressor, noise_variance=variance)
@@ -156,15 +160,15 @@ def _as_read(take: Take, posterior: TouchPosterior) -> np.ndarray:
     return found
 
 
-def _lesson(
+def _labelled_samples(
     take: Take,
     readings: np.ndarray,
     rotations: tuple[str, ...],
     reference: np.ndarray,
     kind: Kind,
     ruled: tuple[str, ...] = (),
-) -> Lesson:
-    taught = replace(
+) -> LabelledSamples:
+    labelled = replace(
         take, readings=readings, rotations=rotations, reference_time_s=take.time_s, reference=reference
     )
-    return Lesson(taught, kind, ruled)
+    return LabelledSamples(labelled, kind, ruled)

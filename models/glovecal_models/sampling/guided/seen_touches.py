@@ -25,8 +25,8 @@ from glovecal_models.inverse_kinematics.touch_check import (
     require_happened,
     require_possible,
 )
-from glovecal_models.sampling.guided.rotation_belief import RotationBelief
-from glovecal_models.sampling.guided.taught_samples import TaughtTake
+from glovecal_models.sampling.guided.labelled_takes import LabelledTake
+from glovecal_models.sampling.guided.rotation_posterior import RotationPosterior
 from glovecal_models.sampling.guided.touch_posterior import TouchFrames, TouchPosterior
 from glovecal_models.sampling.limits import SAMPLING_LIMITS, SamplingLimits
 from glovecal_models.takes.take import Take
@@ -66,27 +66,27 @@ class RefusedTouch:
 
 
 def seen_touches(
-    takes: Iterable[TaughtTake], first: TouchPosterior, skeleton: Skeleton
+    takes: Iterable[LabelledTake], first: TouchPosterior, skeleton: Skeleton
 ) -> tuple[list[SeenTouch], list[RefusedTouch]]:
     """Every contact of ``takes`` looked at through ``first``, the calibration without any touch."""
     seen: list[SeenTouch] = []
     refused: list[RefusedTouch] = []
-    for taught in takes:
-        for pose, contact in taught.contacts.items():
+    for labelled in takes:
+        for pose, contact in labelled.contacts.items():
             try:
-                seen.append(_seen(taught, pose, contact, first, skeleton))
+                seen.append(_seen(labelled, pose, contact, first, skeleton))
             except BadInput as error:
                 brief = error.brief if isinstance(error, TouchNotSeen) else f"{error}."
-                refused.append(RefusedTouch(taught.take.name, pose, str(error), brief))
+                refused.append(RefusedTouch(labelled.take.name, pose, str(error), brief))
     return seen, refused
 
 
 def _seen(
-    taught: TaughtTake, pose: str, contact: Touch | Rod, first: TouchPosterior, skeleton: Skeleton
+    labelled: LabelledTake, pose: str, contact: Touch | Rod, first: TouchPosterior, skeleton: Skeleton
 ) -> SeenTouch:
     chains = TipChains(skeleton, contact.fingers)
     require_possible(chains, contact, skeleton)
-    take, rows = taught.take, taught.frames(pose)
+    take, rows = labelled.take, labelled.frames(pose)
     if not len(rows):
         raise BadInput(f"no frame of take {take.name!r} is named {pose!r}")
     smooth = steadied(take.time_s[rows], take.readings[rows].astype(float))
@@ -102,10 +102,10 @@ def _seen(
 
 
 def _hand(first: TouchPosterior, readings: np.ndarray) -> PredictedHand:
-    """As the beliefs see it in ``readings`` (N, S)."""
+    """As the priors see it in ``readings`` (N, S)."""
     mean = np.column_stack([first.angles(name, readings) for name in HAND_ROTATIONS])
     variance = np.column_stack([first.variance(name, readings) for name in HAND_ROTATIONS])
-    new = np.array([first.beliefs[name].prior.frame_sd_deg for name in HAND_ROTATIONS])
+    new = np.array([first.priors[name].prior.frame_sd_deg for name in HAND_ROTATIONS])
     return PredictedHand(mean, np.sqrt(variance + new**2), np.zeros(mean.shape, dtype=bool))
 
 
@@ -114,7 +114,7 @@ FRAMES_A_TOUCH = 100
 
 
 def closing_touches(
-    beliefs: Mapping[str, RotationBelief],
+    priors: Mapping[str, RotationPosterior],
     sensors: Sequence[str],
     skeleton: Skeleton,
     seen: Sequence[SeenTouch],
@@ -126,7 +126,7 @@ def closing_touches(
     most = limits.touch_most_left_mm
     while True:
         touches = [touch.some(FRAMES_A_TOUCH) for touch in kept]
-        posterior = TouchPosterior(beliefs, sensors, skeleton, touches, cancelled)
+        posterior = TouchPosterior(priors, sensors, skeleton, touches, cancelled)
         left = [float(np.median(posterior.apart_mm(touch, skeleton))) for touch in touches]
         if not left or max(left) <= most:
             return posterior, kept, refused

@@ -2,7 +2,7 @@
 
 Inverse kinematics of single frames (``ik_samples.py``) cannot know whether a finger or the thumb was read
 wrong, so it divides the gap between them, and repeating it with a better calibration converges slowly. But a
-calibration errs in the same way in every frame: beliefs say how its errors go together, the touches of all
+calibration errs in the same way in every frame: priors say how its errors go together, the touches of all
 frames and fingers are conditions on them, and one Gauss-Newton search (an iterated Kalman update) finds the
 likeliest calibration under which every touch of the session closes. It is equation (6) of Wang & Neff 2013
 over a session instead of a frame.
@@ -20,7 +20,7 @@ from glovecal_models.errors import Cancelled
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.inverse_kinematics.contact import Rod, Touch
 from glovecal_models.inverse_kinematics.tip_chains import TipChains
-from glovecal_models.sampling.guided.rotation_belief import RotationBelief
+from glovecal_models.sampling.guided.rotation_posterior import RotationPosterior
 
 CONTACT_SD_MM = 0.3
 """How far tips that touch are from one point."""
@@ -39,56 +39,56 @@ class TouchFrames:
 
 
 class TouchPosterior:
-    """Beliefs after the touches. ``sensors`` are the columns of all readings given to it."""
+    """Posteriors after the touches. ``sensors`` are the columns of all readings given to it."""
 
     def __init__(
         self,
-        beliefs: Mapping[str, RotationBelief],
+        priors: Mapping[str, RotationPosterior],
         sensors: Sequence[str],
         skeleton: Skeleton | None,
         touches: Sequence[TouchFrames],
         cancelled: Callable[[], bool] | None = None,
     ) -> None:
-        self.beliefs = beliefs
+        self.priors = priors
         self._sensors = tuple(sensors)
         self._touches = [
-            _Chained(each, TipChains(skeleton, each.contact.fingers), beliefs)
+            _Chained(each, TipChains(skeleton, each.contact.fingers), priors)
             for each in touches
             if skeleton is not None
         ]
-        self._at = {name: self._frames_of(name) for name in beliefs}
+        self._at = {name: self._frames_of(name) for name in priors}
         self._by_touch: dict[str, np.ndarray] = {}
         self._search(cancelled)
 
     def angles(self, rotation: str, readings: np.ndarray) -> np.ndarray:
         """(N,), degrees, at readings (N, S); a rule is followed."""
-        belief = self.beliefs[rotation]
+        process = self.priors[rotation]
         columns = self._columns(rotation)
-        angle = belief.mean(readings[:, columns])
+        angle = process.mean(readings[:, columns])
         if rotation in self._by_touch:
             others = self._at[rotation]
-            angle = angle + belief.covariance(readings[:, columns], others) @ self._by_touch[rotation]
-        follows = belief.prior.follows
+            angle = angle + process.covariance(readings[:, columns], others) @ self._by_touch[rotation]
+        follows = process.prior.follows
         return angle + sum(weight * self.angles(name, readings) for name, weight in follows.items())
 
     def variance(self, rotation: str, readings: np.ndarray) -> np.ndarray:
         """(N,), degrees squared, of the calibration's error; what a rule follows counts as independent."""
-        belief = self.beliefs[rotation]
+        process = self.priors[rotation]
         own = readings[:, self._columns(rotation)]
-        variance = belief.variance(own)
+        variance = process.variance(own)
         if rotation in self._by_touch:
-            towards = belief.covariance(own, self._at[rotation]) @ self._slopes[rotation].T
+            towards = process.covariance(own, self._at[rotation]) @ self._slopes[rotation].T
             variance = variance - np.einsum("nm,mn->n", towards, cho_solve(self._together, towards.T))
-        follows = belief.prior.follows
+        follows = process.prior.follows
         followed = sum(weight**2 * self.variance(name, readings) for name, weight in follows.items())
         return np.maximum(variance, 0.0) + followed
 
     def told(self, rotation: str, readings: np.ndarray) -> float:
-        """The share of the belief's variance at readings (N, S) that the touches take away, 0 to 1."""
-        before = float(self.beliefs[rotation].variance(readings[:, self._columns(rotation)]).mean())
+        """Share of the rotation's variance at readings (N, S) that the touches remove, 0 to 1."""
+        before = float(self.priors[rotation].variance(readings[:, self._columns(rotation)]).mean())
         if rotation not in self._by_touch or before == 0.0:
             return 0.0
-        follows = self.beliefs[rotation].prior.follows
+        follows = self.priors[rotation].prior.follows
         followed = sum(w**2 * self.variance(name, readings).mean() for name, w in follows.items())
         return float(np.clip(1 - (self.variance(rotation, readings).mean() - followed) / before, 0.0, 1.0))
 
@@ -100,7 +100,7 @@ class TouchPosterior:
         return np.array([np.linalg.norm(touch.contact.missing(each, 0)[0]) for each in tips])
 
     def _columns(self, rotation: str) -> list[int]:
-        return [self._sensors.index(name) for name in self.beliefs[rotation].prior.sensors]
+        return [self._sensors.index(name) for name in self.priors[rotation].prior.sensors]
 
     def _frames_of(self, rotation: str) -> np.ndarray:
         """Inputs (N, D) of ``rotation`` in the frames of the touches it takes part in."""
@@ -114,8 +114,8 @@ class TouchPosterior:
         names = [name for name, at in self._at.items() if len(at)]
         if not names:
             return
-        prior = {name: self.beliefs[name].mean(self._at[name]) for name in names}
-        covariance = {name: self.beliefs[name].covariance(self._at[name], self._at[name]) for name in names}
+        prior = {name: self.priors[name].mean(self._at[name]) for name in names}
+        covariance = {name: self.priors[name].covariance(self._at[name], self._at[name]) for name in names}
         force = {name: np.zeros(len(prior[name])) for name in names}
         found = prior
         for _ in range(MOST_STEPS):
@@ -204,12 +204,14 @@ def _stacked(
 
 
 class _Chained:
-    """Frames of one contact with the chains of its tips, and the beliefs ("functions") that move them."""
+    """Frames of one contact with the chains of its tips, and the priors ("functions") that move them."""
 
-    def __init__(self, touch: TouchFrames, chains: TipChains, beliefs: Mapping[str, RotationBelief]) -> None:
+    def __init__(
+        self, touch: TouchFrames, chains: TipChains, priors: Mapping[str, RotationPosterior]
+    ) -> None:
         self.contact, self.readings = touch.contact, touch.readings
-        self._chains, self._beliefs = chains, beliefs
-        followed = [rule for name in chains.rotations for rule in beliefs[name].prior.follows]
+        self._chains, self._priors = chains, priors
+        followed = [rule for name in chains.rotations for rule in priors[name].prior.follows]
         self.functions = tuple(dict.fromkeys([*chains.rotations, *followed]))
 
     def conditions(self, found: Mapping[str, np.ndarray], rows: dict[str, slice]) -> _Conditions:
@@ -221,7 +223,7 @@ class _Chained:
         by_function = {name: np.zeros(by_angle.shape[:2]) for name in self.functions}
         for column, name in enumerate(self._chains.rotations):
             by_function[name] += by_angle[:, :, column]
-            for rule, weight in self._beliefs[name].prior.follows.items():
+            for rule, weight in self._priors[name].prior.follows.items():
                 by_function[rule] += weight * by_angle[:, :, column]
         return _Conditions(
             np.stack(missing).reshape(len(tips), -1), by_function, self._noise(by_function), rows
@@ -232,9 +234,9 @@ class _Chained:
         size = next(iter(slopes.values())).shape[1]
         noise = np.tile(CONTACT_SD_MM**2 * np.eye(size), (len(self.readings), 1, 1))
         for name, slope in slopes.items():
-            noise += self._beliefs[name].prior.frame_sd_deg ** 2 * slope[:, :, None] * slope[:, None, :]
+            noise += self._priors[name].prior.frame_sd_deg ** 2 * slope[:, :, None] * slope[:, None, :]
         return noise
 
     def _angle(self, name: str, found: Mapping[str, np.ndarray]) -> np.ndarray:
-        follows = self._beliefs[name].prior.follows
+        follows = self._priors[name].prior.follows
         return found[name] + sum(weight * found[rule] for rule, weight in follows.items())

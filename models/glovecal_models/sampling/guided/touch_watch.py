@@ -1,4 +1,4 @@
-"""Did the tips touch? Asked while a sampling goes on, of what its steps so far have taught."""
+"""Did the tips touch? Asked while a sampling goes on, of what its steps so far have labelled."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.inverse_kinematics.tip_chains import TipChains
 from glovecal_models.inverse_kinematics.touch_check import require_possible
 from glovecal_models.layout import Layout
-from glovecal_models.sampling.guided.rotation_belief import first_beliefs
+from glovecal_models.sampling.guided.labelled_takes import FK, LabelledTake, contact_of, labelled_takes
+from glovecal_models.sampling.guided.rotation_posterior import first_posteriors
 from glovecal_models.sampling.guided.seen_touches import seen_touches
-from glovecal_models.sampling.guided.taught_samples import FK, TaughtTake, contact_of, taught_samples
 from glovecal_models.sampling.guided.touch_posterior import TouchPosterior
 from glovecal_models.sampling.protocol import Protocol, Step
 from glovecal_models.sampling.reading import GloveReading
@@ -31,29 +31,29 @@ class TouchWatch:
     def __init__(self, layout: Layout, skeleton: Skeleton) -> None:
         self._layout = layout
         self._skeleton = skeleton
-        self._taught: dict[str, TaughtTake] = {}
+        self._labelled: dict[str, LabelledTake] = {}
 
     def learn(self, state: SamplingState, step: Step, readings: Sequence[GloveReading]) -> None:
         if step.kind in FK:
-            self._taught[step.name] = _taught(state, step, readings)
+            self._labelled[step.name] = _labelled(state, step, readings)
 
     def why_not(self, state: SamplingState, step: Step, readings: Sequence[GloveReading]) -> str | None:
         """A sentence when these frames cannot be of fingertips that touch, or no hand like this can."""
         finished = state.finished()
         known = [
-            taught.in_order(self._layout)
-            for name, taught in self._taught.items()
+            labelled.in_order(self._layout)
+            for name, labelled in self._labelled.items()
             if name in finished and finished[name].outcome == "good"
         ]
         ranges = state.ranges
         if not known or ranges["low"] is None:
             return None
         both = zip(ranges["low"], ranges["high"], strict=True)
-        beliefs = first_beliefs(
-            self._layout, taught_samples(known), dict(zip(state.sensors, both, strict=True))
+        priors = first_posteriors(
+            self._layout, labelled_takes(known), dict(zip(state.sensors, both, strict=True))
         )
-        first = TouchPosterior(beliefs, self._layout.sensors, None, ())
-        touching = _taught(state, step, readings).in_order(self._layout)
+        first = TouchPosterior(priors, self._layout.sensors, None, ())
+        touching = _labelled(state, step, readings).in_order(self._layout)
         _, refused = seen_touches([touching], first, self._skeleton)
         return refused[0].brief if refused else None
 
@@ -69,7 +69,7 @@ def require_possible_touches(protocol: Protocol, skeleton: Skeleton) -> None:
                 raise BadInput(f"step {step.name}: {error}. Protocol fk_only asks for no touch") from error
 
 
-def _taught(state: SamplingState, step: Step, readings: Sequence[GloveReading]) -> TaughtTake:
+def _labelled(state: SamplingState, step: Step, readings: Sequence[GloveReading]) -> LabelledTake:
     time_s = np.array([reading.time_s for reading in readings])
     rotations = tuple(step.angles)
     known = np.tile([step.angles[name] for name in rotations], (len(time_s), 1))
@@ -85,4 +85,4 @@ def _taught(state: SamplingState, step: Step, readings: Sequence[GloveReading]) 
         poses=(step.pose,) * len(time_s),
     )
     contacts = {step.pose: contact_of(step.touches, step.rod_mm)} if step.touches else {}
-    return TaughtTake(take, step.kind, contacts)
+    return LabelledTake(take, step.kind, contacts)

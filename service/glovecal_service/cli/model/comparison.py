@@ -89,7 +89,7 @@ def _print(
 
 def _rows(result: dict[str, Any]) -> list[dict[str, Any]]:
     rotations = [{"rotation": key, **value} for key, value in result["rotations"].items()]
-    return [{"rotation": "all", **result["over_all"]}, *rotations] if rotations else []
+    return [{"rotation": "all", **result["overall"]}, *rotations] if rotations else []
 
 
 def _interval(floor: dict[str, Any] | None) -> str | None:
@@ -121,8 +121,8 @@ def _print_side_by_side(documents: dict[str, dict[str, Any]], results: dict[str,
 
 def _warn(name: str, result: dict[str, Any], takes: list[dict[str, Any]]) -> None:
     warn_trained_on(name, result["trained_on"], takes)
-    if result["left_out"]:
-        frames = ", ".join(f"{count} frames of {rotation}" for rotation, count in result["left_out"].items())
+    if result["excluded"]:
+        frames = ", ".join(f"{count} frames of {rotation}" for rotation, count in result["excluded"].items())
         err.print(f"Not compared, because the sensor failed or frames were repeated: {frames}.")
     if result["not_predicted"]:
         err.print(f"Model {name[:12]} does not predict {', '.join(result['not_predicted'])}.", style="yellow")

@@ -53,7 +53,7 @@ def print_fingertips_beside(models: Mapping[str, dict[str, Any] | None], heading
 
 
 def _rows(found: dict[str, Any]) -> list[dict[str, Any]]:
-    rows = {"all": found["over_all"], **found["fingers"]}
+    rows = {"all": found["overall"], **found["fingers"]}
     if found["thumb_index"] is not None:
         rows["thumb to index"] = found["thumb_index"]
     return [{"finger": finger, **errors} for finger, errors in rows.items()]

@@ -15,7 +15,7 @@ from glovecal_service.cli.terminal.printing import out, print_json, print_table
 if TYPE_CHECKING:
     pass
 
-POSES = {"pose": "pose", "angles": "angles", "before_deg": "error (°)", "left_out_deg": "from the others (°)"}
+POSES = {"pose": "pose", "angles": "angles", "before_deg": "error (°)", "held_out_deg": "held out (°)"}
 SENSORS = {
     "sensor": "sensor",
     "readings": "reads more by",

@@ -8,9 +8,8 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Response
 from pydantic import Field, StringConstraints
 
-from glovecal_models.calibration.declared_effects import declaration_of
-from glovecal_models.calibration.had_already import trained_rotations
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.model_recipe import declaration_of, trained_rotations
 from glovecal_models.effects.catalogue import effect as known_effect
 from glovecal_models.errors import BadInput
 from glovecal_service.rest.effect.catalogue import EffectInPath, can_be_added

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Response
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training import train
@@ -13,14 +13,13 @@ from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.comparison.compare import compare
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_service.jobs.model_work import trained_ids
-from glovecal_service.plain import plain
 from glovecal_service.report.caption import ReportedModel, caption_of
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.request_types import Id, ModelInPath, ModelReference, StrictBody
-from glovecal_service.rest.model.fingertips import FingertipsView
 from glovecal_service.store.records import ModelRecord
 from glovecal_service.store.store import Store
+from glovecal_service.views.comparison import ComparisonView, comparison_view
 
 router = APIRouter(prefix="/models", tags=["models"])
 
@@ -38,71 +37,18 @@ class AgainstBeside(Against):
     )
 
 
-class Floor(BaseModel):
-    floor_deg: float | None = Field(description="How small an error can get on these measurements.")
-    low_deg: float | None = Field(description="95 % interval, from resampled pieces.")
-    high_deg: float | None
-    prediction_deg: float | None = Field(description="What of it is the prediction's own jitter.")
-    how: str = Field(
-        description="still hand, still joint, repeated poses, spectrum, frame to frame or near readings; the "
-        "best first."
-    )
-    pieces: int = Field(description="Holds, repeats or blocks of time that it was pooled from.")
-    is_lower_bound: bool = Field(description="Noise with a memory is not in it.")
-
-
-class Errors(BaseModel):
-    count: int
-    rmse_deg: float | None
-    mae_deg: float | None
-    bias_deg: float | None
-    percentile_95_deg: float | None
-    coverage: float | None = Field(
-        description="Errors within one claimed standard deviation; 0.68 is truthful."
-    )
-    nlpd: float | None = Field(
-        description="Mean negative log predictive density, nats; a truthful constant standard deviation has "
-        "ln(RMSE) + 1.42. Null where a claimed standard deviation is 0."
-    )
-    baseline_deg: float | None = Field(description="Error of always answering the mean of the measurements.")
-    floor: Floor | None = Field(description="How small the RMSE can get; null: too little was measured.")
-
-
-class PoseErrors(BaseModel):
-    pose: str
-    count: int
-    mean_deg: float | None
-    sd_deg: float | None
-
-
-class ComparisonView(BaseModel):
-    model: str
-    over_all: Errors
-    rotations: dict[str, Errors]
-    poses: list[PoseErrors]
-    not_measured: list[str]
-    not_predicted: list[str]
-    fingertips: FingertipsView | None = Field(
-        description="Null where no finger's chain was predicted and measured."
-    )
-    left_out: dict[str, int] = Field(
-        description="Measured frames, by rotation, that are not compared: faulty sensors, repeated frames."
-    )
-    trained_on: list[str] = Field(description="Takes among those given that the model was trained on.")
-
-
 @router.post(
     "/{id}/compare",
     response_model=ComparisonView,
     summary="The model against measurements",
     responses=change_problems(409),
 )
-def compare_model(id: ModelInPath, body: Against, parts: PartsNeeded) -> dict[str, Any]:
+def compare_model(id: ModelInPath, body: Against, parts: PartsNeeded) -> ComparisonView:
     """Errors in degrees, and of fingertips in mm; `trained_on` says which takes it has seen before."""
     record, model, wanted, seen = chosen(id, body, parts)
     takes = [parts.store.takes.load(take) for take in wanted]
-    comparison = compare(model, takes, dimensions=_hand_of(record, parts))
-    return plain(comparison.to_document()) | {"model": record.id, "trained_on": seen}
+    found = compare(model, takes, dimensions=_hand_of(record, parts))
+    return comparison_view(found, record.id, seen)
 
 
 @router.post(

@@ -23,9 +23,9 @@ from glovecal_service.rest.http.request_types import (
     SubjectFilter,
     SubjectName,
 )
-from glovecal_service.rest.model.views import EffectView, KernelChoiceView, effect_view, kernel_view
 from glovecal_service.store.errors import StoreDamaged
 from glovecal_service.store.records import Activation, ModelRecord
+from glovecal_service.views.training import EffectView, KernelChoiceView, effect_view, kernel_view
 
 router = APIRouter(prefix="/models", tags=["models"])
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from fastapi import APIRouter
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from glovecal_models.calibration.artifact import dump
 from glovecal_models.calibration.sensor_sensitivity import sensor_sensitivity
 from glovecal_models.quick_check.pose_book import PoseBook, own_poses, usual_poses
 from glovecal_models.quick_check.quick_check import QuickCheck, quick_check
+from glovecal_models.quick_check.text import quick_check_sentences
 from glovecal_models.takes.take import Take
 from glovecal_service.jobs.model_work import trained_ids
 from glovecal_service.plain import plain
@@ -20,6 +19,7 @@ from glovecal_service.rest.http.request_types import ModelInPath, StrictBody
 from glovecal_service.rest.model.model_takes import TakesNamed, takes_named
 from glovecal_service.store.errors import NotFound
 from glovecal_service.store.records import ModelRecord, TakeRecord
+from glovecal_service.views.quick_check import QuickCheckView, quick_check_view
 
 router = APIRouter(prefix="/models", tags=["models"])
 
@@ -27,73 +27,9 @@ router = APIRouter(prefix="/models", tags=["models"])
 class Check(StrictBody):
     takes: TakesNamed = Field(
         description="Ids or names of short takes of one new wearing, with three to five poses held. Angles "
-        "are measured (`r.` columns), or told by the pose's name (column `pose`, or the take's name)."
+        "are measured (`r.` columns), or known by the pose's name (column `pose`, or the take's name)."
     )
     activate: bool = Field(False, description="Predict live with the child.")
-
-
-class CheckedPoseView(BaseModel):
-    pose: str
-    seconds: float
-    measured: int = Field(description="Rotations whose angle was measured.")
-    by_name: int = Field(description="Rotations whose angle the pose's name told.")
-    saturated: list[str] = Field(
-        description="Sensors at the end of their range: their rotations were left out."
-    )
-    before_deg: float = Field(description="RMS error with the model as it was.")
-    left_out_deg: float | None = Field(description="RMS error with the shift that the other poses tell.")
-
-
-class RefusedView(BaseModel):
-    pose: str
-    reason: str
-
-
-class Expected(BaseModel):
-    now_deg: float = Field(description="RMSE to expect of the wearing before the check.")
-    after_deg: float
-    full_calibration_deg: float = Field(description="The model's held-out error in its training wearings.")
-
-
-class RotationShiftView(BaseModel):
-    rotation: str
-    offset_deg: float = Field(description="Added to the prediction in this wearing.")
-    offset_sd_deg: float
-    gain_deg_per_sd: float = Field(description="Added per standard deviation of the joint.")
-    gain_sd_deg_per_sd: float
-    prior_sd_deg: float = Field(description="Of the offset, before the check.")
-    expected_now_deg: float
-    expected_after_deg: float
-    full_calibration_deg: float
-    is_informed: bool = Field(description="False: no pose told anything, the prior stays.")
-
-
-class SensorShiftView(BaseModel):
-    sensor: str
-    readings: float = Field(description="By how much it reads more than in training, raw readings.")
-    sd_readings: float
-    prior_sd_readings: float
-    degrees: float | None = Field(description="On the scale of the rotation it measures.")
-    sd_degrees: float | None
-    is_informed: bool
-
-
-class QuickCheckView(BaseModel):
-    model: str = Field(description="The child, which knows the wearing.")
-    parent: str
-    active: bool
-    wearing: str
-    poses: list[CheckedPoseView]
-    refused: list[RefusedView] = Field(description="Poses that were not used, and why.")
-    expected: Expected
-    poses_before_deg: float
-    poses_left_out_deg: float | None = Field(
-        description="RMS error of each pose with the shift that the others tell; null with one pose."
-    )
-    rotations: list[RotationShiftView]
-    sensors: list[SensorShiftView]
-    uninformed: list[str] = Field(description="Rotations of which no pose tells anything.")
-    sentences: list[str]
 
 
 @router.post(
@@ -102,7 +38,7 @@ class QuickCheckView(BaseModel):
     summary="Check a new wearing with a few poses",
     responses=change_problems(409),
 )
-def check_wearing(id: ModelInPath, body: Check, parts: PartsNeeded) -> dict[str, Any]:
+def check_wearing(id: ModelInPath, body: Check, parts: PartsNeeded) -> QuickCheckView:
     """Stores a child model with the wearing's shift; this one stays as it is, and rolling back undoes it.
 
     422 when no pose was held, when no angle is known, and when the poses contradict the model or each other.
@@ -127,8 +63,7 @@ def check_wearing(id: ModelInPath, body: Check, parts: PartsNeeded) -> dict[str,
     child = _keep(parts, record, found, rows)
     if body.activate:
         parts.store.models.activate(child.id)
-    document = plain(found.to_document())
-    return document | {"model": child.id, "parent": record.id, "active": body.activate}
+    return quick_check_view(found, child.id, record.id, active=body.activate)
 
 
 def _training_takes(parts: Parts, record: ModelRecord) -> list[TakeRecord]:
@@ -152,7 +87,7 @@ def _keep(parts: Parts, parent: ModelRecord, found: QuickCheck, rows: list[TakeR
         "wearing": found.wearing,
         "takes": [row.id for row in rows],
         "expected": found.report.expected,
-        "sentences": list(found.report.sentences),
+        "sentences": quick_check_sentences(found),
     }
     facts = {**parent.facts, "simulated": found.model.simulated, "quick_check": check}
     return parts.store.models.add(

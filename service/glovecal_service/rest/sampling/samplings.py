@@ -28,11 +28,11 @@ from glovecal_service.rest.http.request_types import (
     SubjectName,
     WearingName,
 )
-from glovecal_service.rest.sampling.view import SamplingView, sampling_view
 from glovecal_service.store.errors import Conflict
 from glovecal_service.store.records import GloveRecord, SamplingRecord
 from glovecal_service.store.sampling_reuse import reuse_takes
 from glovecal_service.store.store import Store
+from glovecal_service.views.sampling import SamplingView, sampling_view
 
 router = APIRouter(prefix="/sampling", tags=["sampling"])
 

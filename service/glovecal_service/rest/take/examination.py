@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Response
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from glovecal_models.errors import LayoutMismatch
 from glovecal_models.independence.independence import examine_independence
-from glovecal_models.independence.proposal import independence_document
 from glovecal_models.takes.take import Take
-from glovecal_service.plain import plain
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
 from glovecal_service.rest.http.request_types import Channel, Id, Identifier, StrictBody
 from glovecal_service.store.records import TakeRecord
 from glovecal_service.store.store import Store
+from glovecal_service.views.examination import ExaminationView, examination_view
 
 router = APIRouter(prefix="/takes/examination", tags=["takes"])
 
@@ -42,102 +41,16 @@ class ExaminationRequest(StrictBody):
     layout_name: Identifier | None = Field(None, description="Of the proposed layout.")
 
 
-class ShareView(BaseModel):
-    sensor: str
-    std_pct: float | None
-    std_low: float | None = Field(description="95 % interval, pieces of time weighted anew.")
-    std_high: float | None
-    max_pct: float | None
-    max_low: float | None
-    max_high: float | None
-    affects: str = Field(description='By the 5 % and 12 % rule: "yes", "no" or "undecided".')
-    moved_pct: float | None = Field(description="How much of its own range it was moved through.")
-    rivals: list[str] = Field(description="Sensors that always moved along and could be the cause.")
-
-
-class StillView(BaseModel):
-    std_pct: float | None
-    span_pct: float | None
-    is_still: bool
-
-
-class ActiveRangeView(BaseModel):
-    readings: float | None
-    source: str
-    angle_deg: float | None
-
-
-class ExaminedRotationView(BaseModel):
-    rotation: str
-    sensor: str
-    takes: list[str]
-    seconds: float
-    std_pct: float | None = Field(description="Standard deviation, per cent of the active range.")
-    max_pct: float | None
-    is_coupled: bool
-    unexplained_pct: float | None = Field(description="RMS that no other sensor explains.")
-    affecting: list[ShareView]
-    not_moved: list[str]
-    still: StillView | None = Field(description="By measured angles; null where there are none.")
-    active_range: ActiveRangeView
-    doubts: list[str]
-
-
-class OneWayView(BaseModel):
-    affecting: str
-    affected: str
-    sentence: str
-
-
-class WornSideView(BaseModel):
-    verdict: str = Field(description='"as it should be", "other hand", "back to front" or "not judgeable".')
-    probability: float | None = Field(description="That signs by lot agree so well.")
-    reversed_sensors: list[str]
-    sentence: str
-
-
-class ProposalView(BaseModel):
-    rotation: str
-    kind: str
-    sensors: list[str]
-    kind_now: str
-    sensors_now: list[str]
-    is_sure: bool | None = Field(description="null: not examined, it stays as it is.")
-    is_change: bool
-    sentence: str
-
-
-class RuleView(BaseModel):
-    std_pct: float
-    max_pct: float
-
-
-class ExaminationView(BaseModel):
-    layout: str
-    rule: RuleView
-    sensors: list[str]
-    still: dict[str, list[str]]
-    rotations: list[ExaminedRotationView]
-    one_way: list[OneWayView]
-    dead_sensors: list[str]
-    worn_side: WornSideView
-    proposals: list[ProposalView]
-    proposed_layout: dict[str, Any] = Field(
-        description="With the proposals that are sure; store it with PUT gloves/{layout}."
-    )
-    sentences: list[str] = Field(description="What is odd.")
-
-
 @router.post(
     "",
     response_model=ExaminationView,
     summary="Which sensors stretch which others",
     responses=change_problems(409),
 )
-def examine(body: ExaminationRequest, store: StoreNeeded) -> dict[str, Any]:
+def examine(body: ExaminationRequest, store: StoreNeeded) -> ExaminationView:
     """A joint is kept still, others move: its sensor's deviation in per cent of its active range, and each
     affecting sensor's own share. Nothing is stored."""
-    return _document(body, store)
+    return _examined(body, store)
 
 
 @router.post(
@@ -156,10 +69,12 @@ def report(body: ExaminationRequest, store: StoreNeeded) -> Response:
     from glovecal_service.report.examination_page import examination_page  # draws: few requests need it
 
     subject = store.takes.get(body.takes[0]).subject
-    return Response(examination_page(_document(body, store), subject), media_type="text/html; charset=utf-8")
+    return Response(
+        examination_page(_examined(body, store).model_dump(), subject), media_type="text/html; charset=utf-8"
+    )
 
 
-def _document(body: ExaminationRequest, store: Store) -> dict[str, Any]:
+def _examined(body: ExaminationRequest, store: Store) -> ExaminationView:
     rows = [store.takes.get(id) for id in dict.fromkeys(body.takes)]
     layout_name = rows[0].layout
     if body.range_takes is None:
@@ -176,7 +91,7 @@ def _document(body: ExaminationRequest, store: Store) -> dict[str, Any]:
         take.name: body.still[row.id] for take, row in zip(takes, rows, strict=True) if row.id in body.still
     }
     found = examine_independence(store.layouts.get(layout_name), takes, _loaded(store, wanted), named)
-    return plain(independence_document(found, body.layout_name or f"{layout_name[:55]}-examined"))
+    return examination_view(found, body.layout_name or f"{layout_name[:55]}-examined")
 
 
 def _others(store: Store, rows: list[TakeRecord]) -> list[TakeRecord]:

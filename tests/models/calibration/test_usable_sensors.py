@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from glovecal_models.calibration.artifact import dump, load
-from glovecal_models.calibration.living_sensors import living_sensors
+from glovecal_models.calibration.text import plan_sentences
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_plan import plan_training
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.calibration.usable_sensors import usable_sensors
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.errors import NotTrainable
 from glovecal_models.layout import Layout
@@ -42,10 +43,9 @@ def test_dead_and_clipped_sensors_are_left_out_and_told():
     layout = Layout.from_columns("many", SENSORS, ["BEND"])
     plan = plan_training(takes, layout, "anna", LINEAR)
     assert (
-        "Sensors S08 (always 121), S16 (only 7 or 8), S30 (at its end stop 255 in 90 % of the frames) say"
-        " nothing of the hand in these takes: left out of training, rotations are read from the others. Is a"
-        " wire broken?"
-    ) in plan.sentences
+        "Dead sensors in these takes: S08 (always 121), S16 (only 7 or 8), S30 (at its end stop 255 in 90 % "
+        "of the frames). Not used in training; rotations are read from the others. Is a wire broken?"
+    ) in plan_sentences(plan)
     model = load(dump(train(takes, layout, "anna", LINEAR)))
     assert model.layout.sensors == SENSORS, "the glove still sends all of them"
     assert len(model.rotations[0].correspondence.sensors) == 58
@@ -71,9 +71,11 @@ def test_a_rotation_without_its_own_sensor_is_left_out_of_the_model():
     )
     plan = plan_training([take], layout, "anna", LINEAR)
     assert list(plan.correspondences) == ["B"]
-    assert "A: left out of the model, as no living sensor measures it." in plan.sentences
+    assert "No working sensor measures A: not in the model." in plan_sentences(plan)
     nothing = Layout.from_toml('name = "one"\nsensors = ["A", "B"]\n[rotations]\nA = ["A"]')
-    with pytest.raises(NotTrainable, match=r"Sensor A \(always 9\) says nothing of the hand"):
+    with pytest.raises(
+        NotTrainable, match=r"no working sensor measures A; dead in these takes: A \(always 9\)"
+    ):
         plan_training([take], nothing, "anna", LINEAR)
 
 
@@ -86,7 +88,7 @@ def test_a_sensor_that_rests_at_its_end_with_its_joint_is_not_clipped():
     for angle, expected in ((bent, []), (other, ["A"])):
         reference = np.column_stack([angle, other])
         take = Take("t", "w", ("A", "B"), time, np.column_stack([bent, other]), ("A", "B"), time, reference)
-        assert [item.sensor for item in living_sensors(layout, [take]).left_out] == expected
+        assert [item.sensor for item in usable_sensors(layout, [take]).dead] == expected
 
 
 def test_the_check_of_a_take_names_them():

@@ -1,6 +1,6 @@
 """What is believed of each rotation's calibration, from takes with known angles, from rules and from ranges.
 
-A belief is a process over readings: the paper's covariance (Wang & Neff 2013, equation 8) with a plane so
+A posterior is a process over readings: the paper's covariance (Wang & Neff 2013, equation 8) with a plane so
 wide that data alone decide it. Unlike a trained regressor it knows how its errors in different frames go
 together: a wrong gain is wrong in every frame. That is what lets fingertips that touch in many frames correct
 it (``touch_posterior.py``).
@@ -23,7 +23,7 @@ from glovecal_models.hand.rotations import HAND_ROTATIONS, REST_DEG, RULES
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.inverse_kinematics.hand_shape import FINGER_SD_DEG, THUMB_SD_DEG
 from glovecal_models.layout import Layout
-from glovecal_models.sampling.guided.taught_samples import TaughtSamples, hold_sd_deg
+from glovecal_models.sampling.guided.labelled_takes import LabelledFrames, hold_sd_deg
 from glovecal_models.typical_counts import TYPICAL_COUNTS
 
 Shape = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -47,7 +47,7 @@ class Prior:
     slope_sd_deg: float
     shape: Shape
     follows: dict[str, float] = field(default_factory=dict)
-    """Weights of the rotations that it follows; the belief is then of what the rule misses."""
+    """Weights of the rotations that it follows; the posterior is then of what the rule misses."""
     frame_sd_deg: float = 0.6
     """What is new in each frame: sensors' noise, or a joint that no sensor reads."""
 
@@ -62,7 +62,7 @@ class Prior:
         return self.offset_sd_deg**2 + self.slope_sd_deg**2 * (x @ z.T) + self.shape(x, z)
 
 
-class RotationBelief:
+class RotationPosterior:
     """``prior`` after samples: readings (N, D) raw counts, angles (N,) and their errors (N,), degrees."""
 
     def __init__(self, prior: Prior, readings: np.ndarray, angles: np.ndarray, sd: np.ndarray) -> None:
@@ -111,37 +111,37 @@ RANGE_SLOPE_DEG = 15.0
 MOST_SAMPLES = 300
 
 
-def first_beliefs(
+def first_posteriors(
     layout: Layout,
-    samples: TaughtSamples,
+    samples: LabelledFrames,
     ranges: Ranges,
     only: Iterable[str] | None = None,
-) -> dict[str, RotationBelief]:
+) -> dict[str, RotationPosterior]:
     """Of every rotation that the hand has or the layout reads, or ``only`` of these."""
     held_sd = hold_sd_deg(samples, layout)
-    taught = (name for name in layout.rotations if name in samples.rotations)
-    names = dict.fromkeys([*HAND_ROTATIONS, *taught] if only is None else only)
+    labelled = (name for name in layout.rotations if name in samples.rotations)
+    names = dict.fromkeys([*HAND_ROTATIONS, *labelled] if only is None else only)
     return {name: _belief(name, layout, samples, ranges, held_sd) for name in names}
 
 
 def _belief(
     rotation: str,
     layout: Layout,
-    samples: TaughtSamples,
+    samples: LabelledFrames,
     ranges: Ranges,
     held_sd: float,
-) -> RotationBelief:
+) -> RotationPosterior:
     sensors = layout.correspondence(rotation).sensors if rotation in layout.rotations else ()
     low, high = np.array([ranges[name] for name in sensors]).reshape(-1, 2).T
     middle, span = (low + high) / 2, np.maximum(high - low, 1.0)
     held, held_angles = samples.of_holds(rotation, sensors)
     moved, moved_angles = samples.of_widgets(rotation, sensors)
     if not sensors or not len(held) + len(moved):
-        prior = _untaught(rotation, layout, sensors, middle, span)
-        return RotationBelief(prior, np.empty((0, len(sensors))), np.empty(0), np.empty(0))
+        prior = _unlabelled(rotation, layout, sensors, middle, span)
+        return RotationPosterior(prior, np.empty((0, len(sensors))), np.empty(0), np.empty(0))
     shape = _bowed(rotation, len(sensors))
     prior = Prior(sensors, middle, span, np.zeros(len(sensors)), 0.0, WIDE_DEG, WIDE_DEG, shape)
-    return RotationBelief(
+    return RotationPosterior(
         prior,
         np.concatenate([held, _some(moved)]),
         np.concatenate([held_angles, _some(moved_angles)]),
@@ -149,7 +149,7 @@ def _belief(
     )
 
 
-def _untaught(
+def _unlabelled(
     rotation: str, layout: Layout, sensors: tuple[str, ...], middle: np.ndarray, span: np.ndarray
 ) -> Prior:
     """From the rule, else from the range."""

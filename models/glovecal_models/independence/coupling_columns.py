@@ -30,7 +30,7 @@ def product_columns(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return np.column_stack([first**a * second**b for a, b in PRODUCTS])
 
 
-class PullColumns:
+class CouplingColumns:
     """Columns by name; the sums of products of each block, shape (B, P, P)."""
 
     def __init__(
@@ -70,13 +70,13 @@ class PullColumns:
         return _solve(np.tensordot(weight, self.sums, 1), self.places(chosen))
 
     def held_out_rms(self, chosen: Sequence[str | tuple[str, str]]) -> float:
-        """RMS error on blocks left out, every fifth at a time."""
+        """RMS error on held-out blocks, every fifth at a time."""
         places, total, squared = self.places(chosen), self.sums.sum(axis=0), 0.0
         for fold in range(FOLDS):
-            left_out = self.sums[fold::FOLDS].sum(axis=0)
-            b = _solve(total - left_out, places)
-            inner = left_out[np.ix_(places, places)]
-            squared += float(left_out[-1, -1] - 2 * b @ left_out[places, -1] + b @ inner @ b)
+            held_out = self.sums[fold::FOLDS].sum(axis=0)
+            b = _solve(total - held_out, places)
+            inner = held_out[np.ix_(places, places)]
+            squared += float(held_out[-1, -1] - 2 * b @ held_out[places, -1] + b @ inner @ b)
         return float(np.sqrt(max(squared, 0.0) / self.rows.sum()))
 
 

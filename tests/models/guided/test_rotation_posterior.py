@@ -14,19 +14,19 @@ from glovecal_models.hand.rotations import HAND_ROTATIONS
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.inverse_kinematics.contact import Rod, Touch
 from glovecal_models.layout import Layout
-from glovecal_models.sampling.guided.rotation_belief import (
+from glovecal_models.sampling.guided.labelled_takes import LabelledFrames
+from glovecal_models.sampling.guided.rotation_posterior import (
     BOW_LENGTH,
     BOW_SHARE,
     Prior,
-    RotationBelief,
-    first_beliefs,
+    RotationPosterior,
+    first_posteriors,
 )
-from glovecal_models.sampling.guided.taught_samples import TaughtSamples
 from glovecal_models.sampling.guided.touch_posterior import TouchFrames, TouchPosterior
 
 LAYOUT = Layout.built_in("cyberglove18")
 HAND = hand_skeleton(HandDimensions.from_measured({"hand_length": 182}))
-NOTHING = TaughtSamples((), ())
+NOTHING = LabelledFrames((), ())
 RANGES = dict.fromkeys(LAYOUT.sensors, (50.0, 150.0))
 
 
@@ -41,14 +41,14 @@ def test_a_belief_is_scikit_learns_process() -> None:
 
     middle, span = np.full(2, 100.0), np.full(2, 100.0)
     prior = Prior(("A", "B"), middle, span, np.zeros(2), 0.0, 30.0, 60.0, bow)
-    belief = RotationBelief(prior, readings, angles, sd)
+    process = RotationPosterior(prior, readings, angles, sd)
     kernel = ConstantKernel(60.0**2) * DotProduct(30.0 / 60.0) + ConstantKernel(16.0) * RBF(0.5)
     options: dict[str, Any] = {"alpha": sd**2, "optimizer": None}
     peer = GaussianProcessRegressor(kernel, **options).fit((readings - 100) / 100, angles)
     mean, covariance = peer.predict((at - 100) / 100, return_cov=True)
-    np.testing.assert_allclose(belief.mean(at), mean, atol=1e-6)
-    np.testing.assert_allclose(belief.covariance(at, at), covariance, atol=1e-6)
-    np.testing.assert_allclose(belief.variance(at), np.diag(covariance), atol=1e-6)
+    np.testing.assert_allclose(process.mean(at), mean, atol=1e-6)
+    np.testing.assert_allclose(process.covariance(at, at), covariance, atol=1e-6)
+    np.testing.assert_allclose(process.variance(at), np.diag(covariance), atol=1e-6)
 
 
 def touches(count: int = 12) -> list[TouchFrames]:
@@ -59,12 +59,12 @@ def touches(count: int = 12) -> list[TouchFrames]:
 
 
 def test_without_touches_nothing_changes() -> None:
-    beliefs = first_beliefs(LAYOUT, NOTHING, RANGES)
+    priors = first_posteriors(LAYOUT, NOTHING, RANGES)
     readings = touches()[0].readings
-    posterior = TouchPosterior(beliefs, LAYOUT.sensors, HAND, ())
+    posterior = TouchPosterior(priors, LAYOUT.sensors, HAND, ())
     column = [LAYOUT.sensors.index("I_MCP")]
     np.testing.assert_array_equal(
-        posterior.angles("I_MCP", readings), beliefs["I_MCP"].mean(readings[:, column])
+        posterior.angles("I_MCP", readings), priors["I_MCP"].mean(readings[:, column])
     )
     assert posterior.told("I_MCP", readings) == 0.0
     follows = 2 / 3 * posterior.angles("I_PIP", readings)
@@ -72,9 +72,9 @@ def test_without_touches_nothing_changes() -> None:
 
 
 def test_touches_close_and_only_take_uncertainty_away() -> None:
-    beliefs, some = first_beliefs(LAYOUT, NOTHING, RANGES), touches()
-    before = TouchPosterior(beliefs, LAYOUT.sensors, HAND, ())
-    after = TouchPosterior(beliefs, LAYOUT.sensors, HAND, some)
+    priors, some = first_posteriors(LAYOUT, NOTHING, RANGES), touches()
+    before = TouchPosterior(priors, LAYOUT.sensors, HAND, ())
+    after = TouchPosterior(priors, LAYOUT.sensors, HAND, some)
     for touch in some:
         assert np.median(after.apart_mm(touch, HAND)) < 0.5 * np.median(before.apart_mm(touch, HAND))
     for rotation in HAND_ROTATIONS:
@@ -87,10 +87,10 @@ def test_touches_close_and_only_take_uncertainty_away() -> None:
 
 def test_one_linear_touch_is_a_conditioned_normal() -> None:
     """Small errors of one frame: the posterior is that of a normal density under a linear condition."""
-    beliefs = first_beliefs(LAYOUT, NOTHING, RANGES)
+    priors = first_posteriors(LAYOUT, NOTHING, RANGES)
     touch = TouchFrames(Rod(("T", "I"), 60.0), np.full((1, len(LAYOUT.sensors)), 100.0))
-    after = TouchPosterior(beliefs, LAYOUT.sensors, HAND, [touch])
-    before = TouchPosterior(beliefs, LAYOUT.sensors, HAND, ())
+    after = TouchPosterior(priors, LAYOUT.sensors, HAND, [touch])
+    before = TouchPosterior(priors, LAYOUT.sensors, HAND, ())
     names = [name for name in HAND_ROTATIONS if after.told(name, touch.readings) > 0]
     moved = np.array(
         [after.angles(name, touch.readings)[0] - before.angles(name, touch.readings)[0] for name in names]
@@ -103,6 +103,6 @@ def test_one_linear_touch_is_a_conditioned_normal() -> None:
 
 def test_a_hold_bends_a_line_no_more_than_a_sensor_does() -> None:
     low, high = -10.0, 90.0
-    belief = first_beliefs(LAYOUT, NOTHING, RANGES)["I_MCP"]
+    process = first_posteriors(LAYOUT, NOTHING, RANGES)["I_MCP"]
     x = np.array([[0.0], [BOW_LENGTH]])
-    assert belief.prior.shape(x, x)[0, 0] == pytest.approx((BOW_SHARE * (high - low)) ** 2)
+    assert process.prior.shape(x, x)[0, 0] == pytest.approx((BOW_SHARE * (high - low)) ** 2)

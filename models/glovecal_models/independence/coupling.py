@@ -1,10 +1,10 @@
-"""Each affecting sensor's own share in what a still sensor did, also where neighbours moved together.
+"""Coupling decomposition: the shares of all affecting sensors in a still sensor's signal.
 
 Sensors are taken in one after another while the error on pieces of time left out falls, then products of
 two; what is no longer missed is dropped again. The share of a sensor is what its own curve does on an even
 sweep over the range it was moved through: standard and largest deviation, as in Wang & Neff 2013, Table 1.
 Intervals come from weighting pieces of time anew. A sensor that could stand in for another, because both
-always moved together, is told as its rival: no interval shows that.
+always moved together, is listed as its rival: no interval shows that.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glovecal_models.independence.pull_columns import PullColumns, curve_columns, product_columns
+from glovecal_models.independence.coupling_columns import CouplingColumns, curve_columns, product_columns
 
 LEAST_STD_PCT, LEAST_MAX_PCT = 5.0, 12.0
 """The paper's rule: from either on a sensor is cross-coupled."""
-LEAST_TOLD_PCT = 0.7
-"""Smaller pulls (standard deviation, per cent of the range) are not looked for: a hand held still moves as
+LEAST_CROSSTALK_PCT = 0.7
+"""Smaller crosstalk (standard deviation, per cent of the range) is not looked for: a hand held still moves as
 much."""
 FEW = 3
 """Up to so many sensors all products stay in the fit: where joints move together a product that is left out
@@ -47,20 +47,20 @@ class AffectingShare:
 
 
 @dataclass(frozen=True)
-class TakenApart:
+class Coupling:
     shares: tuple[AffectingShare, ...]
     """Sensors that add something, the strongest first."""
     products: Mapping[tuple[str, str], np.ndarray]
-    """Pairs whose common movement does something else than both pulls added; a number for each product."""
+    """Pairs whose common movement does something else than the sum of both; a number for each product."""
     unexplained_pct: float
-    """RMS, on pieces left out, of what no sensor explains."""
+    """RMS, on held-out pieces, of what no sensor explains."""
     constants: np.ndarray
     """Shape (C,): what stands before each of the constants."""
     curves: Mapping[str, np.ndarray]
     """Each sensor's own curve: a number for each power."""
 
-    def pull(self, moved: Mapping[str, np.ndarray]) -> np.ndarray | float:
-        """Per cent of the range, shape (N,), by which the sensor is pulled; ``moved`` as it was learned."""
+    def crosstalk(self, moved: Mapping[str, np.ndarray]) -> np.ndarray | float:
+        """Per cent of the range, shape (N,), crosstalk on the sensor; ``moved`` as it was learned."""
         alone = sum(curve_columns(moved[name]) @ own for name, own in self.curves.items() if name in moved)
         both = (
             product_columns(moved[first], moved[second]) @ own
@@ -70,53 +70,55 @@ class TakenApart:
         return alone + sum(both)
 
 
-def take_apart(
+def decompose(
     target: np.ndarray,
     moved: dict[str, np.ndarray],
     constants: np.ndarray,
     block: np.ndarray,
-    pulled: Set[str] = frozenset(),
+    coupled: Set[str] = frozenset(),
     *,
     at_once: bool = True,
-) -> TakenApart:
+) -> Coupling:
     """``target`` (N,) is the still sensor in per cent of its range, each of ``moved`` (N,) a joint in shares
-    of its range from where it began, ``constants`` (N, C) what is in every fit. Sensors in ``pulled`` are
+    of its range from where it began, ``constants`` (N, C) what is in every fit. Sensors in ``coupled`` are
     cross-coupled themselves: one that is no cause still moves with the causes, so they come last. Products
     need joints that moved ``at_once``."""
 
-    def columns(names: list[str], beside: list[str] | None = None) -> PullColumns:
+    def columns(names: list[str], beside: list[str] | None = None) -> CouplingColumns:
         """``names`` with all their products, or with those that have one of ``beside`` in them."""
         pairs = [(a, b) for place, a in enumerate(names) for b in names[place + 1 :]] if at_once else []
         if beside is not None:
             pairs = [pair for pair in pairs if set(pair) & set(beside)]
-        return PullColumns(target, moved, constants, block, pairs)
+        return CouplingColumns(target, moved, constants, block, pairs)
 
     chosen: list[str] = []
-    for stage in ([name for name in moved if name not in pulled], list(moved)):
+    for stage in ([name for name in moved if name not in coupled], list(moved)):
         waiting = [name for name in stage if name not in chosen]
         while (best := _next(columns([*chosen, *waiting], chosen[:FEW]), waiting, chosen)) is not None:
             chosen.append(best)
             waiting.remove(best)
     whole = columns(chosen)
-    fitted = _without_the_needless(whole, [*chosen, *_products(whole, chosen)])
+    fitted = _pruned(whole, [*chosen, *_products(whole, chosen)])
     sensors = [name for name in fitted if isinstance(name, str)]
     if len(sensors) <= FEW:
         whole = columns(sensors)
         fitted = sensors + [name for name in whole.groups if not isinstance(name, str)]
-    return _told(whole, fitted, moved, pulled)
+    return _coupling(whole, fitted, moved, coupled)
 
 
-def _told(columns: PullColumns, fitted: list, moved: dict[str, np.ndarray], pulled: Set[str]) -> TakenApart:
+def _coupling(
+    columns: CouplingColumns, fitted: list, moved: dict[str, np.ndarray], coupled: Set[str]
+) -> Coupling:
     draws = _draws(columns, fitted)
     shares = [
-        _share(name, columns, fitted, draws, moved, _rivals(columns, fitted, name, list(moved), pulled))
+        _share(name, columns, fitted, draws, moved, _rivals(columns, fitted, name, list(moved), coupled))
         for name in fitted
         if isinstance(name, str)
     ]
     shares.sort(key=lambda item: -item.std_pct)
     places = columns.places(fitted)
     learned = {name: draws[0, [places.index(place) for place in columns.groups[name]]] for name in fitted}
-    return TakenApart(
+    return Coupling(
         tuple(shares),
         {name: own for name, own in learned.items() if not isinstance(name, str)},
         columns.held_out_rms(fitted),
@@ -130,9 +132,9 @@ def follows_the_rule(std_pct: float, max_pct: float) -> bool:
     return std_pct >= LEAST_STD_PCT or max_pct >= LEAST_MAX_PCT
 
 
-def _next(columns: PullColumns, waiting: list[str], chosen: list[str]) -> str | None:
-    """Which sensor lowers the error on pieces left out the most, each with its products with those chosen
-    first: a pull that ends when both are bent is seen no other way. None when none lowers it enough."""
+def _next(columns: CouplingColumns, waiting: list[str], chosen: list[str]) -> str | None:
+    """Which sensor lowers the error on held-out pieces the most, each with its products with those chosen
+    first: crosstalk that ends when both are bent is seen no other way. None when none lowers it enough."""
 
     def with_products(names: list[str]) -> list:
         pairs = [pair for pair in columns.groups if not isinstance(pair, str) and set(pair) <= set(names)]
@@ -141,17 +143,17 @@ def _next(columns: PullColumns, waiting: list[str], chosen: list[str]) -> str | 
     error = columns.held_out_rms(with_products(chosen))
     with_it = {name: columns.held_out_rms(with_products([*chosen, name])) for name in waiting}
     best = min(with_it, key=lambda name: with_it[name], default=None)
-    return best if best is not None and error**2 - with_it[best] ** 2 >= LEAST_TOLD_PCT**2 else None
+    return best if best is not None and error**2 - with_it[best] ** 2 >= LEAST_CROSSTALK_PCT**2 else None
 
 
-def _selected(columns: PullColumns, candidates: list, already: list) -> list:
-    """Candidates that lower the error on pieces left out, in the order in which they do."""
+def _selected(columns: CouplingColumns, candidates: list, already: list) -> list:
+    """Candidates that lower the error on held-out pieces, in the order in which they do."""
     chosen, waiting = [], list(candidates)
     error = columns.held_out_rms(already)
     while waiting:
         with_it = {name: columns.held_out_rms([*already, *chosen, name]) for name in waiting}
         best = min(with_it, key=lambda name: with_it[name])
-        if error**2 - with_it[best] ** 2 < LEAST_TOLD_PCT**2:
+        if error**2 - with_it[best] ** 2 < LEAST_CROSSTALK_PCT**2:
             break
         chosen.append(best)
         waiting.remove(best)
@@ -159,11 +161,11 @@ def _selected(columns: PullColumns, candidates: list, already: list) -> list:
     return chosen
 
 
-def _products(columns: PullColumns, chosen: list) -> list:
+def _products(columns: CouplingColumns, chosen: list) -> list:
     return _selected(columns, [name for name in columns.groups if not isinstance(name, str)], chosen)
 
 
-def _without_the_needless(columns: PullColumns, fitted: list) -> list:
+def _pruned(columns: CouplingColumns, fitted: list) -> list:
     """Drops what the rest does as well, the least needed first: products, then sensors without products."""
     for of_sensors in (False, True):
         while True:
@@ -172,13 +174,13 @@ def _without_the_needless(columns: PullColumns, fitted: list) -> list:
             error = columns.held_out_rms(fitted)
             without = {name: columns.held_out_rms([n for n in fitted if n != name]) for name in candidates}
             least = min(without, key=lambda name: without[name], default=None)
-            if least is None or without[least] ** 2 - error**2 >= LEAST_TOLD_PCT**2:
+            if least is None or without[least] ** 2 - error**2 >= LEAST_CROSSTALK_PCT**2:
                 break
             fitted = [name for name in fitted if name != least]
     return fitted
 
 
-def _draws(columns: PullColumns, fitted: list) -> np.ndarray:
+def _draws(columns: CouplingColumns, fitted: list) -> np.ndarray:
     """Coefficients with pieces of time weighted anew, shape (DRAWS + 1, P); the first counts each once.
 
     Weights are exponential (Rubin's Bayesian bootstrap, 1981): no piece is ever left out, as few of them hold
@@ -192,7 +194,7 @@ def _draws(columns: PullColumns, fitted: list) -> np.ndarray:
 
 def _share(
     name: str,
-    columns: PullColumns,
+    columns: CouplingColumns,
     fitted: list,
     draws: np.ndarray,
     moved: dict[str, np.ndarray],
@@ -214,14 +216,16 @@ def _share(
     )  # fmt: skip
 
 
-def _rivals(columns: PullColumns, fitted: list, name: str, every: list, pulled: Set[str]) -> tuple[str, ...]:
+def _rivals(
+    columns: CouplingColumns, fitted: list, name: str, every: list, coupled: Set[str]
+) -> tuple[str, ...]:
     """Sensors that would do as well in the place of ``name``; not those that only move with it."""
     others = [item for item in fitted if item != name]
-    as_good = columns.held_out_rms(fitted) ** 2 + LEAST_TOLD_PCT**2
+    as_good = columns.held_out_rms(fitted) ** 2 + LEAST_CROSSTALK_PCT**2
     return tuple(
         item
         for item in every
         if item not in fitted
-        and (name in pulled or item not in pulled)
+        and (name in coupled or item not in coupled)
         and columns.held_out_rms([*others, item]) ** 2 < as_good
     )

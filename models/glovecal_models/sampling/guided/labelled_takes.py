@@ -27,18 +27,18 @@ FK: tuple[Kind, ...] = ("fk_independent", "fk_cross_couple")
 
 
 @dataclass(frozen=True)
-class TaughtTake:
+class LabelledTake:
     take: Take
     kind: Kind
     contacts: Mapping[str, Touch | Rod] = field(default_factory=dict)
     """What tips did, by the name that the take gives its frames."""
 
     @classmethod
-    def of(cls, sampled: SampledTake) -> TaughtTake:
+    def of(cls, sampled: SampledTake) -> LabelledTake:
         return cls.from_document(sampled.take, sampled.to_document())
 
     @classmethod
-    def from_document(cls, take: Take, document: Mapping[str, Any]) -> TaughtTake:
+    def from_document(cls, take: Take, document: Mapping[str, Any]) -> LabelledTake:
         """``document``: as ``SampledTake.to_document`` makes it. Raises BadInput for an impossible rod."""
         contacts = {
             step["pose"]: contact_of(step["touches"], step["rod_mm"])
@@ -47,7 +47,7 @@ class TaughtTake:
         }
         return cls(take, document["kind"], contacts)
 
-    def in_order(self, layout: Layout) -> TaughtTake:
+    def in_order(self, layout: Layout) -> LabelledTake:
         """With the layout's sensors alone, in its order; the take has them all."""
         take = self.take
         columns = [take.sensors.index(name) for name in layout.sensors]
@@ -104,7 +104,7 @@ class Moved:
 
 
 @dataclass(frozen=True)
-class TaughtSamples:
+class LabelledFrames:
     holds: tuple[Held, ...]
     moved: tuple[Moved, ...]
 
@@ -132,28 +132,28 @@ class TaughtSamples:
         return tuple(dict.fromkeys([*held, *(name for each in self.moved for name in each.take.rotations)]))
 
 
-def taught_samples(takes: Sequence[TaughtTake]) -> TaughtSamples:
+def labelled_takes(takes: Sequence[LabelledTake]) -> LabelledFrames:
     """Poses that verify the glove's place are samples too, where other takes know the angles of that pose."""
     holds = [
-        _held(taught.take, rows, _known(taught.take, rows))
-        for taught in takes
-        if taught.kind == "fk_independent"
-        for rows in taught.steps()
+        _held(labelled.take, rows, _known(labelled.take, rows))
+        for labelled in takes
+        if labelled.kind == "fk_independent"
+        for rows in labelled.steps()
     ]
     known = {held.pose: held.angles for held in holds}
-    for taught in takes:
-        if taught.kind == "verification":
-            runs = [(pose, taught.frames(pose)) for pose in known if pose]
-            holds += [_held(taught.take, rows, known[pose]) for pose, rows in runs if len(rows)]
+    for labelled in takes:
+        if labelled.kind == "verification":
+            runs = [(pose, labelled.frames(pose)) for pose in known if pose]
+            holds += [_held(labelled.take, rows, known[pose]) for pose, rows in runs if len(rows)]
     moved = [
-        Moved(taught.take, steadied(taught.take.time_s, taught.take.readings.astype(float)))
-        for taught in takes
-        if taught.kind == "fk_cross_couple"
+        Moved(labelled.take, steadied(labelled.take.time_s, labelled.take.readings.astype(float)))
+        for labelled in takes
+        if labelled.kind == "fk_cross_couple"
     ]
-    return TaughtSamples(tuple(holds), tuple(moved))
+    return LabelledFrames(tuple(holds), tuple(moved))
 
 
-def hold_sd_deg(samples: TaughtSamples, layout: Layout) -> float:
+def hold_sd_deg(samples: LabelledFrames, layout: Layout) -> float:
     """How far poses are from the angles they are said to have: the scatter about a line of the rotations that
     one sensor reads by itself. Leans on the usual spread of 2.5 degrees where little was held."""
     squared, freedom = SEEN_BEFORE * REPEAT_SD_DEG**2, SEEN_BEFORE

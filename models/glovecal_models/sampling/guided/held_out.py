@@ -1,7 +1,7 @@
 """How well a session tells what is left out of it: each widget between others, and each touch, one at a time.
 
 The only true errors that a session without a reference system has. They are those of its calibration as it is
-believed (``rotation_belief.py``, ``touch_posterior.py``); the regressor trained on it follows it closely.
+believed (``rotation_posterior.py``, ``touch_posterior.py``); the regressor trained on it follows it closely.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import numpy as np
 from glovecal_models.errors import Cancelled
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.layout import Layout
-from glovecal_models.sampling.guided.rotation_belief import Ranges, first_beliefs
+from glovecal_models.sampling.guided.labelled_takes import LabelledFrames, Moved
+from glovecal_models.sampling.guided.rotation_posterior import Ranges, first_posteriors
 from glovecal_models.sampling.guided.seen_touches import SeenTouch
-from glovecal_models.sampling.guided.taught_samples import Moved, TaughtSamples
 from glovecal_models.sampling.guided.touch_posterior import TouchPosterior
 
 FEWEST = 3
@@ -25,7 +25,7 @@ FRAMES_A_TOUCH = 40
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class HeldOutErrors:
     widget_rmse_deg: dict[str, float]
     """By rotation: of frames with a widget that was left out, over its widgets but the first and the last,
     without which nothing would tell the ends of the range."""
@@ -52,15 +52,15 @@ class LeftOut:
         return said
 
 
-def left_out(
+def held_out_errors(
     layout: Layout,
-    samples: TaughtSamples,
+    samples: LabelledFrames,
     ranges: Ranges,
     skeleton: Skeleton | None,
     seen: Sequence[SeenTouch],
     whole: TouchPosterior,
     cancelled: Callable[[], bool] | None = None,
-) -> LeftOut:
+) -> HeldOutErrors:
     """Nothing of what has fewer than ``FEWEST`` to choose from. Raises Cancelled."""
     widgets = {}
     for rotation in samples.rotations:
@@ -70,18 +70,18 @@ def left_out(
             widgets[rotation] = float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
         if cancelled is not None and cancelled():
             raise Cancelled("leaving out widgets was cancelled")
-    return LeftOut(widgets, _of_touches(layout, skeleton, seen, whole, cancelled))
+    return HeldOutErrors(widgets, _of_touches(layout, skeleton, seen, whole, cancelled))
 
 
 def _of_widget(
-    layout: Layout, samples: TaughtSamples, ranges: Ranges, rotation: str, angle: float
+    layout: Layout, samples: LabelledFrames, ranges: Ranges, rotation: str, angle: float
 ) -> np.ndarray:
-    """Errors (N,) of the frames with the widget of ``angle`` in a belief from all others, degrees."""
+    """Errors (N,) of the frames with the widget of ``angle`` in a posterior from all others, degrees."""
     sensors = layout.correspondence(rotation).sensors
     readings, angles = samples.of_widgets(rotation, sensors)
     others = replace(samples, moved=tuple(_without(moved, rotation, angle) for moved in samples.moved))
-    belief = first_beliefs(layout, others, ranges, only=[rotation])[rotation]
-    return belief.mean(readings[angles == angle]) - angle
+    process = first_posteriors(layout, others, ranges, only=[rotation])[rotation]
+    return process.mean(readings[angles == angle]) - angle
 
 
 def _without(moved: Moved, rotation: str, angle: float) -> Moved:
@@ -105,6 +105,6 @@ def _of_touches(
     found = {}
     for touch in seen:
         others = [other.some(FRAMES_A_TOUCH) for other in seen if other is not touch]
-        posterior = TouchPosterior(whole.beliefs, layout.sensors, skeleton, others, cancelled)
+        posterior = TouchPosterior(whole.priors, layout.sensors, skeleton, others, cancelled)
         found[touch.pose] = float(np.median(posterior.apart_mm(touch.some(FRAMES_A_TOUCH), skeleton)))
     return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,7 +11,23 @@ from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.effects.base.interval_effect import Interval, IntervalEffect
 
 
-class Widening:
+class VarianceInflation(NamedTuple):
+    """Of one frame, or of N frames with N as the first axis."""
+
+    variance: np.ndarray
+    """(R,) degrees squared beside the claimed variance; negative where an effect explains noise."""
+    is_faulty: np.ndarray
+    """(R,) whether a sensor that the rotation is read from fails now; the angle is the last good one."""
+
+    @classmethod
+    def more(cls, inflation: VarianceInflation | None, variance: np.ndarray) -> VarianceInflation:
+        """``inflation``, or none yet, with ``variance`` of the same shape added."""
+        if inflation is None:
+            return cls(variance, np.zeros(variance.shape, dtype=bool))
+        return cls(inflation.variance + variance, inflation.is_faulty)
+
+
+class IntervalInflation:
     """All interval effects of one model together; without a state."""
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Which effects a calibration is to have, and where."""
+"""An effect that a calibration is asked to have, and where."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from glovecal_models.effects.catalogue import effect
 
 
 @dataclass(frozen=True)
-class WantedEffect:
+class EffectRequest:
     """An effect and the rotations it is on."""
 
     name: str

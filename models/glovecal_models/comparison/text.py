@@ -1,0 +1,82 @@
+"""Sentences about comparisons: where a rotation's error comes from, wearings, fingertips."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from glovecal_models.comparison.fingertips import FingertipErrors, TipErrors
+from glovecal_models.comparison.wearings import WearingErrors
+from glovecal_models.comparison.where_it_fails import RotationFindings
+
+
+def rotation_sentence(item: RotationFindings) -> str:
+    """The error of one rotation, its noise floor and what it depends on."""
+    start = f"{item.rotation}: RMSE {item.rmse_deg:.1f} degrees"
+    if item.floor is not None:
+        bound = "lower bound " if item.floor.is_lower_bound else ""
+        start += f" (noise floor {bound}{item.floor.floor_deg:.1f})"
+        if item.is_near_floor:
+            return f"{start}: {_at_floor(item)}."
+    if abs(item.bias_deg) >= item.limits.mostly_bias_share * item.rmse_deg:
+        start += f", mostly a constant {item.bias_deg:+.1f}"
+    if not item.structure:
+        slow = "" if item.slow is None else f"; {100 * item.slow.share:.0f} % of its variance is below 1 Hz"
+        return f"{start}; no recorded column explains it{slow}."
+    first, *rest = item.structure
+    low, high = float(np.min(first.mean_deg)), float(np.max(first.mean_deg))
+    also = f"; {len(rest)} other column{'s' if len(rest) > 1 else ''} significant" if rest else ""
+    return (
+        f"{start}. It depends on {first.phrase}: from {low:+.1f} to {high:+.1f} degrees, "
+        f"RMS contribution {first.explained_deg:.1f} degrees{also}."
+    )
+
+
+def wearings_sentence(item: WearingErrors) -> str:
+    """Whether the mean error changes with the wearing."""
+    low, high = int(np.argmin(item.mean_deg)), int(np.argmax(item.mean_deg))
+    first, last = (f"{item.mean_deg[at]:+.1f} degrees in wearing {item.wearings[at]}" for at in (low, high))
+    ends = f"from {first} to {last}"
+    if item.p_value is None:
+        return f"The mean error goes {ends}; too few takes to say whether the wearing is the cause."
+    if item.is_significant:
+        return f"The mean error changes with the wearing, {ends} (p = {item.p_value:.2g})."
+    return f"The mean error goes {ends}, no more than between takes (p = {item.p_value:.2g})."
+
+
+def fingertips_sentence(errors: FingertipErrors) -> str:
+    """Errors of the fingertips, for which hand, and what was assumed."""
+    overall, fingers = errors.overall, errors.fingers
+    hand = f"for a hand of {errors.hand_length_mm:.0f} mm"
+    hand += ", an assumed size" if errors.is_assumed else ""
+    worst = max(fingers, key=lambda name: fingers[name].rmse_mm)
+    sentence = f"Fingertip error {overall.rmse_mm:.1f} mm (RMSE, {hand}{_scale(overall)})"
+    if len(fingers) > 1:
+        sentence += f", largest at the {worst} with {fingers[worst].rmse_mm:.1f} mm"
+    if errors.thumb_index is not None:
+        sentence += f"; distance between thumb and index fingertip: {errors.thumb_index.rmse_mm:.1f} mm"
+    if overall.assumed_equal:
+        were = "was" if len(overall.assumed_equal) == 1 else "were"
+        sentence += f". {_listed(overall.assumed_equal)} {were} not measured throughout and assumed equal"
+    return f"{sentence}."
+
+
+def _at_floor(item: RotationFindings) -> str:
+    if item.is_jittery and item.floor is not None:
+        return (
+            f"no more than the prediction's own jitter of {item.floor.prediction_deg:.1f} while the hand is "
+            "still; the model follows its sensors too closely"
+        )
+    return "at the noise floor"
+
+
+def _scale(errors: TipErrors) -> str:
+    if errors.floor is None:
+        return f"; when predicting the mean {errors.baseline_mm:.1f}"
+    bound = "lower bound " if errors.floor.is_lower_bound else ""
+    return f"; noise floor {bound}{errors.floor.floor_mm:.1f}"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
