@@ -17,7 +17,7 @@ from glovecal_models.comparison.dependence import covariates
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.resampled import resampled
-from glovecal_models.effects.delay.offset_to import offset_to
+from glovecal_models.effects.delay.clock_offset import offset_to
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session

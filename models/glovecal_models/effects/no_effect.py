@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from glovecal_models.effects.base.columnless_effect import ColumnlessEffect
+from glovecal_models.effects.base.effect import ColumnlessEffect
 from glovecal_models.effects.base.facts import Kind, Stage
 from glovecal_models.effects.base.signals import Signals
 

@@ -11,9 +11,8 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from glovecal_models.effects.base.columnless_effect import ColumnlessEffect
 from glovecal_models.effects.base.control import control_columns
-from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.effect import ColumnlessEffect, Effect
 from glovecal_models.effects.base.facts import Control, Kind, Settings, Stage
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.catalogue import catalogue, stored_effect

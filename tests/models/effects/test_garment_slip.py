@@ -9,8 +9,13 @@ import pytest
 from scipy.signal import lfilter
 
 from glovecal_models.effects.base.interval_effect import ClaimedErrors
-from glovecal_models.effects.garment_slip.garment_slip import GarmentSlip
-from glovecal_models.effects.garment_slip.slip_growth import GROWS_S, SlipGrowth, SlipInterval, slip_growth
+from glovecal_models.effects.garment_slip.garment_slip import (
+    GROWS_S,
+    GarmentSlip,
+    SlipGrowth,
+    SlipInterval,
+    slip_growth,
+)
 from glovecal_models.effects.garment_slip.slip_walk import slip_walk
 
 SLIP = GarmentSlip()

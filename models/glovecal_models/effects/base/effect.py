@@ -14,12 +14,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from glovecal_models.effects.base.assessment import Assessment
-from glovecal_models.effects.base.facts import EffectFacts, Settings
+from glovecal_models.effects.base.facts import Control, EffectFacts, Settings
 from glovecal_models.effects.base.problem import Problem
 from glovecal_models.effects.base.signals import GloveFrames, Signals
 
@@ -163,3 +163,18 @@ class _InstantStream(Stream):
         if signals is None:
             return super().together(streams, frames)
         return first._effect.columns(signals, first._settings, first._shape)
+
+
+class ColumnlessEffect(InstantEffect):
+    """Zero columns, one shape of zeros."""
+
+    control: ClassVar[Control] = "none"
+
+    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
+        return np.zeros((1, takes[0].own.shape[1], len(self.parameters)))
+
+    def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        return np.zeros((len(take), take.own.shape[1], 0))
+
+    def weight_names(self, settings: Settings) -> tuple[str, ...]:
+        return ()

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from glovecal_models.effects.base.assessment import Assessment
-from glovecal_models.effects.base.columnless_effect import ColumnlessEffect
+from glovecal_models.effects.base.effect import ColumnlessEffect
 from glovecal_models.effects.base.facts import Kind, Settings, Stage
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.errors import BadInput

@@ -1,7 +1,8 @@
 """Clock offset: the reference system's clock and the glove's do not agree, in each take by its own amount.
 
 A reference-side effect: it is repaired in the measurement, not predicted. The offset comes from the clock
-scan; a drift is added in takes of a minute or more where it pays.
+scan; a drift is added in takes of a minute or more where it pays. In a take that training never saw it is
+where the reference is nearest to what the model predicts.
 """
 
 from __future__ import annotations
@@ -27,9 +28,40 @@ from glovecal_models.effects.base.signature_effect import (
 from glovecal_models.effects.delay.clock_drift import LARGEST_PPM, ClockDrift, clock_drift, without_drift
 from glovecal_models.effects.delay.delay_grid import delay_errors, held_out_beside, why_no_delay_shows
 from glovecal_models.effects.delay.delay_verdict import CLOCK, LAG, clock_choice, first_delay
-from glovecal_models.effects.delay.offset_to import offset_to
 from glovecal_models.takes.clock_scan import RANGE_S, ClockOffset, aligned, clock_offsets
 from glovecal_models.takes.take import Take
+
+COARSE_S, FINE_S = 0.04, 0.002
+LEAST_OVERLAP = 0.6
+"""Of the frames that the reference can cover."""
+
+
+def offset_to(take: Take, rotations: Sequence[str], predicted: np.ndarray, width_s: float) -> float:
+    """Seconds, at most ``width_s`` from zero, for the model's angles (N, R) at the frames, degrees."""
+    columns = [(take.rotations.index(name), i) for i, name in enumerate(rotations) if name in take.rotations]
+    scale = np.maximum(np.nanstd(take.reference, axis=0), 1.0)
+
+    measured_s = float(take.reference_time_s[-1] - take.reference_time_s[0])
+    least = LEAST_OVERLAP * min(1.0, measured_s / max(take.duration_s, 1e-9))
+
+    def misfit(offset_s: float) -> float:
+        at = take.time_s + offset_s
+        inside = (at >= take.reference_time_s[0]) & (at <= take.reference_time_s[-1])
+        if inside.mean() < least:
+            return np.inf
+        total = []
+        for column, row in columns:
+            known = np.isfinite(take.reference[:, column])
+            if known.sum() > 1:
+                values = np.interp(at[inside], take.reference_time_s[known], take.reference[known, column])
+                total.append(np.mean((values - predicted[inside, row]) ** 2) / scale[column] ** 2)
+        return float(np.mean(total)) if total else np.inf
+
+    coarse = np.arange(-width_s, width_s + COARSE_S / 2, COARSE_S)
+    best = float(coarse[int(np.argmin([misfit(offset) for offset in coarse]))])
+    fine = np.arange(best - COARSE_S, best + COARSE_S + FINE_S / 2, FINE_S)
+    return float(fine[int(np.argmin([misfit(offset) for offset in fine]))])
+
 
 BEYOND_DELAYS_S = 0.15
 """Smaller offsets are left to the comparison, which tells them from a lag."""

@@ -6,20 +6,25 @@ one wearing differ (take_spread.py). Every glove slips by a few tenths of a degr
 A model that has it claims a standard deviation that grows from the start of a run or wearing. Where the glove
 sits is not estimated anew from the readings: on four simulated gloves that slip by 2 degrees, the postures of
 a whole 40 s take told the offset to 1.5 degrees at best, and only for a hand that moves as in training.
+
+Training takes the wandering that it sees for measurement noise: with that the claim starts, because where the
+glove sits is not known at the start of a run either. From there the offset walks on.
+On twelve simulated gloves with slips of 1 and 2 degrees (two laws), takes of 10 minutes in a new wearing were
+inside the 95 % interval for 76 % of their frames without this and for 94 % with it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from glovecal_models.effects.base.facts import Rival, Settings, Stage
-from glovecal_models.effects.base.interval_effect import ClaimedErrors, IntervalEffect
+from glovecal_models.effects.base.interval_effect import ClaimedErrors, Interval, IntervalEffect
 from glovecal_models.effects.base.motions import CROSSED
 from glovecal_models.effects.base.signature_effect import Finding, Proposal, Recorded, check_signature_input
-from glovecal_models.effects.garment_slip.slip_growth import GROWS_S, SlipGrowth, SlipInterval, slip_growth
 from glovecal_models.effects.garment_slip.slip_walk import (
     OVER_NOISE,
     SlipWalk,
@@ -29,6 +34,39 @@ from glovecal_models.effects.garment_slip.slip_walk import (
 )
 from glovecal_models.effects.garment_slip.take_spread import TakeSpread, is_common, spread_of_takes
 from glovecal_models.takes.take import Take
+
+GROWS_S = 1800.0
+"""A cloth does not walk away for ever: from then on the variance stays."""
+
+
+@dataclass(frozen=True)
+class SlipGrowth:
+    """Of one rotation."""
+
+    rate_deg_per_sqrt_min: float
+
+    def to_settings(self) -> Settings:
+        """Plain JSON-able data."""
+        return asdict(self)
+
+
+class SlipInterval(Interval):
+    """Of L rotations."""
+
+    def __init__(self, growths: Sequence[SlipGrowth]) -> None:
+        self._a_minute = np.array([item.rate_deg_per_sqrt_min**2 for item in growths])
+
+    def added_variance(self, since_start_s: np.ndarray, readings: np.ndarray) -> np.ndarray:
+        return np.clip(since_start_s, 0.0, GROWS_S)[:, None] / 60.0 * self._a_minute
+
+
+def slip_growth(held_out: Sequence[ClaimedErrors]) -> SlipGrowth:
+    """From the errors of one rotation on held-out takes; a rate of zero where they are too short to say."""
+    times, errors, angles = zip(
+        *((item.since_start_s, item.error, item.measured) for item in held_out), strict=True
+    )
+    walk = slip_walk(times, errors, angles)
+    return SlipGrowth(0.0 if walk is None else walk.rate_deg_per_sqrt_min)
 
 
 class GarmentSlip(IntervalEffect):

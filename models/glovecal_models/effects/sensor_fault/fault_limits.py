@@ -7,8 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from glovecal_models.effects.base.signature_effect import Finding, frames_inside, smallest_step
-from glovecal_models.effects.sensor_fault.fault_watch import LONGEST_JUMP_S, MOVING_SHARE, FaultLimits
-from glovecal_models.effects.sensor_fault.reading_track import ReadingTrack
+from glovecal_models.effects.sensor_fault.fault_watch import (
+    LONGEST_JUMP_S,
+    MOVING_SHARE,
+    FaultLimits,
+    ReadingTrack,
+)
 from glovecal_models.takes.take import Take
 
 LEAST_OF_RANGE = (0.5, 99.5)

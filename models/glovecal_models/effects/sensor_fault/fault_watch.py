@@ -3,6 +3,10 @@
 Two signs, both against what the sensor did in training when nothing was wrong. It *jumps*: it is farther
 from where it was heading than it ever came in that time. It *stands still* while the other sensors move, for
 longer than it ever did. A jump is forgotten after ``LONGEST_JUMP_S``: by then the joint may be anywhere.
+
+Where a sensor is heading are its level and slope, from its good readings alone: a finger's speed changes
+little from frame to frame, so that a reading is predicted far better from both than from the reading before
+(alpha-beta filter, Kalata 1984). Rotations whose sensor fails keep their last good angle, and grow uncertain as fast as the joint moves.
 """
 
 from __future__ import annotations
@@ -15,7 +19,40 @@ import numpy as np
 
 from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
-from glovecal_models.effects.sensor_fault.reading_track import ReadingTrack
+from glovecal_models.effects.base.signature_effect import Held, Hold
+
+LEVEL_GAIN, SLOPE_GAIN = 0.6, 0.3
+LONGEST_AHEAD_S = 0.1
+"""A movement goes on as it was for so long; then the hand may as well have stopped."""
+
+
+class ReadingTrack:
+    """State of S sensors, strictly causal."""
+
+    def __init__(self, time_s: float, readings: np.ndarray) -> None:
+        self.last = readings.astype(float)
+        """(S,), each sensor's last good reading, raw counts."""
+        self.time_s = np.full(len(readings), float(time_s))
+        """(S,), when it was."""
+        self._level, self._slope = self.last.copy(), np.zeros(len(readings))
+
+    def foretold(self, time_s: float) -> np.ndarray:
+        """(S,) raw counts."""
+        return self._level + self._slope * np.minimum(time_s - self.time_s, LONGEST_AHEAD_S)
+
+    def take(self, time_s: float, readings: np.ndarray, is_good: np.ndarray) -> None:
+        """The next frame's readings (S,), of which only the good ones are believed."""
+        foretold, passed = self.foretold(time_s), np.maximum(time_s - self.time_s, 1e-3)
+        surprise = readings - foretold
+        level = foretold + LEVEL_GAIN * surprise
+        slope = self._slope + SLOPE_GAIN * surprise / passed
+        # After an absence the slope is old news.
+        slope = np.where(passed > LONGEST_AHEAD_S, 0.0, slope)
+        self._level = np.where(is_good, np.where(passed > LONGEST_AHEAD_S, readings, level), self._level)
+        self._slope = np.where(is_good, slope, self._slope)
+        self.last = np.where(is_good, readings, self.last)
+        self.time_s = np.where(is_good, time_s, self.time_s)
+
 
 LONGEST_JUMP_S = 0.5
 MOVING_SHARE = 0.5
@@ -104,3 +141,41 @@ class FaultWatch:
         share = np.clip((elapsed_s - low) / (high - low), 0.0, 1.0)
         before, after = self._surprises[self._lanes, at - 1], self._surprises[self._lanes, at]
         return np.where(elapsed_s > self._lags[-1], np.inf, before + share * (after - before))
+
+
+class FaultHold(Hold):
+    """By a ``FaultWatch`` of the readings."""
+
+    def __init__(self, live: Settings, rotations: Sequence[str], sensors: Sequence[str]) -> None:
+        """``live``: settings of ``FaultLimits``."""
+        limits = FaultLimits.of(live)
+        self._sensors = tuple(sensors)
+        self._watch = FaultWatch(limits, sensors)
+        self._reads = np.zeros((len(rotations), len(sensors)), dtype=bool)
+        self._moves = np.zeros((len(rotations), len(limits.move_lag_s)))
+        for name, moves, read in zip(limits.rotations, limits.move_deg, limits.reads, strict=True):
+            if name in rotations:
+                row = list(rotations).index(name)
+                self._moves[row] = moves
+                self._reads[row, [self._sensors.index(sensor) for sensor in read]] = True
+        self._lags = np.array(limits.move_lag_s)
+        self._last: np.ndarray | None = None
+
+    def reset(self) -> None:
+        self._watch.reset()
+        self._last = None
+
+    def frame(self, time_s: float, base: np.ndarray, readings: np.ndarray) -> Held:
+        good, age_s = self._watch.frame(time_s, readings)
+        fails = age_s > 0.0
+        if self._last is None or not fails.any():
+            self._last = base.copy()
+            return Held(base, readings, np.zeros(len(base)), np.zeros(len(base), dtype=bool), ())
+        is_faulty = np.any(self._reads & fails, axis=1)
+        self._last = np.where(is_faulty, self._last, base)
+        variance = np.zeros(len(base))
+        for row in np.flatnonzero(is_faulty):
+            oldest = float(age_s[self._reads[row]].max())
+            variance[row] = np.interp(oldest, self._lags, self._moves[row]) ** 2
+        names = tuple(name for name, failing in zip(self._sensors, fails, strict=True) if failing)
+        return Held(self._last, np.where(fails, good, readings), variance, is_faulty, names)

@@ -25,7 +25,7 @@ from glovecal_models.effects.base.signature_effect import (
     named,
     stretches_of,
 )
-from glovecal_models.effects.sensor_fault.fault_hold import FaultHold
+from glovecal_models.effects.sensor_fault.fault_watch import FaultHold
 from glovecal_models.effects.sensor_fault.gain_jump import gain_jump
 from glovecal_models.effects.sensor_fault.live_check import live_check
 from glovecal_models.effects.sensor_fault.reading_faults import GRADUAL_SHARE, dropouts, spikes, stuck
