@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast
 
@@ -13,6 +13,7 @@ from glovecal._plotting import MODEL, SCALE, axes_for, finished, named_rows
 from glovecal._shown import Shown
 from glovecal._table import Column, Table
 from glovecal._takes import takes_in
+from glovecal_models.progress import Cancel
 from glovecal_models.takes.take import Take
 
 if TYPE_CHECKING:
@@ -99,7 +100,7 @@ def add_effect(
     rotations: Sequence[str] | None = None,
     samples: int = 2000,
     seed: int = 0,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
     progress: Progress = None,
 ) -> Addition:
     """Learn a model anew with one effect, and keep it only if the held-out error falls by 5 % or more.
@@ -140,7 +141,7 @@ def remove_effect(
     *,
     samples: int = 2000,
     seed: int = 0,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
     progress: Progress = None,
 ) -> CalibrationModel:
     """The model learned anew from its training takes without one of its effects; the one given stays.

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 from threadpoolctl import threadpool_limits
 
-Report = Callable[[str, float], None]
+from glovecal_models.progress import Report
+
 Progress = bool | Report | None
 """None or False: silent. True: a line on stderr that rewrites itself. Else it is called with a sentence and
 the fraction done, 0 to 1; what it raises ends the work."""

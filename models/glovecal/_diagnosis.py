@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from glovecal._plotting import CONTROL, MODEL, axes_for, finished, named_rows
 from glovecal._shown import Shown
 from glovecal._table import Column, Table
 from glovecal._takes import takes_in
+from glovecal_models.progress import Cancel
 from glovecal_models.takes.take import Take
 
 if TYPE_CHECKING:
@@ -103,7 +104,7 @@ def diagnose(
     *,
     also: Sequence[str] = (),
     seed: int = 0,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
     progress: Progress = None,
 ) -> Diagnosis:
     """Try every known effect on held-out takes, beside a control with the same freedom that cannot be right.

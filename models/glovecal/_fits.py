@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import connection, get_context
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from glovecal._calls import Report
 from glovecal_models.errors import Cancelled
+from glovecal_models.progress import Cancel
 
 if TYPE_CHECKING:
     from glovecal_models.calibration.fit_task import FitResult, FitTask
@@ -21,7 +22,7 @@ POLL_S = 0.1
 
 
 def fitted(
-    tasks: Sequence[FitTask], workers: int, cancelled: Callable[[], bool] | None, report: Report
+    tasks: Sequence[FitTask], workers: int, cancelled: Cancel | None, report: Report
 ) -> list[FitResult]:
     """All results, in any order. Raises Cancelled, and RuntimeError when a worker dies.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from glovecal._plotting import CONTROL, FLOOR, MODEL, SCALE, axes_for, finished,
 from glovecal._shown import Shown
 from glovecal._table import Column, Table
 from glovecal._takes import takes_in
+from glovecal_models.progress import Cancel
 from glovecal_models.takes.take import Take
 
 if TYPE_CHECKING:
@@ -121,7 +122,7 @@ def improve(
     samples: int = 2000,
     max_steps: int = 6,
     seed: int = 0,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
     progress: Progress = None,
 ) -> Improvement:
     """Train, then diagnose, add and verify until the noise floor, or until nothing more can be named.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from glovecal._calls import Progress, library_call
@@ -10,6 +10,7 @@ from glovecal._fits import fitted
 from glovecal._layouts import LayoutLike, layout_for
 from glovecal._model import CalibrationModel
 from glovecal._takes import takes_in
+from glovecal_models.progress import Cancel
 from glovecal_models.takes.take import Take
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ def train(
     seed: int = 0,
     keep_dead: bool = False,
     workers: int = 1,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
     progress: Progress = None,
 ) -> CalibrationModel:
     """Learn the map from readings to rotations from takes with reference angles.

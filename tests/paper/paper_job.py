@@ -9,7 +9,7 @@ from typing import Any
 
 from paper_machine import commit, computer
 
-from glovecal_models.calibration.training_settings import Report
+from glovecal_models.progress import Report
 
 Rows = Callable[[int, bool, Report], Mapping[str, Sequence[Any]]]
 """Seed, quick, and where to report progress -> dataclass rows by their kind."""

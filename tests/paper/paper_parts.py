@@ -26,7 +26,7 @@ from table_2 import Table2Row, table_2
 from table_3 import Table3Row
 from table_4 import SIZES, SIZES_HZ, SIZES_SAMPLES, Table4Row, size_row, started
 
-from glovecal_models.calibration.training_settings import Report
+from glovecal_models.progress import Report
 
 SUBJECTS = 3
 QUICK_EVERY = 16

@@ -22,13 +22,14 @@ from itertools import product
 import numpy as np
 
 from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_settings import Report, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.covariance.linear_ard import LinearArd
 from glovecal_models.covariance.squared_exponential import SquaredExponential, SquaredExponentialArd
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.inverse_kinematics.contact import Touch
 from glovecal_models.inverse_kinematics.ik_samples import ik_samples
+from glovecal_models.progress import Report
 from glovecal_models.regression.exact import fit_exact
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
 from glovecal_models.regression.mean import LinearMean, ZeroMean

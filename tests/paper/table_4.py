@@ -26,7 +26,8 @@ from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.sample_weight import Recorded, Weighted, fit_weighted
 from glovecal_models.calibration.training import assemble
 from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
-from glovecal_models.calibration.training_settings import Report, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.progress import Report
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.regression.spgp import fit_spgp
 from glovecal_models.threads import pin_blas_to_one_thread

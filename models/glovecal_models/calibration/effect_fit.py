@@ -8,7 +8,7 @@ three simulated gloves (hysteresis, creep, donning) a third changed the error by
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,8 +23,8 @@ from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.samples import Samples, linear_correspondence
 from glovecal_models.calibration.training_plan import task_for
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.errors import Cancelled
 from glovecal_models.layout import Correspondence
+from glovecal_models.progress import Cancel, stop_if
 from glovecal_models.regression.regressor import Regressor
 
 TURNS = 2
@@ -49,7 +49,7 @@ def fit_with_effects(
     wanted: Sequence[EffectRequest],
     settings: TrainingSettings,
     *,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
 ) -> EffectFit:
     """Train ``rotations`` with those of ``wanted`` that predict something. Raises NotTrainable, Cancelled."""
     wanted = [item for item in wanted if item.has_columns and set(item.rotations) & set(rotations)]
@@ -60,7 +60,7 @@ def fit_with_effects(
     regressors: dict[str, Regressor] = {}
     for _ in range(TURNS if wanted else 1):
         for name in rotations:
-            _stop_if(cancelled)
+            stop_if(cancelled, "adding an effect")
             results[name] = _trained(takes, columns[name], corrected.get(name), settings, cancelled)
             regressors[name] = restore_regressor(results[name].arrays, results[name].settings)
         if wanted:
@@ -68,7 +68,7 @@ def fit_with_effects(
             corrected = _explained(takes, columns, regressors, effects)
     if wanted:
         for name in rotations:
-            _stop_if(cancelled)
+            stop_if(cancelled, "adding an effect")
             results[name] = _trained(takes, columns[name], corrected.get(name), settings, cancelled)
     return EffectFit(results, effects)
 
@@ -84,7 +84,7 @@ def _trained(
     correspondence: Correspondence,
     correction: list[np.ndarray] | None,
     settings: TrainingSettings,
-    cancelled: Callable[[], bool] | None,
+    cancelled: Cancel | None,
 ) -> FitResult:
     """The rotation's regressor, trained on the reference without the effects' part."""
     targets, inputs = takes.target(correspondence.rotation), takes.inputs(correspondence)
@@ -122,7 +122,7 @@ def _fitted_effects(
     regressors: Mapping[str, Regressor],
     wanted: Sequence[EffectRequest],
     settings: TrainingSettings,
-    cancelled: Callable[[], bool] | None,
+    cancelled: Cancel | None,
 ) -> tuple[AddedEffect, ...]:
     """Shapes one effect after another, then all weights of a joint together."""
     touched = [name for name in columns if any(name in item.rotations for item in wanted)]
@@ -135,7 +135,7 @@ def _fitted_effects(
     priors: dict[str, list[np.ndarray]] = {name: [] for name in touched}
     shapes: list[np.ndarray] = []
     for group in groups:
-        _stop_if(cancelled)
+        stop_if(cancelled, "adding an effect")
         shape = best_shape(group, rows, bases, extra, priors)
         shapes.append(shape)
         found = [group.wanted.effect.columns(take, group.settings, shape) for take in group.signals]
@@ -213,8 +213,3 @@ def _explained(
                 sums = total.setdefault(name, [np.zeros(len(item.time_s)) for item in takes.takes])
                 sums[number] += part[:, lane]
     return total
-
-
-def _stop_if(cancelled: Callable[[], bool] | None) -> None:
-    if cancelled and cancelled():
-        raise Cancelled("adding an effect was cancelled")

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
 from typing import Any
@@ -17,8 +16,9 @@ import numpy as np
 
 from glovecal_models.calibration.kernel_choice import fit_best_kernel
 from glovecal_models.calibration.sample_weight import Recorded, fit_weighted
-from glovecal_models.calibration.training_settings import Report, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
+from glovecal_models.progress import Cancel, Report
 from glovecal_models.regression.kernel_candidates import CHOOSING
 from glovecal_models.regression.linear_regressor import fit_linear, rescale_readings
 from glovecal_models.regression.regressor import Regressor
@@ -61,9 +61,7 @@ class FitResult:
     held_out_count: int
 
 
-def run_task(
-    task: FitTask, *, cancelled: Callable[[], bool] | None = None, report: Report | None = None
-) -> FitResult:
+def run_task(task: FitTask, *, cancelled: Cancel | None = None, report: Report | None = None) -> FitResult:
     """Fit one task. Raises Cancelled when ``cancelled()`` turns true, NotTrainable."""
     regressor = _fit(task, cancelled, report)
     error = 0.0
@@ -79,7 +77,7 @@ def run_task(
     )
 
 
-def _fit(task: FitTask, cancelled: Callable[[], bool] | None, report: Report | None) -> Regressor:
+def _fit(task: FitTask, cancelled: Cancel | None, report: Report | None) -> Regressor:
     settings = task.settings
     if settings.method == "raw":
         span = ACTIVE_RANGE_DEG.get(task.rotation)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,8 +19,7 @@ from glovecal_models.calibration.folds import are_short, first_measured, folds_o
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import NotTrainable
-
-Report = Callable[[str, float], None]
+from glovecal_models.progress import Cancel, Report
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,7 @@ def held_out_errors(
     wanted: Sequence[EffectRequest],
     settings: TrainingSettings,
     *,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
     report: Report | None = None,
 ) -> HeldOutErrors:
     """Leave out whole takes, in ``settings.folds`` folds, at least two. Raises NotTrainable, Cancelled.

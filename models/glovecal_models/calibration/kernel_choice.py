@@ -7,7 +7,7 @@ the same units, and again without each fold of whole takes. Autocorrelated sampl
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,8 +15,9 @@ import numpy as np
 from glovecal_models.calibration.folds import folds_over_takes
 from glovecal_models.calibration.sample_weight import Recorded, fit_weighted
 from glovecal_models.calibration.samples import Samples, representative_index
-from glovecal_models.calibration.training_settings import Report, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput, NotTrainable
+from glovecal_models.progress import Cancel, Report, part
 from glovecal_models.regression.kernel_candidates import CANDIDATE, LMC, KernelCandidate, candidates_of
 from glovecal_models.regression.kernel_scores import CandidateScore, KernelScores, with_choice
 from glovecal_models.regression.linear_regressor import fit_linear
@@ -28,8 +29,6 @@ TRIED_SAMPLES = 500
 FOLDS = 3
 FOLD_ITERATIONS = 25
 """From the optimum of all tried samples, that without a fold is near."""
-Cancel = Callable[[], bool] | None
-Say = Callable[[str, float], None]
 LAST_ITERATIONS = 15
 """On all samples, from the optimum of some: more would move the hyperparameters by less than their doubt."""
 
@@ -49,8 +48,8 @@ def score_candidates(
     sample_weight: float = 1.0,
     thorough: bool = True,
     seed: int = 0,
-    cancelled: Cancel = None,
-    report: Say | None = None,
+    cancelled: Cancel | None = None,
+    report: Report | None = None,
 ) -> Tried:
     """Score ``candidates``, the first being the one that stays unless another is clearly better.
 
@@ -94,10 +93,10 @@ class _Trial:
     """Masks (N,) over all samples."""
     weight: float
     seed: int
-    cancelled: Cancel
+    cancelled: Cancel | None
 
     @classmethod
-    def of(cls, samples: Recorded, sample_weight: float, seed: int, cancelled: Cancel) -> _Trial:
+    def of(cls, samples: Recorded, sample_weight: float, seed: int, cancelled: Cancel | None) -> _Trial:
         chosen = _spread(samples, seed)
         weight = min(1.0, sample_weight * len(samples.target) / len(chosen))
         return cls(samples, chosen, tuple(_usable_folds(samples, chosen)), weight, seed, cancelled)
@@ -180,7 +179,7 @@ def fit_best_kernel(
     settings: TrainingSettings,
     *,
     thorough: bool = True,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
     report: Report | None = None,
 ) -> ProcessRegressor:
     """Choose among the method's candidates and train the chosen one on all ``samples``.
@@ -192,14 +191,14 @@ def fit_best_kernel(
     if kept is not None and kept not in CANDIDATE:
         raise BadInput(f"no kernel {kept!r} for {rotation}; there are {', '.join(CANDIDATE)}")
     candidates = (CANDIDATE[kept],) if kept else candidates_of(settings.method)
-    base = fit_weighted(samples, seed=settings.seed, cancelled=cancelled, report=_part(report, 0.0, 0.2))
+    base = fit_weighted(samples, seed=settings.seed, cancelled=cancelled, report=part(report, 0.0, 0.2))
     if kept == LMC:
         return base.regressor
     chosen, scores, search = candidates[0], None, {}
     if len(candidates) > 1:
         tried = score_candidates(
             samples, candidates, sample_weight=base.weight, thorough=thorough, seed=settings.seed,
-            cancelled=cancelled, report=_part(report, 0.2, 0.7),
+            cancelled=cancelled, report=part(report, 0.2, 0.7),
         )  # fmt: skip
         scores, chosen = tried.scores, CANDIDATE[tried.scores.chosen.name]
         search = {"start": tried.optimum[chosen.name]}
@@ -213,9 +212,3 @@ def fit_best_kernel(
         )  # fmt: skip
         process = replace(process, evidence=process.evidence | base.evidence)
     return process if scores is None else with_choice(process, scores)
-
-
-def _part(report: Report | None, low: float, high: float) -> Report | None:
-    if report is None:
-        return None
-    return lambda sentence, share: report(sentence, low + (high - low) * share)

@@ -15,7 +15,6 @@ errors k frames apart (the integrated autocorrelation time; Kish's design effect
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -23,6 +22,7 @@ import numpy as np
 
 from glovecal_models.calibration.folds import folds_over_takes
 from glovecal_models.errors import NotTrainable
+from glovecal_models.progress import Cancel, Report, part
 from glovecal_models.regression.fast_lmc import finish_search, fit_lmc_gpr
 from glovecal_models.regression.lmc_search import LmcSearch, fit_roughly
 from glovecal_models.regression.process_regressor import ProcessRegressor
@@ -36,8 +36,6 @@ LEAST_WORTH = 10
 CROWDED = 0.5
 """Degrees of freedom of the process per independent sample, from which it may be following single ones."""
 FOLDS = 3
-Cancel = Callable[[], bool] | None
-Report = Callable[[str, float], None]
 FADED = 0.05
 """Correlation at which errors are taken for independent: what follows is scatter of the estimate."""
 LEAST_PAIRS = 30
@@ -72,8 +70,8 @@ def fit_weighted(
     samples: Recorded,
     *,
     seed: int = 0,
-    cancelled: Callable[[], bool] | None = None,
-    report: Callable[[str, float], None] | None = None,
+    cancelled: Cancel | None = None,
+    report: Report | None = None,
 ) -> Weighted:
     """The LMC-GPR of ``samples``, each counting what serves takes left out best.
 
@@ -90,14 +88,14 @@ def fit_weighted(
         )
         need = _Need.of(samples, rough.mean(samples.inputs), rough.degrees_of_freedom())
     if need is None or not need.is_there:
-        whole = finish_search(search, cancelled=cancelled, report=_part(report, 0.1, 0.5))
+        whole = finish_search(search, cancelled=cancelled, report=part(report, 0.1, 0.5))
         fitted = whole.predict(samples.inputs)
         freedom = np.minimum(fitted.variance / max(whole.noise_variance, 1e-12), 1.0).sum()
         need = _Need.of(samples, fitted.mean, float(freedom))
     evidence: dict[str, Any] = {"effective_sample_ratio": need.share, "degrees_of_freedom": need.freedom}
     best = 1.0
     if need.is_there:
-        trial = _Trial(samples, search, seed, cancelled, _part(report, 0.5, 0.8))
+        trial = _Trial(samples, search, seed, cancelled, part(report, 0.5, 0.8))
         errors = trial.held_out_errors()
         evidence["held_out_rmse_deg"] = {f"{weight:g}": errors[weight] for weight in sorted(errors)[::-1]}
         best = min(errors, key=lambda weight: (errors[weight], weight), default=1.0)
@@ -128,7 +126,7 @@ class _Trial:
     """Weights compared by the errors of processes that have not seen some of the takes."""
 
     def __init__(
-        self, samples: Recorded, whole: LmcSearch, seed: int, cancelled: Cancel, report: Report | None
+        self, samples: Recorded, whole: LmcSearch, seed: int, cancelled: Cancel | None, report: Report | None
     ) -> None:
         """``whole``: the search on all samples at weight 1."""
         self._samples, self._seed, self._cancelled, self._report = samples, seed, cancelled, report
@@ -203,14 +201,6 @@ def _can_be_left_out(samples: Recorded, held_out: np.ndarray) -> bool:
     except NotTrainable:
         return False
     return True
-
-
-def _part(
-    report: Callable[[str, float], None] | None, low: float, high: float
-) -> Callable[[str, float], None] | None:
-    if report is None:
-        return None
-    return lambda sentence, share: report(sentence, low + (high - low) * share)
 
 
 def effective_sample_ratio(error: np.ndarray, take: np.ndarray, position: np.ndarray) -> float:

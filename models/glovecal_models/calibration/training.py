@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,8 +10,9 @@ import numpy as np
 from glovecal_models.calibration.fit_task import FitResult, run_task
 from glovecal_models.calibration.model import CalibrationModel, RotationModel, restore_regressor
 from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
-from glovecal_models.calibration.training_settings import Report, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.layout import Correspondence, Layout
+from glovecal_models.progress import Cancel, Report
 from glovecal_models.regression.regressor import RuleRegressor
 from glovecal_models.takes.take import Take
 
@@ -24,7 +25,7 @@ def train(
     *,
     take_hashes: Sequence[str] = (),
     parent: str | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
     report: Report | None = None,
 ) -> CalibrationModel:
     """Plan, fit and assemble in this process; a service spreads the same tasks over workers."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -14,7 +13,6 @@ METHODS: tuple[Method, ...] = get_args(Method)
 """``raw`` is no calibration at all, the scale that the others are read against; ``auto`` takes for each
 rotation what fits it (``kernel_choice``), ``polynomial_gpr`` and ``general_gpr`` insist on a kind of kernel.
 """
-Report = Callable[[str, float], None]
 """Called with a sentence and the fraction done, 0 to 1."""
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +21,7 @@ from glovecal_models.effects.base.control import control_columns
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.signals import Signals
+from glovecal_models.progress import Report
 
 PERMUTATIONS_TRIED = 5
 
@@ -30,7 +31,7 @@ def assessed(
     effects: Sequence[Effect],
     generator: np.random.Generator,
     without: Set[str] = frozenset(),
-    report: Callable[[str, float], None] | None = None,
+    report: Report | None = None,
 ) -> tuple[list[Assessment], list[NotIdentifiable]]:
     """Every identifiable effect, and why the others are not.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -31,8 +31,8 @@ from glovecal_models.diagnosis.signatures import are_held_levels, beside_levels,
 from glovecal_models.diagnosis.unexplained_residual import UnexplainedResidual, unexplained_residual
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.catalogue import candidates
-from glovecal_models.errors import Cancelled
 from glovecal_models.layout import Layout
+from glovecal_models.progress import Cancel, Report, stop_if
 from glovecal_models.takes.take import Take
 
 
@@ -47,8 +47,8 @@ def diagnose(
     noise_floor_deg: Mapping[str, float] | None = None,
     seed: int = 0,
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
-    cancelled: Callable[[], bool] | None = None,
-    report: Callable[[str, float], None] | None = None,
+    cancelled: Cancel | None = None,
+    report: Report | None = None,
 ) -> Diagnosis:
     """``known``: effects the model has already; they are part of the base. ``limits`` decide the verdicts.
 
@@ -56,8 +56,7 @@ def diagnose(
     """
 
     def progress(text: str, share: float) -> None:
-        if cancelled and cancelled():
-            raise Cancelled("the diagnosis was cancelled")
+        stop_if(cancelled, "the diagnosis")
         if report:
             report(text, share)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -20,7 +20,7 @@ from glovecal_models.calibration.model_recipe import (
     trained_rotations,
 )
 from glovecal_models.calibration.prepared_takes import PreparedTakes
-from glovecal_models.calibration.training_settings import Report, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.diagnosis.signatures import own_sensors
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.interval_effect import IntervalEffect
@@ -33,6 +33,7 @@ from glovecal_models.improvement.addition import Addition, total_rmse_deg
 from glovecal_models.improvement.control_share import share_left_by_control
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 from glovecal_models.improvement.proposals import proposed
+from glovecal_models.progress import Cancel, Report, part
 from glovecal_models.takes.take import Take
 
 
@@ -51,7 +52,7 @@ def add_effect(
     parent_id: str | None = None,
     take_hashes: Sequence[str] = (),
     limits: ImprovementLimits = IMPROVEMENT_LIMITS,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
     report: Report | None = None,
 ) -> Addition:
     """Learn ``model`` anew with effect ``name`` on ``rotations`` (default: all measured ones).
@@ -86,9 +87,9 @@ def add_effect(
         _require_judgeable(prepared, effect.missing(_all_signals(prepared)), name)
     before = before or held_out_errors(
         PreparedTakes.of(repaired_takes(takes, has), model.layout), chosen, has, settings,
-        cancelled=cancelled, report=_part(report, 0.0, 0.4, "measuring what there is"),
+        cancelled=cancelled, report=part(report, 0.0, 0.4, "measuring what there is"),
     )  # fmt: skip
-    with_it = _part(report, 0.4, 0.8, f"with {name}")
+    with_it = part(report, 0.4, 0.8, f"with {name}")
     after = held_out_errors(prepared, chosen, wanted, settings, cancelled=cancelled, report=with_it)
     judged = tuple(judged or chosen)
     undone = Addition(
@@ -129,7 +130,7 @@ def _acting_live(
     has: Sequence[EffectRequest],
     fresh: EffectRequest,
     effect: SignatureEffect,
-    cancelled: Callable[[], bool] | None,
+    cancelled: Cancel | None,
 ) -> tuple[EffectRequest, LiveCheck | None]:
     """The effect with what it needs to act on live frames, where it can."""
     others = repaired_takes(takes, [item for item in has if item.name != fresh.name])
@@ -172,9 +173,3 @@ def _all_signals(takes: PreparedTakes) -> list[Signals]:
     """Signals of all joints as measured, to ask whether an effect can be judged at all."""
     own = [np.where(np.isfinite(part), part, 0.0) for part in takes.reference]
     return takes.signals(own, np.zeros(own[0].shape[1]), frozenset())
-
-
-def _part(report: Report | None, low: float, high: float, what: str) -> Report | None:
-    if report is None:
-        return None
-    return lambda text, share: report(f"{what}: {text}", low + (high - low) * share)

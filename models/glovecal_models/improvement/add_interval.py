@@ -6,7 +6,7 @@ the claim is truer with it is checked on takes that it has not learned from eith
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -27,6 +27,7 @@ from glovecal_models.effects.base.interval_effect import ClaimedErrors, Interval
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.addition import Addition, Claim, ClaimCheck
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
+from glovecal_models.progress import Cancel
 
 PARTS = 3
 
@@ -42,7 +43,7 @@ def add_interval(
     parent_id: str | None = None,
     take_hashes: Sequence[str] = (),
     limits: ImprovementLimits = IMPROVEMENT_LIMITS,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
 ) -> Addition:
     """``model`` with ``fresh``, if the held-out NLPD falls with it; its regressors stay as they are.
 
@@ -133,7 +134,7 @@ def claimed_errors(
     settings: TrainingSettings,
     *,
     limits: ImprovementLimits = IMPROVEMENT_LIMITS,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
 ) -> tuple[ClaimedErrors, ...]:
     """One for each rotation and take. Raises BadInput for too few takes, NotTrainable, Cancelled."""
     fewest = limits.claim_fewest_takes

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from glovecal_models.diagnosis.problem import measured_joints
 from glovecal_models.diagnosis.resampled import SMOOTHING, bridge_s, resampled, smoothed
 from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.effect import Effect
-from glovecal_models.errors import Cancelled
+from glovecal_models.progress import Cancel, stop_if
 from glovecal_models.takes.take import Take
 
 
@@ -25,7 +25,7 @@ def share_left_by_control(
     takes: Sequence[Take],
     effect: Effect,
     rotations: Sequence[str],
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
 ) -> float | None:
     """Of the RMSE of ``rotations`` on held-out takes, at most 1; None when the takes cannot judge it.
@@ -34,8 +34,7 @@ def share_left_by_control(
     """
 
     def progress(text: str, share: float) -> None:
-        if cancelled and cancelled():
-            raise Cancelled("adding an effect was cancelled")
+        stop_if(cancelled, "adding an effect")
 
     joints = [name for name in measured_joints(takes, model.layout) if name in rotations]
     if not joints:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +16,7 @@ from glovecal_models.calibration.model_recipe import (
 )
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_settings import Report, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.calibration.usable_sensors import usable_sensors
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.noise_floor import rotation_noise
@@ -34,6 +34,7 @@ from glovecal_models.improvement.proposals import Proposed, repairs, widenings
 from glovecal_models.improvement.remove_effect import without_redundant
 from glovecal_models.improvement.step_errors import baselines, step_errors, why_stopped
 from glovecal_models.layout import Layout
+from glovecal_models.progress import Cancel, Report
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.take_warnings import take_warnings
 
@@ -49,7 +50,7 @@ def improve(
     seed: int = 0,
     take_hashes: Sequence[str] = (),
     limits: ImprovementLimits = IMPROVEMENT_LIMITS,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
     report: Report | None = None,
 ) -> Improvement:
     """Train, then add what the diagnosis names while it pays. Raises NotTrainable, BadInput, Cancelled.
@@ -88,7 +89,7 @@ class _Loop:
         seed: int,
         hashes: tuple[str, ...],
         limits: ImprovementLimits,
-        cancelled: Callable[[], bool] | None,
+        cancelled: Cancel | None,
         report: Report | None,
     ) -> None:
         self.takes, self.subject, self.settings = list(takes), subject, settings

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Sequence, Set
 from typing import NamedTuple
 
 from glovecal_models.calibration.model import CalibrationModel
@@ -16,6 +16,7 @@ from glovecal_models.diagnosis.signatures import are_held_levels, own_sensors, s
 from glovecal_models.effects.base.signature_effect import Proposal, Recorded, SignatureEffect
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.errors import BadInput
+from glovecal_models.progress import Cancel
 from glovecal_models.takes.take import Take
 
 
@@ -55,7 +56,7 @@ def proposed(
     takes: Sequence[Take],
     effect: SignatureEffect,
     rotations: Sequence[str] | None,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
 ) -> Proposal:
     """What is found of ``effect`` in ``takes``, as it would be added on ``rotations`` (None: where it is
@@ -96,7 +97,7 @@ def _by_comparison(
     model: CalibrationModel,
     takes: Sequence[Take],
     effect: SignatureEffect,
-    cancelled: Callable[[], bool] | None,
+    cancelled: Cancel | None,
     limits: DiagnosisLimits,
 ) -> Proposal | None:
     found = diagnose(

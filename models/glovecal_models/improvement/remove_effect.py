@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from glovecal_models.calibration.child_model import child_model, columnless_effects
 from glovecal_models.calibration.effect_fit import fit_with_effects
@@ -19,6 +19,7 @@ from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.addition import Addition
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
+from glovecal_models.progress import Cancel
 from glovecal_models.takes.take import Take
 
 
@@ -28,7 +29,7 @@ def errors_if_redundant(
     name: str,
     now: HeldOutErrors,
     settings: TrainingSettings | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
     limits: ImprovementLimits = IMPROVEMENT_LIMITS,
 ) -> HeldOutErrors | None:
     """The errors without effect ``name`` where it is redundant on the rotations of ``now``, else None."""
@@ -47,7 +48,7 @@ def remove_effect(
     settings: TrainingSettings | None = None,
     parent_id: str | None = None,
     take_hashes: Sequence[str] = (),
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
 ) -> CalibrationModel:
     """The model without effect ``name``. Raises BadInput when it has none of that name, Cancelled."""
     has = requested_effects(model)
@@ -70,7 +71,7 @@ def without_redundant(
     errors: HeldOutErrors,
     settings: TrainingSettings,
     take_hashes: Sequence[str],
-    cancelled: Callable[[], bool] | None,
+    cancelled: Cancel | None,
     limits: ImprovementLimits = IMPROVEMENT_LIMITS,
 ) -> tuple[CalibrationModel, HeldOutErrors, tuple[str, ...]]:
     """The child without earlier effects that the new one makes redundant (an alias may have come first), the

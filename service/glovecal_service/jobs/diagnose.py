@@ -12,8 +12,9 @@ from glovecal_models.comparison.noise_floor import rotation_noise
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.known_effect import known_effects
 from glovecal_models.effects.catalogue import effect_of_declaration, known_by_name
+from glovecal_models.progress import Report
 from glovecal_models.takes.take import Take
-from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult
+from glovecal_service.jobs.job_kind import JobPlan, Step, Task, TaskResult
 from glovecal_service.jobs.model_work import ModelWork, takes_of, text_in
 from glovecal_service.jobs.task_key import task_key
 from glovecal_service.store import Store

@@ -12,9 +12,10 @@ from glovecal_models.calibration.artifact import dump, load
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
+from glovecal_models.progress import Report
 from glovecal_models.takes.take import Take
 from glovecal_service.jobs.child_record import keep_child
-from glovecal_service.jobs.job_kind import JobPlan, Report, Task, TaskResult
+from glovecal_service.jobs.job_kind import JobPlan, Task, TaskResult
 from glovecal_service.jobs.job_kind import Step as JobStep
 from glovecal_service.jobs.model_work import is_short, text_in
 from glovecal_service.jobs.task_key import task_key

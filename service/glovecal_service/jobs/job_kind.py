@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from glovecal_models.progress import Cancel, Report
+
 if TYPE_CHECKING:
     from glovecal_service.store import Store
     from glovecal_service.store.records import JobRecord
-
-Cancelled = Callable[[], bool]
-Report = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ class Task:
     """Names the result: data, settings and software version hashed. A finished key is never run again."""
     label: str
     """For messages: ``I_PIP`` or ``I_PIP, fold 2``."""
-    function: Callable[[Any, Cancelled, Report], TaskResult]
+    function: Callable[[Any, Cancel, Report], TaskResult]
     """A function of a module (workers import it); polls the second argument and raises Cancelled. A long one
     says to the third how far it is."""
     payload: Any

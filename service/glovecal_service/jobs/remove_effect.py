@@ -9,8 +9,9 @@ from typing import Any
 from glovecal_models.calibration.model_recipe import declared_effects
 from glovecal_models.effects.catalogue import known_by_name
 from glovecal_models.improvement.remove_effect import remove_effect
+from glovecal_models.progress import Report
 from glovecal_service.jobs.child_record import artifact_array, keep_child
-from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult
+from glovecal_service.jobs.job_kind import JobPlan, Step, Task, TaskResult
 from glovecal_service.jobs.model_work import ModelWork, takes_of, text_in
 from glovecal_service.jobs.task_key import task_key
 from glovecal_service.plain import plain

@@ -16,9 +16,10 @@ from glovecal_models.calibration.training import assemble
 from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput, NotTrainable
+from glovecal_models.progress import Report
 from glovecal_models.regression.kernel_scores import choice_of, kernel_sentences
 from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult
+from glovecal_service.jobs.job_kind import JobPlan, Step, Task, TaskResult
 from glovecal_service.jobs.training_takes import TrainingTakes
 from glovecal_service.store import Store
 from glovecal_service.store.records import JobRecord, TakeRecord

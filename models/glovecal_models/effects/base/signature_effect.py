@@ -18,6 +18,7 @@ from glovecal_models.effects.base.effect import ColumnlessEffect
 from glovecal_models.effects.base.facts import Kind, Settings, Stage
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.errors import BadInput
+from glovecal_models.progress import Cancel
 from glovecal_models.takes.take import Take
 
 MOST_NAMED = 4
@@ -179,7 +180,7 @@ class SignatureEffect(ColumnlessEffect):
         sensor_of: Mapping[str, str],
         sensors: Sequence[str],
         reads: Mapping[str, tuple[str, ...]],
-        cancelled: Callable[[], bool] | None = None,
+        cancelled: Cancel | None = None,
     ) -> LiveCheck | None:
         """How it acts on live frames; None: not at all.
 

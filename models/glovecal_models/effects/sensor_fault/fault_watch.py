@@ -6,7 +6,8 @@ longer than it ever did. A jump is forgotten after ``LONGEST_JUMP_S``: by then t
 
 Where a sensor is heading are its level and slope, from its good readings alone: a finger's speed changes
 little from frame to frame, so that a reading is predicted far better from both than from the reading before
-(alpha-beta filter, Kalata 1984). Rotations whose sensor fails keep their last good angle, and grow uncertain as fast as the joint moves.
+(alpha-beta filter, Kalata 1984). Rotations whose sensor fails keep their last good angle, and grow uncertain
+as fast as the joint moves.
 """
 
 from __future__ import annotations

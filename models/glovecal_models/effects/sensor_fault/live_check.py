@@ -9,7 +9,7 @@ import numpy as np
 from glovecal_models.effects.base.signature_effect import Finding, LiveCheck, frames_inside
 from glovecal_models.effects.sensor_fault.fault_limits import fault_limits
 from glovecal_models.effects.sensor_fault.fault_watch import FaultLimits, FaultWatch
-from glovecal_models.errors import Cancelled
+from glovecal_models.progress import Cancel, stop_if
 from glovecal_models.takes.take import Take
 
 PARTS = 3
@@ -26,7 +26,7 @@ def live_check(
     sensors: Sequence[str],
     reads: Mapping[str, tuple[str, ...]],
     find: Found,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
 ) -> LiveCheck:
     """``takes`` with their faults. Raises BadInput for a sensor that a take lacks, Cancelled."""
     found = find(takes)
@@ -34,8 +34,7 @@ def live_check(
     failing = np.any([mark.any(axis=0) for mark in marks], axis=0)
     seen = false = faulty = sound = 0
     for part in range(min(PARTS, len(takes))):
-        if cancelled and cancelled():
-            raise Cancelled("adding an effect was cancelled")
+        stop_if(cancelled, "adding an effect")
         kept = [take for number, take in enumerate(takes) if number % PARTS != part] or list(takes)
         limits = fault_limits(kept, sensors, find(kept), reads)
         for take, mark in list(zip(takes, marks, strict=True))[part::PARTS]:

@@ -6,7 +6,7 @@ Four signatures: *stuck* (one value while the reference moves), *spikes* (gone a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import ClassVar
 
@@ -35,6 +35,7 @@ from glovecal_models.effects.sensor_fault.short_faults import (
     shortly_stuck,
     small_dropouts,
 )
+from glovecal_models.progress import Cancel
 from glovecal_models.takes.take import Take
 
 REFERENCE_MOVES_DEG = 10.0
@@ -78,7 +79,7 @@ class SensorFault(SignatureEffect):
         sensor_of: Mapping[str, str],
         sensors: Sequence[str],
         reads: Mapping[str, tuple[str, ...]],
-        cancelled: Callable[[], bool] | None = None,
+        cancelled: Cancel | None = None,
     ) -> LiveCheck:
         return live_check(takes, sensors, reads, lambda some: self.find(some, sensor_of), cancelled)
 

@@ -8,7 +8,7 @@ angles the first calibration is the sensors' range put on the joints' (section 5
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,10 +17,11 @@ import numpy as np
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.samples import require_layout
 from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_settings import Report, TrainingSettings
-from glovecal_models.errors import Cancelled, NotTrainable
+from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.errors import NotTrainable
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.layout import Layout
+from glovecal_models.progress import Cancel, Report, stop_if
 from glovecal_models.sampling.guided.held_out import HeldOutErrors, held_out_errors
 from glovecal_models.sampling.guided.labelled_takes import FK, LabelledTake, hold_sd_deg, labelled_takes
 from glovecal_models.sampling.guided.rotation_posterior import first_posteriors, reading_ranges
@@ -101,7 +102,7 @@ def guided_samples(
     layout: Layout,
     skeleton: Skeleton | None,
     *,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
     report: Report | None = None,
 ) -> GuidedSamples:
     """Both passes but for the training; see ``guided_calibration``. Raises as it does."""
@@ -124,7 +125,7 @@ def guided_samples(
         say("first pass: which touches can be seen in what poses and widgets labelled", 0.1)
         first = TouchPosterior(priors, layout.sensors, skeleton, ())
         seen, refused = seen_touches(touching, first, skeleton)
-        _stop_if(cancelled)
+        stop_if(cancelled, "training")
     say("what all touches tell together", 0.5)
     posterior = TouchPosterior(priors, layout.sensors, skeleton, (), cancelled)
     if seen and skeleton is not None:
@@ -161,7 +162,7 @@ def guided_calibration(
     *,
     take_hashes: Sequence[str] = (),
     parent: str | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
     report: Report | None = None,
 ) -> GuidedCalibration:
     """Train on the takes of one or several samplings of a subject, whose hand is ``skeleton``.
@@ -215,8 +216,3 @@ def _plain(
     ]
     said = f"Trained by method {settings.method}, which takes known angles as they are and no touches."
     return GuidedCalibration(model, tuple(item for item in counts if item.samples), (), (said,))
-
-
-def _stop_if(cancelled: Callable[[], bool] | None) -> None:
-    if cancelled is not None and cancelled():
-        raise Cancelled("training was cancelled")

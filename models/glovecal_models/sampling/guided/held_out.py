@@ -6,14 +6,14 @@ believed (``rotation_posterior.py``, ``touch_posterior.py``); the regressor trai
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.errors import Cancelled
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.layout import Layout
+from glovecal_models.progress import Cancel, stop_if
 from glovecal_models.sampling.guided.labelled_takes import LabelledFrames, Moved
 from glovecal_models.sampling.guided.rotation_posterior import Ranges, first_posteriors
 from glovecal_models.sampling.guided.seen_touches import SeenTouch
@@ -59,7 +59,7 @@ def held_out_errors(
     skeleton: Skeleton | None,
     seen: Sequence[SeenTouch],
     whole: TouchPosterior,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
 ) -> HeldOutErrors:
     """Nothing of what has fewer than ``FEWEST`` to choose from. Raises Cancelled."""
     widgets = {}
@@ -68,8 +68,7 @@ def held_out_errors(
         if len(angles) >= FEWEST:
             errors = [_of_widget(layout, samples, ranges, rotation, angle) for angle in angles[1:-1].tolist()]
             widgets[rotation] = float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
-        if cancelled is not None and cancelled():
-            raise Cancelled("leaving out widgets was cancelled")
+        stop_if(cancelled, "leaving out widgets")
     return HeldOutErrors(widgets, _of_touches(layout, skeleton, seen, whole, cancelled))
 
 
@@ -98,7 +97,7 @@ def _of_touches(
     skeleton: Skeleton | None,
     seen: Sequence[SeenTouch],
     whole: TouchPosterior,
-    cancelled: Callable[[], bool] | None,
+    cancelled: Cancel | None,
 ) -> dict[str, float]:
     if skeleton is None or len(seen) < FEWEST:
         return {}

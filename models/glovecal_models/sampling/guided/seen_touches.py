@@ -6,7 +6,7 @@ session leaves open cannot be true.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,7 @@ from glovecal_models.inverse_kinematics.touch_check import (
     require_happened,
     require_possible,
 )
+from glovecal_models.progress import Cancel
 from glovecal_models.sampling.guided.labelled_takes import LabelledTake
 from glovecal_models.sampling.guided.rotation_posterior import RotationPosterior
 from glovecal_models.sampling.guided.touch_posterior import TouchFrames, TouchPosterior
@@ -118,7 +119,7 @@ def closing_touches(
     sensors: Sequence[str],
     skeleton: Skeleton,
     seen: Sequence[SeenTouch],
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancel | None = None,
     limits: SamplingLimits = SAMPLING_LIMITS,
 ) -> tuple[TouchPosterior, list[SeenTouch], list[RefusedTouch]]:
     """The likeliest calibration, the touches it rests on, and those that contradict. Raises Cancelled."""

@@ -10,7 +10,7 @@ over a session instead of a frame.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,7 @@ from glovecal_models.errors import Cancelled
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.inverse_kinematics.contact import Rod, Touch
 from glovecal_models.inverse_kinematics.tip_chains import TipChains
+from glovecal_models.progress import Cancel
 from glovecal_models.sampling.guided.rotation_posterior import RotationPosterior
 
 CONTACT_SD_MM = 0.3
@@ -47,7 +48,7 @@ class TouchPosterior:
         sensors: Sequence[str],
         skeleton: Skeleton | None,
         touches: Sequence[TouchFrames],
-        cancelled: Callable[[], bool] | None = None,
+        cancelled: Cancel | None = None,
     ) -> None:
         self.priors = priors
         self._sensors = tuple(sensors)
@@ -108,7 +109,7 @@ class TouchPosterior:
         rows = [each.readings[:, columns] for each in self._touches if rotation in each.functions]
         return np.concatenate([np.empty((0, len(columns))), *rows])
 
-    def _search(self, cancelled: Callable[[], bool] | None) -> None:
+    def _search(self, cancelled: Cancel | None) -> None:
         """Angles are prior + covariance times ``force`` (N,) of each rotation; steps that do not help are
         shortened."""
         names = [name for name, at in self._at.items() if len(at)]
