@@ -24,8 +24,8 @@ from glovecal_client.wire.frame import encode_frame
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.errors import BadInput
 from glovecal_service.realtime.frame_gate import TAKEOVER_AFTER_NS
-from glovecal_service.realtime.recording_file import RecordingFile
 from glovecal_service.realtime.recording_take import read_take
+from glovecal_service.realtime.run_ledger import RunLedger
 
 SETTLING_S = 2.5
 
@@ -221,7 +221,7 @@ def test_context_goes_with_the_frame_and_what_is_not_sent_is_said() -> None:
 def test_a_recording_read_back_gives_what_was_live(tmp_path: Path) -> None:
     frames = moving_frames(200)
     meta = {"capture": {"sensors": list(LAYOUT.sensors), "context": []}}
-    file = RecordingFile.create(tmp_path / "r.glog", meta)
+    file = RunLedger.create(tmp_path / "r.glog", meta)
     for frame in frames:
         file.add(frame, encode_frame(frame))
     file.close()

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glovecal_client.wire.frame import Frame, FrameFlag, encode_frame
-from glovecal_service.realtime.recording_file import RecordingFile
+from glovecal_service.realtime.run_ledger import RunLedger
 from glovecal_service.realtime.sequence_ranges import SequenceRanges
 
 numbers = st.lists(st.integers(0, 60), max_size=80)
@@ -43,7 +43,7 @@ def test_ranges_without_a_gap_are_one() -> None:
 
 def test_a_file_opened_again_knows_where_the_numbers_jumped(tmp_path: Path) -> None:
     """A made-up first number, the glove's own, a jump far ahead, a restart below; one gap, then repaired."""
-    file = RecordingFile.create(tmp_path / "r.glog", {})
+    file = RunLedger.create(tmp_path / "r.glog", {})
     numbers = [10**9, *range(100, 110), *range(112, 120), *range(10**6, 10**6 + 5), *range(5)]
     for at, number in enumerate(numbers):
         time_ns = at * 8_000_000
@@ -54,6 +54,6 @@ def test_a_file_opened_again_knows_where_the_numbers_jumped(tmp_path: Path) -> N
     account = file.runs[1].document()
     assert (account["sent"], account["recorded"], account["missing"]) == (31, 30, [[111, 111]])
     file.close()
-    again = RecordingFile.resume(tmp_path / "r.glog")
+    again = RunLedger.resume(tmp_path / "r.glog")
     assert again.runs[1].document() == account
     again.close()

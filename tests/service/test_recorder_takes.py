@@ -64,7 +64,7 @@ def check_exact(store: Store, record: RecordingRecord) -> None:
     assert facts["sent"] == facts["recorded"] + facts["missing_frames"]
     assert facts["missing_frames"] == sum(last - first + 1 for first, last in facts["missing"])
     take = store.takes.load(facts["take"])
-    assert len(take.time_s) == facts["recorded"] + facts["lead_in"]["frames"]
+    assert len(take.time_s) == facts["recorded"] + facts["pre_roll"]["frames"]
     kept = store.takes.get(facts["take"])
     assert (kept.recording, kept.state) == (record.id, "complete")
 
@@ -131,8 +131,8 @@ def test_what_capture_cannot_be_asked_for_is_pending(settings: Settings, store: 
     assert len(store.takes.load(record.facts["take"]).time_s) == 16
     assert "incomplete, repairing: " in sentence(store, asked.id)
     assert "6 still to be fetched from the capture log" in sentence(store, asked.id)
-    assert record.facts["lead_in"]["frames"] == 0
-    assert "capture's log did not give more: " in record.facts["lead_in"]["sentence"]
+    assert record.facts["pre_roll"]["frames"] == 0
+    assert "capture's log did not give more: " in record.facts["pre_roll"]["sentence"]
 
 
 def test_numbers_that_no_glove_can_have_reached_are_not_sent(settings: Settings, store: Store) -> None:
@@ -231,7 +231,7 @@ def test_a_full_disk_is_said_and_what_was_recorded_stays(
         assert record.facts["pending_frames"] > 0
         assert "the disk is full" in record.facts["sentence"]
         kept = store.takes.get(record.facts["take"])
-        assert kept.frames == record.facts["recorded"] + record.facts["lead_in"]["frames"] > 100
+        assert kept.frames == record.facts["recorded"] + record.facts["pre_roll"]["frames"] > 100
         subprocess.run(["mount", "-o", "remount,size=4m", str(small_disk)], check=True)
         record = settled(store, asked.id)
     check_exact(store, record)

@@ -26,7 +26,7 @@ from glovecal_service.realtime import reconciliation
 from glovecal_service.realtime.capture_log import CaptureRun, CaptureStanding
 from glovecal_service.realtime.reconciliation import Patience, reconcile
 from glovecal_service.realtime.recording_account import Settlement
-from glovecal_service.realtime.recording_file import BEGIN, RecordingFile
+from glovecal_service.realtime.run_ledger import BEGIN, RunLedger
 
 MS = 1_000_000
 CLOCK_AHEAD_NS = 3_600_000 * MS
@@ -110,7 +110,7 @@ class Story:
         self.path = folder / "recording.glog"
         wall_ns = self.capture.numbered[-1].frame.wall_ns
         begin = {"run_id": f"{1:016x}", "sequence": self.capture.sequence, "wall_ns": wall_ns}
-        self.file = self.opened(RecordingFile.create(self.path, {BEGIN: begin}))
+        self.file = self.opened(RunLedger.create(self.path, {BEGIN: begin}))
         self.begin = len(self.capture.numbered)
 
     def tell(self, what: str, count: int) -> None:
@@ -126,18 +126,18 @@ class Story:
             if what.startswith("received"):
                 self.file.add(frame, encode_frame(frame))
 
-    def kill(self, frames_meanwhile: int) -> RecordingFile:
+    def kill(self, frames_meanwhile: int) -> RunLedger:
         """The process is gone with what it knew; the file is left as it was."""
         for _ in range(frames_meanwhile):
             self.capture.frame(True)
-        return self.opened(RecordingFile.resume(self.path))
+        return self.opened(RunLedger.resume(self.path))
 
-    def opened(self, file: RecordingFile) -> RecordingFile:
+    def opened(self, file: RunLedger) -> RunLedger:
         """A killed process' file is closed at the very end; nothing waits in it that this would write."""
         return self.capture.open.enter_context(closing(file))
 
     def settle(self, stop_ns: int) -> Settlement:
-        file = RecordingFile.resume(self.path)
+        file = RunLedger.resume(self.path)
         outcome = reconcile(file, self.capture, stop_ns, Patience(60.0, Event()))
         file.close()
         return Settlement.of(file, outcome)

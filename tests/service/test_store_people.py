@@ -184,7 +184,7 @@ def test_a_recording_moves_forward_only(store):
     recording_facts = dict(done.facts)
     asked_s = recording_facts.pop("stop_asked_s")
     assert done.ended_at == datetime.fromtimestamp(asked_s, UTC)
-    assert recording_facts == {"lead_in": {"asked_s": 60.0}, "first_sequence": 7, **facts}
+    assert recording_facts == {"pre_roll": {"asked_s": 60.0}, "first_sequence": 7, **facts}
     assert store.recordings.stop(recording.id).state == "done"
     assert store.recordings.update(recording.id, state="failed").state == "done"
     second = store.recordings.request("left", name="run")

@@ -20,7 +20,7 @@ WANDER_PER_CENT = 1.0
 
 @dataclass(frozen=True)
 class SmoothTake:
-    """A take without its lead-in, smoothed over ``WINDOW_S`` and thinned."""
+    """A take without its pre-roll, smoothed over ``WINDOW_S`` and thinned."""
 
     take: Take
     time_s: np.ndarray
@@ -49,7 +49,7 @@ class SmoothTake:
 
 def smooth_take(take: Take) -> SmoothTake:
     """Of a take with at least one frame."""
-    first = min(take.lead_in_frames, len(take.time_s) - 1)
+    first = min(take.pre_roll_frames, len(take.time_s) - 1)
     time, readings = take.time_s[first:], take.readings[first:]
     angles = take.reference_at_frames(take.rotations)[first:]
     interval = float(np.median(np.diff(time))) if len(time) > 1 else WINDOW_S

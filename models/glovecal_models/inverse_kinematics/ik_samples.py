@@ -57,8 +57,8 @@ def ik_samples(take: Take, model: CalibrationModel, skeleton: Skeleton, contact:
     """
     chains = TipChains(skeleton, contact.fingers)
     require_possible(chains, contact, skeleton)
-    hand = predicted_hand(take, model).frames(slice(take.lead_in_frames, None))
-    hand = replace(hand, mean_deg=steadied(take.time_s[take.lead_in_frames :], hand.mean_deg))
+    hand = predicted_hand(take, model).frames(slice(take.pre_roll_frames, None))
+    hand = replace(hand, mean_deg=steadied(take.time_s[take.pre_roll_frames :], hand.mean_deg))
     shape = hand.shape(chains)
     if not len(shape):
         raise BadInput(f"take {take.name!r} has no frames to find a touch in")
@@ -67,7 +67,7 @@ def ik_samples(take: Take, model: CalibrationModel, skeleton: Skeleton, contact:
     require_happened(verdict, contact, hand, skeleton)
     kept = verdict.believable & ~hand.is_faulty[:, chains.columns].any(axis=1)
     told = _told(chains, contact, shape, found.angles_deg)
-    frames = np.flatnonzero(kept) + take.lead_in_frames
+    frames = np.flatnonzero(kept) + take.pre_roll_frames
     return IkSamples(
         contact=contact,
         rotations=chains.rotations,

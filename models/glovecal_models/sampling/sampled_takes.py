@@ -1,7 +1,7 @@
 """Takes from the marks of a sampling: what was recorded in its steps, with what is known of the angles.
 
 The recording stays as it is; these takes are cut out of it. Steps of one part that follow each other make one
-take, and what was recorded in the minute before is its lead-in. A held or clamped rotation has its angle in
+take, and what was recorded in the minute before is its pre-roll. A held or clamped rotation has its angle in
 every frame of its step, all else is not measured. Touches get their angles from inverse kinematics: until
 then their takes have none.
 """
@@ -20,7 +20,7 @@ from glovecal_models.sampling.state import Attempt, SamplingState
 from glovecal_models.sampling.steps import CHECK_PART
 from glovecal_models.takes.take import Take
 
-LEAD_IN_S = 60.0
+PRE_ROLL_S = 60.0
 REUSABLE: tuple[Kind, ...] = ("fk_independent", "fk_cross_couple")
 """Kinds that hold for another subject too, roughly: sensors are calibrated, not hands (Wang & Neff 2013,
 section 8.2). An IK sample depends on the lengths of one hand."""
@@ -121,7 +121,7 @@ def _frames(take: Take, attempt: Attempt) -> np.ndarray:
 def _cut(whole: Take, marks: list[tuple[Step, Attempt]], name: str) -> SampledTake:
     rows = [_frames(whole, attempt) for _, attempt in marks]
     begins_s = float(whole.time_s[rows[0][0]])
-    first = int(np.searchsorted(whole.time_s, begins_s - LEAD_IN_S))
+    first = int(np.searchsorted(whole.time_s, begins_s - PRE_ROLL_S))
     last = int(rows[-1][-1]) + 1
     rotations = tuple(dict.fromkeys(rotation for step, _ in marks for rotation in step.angles))
     reference = np.full((last - first, len(rotations)), np.nan)

@@ -43,8 +43,8 @@ def reference_warnings(take: Take) -> list[str]:
 
 
 def frames_with_reference(take: Take) -> np.ndarray:
-    """(N,) whether anything was measured at each frame that was asked for; the lead-in is not counted."""
-    angles = take.reference_at_frames(take.rotations)[take.lead_in_frames :]
+    """(N,) whether anything was measured at each frame that was asked for; the pre-roll is not counted."""
+    angles = take.reference_at_frames(take.rotations)[take.pre_roll_frames :]
     return np.any(np.isfinite(angles), axis=1)
 
 

@@ -39,8 +39,8 @@ class Take:
     """A pose name for each frame ("" for none), or None when the take has no pose column."""
     simulated: bool = False
     begins_s: float | None = None
-    """Frames before this time are a lead-in: recorded before the take was asked for, they tell effects with a
-    memory where they stand. No reference is read there, as other takes may hold the same frames. None: all
+    """Frames before this time are a pre-roll: recorded before the take was asked for, they tell effects with
+    a memory where they stand. No reference is read there, as other takes may hold the same frames. None: all
     frames are asked for."""
 
     def __post_init__(self) -> None:
@@ -69,7 +69,7 @@ class Take:
         return first if self.begins_s is None else max(first, self.begins_s)
 
     @property
-    def lead_in_frames(self) -> int:
+    def pre_roll_frames(self) -> int:
         return 0 if self.begins_s is None else int(np.searchsorted(self.time_s, self.begins_s))
 
     @property
@@ -80,7 +80,7 @@ class Take:
         """Reference angles at the frame times, shape (N, len(rotations)), NaN where none was measured.
 
         With a time column of its own the reference is interpolated linearly, never extrapolated and
-        never across a gap longer than ``LONGEST_INTERPOLATED_GAP_S``, and never in the lead-in.
+        never across a gap longer than ``LONGEST_INTERPOLATED_GAP_S``, and never in the pre-roll.
         """
         result = np.full((len(self.time_s), len(rotations)), np.nan)
         for column, rotation in enumerate(rotations):
@@ -90,7 +90,7 @@ class Take:
             if self.has_own_reference_clock:
                 values = _interpolate(self.time_s, self.reference_time_s, values)
             result[:, column] = values
-        result[: self.lead_in_frames] = np.nan
+        result[: self.pre_roll_frames] = np.nan
         return result
 
 

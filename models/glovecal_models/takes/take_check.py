@@ -49,9 +49,9 @@ class TakeCheck:
     repeated_frames: float
     """Share of frames that are the same as the one before in every sensor."""
     frames_with_reference: float
-    """Share of the frames after the lead-in that have at least one reference angle."""
-    lead_in_frames: int
-    lead_in_s: float
+    """Share of the frames after the pre-roll that have at least one reference angle."""
+    pre_roll_frames: int
+    pre_roll_s: float
     """Frames, and seconds, recorded before the take was asked for."""
     sensors: tuple[SensorRange, ...]
     rotations: tuple[RotationRange, ...]
@@ -72,8 +72,8 @@ def check_take(take: Take) -> TakeCheck:
         longest_interval_s=float(intervals.max()) if len(intervals) else None,
         repeated_frames=repeated,
         frames_with_reference=float(frames_with_reference(take).mean()),
-        lead_in_frames=take.lead_in_frames,
-        lead_in_s=take.start_s - float(take.time_s[0]),
+        pre_roll_frames=take.pre_roll_frames,
+        pre_roll_s=take.start_s - float(take.time_s[0]),
         sensors=sensors,
         rotations=tuple(
             item for index in range(len(take.rotations)) if (item := _rotation(take, index)) is not None

@@ -84,13 +84,13 @@ def _frames_columns(takes: Sequence[Take], *, with_reference: bool) -> dict[str,
 
 
 def _reference_columns(takes: Sequence[Take]) -> dict[str, TableColumn]:
-    takes = [_without_reference_of_lead_in(take) for take in takes]
+    takes = [_without_reference_of_pre_roll(take) for take in takes]
     columns: dict[str, TableColumn] = {"time_s": np.concatenate([take.reference_time_s for take in takes])}
     columns["take"] = [take.name for take in takes for _ in take.reference_time_s]
     return columns | _rotation_columns(takes, lambda take: len(take.reference_time_s))
 
 
-def _without_reference_of_lead_in(take: Take) -> Take:
+def _without_reference_of_pre_roll(take: Take) -> Take:
     """A table does not say where a take begins: a reference that is not to be read is not written."""
     if take.begins_s is None:
         return take

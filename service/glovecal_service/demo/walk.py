@@ -95,7 +95,7 @@ def _record(
         options["duration"] = str(FREE_MOTION_S)  # it has no end of its own
     if wearing == "second":
         options["reference_noise_deg"] = "0"  # the simulated hand's truth itself
-    # each motion is a run of its own, and nothing in this glove remembers: no lead-in
+    # each motion is a run of its own, and nothing in this glove remembers: no pre-roll
     wanted = {
         "glove": GLOVE,
         "name": f"{wearing}-{motion}",

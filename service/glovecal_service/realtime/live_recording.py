@@ -18,14 +18,14 @@ from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_service.realtime.arrivals import Arrivals
 from glovecal_service.realtime.capture_log import CaptureLog
 from glovecal_service.realtime.frame_gate import TAKEOVER_AFTER_NS
-from glovecal_service.realtime.lead_in import LeadIn
-from glovecal_service.realtime.lead_in_wish import LeadInWish
+from glovecal_service.realtime.pre_roll import PreRoll
+from glovecal_service.realtime.pre_roll_request import PreRollRequest
 from glovecal_service.realtime.reconciliation import OutOfTime, Patience, fill_gaps, reconcile
 from glovecal_service.realtime.recording_account import Settlement, recording_account
-from glovecal_service.realtime.recording_file import RecordingFile, decoded
 from glovecal_service.realtime.refusal import Refusal, Refused
+from glovecal_service.realtime.run_ledger import RunLedger, decoded
 from glovecal_service.realtime.sequence_order import SequenceOrder
-from glovecal_service.store.recordings import LEAD_IN
+from glovecal_service.store.recordings import PRE_ROLL
 
 WAITING_LIMIT, STATUSES_LIMIT = 65536, 1024
 HELD_LIMIT = 1024
@@ -40,18 +40,16 @@ class LiveRecording:
     """Reads its glove's frames by a subscription of its own, which cannot hold up anybody else.
 
     It listens before ``open_file`` says where the recording begins, so that no frame is lost in between. The
-    lead-in is fetched once a frame is there to lead to.
+    pre-roll is fetched once a frame is there to lead to.
     """
 
-    def __init__(
-        self, session: zenoh.Session, keys: GloveKeys, open_file: Callable[[], RecordingFile]
-    ) -> None:
+    def __init__(self, session: zenoh.Session, keys: GloveKeys, open_file: Callable[[], RunLedger]) -> None:
         """Raises what ``open_file`` raises."""
         self.keys = keys
         self.refused = 0
         """Messages of a second publisher, damaged ones, and numbers that no glove can have reached."""
         self._session = session
-        self._lead_in: LeadIn | None = None
+        self._pre_roll: PreRoll | None = None
         self._run_id: int | None = None
         self._heard_ns = 0
         self._order = SequenceOrder()
@@ -66,7 +64,7 @@ class LiveRecording:
         except BaseException:
             self._close_arrivals()
             raise
-        self._wish = LeadInWish.of_document(self.file.meta.get(LEAD_IN))
+        self._wish = PreRollRequest.of_document(self.file.meta.get(PRE_ROLL))
 
     def take_in(self) -> None:
         """Write what arrived since the last call."""
@@ -85,24 +83,24 @@ class LiveRecording:
             if f"{books.run_id:016x}" == run_id:
                 books.last, books.ended = max(books.last, last), True
 
-    def take_lead_in(self) -> None:
-        """Write what was fetched of the lead-in since the last call; never waits."""
-        if self._lead_in is None:
-            self._lead_in = self._begin_lead_in()
+    def take_pre_roll(self) -> None:
+        """Write what was fetched of the pre-roll since the last call; never waits."""
+        if self._pre_roll is None:
+            self._pre_roll = self._begin_pre_roll()
         else:
-            self._write_some(self._lead_in)
+            self._write_some(self._pre_roll)
 
-    def _begin_lead_in(self) -> LeadIn | None:
+    def _begin_pre_roll(self) -> PreRoll | None:
         first, oldest = self.file.first_frame, self.file.oldest_frame
         if first is None or oldest is None or not self._wish.most_s:
             return None
         from_ns = first.monotonic_ns - round(self._wish.most_s * 1e9)
-        return LeadIn(self._session, self.keys, oldest, from_ns)
+        return PreRoll(self._session, self.keys, oldest, from_ns)
 
-    def _write_some(self, lead_in: LeadIn) -> None:
-        frames = lead_in.take()
+    def _write_some(self, pre_roll: PreRoll) -> None:
+        frames = pre_roll.take()
         if frames and not self.file.has_room_to_spare:
-            lead_in.stop("the disk is nearly full")
+            pre_roll.stop("the disk is nearly full")
             return
         for frame in frames:
             self.file.add(frame, encode_frame(frame))
@@ -173,24 +171,24 @@ class LiveRecording:
         patience.wait(ON_THE_WAY_S)
         self._stop_listening()
         outcome = reconcile(self.file, self._log, stop_wall_ns, patience)
-        self._finish_lead_in(patience)
+        self._finish_pre_roll(patience)
         self.file.close()
         return Settlement.of(self.file, outcome, refused=self.refused, why_shorter=self._why_shorter())
 
-    def _finish_lead_in(self, patience: Patience) -> None:
-        self.take_lead_in()
-        while self._lead_in is not None and self._lead_in.goes_on and not patience.is_over:
-            self._write_some(self._lead_in)
+    def _finish_pre_roll(self, patience: Patience) -> None:
+        self.take_pre_roll()
+        while self._pre_roll is not None and self._pre_roll.goes_on and not patience.is_over:
+            self._write_some(self._pre_roll)
             time.sleep(0.01)
-        if self._lead_in is not None:
-            self._lead_in.stop()
+        if self._pre_roll is not None:
+            self._pre_roll.stop()
 
     def abandon(self) -> None:
         """Close the file as it is; a later process resumes it."""
         self._stop_listening()
-        if self._lead_in is not None:
-            self._lead_in.stop()
-            self._lead_in.wait()
+        if self._pre_roll is not None:
+            self._pre_roll.stop()
+            self._pre_roll.wait()
         self.file.close()
 
     def _stop_listening(self) -> None:
@@ -208,6 +206,6 @@ class LiveRecording:
         )
 
     def _why_shorter(self) -> str | None:
-        if self._lead_in is not None:
-            return self._lead_in.why_shorter
+        if self._pre_roll is not None:
+            return self._pre_roll.why_shorter
         return "no frame has come yet" if self.file.first_frame is None else None

@@ -17,8 +17,8 @@ from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.state import OVER, SamplingState
 from glovecal_models.sampling.verdict import TouchCheck
 from glovecal_service.realtime.arrivals import Arrivals
-from glovecal_service.realtime.chosen_apart import ChosenApart
-from glovecal_service.realtime.recording_file import decoded
+from glovecal_service.realtime.background_planner import BackgroundPlanner
+from glovecal_service.realtime.run_ledger import decoded
 from glovecal_service.store.errors import Conflict
 from glovecal_service.store.records import RecordingRecord, SamplingRecord
 from glovecal_service.store.store import Store
@@ -46,7 +46,7 @@ class LiveSampling:
     ) -> None:
         self.record = record
         self._clock = clock
-        self._choose = ChosenApart(NextStep(layout))
+        self._choose = BackgroundPlanner(NextStep(layout))
         state = SamplingState.from_document(record.document)
         self._sampling = Sampling(state, touch_check=touch_check, choose=self._choose)
         self._sampling.recording = None

@@ -16,7 +16,7 @@ import zenoh
 from glovecal_client.errors import NoAnswer, QueryRefused, WireError
 from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_service.realtime.capture_log import CaptureStanding
-from glovecal_service.realtime.recording_file import RecordingFile, RunBooks
+from glovecal_service.realtime.run_ledger import RunBooks, RunLedger
 
 END_OF_RUN = (1 << 63) - 1
 TRY_AGAIN_AFTER_S = 0.1
@@ -62,7 +62,7 @@ class Patience:
         self._stopped.wait(seconds)
 
 
-def reconcile(file: RecordingFile, log: Log, stop_wall_ns: int | None, patience: Patience) -> Outcome:
+def reconcile(file: RunLedger, log: Log, stop_wall_ns: int | None, patience: Patience) -> Outcome:
     """Fetch what is not in ``file``, as far as the log can be asked.
 
     ``stop_wall_ns`` is when the end was asked for, by this computer's clock; None: the last frame there is
@@ -86,7 +86,7 @@ def reconcile(file: RecordingFile, log: Log, stop_wall_ns: int | None, patience:
         patience.wait(TRY_AGAIN_AFTER_S)
 
 
-def _reconcile_once(file: RecordingFile, log: Log, stop_wall_ns: int | None, patience: Patience) -> None:
+def _reconcile_once(file: RunLedger, log: Log, stop_wall_ns: int | None, patience: Patience) -> None:
     """Raises NoAnswer, WireError, OutOfTime; QueryRefused when all else was done."""
     try:
         standing = log.standing()
@@ -109,7 +109,7 @@ def _reconcile_once(file: RecordingFile, log: Log, stop_wall_ns: int | None, pat
         raise refused
 
 
-def _open_runs_of(file: RecordingFile, standing: CaptureStanding, end_ns: int) -> None:
+def _open_runs_of(file: RunLedger, standing: CaptureStanding, end_ns: int) -> None:
     """The runs that began after the last one known and before the end: they belong to the recording whole."""
     began_ns = file.last_wall_ns or file.created_wall_ns + standing.clock_ahead_ns
     for run in standing.runs:
@@ -117,7 +117,7 @@ def _open_runs_of(file: RecordingFile, standing: CaptureStanding, end_ns: int) -
             file.open_run(run.run_id)
 
 
-def fill_gaps(file: RecordingFile, books: RunBooks, log: Log, patience: Patience) -> int:
+def fill_gaps(file: RunLedger, books: RunBooks, log: Log, patience: Patience) -> int:
     """Fetch what is missing of a run up to its last frame known; how many came. Raises as ``Log`` does."""
     came = 0
     for first, last in books.missing():
@@ -129,7 +129,7 @@ def fill_gaps(file: RecordingFile, books: RunBooks, log: Log, patience: Patience
 
 def _go_on_to(
     end_ns: int,
-    file: RecordingFile,
+    file: RunLedger,
     books: RunBooks,
     log: Log,
     standing: CaptureStanding,

@@ -19,13 +19,13 @@ from glovecal_client.keys import GloveKeys
 from glovecal_client.queries import ask_json
 from glovecal_models.errors import BadInput, GlovecalError
 from glovecal_service.realtime.capture_log import CaptureLog
-from glovecal_service.realtime.lead_in_wish import lead_in_wish
 from glovecal_service.realtime.live_recording import LiveRecording
+from glovecal_service.realtime.pre_roll_request import pre_roll_request
 from glovecal_service.realtime.reconciliation import Patience
 from glovecal_service.realtime.recording_account import Settlement
-from glovecal_service.realtime.recording_file import BEGIN, CREATED, SUFFIX, RecordingFile
 from glovecal_service.realtime.recording_repair import repair, settle
 from glovecal_service.realtime.recording_result import keep_as_take
+from glovecal_service.realtime.run_ledger import BEGIN, CREATED, SUFFIX, RunLedger
 from glovecal_service.settings import Settings
 from glovecal_service.store.clock import now
 from glovecal_service.store.errors import (
@@ -37,7 +37,7 @@ from glovecal_service.store.errors import (
     StoreError,
     StoreUnavailable,
 )
-from glovecal_service.store.recordings import ENDED_BY, LEAD_IN, STOP_ASKED
+from glovecal_service.store.recordings import ENDED_BY, PRE_ROLL, STOP_ASKED
 from glovecal_service.store.records import RecordingRecord
 from glovecal_service.store.store import Store
 
@@ -48,7 +48,7 @@ RESUME_WITHIN_S = 60.0
 GIVE_UP_AFTER_S = 7 * 86400.0
 """What no capture log gave until then is missing."""
 FINISH_WITHIN_S = 5.0
-"""For the account and the lead-in; ten minutes of it at 120 Hz come in about as long."""
+"""For the account and the pre-roll; ten minutes of it at 120 Hz come in about as long."""
 NOTICED_AFTER_S = 2 * LOOK_EVERY_S
 """A recorder that runs sees a stop by then, and so long one that did not run would have recorded."""
 MOST_AT_ONCE = 32
@@ -107,7 +107,7 @@ class Recorder:
         for id, live in list(self._live.items()):
             try:
                 live.take_in()
-                live.take_lead_in()
+                live.take_pre_roll()
                 live.repair_now_and_then()
             except (ClientError, OSError, ValueError) as error:
                 self._note(id, sentence=f"recording goes on with trouble: {error}")
@@ -181,8 +181,8 @@ class Recorder:
             )
             return
 
-        def file() -> RecordingFile:
-            return RecordingFile.resume(path) if interrupted else self._create(store, record, path)
+        def file() -> RunLedger:
+            return RunLedger.resume(path) if interrupted else self._create(store, record, path)
 
         live = self._live[record.id] = LiveRecording(self._session, self._keys(record), file)
         facts = {}
@@ -199,7 +199,7 @@ class Recorder:
     def _path(self, record: RecordingRecord) -> Path:
         return self._settings.recordings_folder / f"{record.id}{SUFFIX}"
 
-    def _create(self, store: Store, record: RecordingRecord, path: Path) -> RecordingFile:
+    def _create(self, store: Store, record: RecordingRecord, path: Path) -> RunLedger:
         keys = self._keys(record)
         meta: dict[str, Any] = {"recording": record.id, "name": record.name, "glove": record.glove}
         meta[CREATED] = time.time_ns()
@@ -214,9 +214,9 @@ class Recorder:
         except NoAnswer:
             meta.setdefault("capture", _stored_meta(store, record.glove))
         others = _sound(lambda: store.recordings.list(record.glove))
-        meta[LEAD_IN] = lead_in_wish(record, store.gloves.get(record.glove), others, now()).document()
+        meta[PRE_ROLL] = pre_roll_request(record, store.gloves.get(record.glove), others, now()).document()
         try:
-            return RecordingFile.create(path, meta)
+            return RunLedger.create(path, meta)
         except OSError as error:
             raise StorageFull(f"recording {record.name}: {path.name} cannot be written: {error}") from error
 
@@ -312,7 +312,7 @@ def _sound(recordings: Callable[[], list[RecordingRecord]]) -> list[RecordingRec
         return error.sound
 
 
-def _interruption(file: RecordingFile) -> dict[str, Any]:
+def _interruption(file: RunLedger) -> dict[str, Any]:
     return {"last_frame_wall_s": file.last_wall_ns / 1e9, "resumed_wall_s": time.time()}
 
 

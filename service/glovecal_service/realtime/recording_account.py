@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from glovecal_service.realtime.lead_in_wish import LeadInWish
+from glovecal_service.realtime.pre_roll_request import PreRollRequest
 from glovecal_service.realtime.reconciliation import Outcome
-from glovecal_service.realtime.recording_file import RecordingFile
-from glovecal_service.store.recordings import LEAD_IN
+from glovecal_service.realtime.run_ledger import RunLedger
+from glovecal_service.store.recordings import PRE_ROLL
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Settlement:
     outcome: Outcome
 
     @classmethod
-    def of(cls, file: RecordingFile, outcome: Outcome, **told: Any) -> Settlement:
+    def of(cls, file: RunLedger, outcome: Outcome, **told: Any) -> Settlement:
         """Of a file that was closed; ``told`` is as in ``recording_account``."""
         if file.lost_records:
             outcome = Outcome(False, "the disk is full")
@@ -33,17 +33,17 @@ class Settlement:
 
 
 def recording_account(
-    file: RecordingFile, *, complete: bool, refused: int = 0, why_shorter: str | None = None
+    file: RunLedger, *, complete: bool, refused: int = 0, why_shorter: str | None = None
 ) -> dict[str, Any]:
     """Facts for the recording's row; ``sent`` = ``recorded`` + ``missing_frames`` + ``pending_frames``.
 
     ``missing`` are ranges that no log has, known once the account is ``complete``; until then what is not
-    recorded is ``pending``: it may still be fetched. The lead-in is counted apart, and nothing of it is ever
+    recorded is ``pending``: it may still be fetched. The pre-roll is counted apart, and nothing of it is ever
     missing; ``why_shorter`` is a clause on why it is shorter than asked for.
     """
-    wish = LeadInWish.of_document(file.meta.get(LEAD_IN))
+    wish = PreRollRequest.of_document(file.meta.get(PRE_ROLL))
     if why_shorter is None:
-        why_shorter = "the recording was interrupted" if file.lead_in_s < wish.most_s - 1.0 else ""
+        why_shorter = "the recording was interrupted" if file.pre_roll_s < wish.most_s - 1.0 else ""
     runs = [books.document() for books in file.runs.values()]
     gaps = [gap for run in runs for gap in run["missing"]]
     frames = sum(last - first + 1 for first, last in gaps)
@@ -59,7 +59,7 @@ def recording_account(
         "pending": [] if complete else gaps,
         "pending_frames": 0 if complete else frames,
         "refused": refused,
-        LEAD_IN: wish.account(len(file.lead_in), file.lead_in_s, why_shorter),
+        PRE_ROLL: wish.account(len(file.pre_roll), file.pre_roll_s, why_shorter),
         "runs": runs,
         "file": file.path.name,
     }

@@ -9,7 +9,7 @@ from glovecal_client.errors import NoAnswer
 from glovecal_service.realtime.capture_log import CaptureLog
 from glovecal_service.realtime.reconciliation import Patience, reconcile
 from glovecal_service.realtime.recording_account import Settlement
-from glovecal_service.realtime.recording_file import RecordingFile
+from glovecal_service.realtime.run_ledger import RunLedger
 
 REPAIR_WITHIN_S = 60.0
 
@@ -46,7 +46,7 @@ def settle(
     patience: Patience,
 ) -> Settlement:
     """The account of a closed file, repaired as far as ``patience`` allows."""
-    file = RecordingFile.resume(path)
+    file = RunLedger.resume(path)
     try:
         outcome = reconcile(file, log, stop_wall_ns, patience)
     finally:

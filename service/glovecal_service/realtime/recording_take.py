@@ -22,13 +22,13 @@ class RecordedTake:
     take: Take
     clock: dict[str, Any]
     """``wall_minus_time_s``: add it to ``time_s`` for seconds since 1970; ``begins_s``: ``time_s`` of the
-    first frame that was asked for, after the lead-in; ``left_out``: frames not taken."""
+    first frame that was asked for, after the pre-roll; ``left_out``: frames not taken."""
 
 
 def read_take(path: Path, *, name: str, wearing: str, first_sequence: int = 0) -> RecordedTake:
     """The frames of all runs in order; ``time_s`` is the capture computer's monotonic clock in seconds.
 
-    Fetched frames of the first run with numbers below ``first_sequence`` are the lead-in.
+    Fetched frames of the first run with numbers below ``first_sequence`` are the pre-roll.
     Frames whose time does not increase, or with another number of sensors, are left out and counted.
     Raises BadInput if nothing usable remains, DamagedLog, OSError.
     """

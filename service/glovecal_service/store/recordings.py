@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, select
@@ -18,14 +19,16 @@ from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sou
 from glovecal_service.store.subjects import require_subject
 from glovecal_service.store.texts import check_text
 
-LEAD_IN = "lead_in"
+PRE_ROLL = "pre_roll"
 """Fact of a recording: how much of the time before it was asked for, and came."""
+PRE_ROLL_BEFORE = "lead_in"
+"""The same in data folders from before 2026-11-22."""
 STOP_ASKED = "stop_asked_s"
 """Fact of a recording: when its end was asked for, Unix seconds of the service's clock."""
 ENDED_BY = "ended_by"
 """Fact of a recording whose end nobody asked for: what ended it."""
-LEAD_IN_S = 60.0
-LONGEST_LEAD_IN_S = 600.0
+PRE_ROLL_S = 60.0
+LONGEST_PRE_ROLL_S = 600.0
 
 _ORDER: dict[str, int] = {
     "requested": 0,
@@ -51,21 +54,21 @@ class Recordings:
         name: str,
         subject: str | None = None,
         wearing: str | None = None,
-        lead_s: float = LEAD_IN_S,
+        lead_s: float = PRE_ROLL_S,
     ) -> RecordingRecord:
         """Ask for a recording; subject and wearing default to the glove's at this moment.
 
         ``lead_s`` seconds before it are to be in it too, as far as they were captured. Raises BadInput
-        (names, a lead-in that is negative or longer than ``LONGEST_LEAD_IN_S``), NotFound (glove never seen,
-        unknown subject), Conflict if the glove is being recorded already.
+        (names, a pre-roll that is negative or longer than ``LONGEST_PRE_ROLL_S``), NotFound (glove never
+        seen, unknown subject), Conflict if the glove is being recorded already.
         """
         check_identifier(glove, "glove")
         check_text(name, "name of the recording")
         if wearing is not None:
             check_text(wearing, f"wearing of recording {name!r}")
-        if not 0.0 <= lead_s <= LONGEST_LEAD_IN_S:
+        if not 0.0 <= lead_s <= LONGEST_PRE_ROLL_S:
             raise BadInput(
-                f"lead-in of recording {name!r}: {lead_s:g} s; 0 to {LONGEST_LEAD_IN_S:g} s are possible"
+                f"pre-roll of recording {name!r}: {lead_s:g} s; 0 to {LONGEST_PRE_ROLL_S:g} s are possible"
             )
         at, id = now(), new_id()
         with self._database.write() as connection:
@@ -86,7 +89,7 @@ class Recordings:
                 "subject": subject if subject is not None else worn.subject,
                 "wearing": wearing if wearing is not None else worn.wearing,
                 "state": "requested",
-                "facts": {LEAD_IN: {"asked_s": lead_s}},
+                "facts": {PRE_ROLL: {"asked_s": lead_s}},
                 "requested_at": at,
                 "updated_at": at,
             }
@@ -137,6 +140,11 @@ class Recordings:
             return sound_rows(connection, table, statement, _record)
 
 
+def with_pre_roll(facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Facts, or what a run's ledger says of itself, with the pre-roll under today's key."""
+    return {PRE_ROLL if key == PRE_ROLL_BEFORE else key: value for key, value in facts.items()}
+
+
 def _move(connection: Connection, id: str, state: str | None, facts: dict[str, Any]) -> RecordingRecord:
     def change(row: dict[str, Any]) -> dict[str, Any]:
         values: dict[str, Any] = {"facts": {**row["facts"], **facts}, "updated_at": now()}
@@ -163,4 +171,4 @@ def _require(connection: Connection, id: str) -> RecordingRecord:
 
 
 def _record(values: dict[str, Any]) -> RecordingRecord:
-    return RecordingRecord(**values)
+    return RecordingRecord(**{**values, "facts": with_pre_roll(values["facts"])})

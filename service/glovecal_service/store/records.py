@@ -171,7 +171,7 @@ class RecordingRecord:
     state: RecordingState
     facts: dict[str, Any]
     """``first_sequence``, ``last_sequence``, ``sent``, ``recorded``, ``repaired``, ``missing``, ``pending``,
-    ``lead_in``, ``take``"""
+    ``pre_roll``, ``take``"""
     requested_at: datetime
     updated_at: datetime
 

@@ -237,11 +237,11 @@ def test_per_cents_do_not_depend_on_a_sensors_units(gain: list[float], zero: lis
     frames=st.integers(1, 60),
     values=st.sampled_from(["still", "steps", "noise", "huge"]),
     measured=st.sampled_from(["none", "all", "gaps"]),
-    lead_in=st.booleans(),
+    pre_roll=st.booleans(),
     seed=st.integers(0, 99),
 )
 def test_any_take_is_examined_or_refused_in_a_sentence(
-    frames: int, values: str, measured: str, lead_in: bool, seed: int
+    frames: int, values: str, measured: str, pre_roll: bool, seed: int
 ):
     """Single frames, dead sensors, wild readings, angles with gaps: figures are finite or there are none."""
     random = np.random.default_rng(seed)
@@ -252,7 +252,7 @@ def test_any_take_is_examined_or_refused_in_a_sentence(
         "noise": random.standard_normal((frames, 4)),
         "huge": 1e12 * random.standard_normal((frames, 4)),
     }[values]
-    take = Take("still-A", "w", SENSORS, time, made, begins_s=float(time[-1]) + 1 if lead_in else None)
+    take = Take("still-A", "w", SENSORS, time, made, begins_s=float(time[-1]) + 1 if pre_roll else None)
     if measured != "none":
         angles = random.uniform(-90, 90, (frames, 4))
         angles[:: 2 if measured == "gaps" else frames + 1] = np.nan

@@ -121,7 +121,7 @@ def test_touches_after_four_key_poses_bring_the_tips_together() -> None:
     assert apart_mm(second) < 6
 
 
-def test_a_lead_in_gives_no_samples(model, taken) -> None:
+def test_a_pre_roll_gives_no_samples(model, taken) -> None:
     take = replace(taken["M"].take, begins_s=float(taken["M"].take.time_s[60]))
     samples = ik_samples(take, model, HAND, Touch(("T", "M")))
     assert samples.frames.min() >= 60

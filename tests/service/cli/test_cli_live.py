@@ -127,7 +127,7 @@ def test_a_recorded_take_becomes_a_model_that_predicts_live(live, recorded):
         assert frames["predicted"] > 0
         _run_the_documented_subscriber(live)
         _watch_until_interrupted(live)
-        _record_with_lead_in(live)
+        _record_with_pre_roll(live)
         assert "worn by nobody" in run("glove", "wear", GLOVE, "--nobody").out
         eventually(lambda: "no model is active" in run("watch", GLOVE, "--seconds", 0.2).out, "nobody's pose")
         assert f"nobody wears glove {GLOVE}" in run("watch", GLOVE, "--seconds", 0.3).out.replace("\n", " ")
@@ -150,13 +150,13 @@ def _run_the_documented_subscriber(live: dict[str, str]) -> None:
     assert re.match(r"\d+ \(.*'simulated'.*\) \{'T_TMC': -?\d", line), line
 
 
-def _record_with_lead_in(live: dict[str, str]) -> None:
+def _record_with_pre_roll(live: dict[str, str]) -> None:
     """The glove streams for seconds already: the take begins before it was asked for."""
     run = partial(glovecal, live)
-    said = run("record", GLOVE, "second", "--seconds", 0.3, "--lead-in", 0.5).out
+    said = run("record", GLOVE, "second", "--seconds", 0.3, "--pre-roll", 0.5).out
     assert re.search(r"Pre-roll: 0\.[45] of the 0\.5 s before it \(\d+ frames\)\.", said)
-    assert re.search(r"lead-in +\d+ of them in 0\.[45]", run("take", "check", "second").out)
-    assert "lead-in" in run("record", GLOVE, "x", "--lead-in", 601).said.lower()
+    assert re.search(r"pre-roll +\d+ of them in 0\.[45]", run("take", "check", "second").out)
+    assert "pre-roll" in run("record", GLOVE, "x", "--pre-roll", 601).said.lower()
 
 
 def _watch_until_interrupted(live: dict[str, str]) -> None:

@@ -310,7 +310,7 @@ def test_recordings(client: RestClient, settings: Settings) -> None:
         "anna",
         "morning",
     )
-    assert recording["facts"]["lead_in"] == {"asked_s": 60.0}
+    assert recording["facts"]["pre_roll"] == {"asked_s": 60.0}
     with pytest.raises(Refused) as refused:
         client.post("/recordings", {"glove": "left", "name": "again"})
     assert refused.value.status == 409

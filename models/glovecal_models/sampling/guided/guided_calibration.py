@@ -116,7 +116,7 @@ def guided_samples(
         raise NotTrainable(nothing_left(skeleton is not None, 0, ()))
     say("what poses and widgets tell", 0.0)
     samples = labelled_takes(used)
-    readings = np.concatenate([labelled.take.readings[labelled.take.lead_in_frames :] for labelled in used])
+    readings = np.concatenate([labelled.take.readings[labelled.take.pre_roll_frames :] for labelled in used])
     ranges = reading_ranges(layout.sensors, readings)
     priors = first_posteriors(layout, samples, ranges)
     seen: list[SeenTouch] = []

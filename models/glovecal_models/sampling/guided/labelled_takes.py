@@ -55,10 +55,10 @@ class LabelledTake:
         return replace(self, take=ordered)
 
     def frames(self, pose: str) -> np.ndarray:
-        """Rows of the take that are named ``pose``, lead-in left out."""
+        """Rows of the take that are named ``pose``, pre-roll left out."""
         names = self.take.poses or ("",) * len(self.take.time_s)
         rows = np.array([index for index, name in enumerate(names) if name == pose], dtype=int)
-        return rows[rows >= self.take.lead_in_frames]
+        return rows[rows >= self.take.pre_roll_frames]
 
     def steps(self) -> list[np.ndarray]:
         """Rows in which the same rotations have the same known angles, in the order of time."""

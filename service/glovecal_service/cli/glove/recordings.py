@@ -28,7 +28,7 @@ def record(
         typer.Option("--subject", "-s", help="Default: the wearer of the glove.", callback=subject_named),
     ] = None,
     wearing: Annotated[str | None, typer.Option(help="Default: the glove's wearing.")] = None,
-    lead_in: Annotated[
+    pre_roll: Annotated[
         float,
         typer.Option(
             min=0,
@@ -39,7 +39,7 @@ def record(
     as_json: AsJson = False,
 ) -> None:
     """Record a take from a glove that is streaming to the service. Ctrl-C stops it early."""
-    wanted = {"glove": glove, "name": name, "subject": subject, "wearing": wearing, "lead_s": lead_in}
+    wanted = {"glove": glove, "name": name, "subject": subject, "wearing": wearing, "lead_s": pre_roll}
     with connect() as service:
         started = service.post(
             "/recordings", {key: value for key, value in wanted.items() if value is not None}
@@ -69,8 +69,8 @@ def record(
             "glovecal take list shows its state.",
             style="yellow",
         )
-    if lead_in and "take" in facts:
-        out.print(f"Pre-roll: {facts['lead_in']['sentence']}.")
+    if pre_roll and "take" in facts:
+        out.print(f"Pre-roll: {facts['pre_roll']['sentence']}.")
 
 
 def _wait_for_the_recorder(service: RestClient, recording: str, glove: str) -> None:

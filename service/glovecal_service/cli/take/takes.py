@@ -70,7 +70,7 @@ def check(take: Take, as_json: AsJson = False) -> None:
 def _facts(found: dict[str, Any]) -> dict[str, Any]:
     take = found["take"]
     gaps = f"{found['gaps']}, longest interval {found['longest_interval_s'] or 0:.3g} s"
-    accounting, lead_in_s = take["accounting"] or {}, found["lead_in_s"]
+    accounting, pre_roll_s = take["accounting"] or {}, found["pre_roll_s"]
     return {
         "take": f"{take['id']} {take['name']}",
         "subject": take["subject"],
@@ -80,7 +80,7 @@ def _facts(found: dict[str, Any]) -> dict[str, Any]:
         "source": take["source"],
         "added": moment(take["created_at"]),
         "frames": f"{take['frames']} in {take['duration_s']:.2f} s",
-        **({"lead-in": f"{found['lead_in_frames']} of them in {lead_in_s:.2f} s"} if lead_in_s else {}),
+        **({"pre-roll": f"{found['pre_roll_frames']} of them in {pre_roll_s:.2f} s"} if pre_roll_s else {}),
         "state": take["state"],
         **({"frames sent": accounting["sent"]} if "sent" in accounting else {}),
         "rate (Hz)": found["rate_hz"],

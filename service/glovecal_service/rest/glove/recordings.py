@@ -19,7 +19,7 @@ from glovecal_service.rest.http.request_types import (
     SubjectName,
     WearingName,
 )
-from glovecal_service.store.recordings import LEAD_IN_S, LONGEST_LEAD_IN_S
+from glovecal_service.store.recordings import LONGEST_PRE_ROLL_S, PRE_ROLL_S
 from glovecal_service.store.records import RecordingRecord, RecordingState
 
 router = APIRouter(prefix="/recordings", tags=["recordings"])
@@ -31,9 +31,9 @@ class NewRecording(StrictBody):
     subject: SubjectName | None = Field(None, description="None: who wears the glove now.")
     wearing: WearingName | None = None
     lead_s: float = Field(
-        LEAD_IN_S,
+        PRE_ROLL_S,
         ge=0,
-        le=LONGEST_LEAD_IN_S,
+        le=LONGEST_PRE_ROLL_S,
         description="Seconds before the request that are fetched from the capture log, as far as they lie in "
         "the same run and wearing: they tell effects with a memory where they stand.",
     )
@@ -47,7 +47,7 @@ class Recording(BaseModel):
     wearing: str | None
     state: RecordingState
     facts: dict[str, Any] = Field(
-        description="`sent`, `recorded`, `repaired`, `missing`, `pending`, `lead_in`, `take`, `sentence` ..."
+        description="`sent`, `recorded`, `repaired`, `missing`, `pending`, `pre_roll`, `take`, `sentence` ..."
     )
     requested_at: datetime
     updated_at: datetime

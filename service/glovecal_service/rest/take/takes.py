@@ -81,10 +81,10 @@ class CheckView(BaseModel):
     longest_interval_s: float | None
     repeated_frames: float = Field(description="Share of frames that are the same as the one before.")
     frames_with_reference: float = Field(
-        description="Share of frames with at least one reference angle; the lead-in is not counted."
+        description="Share of frames with at least one reference angle; the pre-roll is not counted."
     )
-    lead_in_frames: int = Field(description="Frames before the take was asked for.")
-    lead_in_s: float
+    pre_roll_frames: int = Field(description="Frames before the take was asked for.")
+    pre_roll_s: float
     sensors: list[SensorRangeView]
     rotations: list[RotationRangeView]
     sentences: list[str] = Field(description="What looks wrong.")

@@ -8,7 +8,7 @@ from typing import Any
 from glovecal_models.sampling.state import Choose, NextSteps, SamplingState
 
 
-class ChosenApart:
+class BackgroundPlanner:
     """A ``Choose`` that answers None until ``choose`` has an answer for the state as it is."""
 
     def __init__(self, choose: Choose) -> None:

@@ -26,7 +26,7 @@ TRY_AGAIN_AFTER_S = 2.0
 ANSWER_WITHIN_S = 2.0
 
 
-class LeadIn:
+class PreRoll:
     """Fetches what comes before ``oldest`` in its run, back to ``from_ns`` of the run's monotonic clock.
 
     It ends where the run began, and at a pause after which effects with a memory start anew.
@@ -43,12 +43,12 @@ class LeadIn:
         self._trouble = ""
         self._fetched: Queue[list[Frame]] = Queue(maxsize=2)
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="lead-in", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="pre-roll", daemon=True)
         self._thread.start()
 
     @property
     def why_shorter(self) -> str:
-        """A clause on why the lead-in does not reach back to ``from_ns``; "" when it does."""
+        """A clause on why the pre-roll does not reach back to ``from_ns``; "" when it does."""
         return self._ended if self._ended is not None else self._trouble or "the rest was not fetched"
 
     @property
@@ -95,7 +95,7 @@ class LeadIn:
         )  # fmt: skip
 
     def _wanted(self, block: list[Frame]) -> list[Frame]:
-        """The frames of ``block`` that belong to the lead-in, newest first."""
+        """The frames of ``block`` that belong to the pre-roll, newest first."""
         kept = []
         for frame in reversed(block):
             if frame.monotonic_ns < self._from_ns:

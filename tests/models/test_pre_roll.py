@@ -41,12 +41,12 @@ def session(*causes: Cause, seed: int = 12, clock: str = "same") -> tuple[Take, 
     return record_session(plan, causes).takes
 
 
-def with_lead_in(take: Take) -> Take:
-    """Its first part as a lead-in; the reference that was measured there stays in the table."""
+def with_pre_roll(take: Take) -> Take:
+    """Its first part as a pre-roll; the reference that was measured there stays in the table."""
     return replace(take, begins_s=float(take.time_s[0]) + LEAD_S)
 
 
-def without_lead_in(take: Take) -> Take:
+def without_pre_roll(take: Take) -> Take:
     """Only the part after it."""
     start = float(take.time_s[0]) + LEAD_S
     kept, rows = take.time_s >= start, take.reference_time_s >= start
@@ -73,17 +73,17 @@ def creeping() -> tuple[Take, ...]:
 
 @pytest.mark.parametrize("clock", ["same", "own"])
 def test_no_reference_is_read_there(clock):
-    take = with_lead_in(session(clock=clock)[0])
+    take = with_pre_roll(session(clock=clock)[0])
     known = np.all(np.isfinite(take.reference_at_frames(take.rotations)), axis=1)
-    assert not known[: take.lead_in_frames].any()
-    assert known[take.lead_in_frames :].mean() > 0.99
+    assert not known[: take.pre_roll_frames].any()
+    assert known[take.pre_roll_frames :].mean() > 0.99
     even = resampled(take, SENSORS, SENSORS)
     assert not np.isfinite(even.reference[even.time_s < take.start_s]).any()
     assert np.isfinite(even.readings[even.time_s < take.start_s]).all()
 
 
 def test_samples_and_regressors_are_those_of_the_part_after_it(clean):
-    lead, bare = [with_lead_in(t) for t in clean], [without_lead_in(t) for t in clean]
+    lead, bare = [with_pre_roll(t) for t in clean], [without_pre_roll(t) for t in clean]
     item = LAYOUT.correspondence("I_PIP")
     np.testing.assert_array_equal(gather_samples(lead, item).target, gather_samples(bare, item).target)
     settings = TrainingSettings(method="linear", folds=0)
@@ -94,7 +94,7 @@ def test_samples_and_regressors_are_those_of_the_part_after_it(clean):
 
 
 def test_the_time_in_a_take_counts_from_the_request_on(clean):
-    lead = [with_lead_in(t) for t in clean[:1]]
+    lead = [with_pre_roll(t) for t in clean[:1]]
     found = residuals(train(lead, LAYOUT, "anna", TrainingSettings(method="linear", folds=0)), lead)
     (since,) = (each.values[0] for each in covariates(found, "I_MCP") if each.name == "time in take")
     assert since[0] == pytest.approx(-LEAD_S)
@@ -102,25 +102,25 @@ def test_the_time_in_a_take_counts_from_the_request_on(clean):
 
 
 def test_an_examination_does_not_ask_for_a_reference_there(clean):
-    found = check_take(with_lead_in(clean[0]))
+    found = check_take(with_pre_roll(clean[0]))
     assert found.frames_with_reference == 1.0
-    assert found.lead_in_s == pytest.approx(LEAD_S)
-    assert found.lead_in_frames == pytest.approx(60 * LEAD_S, abs=2)
+    assert found.pre_roll_s == pytest.approx(LEAD_S)
+    assert found.pre_roll_frames == pytest.approx(60 * LEAD_S, abs=2)
     assert found.sentences == ()
-    assert check_take(clean[0]).lead_in_frames == 0
+    assert check_take(clean[0]).pre_roll_frames == 0
 
 
 @pytest.mark.parametrize("clock", ["same", "own"])
 def test_a_table_of_it_holds_the_frames_and_no_reference(clock, tmp_path: Path):
-    take = with_lead_in(session(clock=clock)[0])
+    take = with_pre_roll(session(clock=clock)[0])
     (back,) = read_takes(*write_takes([take], tmp_path / "take.csv"))
     np.testing.assert_array_equal(back.readings, take.readings)
     same = [np.isfinite(each.reference_at_frames(SENSORS)).sum() for each in (back, take)]
     assert same[0] == pytest.approx(same[1], abs=2 * len(SENSORS))
-    assert not np.isfinite(back.reference_at_frames(SENSORS)[: take.lead_in_frames]).any()
+    assert not np.isfinite(back.reference_at_frames(SENSORS)[: take.pre_roll_frames]).any()
 
 
-@pytest.mark.parametrize("marked", [True, False], ids=["lead-in", "a table whose frames begin earlier"])
+@pytest.mark.parametrize("marked", [True, False], ids=["pre-roll", "a table whose frames begin earlier"])
 def test_clocks_are_judged_though_most_frames_have_no_reference(clean, marked):
     late = []
     for take in clean[:3]:
@@ -130,7 +130,7 @@ def test_clocks_are_judged_though_most_frames_have_no_reference(clean, marked):
                 take,
                 reference_time_s=take.reference_time_s[rows] + 0.7,
                 reference=take.reference[rows],
-                begins_s=with_lead_in(take).begins_s if marked else None,
+                begins_s=with_pre_roll(take).begins_s if marked else None,
             )
         )
     with warnings.catch_warnings():
@@ -157,7 +157,7 @@ def test_quarters_and_levels_are_cut_from_what_was_measured():
 def test_what_went_before_tells_creep_where_it_stands(creeping):
     """The hand's way before the reference is read from the sensors: more of the creep is explained."""
     named = {}
-    for name, cut in (("bare", without_lead_in), ("lead", with_lead_in)):
+    for name, cut in (("bare", without_pre_roll), ("lead", with_pre_roll)):
         found = diagnose([cut(take) for take in creeping], LAYOUT).named
         assert found is not None
         assert found.confidence_set == ("creep",), name
@@ -166,4 +166,4 @@ def test_what_went_before_tells_creep_where_it_stands(creeping):
 
 
 def test_a_clean_glove_with_it_is_left_alone(clean):
-    assert diagnose([with_lead_in(take) for take in clean], LAYOUT).named is None
+    assert diagnose([with_pre_roll(take) for take in clean], LAYOUT).named is None

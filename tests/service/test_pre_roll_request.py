@@ -1,4 +1,4 @@
-"""How far back a lead-in may reach: never into another wearing."""
+"""How far back a pre-roll may reach: never into another wearing."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from realtime_support import LAYOUT
 
-from glovecal_service.realtime.lead_in_wish import lead_in_wish
+from glovecal_service.realtime.pre_roll_request import pre_roll_request
+from glovecal_service.store.recordings import with_pre_roll
 from glovecal_service.store.records import GloveRecord, RecordingRecord
 
 GLOVE = "g1"
@@ -17,7 +18,7 @@ NOON = datetime(2026, 5, 1, 12, tzinfo=UTC)
 def said(id: str, seconds: float, subject: str | None = "anna", wearing: str | None = "w") -> RecordingRecord:
     """A recording requested, and last changed, so many seconds after noon; it asks for a minute."""
     at = NOON + timedelta(seconds=seconds)
-    facts = {"lead_in": {"asked_s": 60.0}}
+    facts = {"pre_roll": {"asked_s": 60.0}}
     return RecordingRecord(id, GLOVE, id, subject, wearing, "done", facts, at, at)
 
 
@@ -42,6 +43,13 @@ def worn(assigned_s: float | None = None) -> GloveRecord:
     ],
 )
 def test_it_never_reaches_into_another_wearing(record, glove, others, most_s) -> None:
-    wish = lead_in_wish(record, glove, [record, *others], NOON + timedelta(seconds=100))
+    wish = pre_roll_request(record, glove, [record, *others], NOON + timedelta(seconds=100))
     assert wish.most_s == most_s
     assert bool(wish.why_less) == (most_s < 60.0)
+
+
+def test_a_data_folder_from_before_says_it_under_another_key() -> None:
+    assert with_pre_roll({"lead_in": {"asked_s": 60.0}, "sent": 3}) == {
+        "pre_roll": {"asked_s": 60.0},
+        "sent": 3,
+    }

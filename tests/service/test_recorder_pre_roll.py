@@ -26,7 +26,7 @@ from recorder_support import (
 from glovecal_client import DamagedLog, Recording
 from glovecal_client.session import open_router
 from glovecal_models.errors import BadInput
-from glovecal_service.realtime import lead_in, recording_file
+from glovecal_service.realtime import pre_roll, run_ledger
 from glovecal_service.serve import recorder
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
@@ -46,7 +46,7 @@ def store(settings: Settings) -> Iterator[Store]:
 
 @pytest.fixture(autouse=True)
 def room_on_any_disk(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(recording_file, "LEFT_FREE_BYTES", 0)
+    monkeypatch.setattr(run_ledger, "LEFT_FREE_BYTES", 0)
 
 
 class PausingDevice(SteadyDevice):
@@ -80,8 +80,8 @@ def recorded(store: Store, id: str, frames: int) -> None:
     eventually(lambda: store.recordings.get(id).facts.get("recorded", 0) >= frames, f"{frames} frames")
 
 
-def lead_in_sentence(store: Store, id: str) -> str:
-    return store.recordings.get(id).facts["lead_in"].get("sentence", "")
+def pre_roll_sentence(store: Store, id: str) -> str:
+    return store.recordings.get(id).facts["pre_roll"].get("sentence", "")
 
 
 def finished(store: Store, id: str) -> RecordingRecord:
@@ -94,18 +94,18 @@ def finished(store: Store, id: str) -> RecordingRecord:
 
 
 def check(store: Store, record: RecordingRecord) -> None:
-    """The lead-in is counted apart and precedes what was asked for, without a hole and in one run."""
-    facts, lead = record.facts, record.facts["lead_in"]
+    """The pre-roll is counted apart and precedes what was asked for, without a hole and in one run."""
+    facts, lead = record.facts, record.facts["pre_roll"]
     assert record.state == "done", facts
     assert facts["sent"] == facts["recorded"] + facts["missing_frames"]
     take = store.takes.load(facts["take"])
     assert len(take.time_s) == facts["recorded"] + lead["frames"]
-    assert take.lead_in_frames == lead["frames"]
+    assert take.pre_roll_frames == lead["frames"]
     kept = store.takes.get(facts["take"]).accounting
     assert kept is not None
     assert kept["begins_s"] == take.start_s
     assert take.start_s - take.time_s[0] == pytest.approx(lead["seconds"], abs=1e-6)
-    assert kept["lead_in"] == lead
+    assert kept["pre_roll"] == lead
     assert (np.diff(take.time_s[: lead["frames"] + 1]) < 1.0).all()
 
 
@@ -115,7 +115,7 @@ def test_a_recording_begins_with_the_seconds_before_it(settings: Settings, store
         asked = store.recordings.request(GLOVE, name="walk", lead_s=1.5)
         recorded(store, asked.id, 100)
         record = finished(store, asked.id)
-    lead = record.facts["lead_in"]
+    lead = record.facts["pre_roll"]
     assert lead["asked_s"] == 1.5
     assert lead["seconds"] == pytest.approx(1.5, abs=0.1)
     assert lead["sentence"] == f"1.5 of the 1.5 s before it ({lead['frames']} frames)"
@@ -123,7 +123,7 @@ def test_a_recording_begins_with_the_seconds_before_it(settings: Settings, store
     assert record.facts["repaired"] == 0
     frames = list(Recording.open(settings.recordings_folder / record.facts["file"]).frames())
     own = record.facts["first_sequence"]
-    assert frames[0].sequence == own, "what was asked for is on disk before the lead-in"
+    assert frames[0].sequence == own, "what was asked for is on disk before the pre-roll"
     numbers = sorted(frame.sequence for frame in frames)
     assert numbers == list(range(own - lead["frames"], own + record.facts["recorded"]))
 
@@ -134,7 +134,7 @@ def test_none_is_fetched_when_none_is_asked_for(settings: Settings, store: Store
         asked = store.recordings.request(GLOVE, name="walk", lead_s=0)
         recorded(store, asked.id, 50)
         record = finished(store, asked.id)
-    assert record.facts["lead_in"] == {
+    assert record.facts["pre_roll"] == {
         "asked_s": 0, "frames": 0, "seconds": 0.0, "sentence": "none was asked for"
     }  # fmt: skip
 
@@ -151,7 +151,7 @@ def test_a_run_that_is_shorter_gives_what_it_has_and_nothing_of_the_run_before(
             recorded(store, asked.id, 50)
             record = finished(store, asked.id)
     assert len(logged(settings)) == 2
-    lead = record.facts["lead_in"]
+    lead = record.facts["pre_roll"]
     assert lead["frames"] == record.facts["first_sequence"] >= 150
     assert lead["sentence"].endswith("frames): the run began then")
     assert len(record.facts["runs"]) == 1
@@ -165,8 +165,8 @@ def test_it_ends_at_a_pause_after_which_nothing_remembers(settings: Settings, st
         asked = store.recordings.request(GLOVE, name="paused")
         recorded(store, asked.id, 50)
         record = finished(store, asked.id)
-    assert record.facts["lead_in"]["frames"] == record.facts["first_sequence"] - 100
-    assert "before that the glove was silent for 1." in record.facts["lead_in"]["sentence"]
+    assert record.facts["pre_roll"]["frames"] == record.facts["first_sequence"] - 100
+    assert "before that the glove was silent for 1." in record.facts["pre_roll"]["sentence"]
 
 
 def test_it_ends_where_somebody_said_who_wears_the_glove(settings: Settings, store: Store) -> None:
@@ -181,8 +181,8 @@ def test_it_ends_where_somebody_said_who_wears_the_glove(settings: Settings, sto
         record = finished(store, asked.id)
     take = store.takes.load(record.facts["take"])
     assert take.time_s[0] > said_at - 0.05
-    assert record.facts["lead_in"]["seconds"] > 0.3
-    assert "who wears the glove was said only then" in record.facts["lead_in"]["sentence"]
+    assert record.facts["pre_roll"]["seconds"] > 0.3
+    assert "who wears the glove was said only then" in record.facts["pre_roll"]["sentence"]
 
 
 def written(settings: Settings, id: str) -> list[int]:
@@ -194,53 +194,53 @@ def test_capture_killed_while_it_is_fetched_leaves_the_recording_as_it_is(
     settings: Settings, store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """kill -9 after the first blocks; the take has what came, and its own frames."""
-    monkeypatch.setattr(lead_in, "BLOCK_FRAMES", 16)
-    monkeypatch.setattr(lead_in, "PAUSE_S", 0.15)
-    monkeypatch.setattr(lead_in, "TRY_AGAIN_AFTER_S", 0.1)
+    monkeypatch.setattr(pre_roll, "BLOCK_FRAMES", 16)
+    monkeypatch.setattr(pre_roll, "PAUSE_S", 0.15)
+    monkeypatch.setattr(pre_roll, "TRY_AGAIN_AFTER_S", 0.1)
     with open_router([settings.zenoh]), recording_thread(settings):
         with capture_process(settings) as process:
             captured(settings, 300)
             asked = store.recordings.request(GLOVE, name="killed")
             eventually(
                 lambda: (numbers := written(settings, asked.id)) and min(numbers) < numbers[0],
-                "the first of the lead-in",
+                "the first of the pre-roll",
             )
             process.send_signal(signal.SIGKILL)
             process.wait()
         eventually(
-            lambda: "did not give more" in lead_in_sentence(store, asked.id),
+            lambda: "did not give more" in pre_roll_sentence(store, asked.id),
             "it is said",
         )
         record = finished(store, asked.id)
-    lead = record.facts["lead_in"]
+    lead = record.facts["pre_roll"]
     assert 0 < lead["frames"] < record.facts["first_sequence"]
     assert record.state == "repairing"
-    assert store.takes.load(record.facts["take"]).lead_in_frames == lead["frames"]
+    assert store.takes.load(record.facts["take"]).pre_roll_frames == lead["frames"]
 
 
 def test_capture_that_comes_back_still_has_the_log_of_the_run_before(
     settings: Settings, store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(lead_in, "BLOCK_FRAMES", 16)
-    monkeypatch.setattr(lead_in, "PAUSE_S", 0.1)
-    monkeypatch.setattr(lead_in, "TRY_AGAIN_AFTER_S", 0.1)
+    monkeypatch.setattr(pre_roll, "BLOCK_FRAMES", 16)
+    monkeypatch.setattr(pre_roll, "PAUSE_S", 0.1)
+    monkeypatch.setattr(pre_roll, "TRY_AGAIN_AFTER_S", 0.1)
     with open_router([settings.zenoh]), recording_thread(settings):
         with capture_process(settings) as process:
             captured(settings, 200)
             asked = store.recordings.request(GLOVE, name="twice")
-            eventually(lambda: len(written(settings, asked.id)) > 30, "the first of the lead-in")
+            eventually(lambda: len(written(settings, asked.id)) > 30, "the first of the pre-roll")
             process.send_signal(signal.SIGKILL)
             process.wait()
-        monkeypatch.setattr(lead_in, "PAUSE_S", 0.0)
+        monkeypatch.setattr(pre_roll, "PAUSE_S", 0.0)
         with capture_process(settings):
             eventually(
-                lambda: lead_in_sentence(store, asked.id).endswith("began then"),
+                lambda: pre_roll_sentence(store, asked.id).endswith("began then"),
                 "all of it",
             )
             recorded(store, asked.id, 100)
             record = finished(store, asked.id)
     assert len(record.facts["runs"]) == 2
-    assert record.facts["lead_in"]["frames"] == record.facts["first_sequence"]
+    assert record.facts["pre_roll"]["frames"] == record.facts["first_sequence"]
     assert record.facts["missing"] == []
 
 
@@ -251,8 +251,8 @@ def test_a_log_that_is_gone_is_said_and_the_recording_goes_on(settings: Settings
         asked = store.recordings.request(GLOVE, name="no log")
         recorded(store, asked.id, 100)
         record = finished(store, asked.id)
-    assert record.facts["lead_in"]["frames"] == 0
-    assert "capture's log did not give more" in record.facts["lead_in"]["sentence"]
+    assert record.facts["pre_roll"]["frames"] == 0
+    assert "capture's log did not give more" in record.facts["pre_roll"]["sentence"]
     assert record.facts["recorded"] >= 100
 
 
@@ -269,27 +269,27 @@ def test_a_killed_recorder_goes_on_with_it(
         with recording_thread(settings):
             recorded(store, asked.id, store.recordings.get(asked.id).facts["recorded"] + 100)
             record = finished(store, asked.id)
-    lead = record.facts["lead_in"]
+    lead = record.facts["pre_roll"]
     assert lead["frames"] == record.facts["first_sequence"] >= 600
     assert lead["sentence"].endswith("the run began then")
     assert record.facts["missing"] == []
 
 
-def test_a_nearly_full_disk_gets_no_lead_in(
+def test_a_nearly_full_disk_gets_no_pre_roll(
     settings: Settings, store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(recording_file, "LEFT_FREE_BYTES", shutil.disk_usage(settings.data).free + (1 << 40))
+    monkeypatch.setattr(run_ledger, "LEFT_FREE_BYTES", shutil.disk_usage(settings.data).free + (1 << 40))
     with open_router([settings.zenoh]), capturing(settings), recording_thread(settings):
         captured(settings, 100)
         asked = store.recordings.request(GLOVE, name="full")
         recorded(store, asked.id, 50)
         record = finished(store, asked.id)
-    assert record.facts["lead_in"]["frames"] == 0
-    assert record.facts["lead_in"]["sentence"].endswith("the disk is nearly full")
+    assert record.facts["pre_roll"]["frames"] == 0
+    assert record.facts["pre_roll"]["sentence"].endswith("the disk is nearly full")
 
 
 def test_a_reference_counts_from_the_request_on(settings: Settings, store: Store) -> None:
-    """A tracker that ran all the time has angles of the lead-in too; another take may hold those frames."""
+    """A tracker that ran all the time has angles of the pre-roll too; another take may hold those frames."""
     with open_router([settings.zenoh]), capturing(settings), recording_thread(settings):
         captured(settings, 250)
         asked = store.recordings.request(GLOVE, name="all day")
@@ -306,6 +306,6 @@ def test_a_reference_counts_from_the_request_on(settings: Settings, store: Store
 
 
 @pytest.mark.parametrize("lead_s", [-1.0, 601.0, float("nan")])
-def test_a_lead_in_that_cannot_be_is_refused(store: Store, lead_s: float) -> None:
+def test_a_pre_roll_that_cannot_be_is_refused(store: Store, lead_s: float) -> None:
     with pytest.raises(BadInput, match="0 to 600 s"):
         store.recordings.request(GLOVE, name="x", lead_s=lead_s)

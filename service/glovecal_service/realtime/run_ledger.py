@@ -14,6 +14,7 @@ from glovecal_client.log_records import Recording
 from glovecal_client.plausible_loss import BURST_FRAMES, PlausibleLoss
 from glovecal_client.wire.frame import Frame, decode_frame
 from glovecal_service.realtime.sequence_ranges import SequenceRanges
+from glovecal_service.store.recordings import with_pre_roll
 
 SUFFIX = ".glog"
 BEGIN = "begin"
@@ -94,7 +95,7 @@ class RunBooks:
         }
 
 
-class RecordingFile:
+class RunLedger:
     """A frame log in ``recordings/``; every frame is written once, in the order it came."""
 
     def __init__(self, log: FrameLog) -> None:
@@ -112,18 +113,18 @@ class RecordingFile:
         """Of all frames that were asked for; by the capture computer's clock."""
         self.first_frame: Frame | None = None
         """The first frame that was asked for."""
-        self.lead_in = SequenceRanges()
+        self.pre_roll = SequenceRanges()
         """Frames of the first run that come before it."""
         self.oldest_frame: Frame | None = None
-        """The first frame of the lead-in, or ``first_frame``."""
+        """The first frame of the pre-roll, or ``first_frame``."""
 
     @classmethod
-    def create(cls, path: Path, meta: Mapping[str, Any]) -> RecordingFile:
+    def create(cls, path: Path, meta: Mapping[str, Any]) -> RunLedger:
         """A new file. Raises FileExistsError, OSError."""
         return cls(FrameLog.create(path, meta))
 
     @classmethod
-    def resume(cls, path: Path) -> RecordingFile:
+    def resume(cls, path: Path) -> RunLedger:
         """A file that was left when its process was killed, cut back to its last whole record.
 
         Raises DamagedLog, OSError.
@@ -154,7 +155,7 @@ class RecordingFile:
 
     @property
     def meta(self) -> dict[str, Any]:
-        return self._log.meta
+        return with_pre_roll(self._log.meta)
 
     @property
     def problem(self) -> str | None:
@@ -186,7 +187,7 @@ class RecordingFile:
         return bool(self.runs) and next(reversed(self.runs.values())).ended
 
     @property
-    def lead_in_s(self) -> float:
+    def pre_roll_s(self) -> float:
         if self.first_frame is None or self.oldest_frame is None:
             return 0.0
         return (self.first_frame.monotonic_ns - self.oldest_frame.monotonic_ns) / 1e9
@@ -218,7 +219,7 @@ class RecordingFile:
         elif jumped:
             books.jump_to(frame.sequence)
         if frame.sequence < books.first and not books.lacks(frame.sequence):
-            return frame.repaired and self._enter_lead_in(frame)
+            return frame.repaired and self._enter_pre_roll(frame)
         if not books.enter(frame):
             return False
         if books is next(iter(self.runs.values())):
@@ -228,8 +229,8 @@ class RecordingFile:
         self.last_wall_ns = max(self.last_wall_ns, frame.wall_ns)
         return True
 
-    def _enter_lead_in(self, frame: Frame) -> bool:
-        if not self.lead_in.add(frame.sequence):
+    def _enter_pre_roll(self, frame: Frame) -> bool:
+        if not self.pre_roll.add(frame.sequence):
             return False
         self.oldest_frame = _earlier(frame, self.oldest_frame)
         return True
@@ -244,7 +245,7 @@ class RecordingFile:
             self._count_again()
 
     def _count_again(self) -> None:
-        self.lead_in, self.oldest_frame = SequenceRanges(), self.first_frame
+        self.pre_roll, self.oldest_frame = SequenceRanges(), self.first_frame
         for run in self.runs.values():
             run.repaired = run.last_wall_ns = 0
             for books in (*run.earlier, run):
