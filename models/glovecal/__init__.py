@@ -31,7 +31,7 @@ from glovecal_models.effects.base.context_effect import ContextEffect
 from glovecal_models.effects.base.effect import Effect, InstantEffect, Stream
 from glovecal_models.effects.base.facts import Motion, Parameter, Rival, Settings
 from glovecal_models.effects.base.history_effect import ArrayStateEffect, HistoryEffect
-from glovecal_models.effects.base.joint_units import in_joint_units, settle_joint_units
+from glovecal_models.effects.base.joint_units import fit_joint_units, in_joint_units
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.base.signature_effect import SignatureEffect
 from glovecal_models.errors import BadInput, Cancelled, GlovecalError, NotTrainable
@@ -71,6 +71,7 @@ __all__ = [
     "compare",
     "diagnose",
     "effects",
+    "fit_joint_units",
     "improve",
     "in_joint_units",
     "load_model",
@@ -80,7 +81,6 @@ __all__ = [
     "register_effect",
     "remove_effect",
     "save_model",
-    "settle_joint_units",
     "simulate",
     "train",
     "where",

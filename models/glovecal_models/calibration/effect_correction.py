@@ -103,7 +103,7 @@ class EffectCorrection:
         """Context columns that the effects read."""
         self.settling_s = max(
             (
-                effect.settling_s(item.shape[item.weights.any(axis=1)])
+                effect.transient_s(item.shape[item.weights.any(axis=1)])
                 for effect, (item, _) in zip(self._effects, self._lanes, strict=True)
             ),
             default=0.0,
@@ -145,7 +145,7 @@ class EffectCorrection:
         ``context`` are the columns whose values are known.
         """
         said = [
-            (effect.lacks(item.settings, context, wearing), effect.name)
+            (effect.unavailable_inputs(item.settings, context, wearing), effect.name)
             for effect, (item, _) in zip(self._effects, self._lanes, strict=True)
         ]
         return tuple(f"{lacking}: {name} is not corrected" for lacking, name in said if lacking)

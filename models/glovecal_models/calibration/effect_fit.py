@@ -168,7 +168,7 @@ def _groups(
         values = [np.column_stack(parts) for parts in zip(*(own[name][0] for name in lanes), strict=True)]
         without = frozenset(columns[lanes[0]].sensors) if item.effect.one_joint_at_a_time else frozenset()
         signals = takes.signals(values, np.array([own[name][1] for name in lanes]), without)
-        groups.append(EffectGroup(item, lanes, signals, item.effect.settle(signals)))
+        groups.append(EffectGroup(item, lanes, signals, item.effect.fit_constants(signals)))
     return groups
 
 
@@ -176,7 +176,7 @@ def _base(
     takes: PreparedTakes, correspondence: Correspondence, rows: Sequence[np.ndarray], linear: bool
 ) -> list[Rows]:
     inputs = takes.inputs(correspondence)
-    features = BaseFeatures.settle(inputs, linear=linear)
+    features = BaseFeatures.fit_constants(inputs, linear=linear)
     return [
         Rows(features.columns(part[index]), target[index])
         for part, target, index in zip(inputs, takes.target(correspondence.rotation), rows, strict=True)

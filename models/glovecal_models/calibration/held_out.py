@@ -174,7 +174,7 @@ class BaseFeatures:
     """Of products."""
 
     @classmethod
-    def settle(cls, inputs: Sequence[np.ndarray], *, linear: bool = False) -> BaseFeatures:
+    def fit_constants(cls, inputs: Sequence[np.ndarray], *, linear: bool = False) -> BaseFeatures:
         """``inputs``: for each take (N, D), the measuring sensor first."""
         low = np.min([part.min(axis=0) for part in inputs if len(part)], axis=0)
         high = np.max([part.max(axis=0) for part in inputs if len(part)], axis=0)

@@ -43,7 +43,7 @@ def assessed(
     for number, effect in enumerate(effects):
         if report:
             report(f"trying {effect.name}", number / len(effects))
-        why = effect.missing(design.signals)
+        why = effect.not_applicable_reason(design.signals)
         if why is not None:
             impossible.append(NotIdentifiable(effect.name, _with_advice(effect, why)))
             continue
@@ -153,7 +153,7 @@ def _all_joints(
     joints: Sequence[int] | None = None,
 ) -> tuple[Evidence, ...]:
     joints = range(len(design.rotations)) if joints is None else joints
-    settings = effect.settle(signals)
+    settings = effect.fit_constants(signals)
     grid = effect.grid(signals, settings)
     shapes, lanes, numbers = grid.shape
     tiled = tuple(replace(take, own=np.tile(take.own, (1, shapes))) for take in signals)

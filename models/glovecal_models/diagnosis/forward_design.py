@@ -100,7 +100,7 @@ def forward(
         item = layout.correspondence(rotation)
         neighbours = [] if linear else _read_beside(item, names, layout)
         columns = [column, *(names.index(name) for name in neighbours)]
-        features = BaseFeatures.settle([part[:, columns] for part in filled], linear=linear)
+        features = BaseFeatures.fit_constants([part[:, columns] for part in filled], linear=linear)
         index = [
             rows[(rows >= piece.start) & (rows < piece.stop)]
             for take, parts in zip(takes, cut, strict=True)

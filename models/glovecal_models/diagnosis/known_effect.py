@@ -26,7 +26,7 @@ class KnownEffect:
         if joint not in self.joints:
             return None
         single = [one_lane(take, lane) for take in takes]
-        settings = self.effect.settle(single)
+        settings = self.effect.fit_constants(single)
         shape = self.shapes[self.joints.index(joint)][None, :]
         return [self.effect.columns(take, settings, shape)[:, 0, :] for take in single]
 

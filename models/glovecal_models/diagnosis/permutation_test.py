@@ -30,7 +30,7 @@ def session_p_value(design: ForwardDesign, effect: Effect, generator: np.random.
     """
     joints = range(len(design.rotations))
     permutations = _permutations(design, effect, generator)
-    settings = effect.settle(design.signals)
+    settings = effect.fit_constants(design.signals)
     grid = effect.grid(design.signals, settings)
     rows = [_thinned(take.time_s) for take in design.signals]
     thin = [_some(take, some) for take, some in zip(design.signals, rows, strict=True)]

@@ -43,8 +43,8 @@ class ContextDependence(ContextEffect):
         total = float(np.sum((every - every.mean()) ** 2))
         return cls(column, changes_within_takes=within > MOSTLY_WITHIN * total)
 
-    def settle(self, takes: Sequence[Signals]) -> Settings:
-        settings = super().settle(takes)
+    def fit_constants(self, takes: Sequence[Signals]) -> Settings:
+        settings = super().fit_constants(takes)
         values = np.concatenate([take.context[self.column] for take in takes if self.column in take.context])
         values = values[np.isfinite(values)]
         knots = np.unique(np.quantile(values, np.linspace(0, 1, KNOTS)))

@@ -15,7 +15,7 @@ import numpy as np
 
 from glovecal_models.effects.base.facts import Parameter, Settings
 from glovecal_models.effects.base.history_effect import ArrayStateEffect
-from glovecal_models.effects.base.joint_units import on_lanes, settle_joint_units
+from glovecal_models.effects.base.joint_units import fit_joint_units, on_lanes
 from glovecal_models.effects.base.motions import RAMPS
 from glovecal_models.effects.base.relaxation import relax, relax_once
 from glovecal_models.effects.base.signals import Signals
@@ -41,7 +41,7 @@ class Creep(ArrayStateEffect):
         Parameter("slow_tau", "s", 0.5, 60.0, "1 to 60 s"),
     )
 
-    def missing(self, takes: Sequence[Signals]) -> str | None:
+    def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         longest = max((float(take.time_s[-1] - take.time_s[0]) for take in takes), default=0.0)
         return None if longest >= 8.0 else f"the longest take lasts {longest:.0f} s; creep needs 8 s or more"
 
@@ -51,8 +51,8 @@ class Creep(ArrayStateEffect):
         series = slow[:, None] / RATIO ** np.arange(2, -1, -1)
         return np.repeat(series[:, None, :], takes[0].own.shape[1], axis=1)
 
-    def settle(self, takes: Sequence[Signals]) -> Settings:
-        return settle_joint_units(takes)
+    def fit_constants(self, takes: Sequence[Signals]) -> Settings:
+        return fit_joint_units(takes)
 
     def start(self, own: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
         usual = on_lanes(settings["own_centre_deg"], len(own)) if "own_centre_deg" in settings else own

@@ -13,7 +13,7 @@ import numpy as np
 
 from glovecal_models.effects.base.effect import InstantEffect
 from glovecal_models.effects.base.facts import Control, Rival, Settings
-from glovecal_models.effects.base.joint_units import in_joint_units, settle_joint_units
+from glovecal_models.effects.base.joint_units import fit_joint_units, in_joint_units
 from glovecal_models.effects.base.motions import ONE_FINGER
 from glovecal_models.effects.base.signals import Signals
 
@@ -32,14 +32,14 @@ class CrossCoupling(InstantEffect):
     caveat = "a common cause that was not recorded, such as grip pressure or a strap, looks the same"
     control: ClassVar[Control] = "circularly shifted"
 
-    def missing(self, takes: Sequence[Signals]) -> str | None:
+    def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         return None if any(take.others for take in takes) else "no other sensor was recorded"
 
-    def settle(self, takes: Sequence[Signals]) -> Settings:
+    def fit_constants(self, takes: Sequence[Signals]) -> Settings:
         names = list(dict.fromkeys(name for take in takes for name in take.others if name != PALM))
         return {
             "neighbours": names,
-            **settle_joint_units(takes),
+            **fit_joint_units(takes),
         }
 
     def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:

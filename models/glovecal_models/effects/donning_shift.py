@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from glovecal_models.effects.base.facts import Certainty, Control, Rival, Settings
-from glovecal_models.effects.base.joint_units import in_joint_units, settle_joint_units
+from glovecal_models.effects.base.joint_units import fit_joint_units, in_joint_units
 from glovecal_models.effects.base.motions import CROSSED
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.base.wearing_effect import PRIOR_DEG, WearingEffect
@@ -32,7 +32,7 @@ class DonningShift(WearingEffect):
     )
     control: ClassVar[Control] = "permuted wearings"
 
-    def missing(self, takes: Sequence[Signals]) -> str | None:
+    def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         wearings = len({take.wearing for take in takes})
         if wearings < 2:
             return "all takes are of one wearing"
@@ -40,10 +40,10 @@ class DonningShift(WearingEffect):
             return "every wearing has only one take; record two in one of them"
         return None
 
-    def settle(self, takes: Sequence[Signals]) -> Settings:
+    def fit_constants(self, takes: Sequence[Signals]) -> Settings:
         return {
             "wearings": list(dict.fromkeys(take.wearing for take in takes)),
-            **settle_joint_units(takes),
+            **fit_joint_units(takes),
         }
 
     def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:

@@ -33,7 +33,7 @@ class Hysteresis(ArrayStateEffect):
     rivals: ClassVar = (Rival("creep", RAMPS),)
     parameters: ClassVar = (Parameter("widest_play", "deg", 0.2, 30.0, "1 to 7 deg in bend sensors"),)
 
-    def missing(self, takes: Sequence[Signals]) -> str | None:
+    def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         return None if any(_turns(take) >= 4 for take in takes) else "no joint goes to and fro in these takes"
 
     def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:

@@ -17,5 +17,5 @@ class NoEffect(ColumnlessEffect):
     kind: ClassVar[Kind] = "nothing"
     stage: ClassVar[Stage] = "never"
 
-    def missing(self, takes: Sequence[Signals]) -> str | None:
+    def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         return None

@@ -31,7 +31,7 @@ class Nonlinearity(InstantEffect):
     shown_by: ClassVar = RAMPS
     control: ClassVar[Control] = "circularly shifted"
 
-    def missing(self, takes: Sequence[Signals]) -> str | None:
+    def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         if not takes:
             return "there are no takes"
         low, high = _range(takes)
@@ -40,7 +40,7 @@ class Nonlinearity(InstantEffect):
             return None
         return f"no joint moves more than {widest:.1f} deg; a curve shows from {LEAST_RANGE_DEG:g} deg on"
 
-    def settle(self, takes: Sequence[Signals]) -> Settings:
+    def fit_constants(self, takes: Sequence[Signals]) -> Settings:
         low, high = _range(takes)
         return {"own_low_deg": low.tolist(), "own_high_deg": high.tolist()}
 

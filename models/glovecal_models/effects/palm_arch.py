@@ -30,7 +30,7 @@ class PalmArch(InstantEffect):
     shown_by: ClassVar = ONE_FINGER
     control: ClassVar[Control] = "circularly shifted"
 
-    def missing(self, takes: Sequence[Signals]) -> str | None:
+    def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         known = [take.others[PALM] for take in takes if PALM in take.others]
         if not known:
             return f"no palm arch sensor ({PALM}) is among the other signals"
@@ -38,7 +38,7 @@ class PalmArch(InstantEffect):
             return f"the palm arch sensor ({PALM}) never moves"
         return None
 
-    def settle(self, takes: Sequence[Signals]) -> Settings:
+    def fit_constants(self, takes: Sequence[Signals]) -> Settings:
         ranges: dict[str, list[float]] = {}
         for name in SIGNALS:
             known = [take.others[name] for take in takes if name in take.others]

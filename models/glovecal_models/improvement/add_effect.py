@@ -84,7 +84,7 @@ def add_effect(
             limits=limits, cancelled=cancelled,
         )  # fmt: skip
     if fresh.has_columns:
-        _require_judgeable(prepared, effect.missing(_all_signals(prepared)), name)
+        _require_judgeable(prepared, effect.not_applicable_reason(_all_signals(prepared)), name)
     before = before or held_out_errors(
         PreparedTakes.of(repaired_takes(takes, has), model.layout), chosen, has, settings,
         cancelled=cancelled, report=part(report, 0.0, 0.4, "measuring what there is"),

@@ -176,7 +176,7 @@ def _by_columns(known: Effect) -> tuple[np.ndarray, np.ndarray, np.ndarray, str]
     """Two takes, the second in another wearing and context; the column that does most is the effect."""
     takes = [_ramp_and_hold(known, number) for number in range(2)]
     try:
-        settings = known.settle(takes)
+        settings = known.fit_constants(takes)
         grid = known.grid(takes, settings)
         shape = grid[len(grid) // 2]
         columns = [known.columns(take, settings, shape)[:, 0] for take in takes]

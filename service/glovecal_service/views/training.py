@@ -40,7 +40,7 @@ def effect_view(added: AddedEffect) -> dict[str, Any]:
         "parameters": plain(added.described()),
         "context": list(effect.context),
         "has_memory": effect.has_memory,
-        "settling_s": effect.settling_s(added.shape[[name in added.active for name in added.rotations]]),
+        "settling_s": effect.transient_s(added.shape[[name in added.active for name in added.rotations]]),
         "evidence": plain(current_evidence(added.evidence)),
         "declaration": plain(added.settings.get("declaration")),
     }

@@ -23,7 +23,7 @@ def test_reversed_in_time_is_the_operator_run_backwards(signals):
 
 def test_rolled_in_time_keeps_the_values_and_moves_them(signals):
     coupling = catalogue()["cross_coupling"]
-    settings, shape = coupling.settle(signals), np.zeros((3, 0))
+    settings, shape = coupling.fit_constants(signals), np.zeros((3, 0))
     for seed in range(5):
         twins = control_columns(coupling, signals, settings, shape, np.random.default_rng(seed))
         for take, twin in zip(signals, twins, strict=True):
@@ -34,7 +34,7 @@ def test_rolled_in_time_keeps_the_values_and_moves_them(signals):
 
 def test_context_comes_from_another_wearing(signals):
     temperature = catalogue()["temperature"]
-    settings, shape = temperature.settle(signals), np.zeros((3, 0))
+    settings, shape = temperature.fit_constants(signals), np.zeros((3, 0))
     time, own = signals[3].time_s[:500], signals[3].own[:500]
     context = {"temperature_c": signals[3].context["temperature_c"][:500]}
     brief = replace(signals[3], time_s=time, own=own, others={}, context=context)
@@ -53,7 +53,7 @@ def test_context_comes_from_another_wearing(signals):
 def permuted(takes, seed):
     """The wearing each take got."""
     donning = catalogue()["donning_shift"]
-    settings = donning.settle(takes)
+    settings = donning.fit_constants(takes)
     twins = control_columns(donning, takes, settings, np.zeros((3, 0)), np.random.default_rng(seed))
     wearings = settings["wearings"]
     return [wearings[int(np.argmax(twin[0, 0, : len(wearings)]))] for twin in twins]

@@ -50,7 +50,7 @@ def effect(request: pytest.FixtureRequest) -> Effect:
 @pytest.fixture
 def settings(effect: Effect, signals: list[Signals]) -> Settings:
     """Settings as a stored model holds them."""
-    return json.loads(json.dumps(effect.settle(signals)))
+    return json.loads(json.dumps(effect.fit_constants(signals)))
 
 
 def each_frame(take: Signals) -> list[Signals]:
@@ -108,7 +108,7 @@ def test_it_says_what_it_is(effect: Effect) -> None:
 
 
 def test_the_examples_can_be_judged(effect: Effect, signals: list[Signals]) -> None:
-    assert effect.missing(signals) is None
+    assert effect.not_applicable_reason(signals) is None
 
 
 def test_shapes_are_within_the_declared_ranges(effect: Effect, signals: list[Signals], settings: Any) -> None:
@@ -135,7 +135,7 @@ def test_columns_are_finite_repeatable_and_of_the_right_shape(
 
 
 def test_settings_survive_being_stored(effect: Effect, signals: list[Signals], settings: Settings) -> None:
-    fresh = effect.settle(signals)
+    fresh = effect.fit_constants(signals)
     shape = effect.grid(signals, fresh)[-1]
     expected = effect.columns(signals[0], fresh, shape)
     again = stored_effect(effect.name, settings)
@@ -148,7 +148,7 @@ def test_lanes_do_not_know_each_other(effect: Effect, signals: list[Signals], se
     together = effect.columns(signals[1], settings, shape)
     for lane in range(signals[0].own.shape[1]):
         alone = [one_lane(take, lane) for take in signals]
-        own_settings = effect.settle(alone)
+        own_settings = effect.fit_constants(alone)
         own_shape = effect.grid(alone, own_settings)[-1]
         np.testing.assert_allclose(own_shape, shape[lane : lane + 1], rtol=1e-12)
         found = effect.columns(alone[1], own_settings, own_shape)[:, 0]
@@ -167,7 +167,7 @@ def test_several_shapes_at_once_are_lanes(effect: Effect, signals: list[Signals]
 
 def test_settings_of_other_lanes_are_refused(signals: list[Signals]) -> None:
     effect = catalogue()["nonlinearity"]
-    settings = effect.settle(signals)
+    settings = effect.fit_constants(signals)
     with pytest.raises(BadInput, match="settings of 3 lanes were given signals of 1"):
         effect.columns(one_lane(signals[0], 0), settings, np.zeros((1, 0)))
 
@@ -262,7 +262,7 @@ def test_missing_context_is_said(effect: Effect, signals: list[Signals]) -> None
                 if value is not None:
                     context[name] = np.full(len(take), value)
                 changed.append(replace(take, context=context))
-            reason = effect.missing(changed)
+            reason = effect.not_applicable_reason(changed)
             check_reason(reason)
             assert f"c.{name}" in str(reason)
 
@@ -282,11 +282,11 @@ def test_too_little_motion_is_said(signals: list[Signals]) -> None:
         "donning_shift",
         "creep",
     ):
-        check_reason(catalogue()[name].missing(brief))
+        check_reason(catalogue()[name].not_applicable_reason(brief))
     rigid = [replace(take, others={"PALM_ARCH": np.zeros(len(take))}) for take in signals]
-    check_reason(catalogue()["palm_arch"].missing(rigid))
+    check_reason(catalogue()["palm_arch"].not_applicable_reason(rigid))
     alone = [replace(take, wearing=take.take) for take in signals]
-    check_reason(catalogue()["donning_shift"].missing(alone))
+    check_reason(catalogue()["donning_shift"].not_applicable_reason(alone))
 
 
 def test_the_twin_has_the_same_freedom_and_other_columns(
@@ -318,24 +318,27 @@ def test_it_says_what_it_lacks_and_how_long_it_settles(
     effect: Effect, signals: list[Signals], settings: Settings
 ) -> None:
     known = list(signals[0].context)
-    assert effect.lacks(settings, known, signals[0].wearing) is None
+    assert effect.unavailable_inputs(settings, known, signals[0].wearing) is None
     if effect.context:
-        assert effect.lacks(settings, [], signals[0].wearing) == f"context {effect.context[0]} is not sent"
-    settling_s = effect.settling_s(effect.grid(signals, settings)[-1])
-    assert (settling_s >= 1.0) == effect.has_memory
+        assert (
+            effect.unavailable_inputs(settings, [], signals[0].wearing)
+            == f"context {effect.context[0]} is not sent"
+        )
+    transient_s = effect.transient_s(effect.grid(signals, settings)[-1])
+    assert (transient_s >= 1.0) == effect.has_memory
     assert effect.needs_time or not effect.has_memory
-    assert effect.settling_s(np.zeros((0, len(effect.parameters)))) == 0.0
+    assert effect.transient_s(np.zeros((0, len(effect.parameters)))) == 0.0
 
 
 def test_a_wearing_without_a_name_and_an_unknown_one_are_told_apart(signals: list[Signals]) -> None:
     shift = catalogue()["donning_shift"]
-    settings = shift.settle(signals)
-    assert shift.lacks(settings, [], "") == "nobody said which wearing this is"
-    assert shift.lacks(settings, [], "z") == "wearing 'z' was not in training"
+    settings = shift.fit_constants(signals)
+    assert shift.unavailable_inputs(settings, [], "") == "nobody said which wearing this is"
+    assert shift.unavailable_inputs(settings, [], "z") == "wearing 'z' was not in training"
 
 
 def test_creep_settles_with_its_slow_part_and_time_itself_needs_times() -> None:
-    assert catalogue()["creep"].settling_s(np.array([[0.6, 2.5, 10.0], [1.6, 6.3, 25.0]])) == 25.0
-    assert catalogue()["lag"].settling_s(np.array([[0.05]])) == 1.0
+    assert catalogue()["creep"].transient_s(np.array([[0.6, 2.5, 10.0], [1.6, 6.3, 25.0]])) == 25.0
+    assert catalogue()["lag"].transient_s(np.array([[0.05]])) == 1.0
     assert [effect.needs_time for effect in DECLARED] == [False, True, True]
     assert [effect.has_memory for effect in DECLARED] == [False, True, False]

@@ -26,7 +26,7 @@ def take() -> Signals:
 
 
 def columns(effect: ExpressionEffect, trained: Signals, served: Signals | None = None) -> np.ndarray:
-    settings = effect.settle([trained])
+    settings = effect.fit_constants([trained])
     return effect.columns(served or trained, settings, effect.grid([trained], settings)[0])
 
 
@@ -53,7 +53,7 @@ def test_a_low_pass_answers_a_step_exactly():
     step = take_of(np.where(np.arange(300) < 100, 0.0, 10.0)[:, None])
     effect = ExpressionEffect.parse("name = slow; columns = lowpass(own_deg, tau), previous(own_deg);"
                                     "parameter tau s 0.2 2 = 0.5")  # fmt: skip
-    settings = effect.settle([step])
+    settings = effect.fit_constants([step])
     found = effect.columns(step, settings, np.array([[0.5]]))
     since = (np.arange(300) - 99) / 50
     np.testing.assert_allclose(found[100:, 0, 0], 10 * (1 - np.exp(-since[100:] / 0.5)), atol=1e-12)
@@ -75,7 +75,7 @@ def test_training_on_undefined_frames_is_refused(text, sentence):
     own[30] = 41.5
     effect = ExpressionEffect.parse(f"name = mine; columns = {text}")
     with pytest.raises(BadInput) as caught:
-        effect.settle([take_of(own)])
+        effect.fit_constants([take_of(own)])
     expected = f"effect 'mine': {sentence} at frame 30 of take first (0.600 s from its start)"
     assert str(caught.value).startswith(expected)
 
@@ -88,7 +88,7 @@ def test_serving_gives_such_frames_zero_columns_and_a_flag():
     effect = ExpressionEffect.parse(
         "name = mine; columns = log(own_deg - 40), lowpass(sqrt(own_deg - 40), 1)"
     )
-    settings, shape = effect.settle([sound]), np.zeros((1, 0))
+    settings, shape = effect.fit_constants([sound]), np.zeros((1, 0))
     batch = effect.columns(served, settings, shape)
     assert (np.flatnonzero(effect.undefined_frames(served, settings, shape)) == [20]).all()
     assert not batch[20].any()
@@ -107,16 +107,16 @@ def test_serving_gives_such_frames_zero_columns_and_a_flag():
 
 def test_names_are_checked_against_what_was_recorded(take):
     with pytest.raises(BadInput, match=r"no context column 'c.grip'; known are own, own_deg, t, c.strap_n"):
-        ExpressionEffect.parse("name = grip; columns = c.grip").settle([take])
+        ExpressionEffect.parse("name = grip; columns = c.grip").fit_constants([take])
     effect = ExpressionEffect.parse("name = thumb; columns = THUMB * own")
-    assert effect.missing([take]) == "no signal THUMB was recorded (there are none)"
+    assert effect.not_applicable_reason([take]) == "no signal THUMB was recorded (there are none)"
 
 
 def test_a_taken_name_is_refused_and_a_stored_effect_comes_back(take):
     with pytest.raises(BadInput, match="there is an effect 'creep' already"):
         declared_effect("name = creep; columns = own")
     effect = declared_effect({"name": "strap", "columns": "c.strap_n"})
-    settings = effect.settle([take])
+    settings = effect.fit_constants([take])
     again = stored_effect("strap", settings)
     assert again.explanation == effect.explanation == "Declared by the user: c.strap_n."
     assert stored_effect("creep", {}).name == "creep"
@@ -128,7 +128,7 @@ def test_two_parameters_make_a_grid_with_the_declared_start(take):
     effect = ExpressionEffect.parse(
         "name = two; columns = lowpass(own, tau) ^ 2 * k; parameter tau s 0.1 10 = 2; parameter k 1 -1 1"
     )
-    settings = effect.settle([take])
+    settings = effect.fit_constants([take])
     grid = effect.grid([take], settings)
     assert grid.shape == (36, 2, 2)
     assert 2.0 in grid[:, 0, 0]

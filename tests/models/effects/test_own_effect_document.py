@@ -63,13 +63,13 @@ def test_the_file_is_found_and_the_trial_prints_what_it_says(
 @pytest.mark.usefixtures("installed")
 def test_it_is_an_effect_like_the_others(signals: list[Signals]) -> None:
     strap = catalogue_module.effect("strap_tension")
-    assert strap.missing(signals) == "no context column c.strap_n was recorded"
+    assert strap.not_applicable_reason(signals) == "no context column c.strap_n was recorded"
     generator = np.random.default_rng(0)
     takes = [
         Signals(take.time_s, take.own, {}, {"strap_n": 9 + generator.random(len(take))}, take.wearing)
         for take in signals
     ]
-    settings = strap.settle(takes)
+    settings = strap.fit_constants(takes)
     shape = strap.grid(takes, settings)[0]
     twins = control_columns(strap, takes, settings, shape, generator)
     true = [strap.columns(take, settings, shape) for take in takes]

@@ -51,7 +51,7 @@ def test_a_sensor_that_follows_late_is_described():
         slope, start = generator.normal(0, 0.02), generator.uniform(40, 50)
         takes.append(Signals(TIME, np.zeros((len(TIME), 1)), context={"humidity_pct": start + slope * TIME}))
         felt.append(start + slope * (TIME - 150.0))
-    settings = humidity.settle(takes)
+    settings = humidity.fit_constants(takes)
     columns = np.concatenate([humidity.columns(take, settings, np.zeros((1, 0)))[:, 0] for take in takes])
     target = np.concatenate(felt) - np.mean(felt)
 

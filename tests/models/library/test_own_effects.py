@@ -26,8 +26,8 @@ class Bend(glovecal.InstantEffect):
     explanation = "The sensor bends."
     source = "a test"
 
-    def settle(self, takes):
-        return glovecal.settle_joint_units(takes)
+    def fit_constants(self, takes):
+        return glovecal.fit_joint_units(takes)
 
     def grid(self, takes, settings):
         return np.zeros((1, takes[0].own.shape[1], 0))

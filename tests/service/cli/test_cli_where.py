@@ -30,8 +30,8 @@ def test_sentences_for_people_with_the_worst_rotation_first(trained: tuple[Run, 
     assert answer.code == 0, answer.err
     first, *_ = answer.out.splitlines()
     assert first == f"Model {model[:8]} (linear) against second:"
-    assert "W_FLEX is off by" in answer.out
-    assert answer.out.index("is off by 1") < answer.out.index("is off by 2.")
+    assert "W_FLEX: RMSE" in answer.out
+    assert answer.out.index("RMSE 1") < answer.out.index("RMSE 2.")
     assert "noise floor" in answer.out
     assert "The worst seconds:" in answer.out
     assert "Noise floors:" not in answer.out

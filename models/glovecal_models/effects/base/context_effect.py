@@ -9,7 +9,7 @@ import numpy as np
 
 from glovecal_models.effects.base.effect import InstantEffect
 from glovecal_models.effects.base.facts import Control, Settings
-from glovecal_models.effects.base.joint_units import in_joint_units, settle_joint_units
+from glovecal_models.effects.base.joint_units import fit_joint_units, in_joint_units
 from glovecal_models.effects.base.signals import Signals
 
 PRIOR_DEG = 4.0
@@ -30,14 +30,14 @@ class ContextEffect(InstantEffect):
     def column(self) -> str:
         return self.context[0]
 
-    def settle(self, takes: Sequence[Signals]) -> Settings:
+    def fit_constants(self, takes: Sequence[Signals]) -> Settings:
         values = np.concatenate([take.context[self.column] for take in takes if self.column in take.context])
         values = values[np.isfinite(values)]
         return {
             "low": float(values.min()),
             "high": float(values.max()),
             "usual": float(np.median(values)),
-            **settle_joint_units(takes),
+            **fit_joint_units(takes),
         }
 
     def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:

@@ -32,7 +32,7 @@ Uncertainty = Callable[[np.ndarray], np.ndarray]
 class Effect(EffectFacts, ABC):
     """One physical cause. Stateless: settings and shape are handed in, so that a model can store them."""
 
-    def missing(self, takes: Sequence[Signals]) -> str | None:
+    def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         """Why these takes cannot show the effect, as the end of "cannot be judged: ..."; None if they can."""
         for name in self.context:
             known = [
@@ -62,7 +62,7 @@ class Effect(EffectFacts, ABC):
         matter of time."""
         return None
 
-    def lacks(self, settings: Settings, context: Collection[str], wearing: str) -> str | None:
+    def unavailable_inputs(self, settings: Settings, context: Collection[str], wearing: str) -> str | None:
         """What it would have to be told and is not, so that it corrects nothing; None if nothing.
 
         ``context`` are the columns whose values are known now.
@@ -70,14 +70,14 @@ class Effect(EffectFacts, ABC):
         unknown = [name for name in self.context if name not in context]
         return f"context {unknown[0]} is not sent" if unknown else None
 
-    def settling_s(self, shape: np.ndarray) -> float:
+    def transient_s(self, shape: np.ndarray) -> float:
         """How long a state started anew still shows, for lanes of ``shape`` (L, P); 0 without a memory."""
         if not self.has_memory or not len(shape):
             return 0.0
         times = [shape[:, at].max() for at, item in enumerate(self.parameters) if item.unit == "s"]
         return float(max([LEAST_SETTLING_S, *times]))
 
-    def settle(self, takes: Sequence[Signals]) -> Settings:
+    def fit_constants(self, takes: Sequence[Signals]) -> Settings:
         """Constants from the training takes; the same settings are used wherever the effect is applied."""
         return {}
 

@@ -11,7 +11,7 @@ from glovecal_models.effects.base.signals import Signals
 from glovecal_models.errors import BadInput
 
 
-def settle_joint_units(takes: Sequence[Signals]) -> Settings:
+def fit_joint_units(takes: Sequence[Signals]) -> Settings:
     """Centre and scale of each lane, degrees, to be stored with an effect's settings.
 
     Takes without a row say nothing; at least one has some.

@@ -123,7 +123,7 @@ class SignatureEffect(ColumnlessEffect):
     needs_prediction: ClassVar[bool] = False
     """Whether a take that training never saw is repaired by what a model predicts for it."""
 
-    def missing(self, takes: Sequence[Signals]) -> str | None:
+    def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         """Columns cannot judge a signature; ``find`` looks for itself and finds nothing where it cannot."""
         return None
 

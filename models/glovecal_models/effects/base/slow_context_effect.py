@@ -84,11 +84,11 @@ class SlowContextEffect(ContextEffect):
 
     has_memory: ClassVar[bool] = True
 
-    def settling_s(self, shape: np.ndarray) -> float:
+    def transient_s(self, shape: np.ndarray) -> float:
         return MEMORY_S if len(shape) else 0.0
 
-    def settle(self, takes: Sequence[Signals]) -> Settings:
-        settings = super().settle(takes)
+    def fit_constants(self, takes: Sequence[Signals]) -> Settings:
+        settings = super().fit_constants(takes)
         found = [
             slopes(take.time_s, take.context[self.column]) for take in takes if self.column in take.context
         ]

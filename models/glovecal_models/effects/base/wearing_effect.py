@@ -26,7 +26,7 @@ class WearingEffect(InstantEffect):
     def is_of_training(self, settings: Settings) -> bool:
         return bool(trained_wearings(settings))
 
-    def lacks(self, settings: Settings, context: Collection[str], wearing: str) -> str | None:
+    def unavailable_inputs(self, settings: Settings, context: Collection[str], wearing: str) -> str | None:
         if wearing in settings["wearings"]:
             return None
         return f"wearing {wearing!r} was not in training" if wearing else "nobody said which wearing this is"

@@ -10,7 +10,7 @@ import numpy as np
 from glovecal_models.effects.base.effect import Effect, Stream
 from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.history_effect import LONGEST_GAP_S, elapsed_s, unbroken
-from glovecal_models.effects.base.joint_units import in_joint_units, settle_joint_units
+from glovecal_models.effects.base.joint_units import fit_joint_units, in_joint_units
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.declared.declaration import Declaration
 from glovecal_models.effects.declared.expression_value import Evaluation, Memory, Undefined
@@ -81,17 +81,17 @@ class ExpressionEffect(Effect):
                 if node.kind == "number" and not node.value <= LARGEST:
                     raise BadInput(f"effect {self.name!r}: {node.text} in {column.text!r}: {TOO_LARGE}")
 
-    def missing(self, takes: Sequence[Signals]) -> str | None:
+    def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         for name in self._signals:
             if not any(name in take.others for take in takes):
                 known = sorted({other for take in takes for other in take.others})
                 return f"no signal {name} was recorded (there are {', '.join(known) or 'none'})"
-        why = super().missing(takes)
+        why = super().not_applicable_reason(takes)
         return self._constant(takes) if why is None else why
 
     def _constant(self, takes: Sequence[Signals]) -> str | None:
         """The first column that never changes, whatever its parameters: the calibration has a constant."""
-        settings, moves = self.settle(takes), np.zeros(len(self.declaration.columns), dtype=bool)
+        settings, moves = self.fit_constants(takes), np.zeros(len(self.declaration.columns), dtype=bool)
         low = high = np.zeros(len(moves))
         for shape in self.grid(takes, settings):
             values = [self._evaluated(take, settings, shape)[0] for take in takes if len(take)]
@@ -104,7 +104,7 @@ class ExpressionEffect(Effect):
         text = self.declaration.columns[still[0]].text
         return f"its column {text!r} is always {low[still[0]]:g}; write one that changes with the hand"
 
-    def settle(self, takes: Sequence[Signals]) -> Settings:
+    def fit_constants(self, takes: Sequence[Signals]) -> Settings:
         """Raises BadInput for a name that is not recorded, and for frames in which a column has no value or
         is larger than ``LARGEST``."""
         others = {name for take in takes for name in take.others}
@@ -125,7 +125,7 @@ class ExpressionEffect(Effect):
         settings = {
             "declaration": self.declaration.to_document(),
             "context": context,
-            **settle_joint_units(takes),
+            **fit_joint_units(takes),
         }
         return settings | {"scale": self._scale(takes, settings)}
 

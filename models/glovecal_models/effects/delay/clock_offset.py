@@ -112,7 +112,7 @@ class ClockOffsetEffect(SignatureEffect):
     def needs_movement(self) -> bool:
         return True
 
-    def missing(self, takes: Sequence[Signals]) -> str | None:
+    def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         return why_no_delay_shows(takes)
 
     def assess(self, problem: Problem) -> Assessment:

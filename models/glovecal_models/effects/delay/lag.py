@@ -46,7 +46,7 @@ class Lag(ArrayStateEffect):
         Rival("creep", FAST),
     )
 
-    def missing(self, takes: Sequence[Signals]) -> str | None:
+    def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         return why_no_delay_shows(takes)
 
     def assess(self, problem: Problem) -> Assessment:
