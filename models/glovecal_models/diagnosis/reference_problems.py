@@ -134,7 +134,7 @@ def reference_problems(
         measured = [(take, values) for take, values in measured if np.isfinite(values).sum() >= fewest]
         if measured:
             own = layout.correspondence(rotation)
-            has_own = own.simulated is None and (rotation in own.sensors or len(own.sensors) == 1)
+            has_own = own.measuring_sensor is not None
             inputs = [
                 own.input_columns(_in_order(take, layout), layout.sensors)[:, 0] for take, _ in measured
             ]

@@ -36,12 +36,8 @@ def by_signature(effects: Sequence[Effect], stage: Stage) -> list[SignatureEffec
 
 def own_sensors(layout: Layout, joints: Sequence[str]) -> dict[str, str]:
     """The measuring sensor of each joint that has one."""
-    found = {}
-    for name in joints:
-        item = layout.correspondence(name)
-        if item.simulated is None and (item.rotation in item.sensors or len(item.sensors) == 1):
-            found[name] = item.sensors[item.sensors.index(name)] if name in item.sensors else item.sensors[0]
-    return found
+    found = {name: layout.correspondence(name).measuring_sensor for name in joints}
+    return {name: sensor for name, sensor in found.items() if sensor is not None}
 
 
 def signature_findings(
