@@ -57,7 +57,7 @@ def test_what_cannot_be_judged_is_said(takes: list[Take]) -> None:
     unrelated = replace(take, readings=np.cumsum(generator.normal(size=take.readings.shape), axis=0))
     for one in (still, brief, unrelated, replace(take, reference=np.full_like(take.reference, np.nan))):
         [found] = clock_offsets([one])
-        assert (found.verdict, found.offset_s) == ("not judgeable", 0.0)
+        assert (found.verdict, found.offset_s) == ("not identifiable", 0.0)
         assert "cannot be judged" in found.sentence
 
 

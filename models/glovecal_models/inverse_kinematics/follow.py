@@ -92,7 +92,7 @@ LONGEST_STEP_DEG = 10.0
 SCATTERED_STARTS = 8
 """Hands anywhere within the limits, tried where the way is barred from the last frame and from the shape."""
 MOST_STEPS = 200
-SWAYED, LEAST_EAGER = 0.8, 0.2
+OSCILLATION_BACK_OFF, LEAST_POSTURE_GAIN = 0.8, 0.2
 """Once swayed, joints come back to their shape in smaller steps."""
 AT_LIMIT_DEG = 1e-6
 
@@ -166,30 +166,33 @@ class _Frame:
         return best
 
     def solved(self, start_deg: np.ndarray) -> _Solution:
-        """Steps until the joints are still. Where they sway, the eagerness to get back to the shape falls."""
+        """Steps until the joints are still. Where they oscillate, the gain towards the posture falls."""
         low, high = self.chains.limits_deg.T
         at, before, steps = np.clip(start_deg, low, high), np.zeros(len(low)), 0
-        eagerness = most_eager = 1.0
+        posture_gain = most_gain = 1.0
         while True:
-            step, distance, force = self._step(at, eagerness)
+            step, distance, force = self._step(at, posture_gain)
             furthest = float(np.abs(step).max())
-            still = STILL_DEG * eagerness if distance < TIP_TOLERANCE_MM else STUCK_DEG
+            still = STILL_DEG * posture_gain if distance < TIP_TOLERANCE_MM else STUCK_DEG
             if furthest < still or steps == MOST_STEPS:
-                return _Solution(at, distance, force / eagerness, steps)
+                return _Solution(at, distance, force / posture_gain, steps)
             at = np.clip(at + step * min(1.0, LONGEST_STEP_DEG / max(furthest, STILL_DEG)), low, high)
             if step @ before < 0:
-                eagerness, most_eager = eagerness / 2, max(SWAYED * eagerness, LEAST_EAGER)
+                posture_gain, most_gain = (
+                    posture_gain / 2,
+                    max(OSCILLATION_BACK_OFF * posture_gain, LEAST_POSTURE_GAIN),
+                )
             else:
-                eagerness = min(most_eager, 1.5 * eagerness)
+                posture_gain = min(most_gain, 1.5 * posture_gain)
             before, steps = step, steps + 1
 
-    def _step(self, at: np.ndarray, eagerness: float) -> tuple[np.ndarray, float, np.ndarray]:
+    def _step(self, at: np.ndarray, posture_gain: float) -> tuple[np.ndarray, float, np.ndarray]:
         """The step (K,) in degrees, the distance in mm, the force."""
         tips, slopes = self.chains.tips_and_slopes(at[None])
         missing, rows = self.contact.missing(tips[0], self.frame)
         distance = float(np.sqrt((missing * missing).sum()))
         by_angle = rows.reshape(missing.size, -1) @ slopes[0].reshape(-1, len(at)) * self.sd_deg
         room = (self.chains.limits_deg.T - at) / self.sd_deg
-        back = eagerness * (self.centre_deg - at) / self.sd_deg
+        back = posture_gain * (self.centre_deg - at) / self.sd_deg
         step, force = clamped_step(by_angle, clamped_pull(missing).ravel(), distance, back, room)
         return step * self.sd_deg, distance, force

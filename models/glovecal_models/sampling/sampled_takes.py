@@ -73,7 +73,7 @@ def sampled_takes(state: SamplingState, recorded: Mapping[str, Take], *, name: s
     return takes
 
 
-def is_lesson(document: Mapping[str, Any]) -> bool:
+def is_labelled(document: Mapping[str, Any]) -> bool:
     """Whether a take with this document belongs to a calibration; the check of a later wearing does not."""
     return document["kind"] != "range" and document["part"] != CHECK_PART
 

@@ -69,11 +69,11 @@ def touching_segment(
     duration_s: float = 3.0,
     *,
     rod_mm: float = 0.0,
-    eagerness: float = 1.0,
+    posture_gain: float = 1.0,
 ) -> Segment:
     """Thumb and ``finger`` ("I", "M", "R" or "P") touching from beginning to end, or a rod between them.
 
-    ``eagerness`` makes the waves larger and quicker.
+    ``posture_gain`` makes the waves larger and quicker.
 
     Raises BadInput for another finger, and for a hand of ``skeleton`` whose tips cannot stay together.
     """
@@ -84,20 +84,20 @@ def touching_segment(
     tips = _Tips(hand, skeleton, finger, rod_mm)
     near = posture_vector(POSTURES["ok"] | _NEAR_TOUCH[finger] | dict.fromkeys(GAPS, 4.0))
     touching = _brought_together(near[None], tips)
-    meant = _waving(touching, finger, random, int(np.ceil(duration_s * TABLE_HZ)) + 1, eagerness)
+    meant = _waving(touching, finger, random, int(np.ceil(duration_s * TABLE_HZ)) + 1, posture_gain)
     table = _brought_together(meant, tips)
     return Segment(name, TouchingMotion(table, name), Unrest(random, held=DRIVEN))
 
 
 def _waving(
-    posture: np.ndarray, finger: str, random: np.random.Generator, frames: int, eagerness: float
+    posture: np.ndarray, finger: str, random: np.random.Generator, frames: int, posture_gain: float
 ) -> np.ndarray:
     """Slow waves of the two fingers about ``posture`` (1, len(DRIVEN))."""
     table = np.tile(posture, (frames, 1))
     time = np.arange(frames) / TABLE_HZ
     for column, name in enumerate(DRIVEN):
         size = WAVES_DEG.get(name.partition("_")[2], 0.0) if name[0] in ("T", finger) else 0.0
-        size, speed = eagerness * size, eagerness * random.uniform(*WAVES_HZ)
+        size, speed = posture_gain * size, posture_gain * random.uniform(*WAVES_HZ)
         phase = random.uniform(0, 2 * np.pi)
         table[:, column] += size * np.sin(2 * np.pi * speed * time + phase)
     return within_range(table)
@@ -188,7 +188,7 @@ class RealTouches:
             seed,
             LONGEST_TOUCH_S,
             rod_mm=step.rod_mm or 0.0,
-            eagerness=EAGERNESS,
+            posture_gain=EAGERNESS,
         )
         return _ToAndFro(touching.motion)
 

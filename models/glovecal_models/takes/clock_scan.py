@@ -33,7 +33,7 @@ LOOKS_LIKE_LAG_S = -0.15
 """Readings this much late may as well come from a lag in the sensors."""
 SHORTEST_SCANNED_S = 2.0
 
-Verdict = Literal["offset", "agrees", "not judgeable", "range too small"]
+Verdict = Literal["offset", "agrees", "not identifiable", "range too small"]
 
 
 @dataclass(frozen=True)
@@ -194,7 +194,7 @@ def _best_for_map(
 def _judged(take: Take, grid: Grid | None, scan: np.ndarray | None, offset_s: float | None) -> ClockOffset:
     if grid is None or scan is None or offset_s is None:
         sentence = f"Take {take.name}: the clocks cannot be judged; too short, or the reference never moves."
-        return ClockOffset(take.name, "not judgeable", 0.0, -RANGE_S, RANGE_S, 1.0, 1.0, 1.0, sentence)
+        return ClockOffset(take.name, "not identifiable", 0.0, -RANGE_S, RANGE_S, 1.0, 1.0, 1.0, sentence)
     before = unexplained(grid, grid.readings, grid.time_s)
     after = unexplained(grid, grid.readings, grid.time_s + offset_s)
     least = float(np.nanmin(_scan(grid, grid.readings[::-1])))
@@ -202,7 +202,7 @@ def _judged(take: Take, grid: Grid | None, scan: np.ndarray | None, offset_s: fl
     low, high = (float(near.min()), float(near.max())) if len(near) else (offset_s, offset_s)
     verdict: Verdict = "offset"
     if after > BETTER_THAN_REVERSED * least:
-        verdict = "not judgeable"
+        verdict = "not identifiable"
     elif abs(offset_s) >= RANGE_S - COARSE_S:
         verdict = "range too small"
     elif not after <= WORTHWHILE * before:
@@ -214,7 +214,7 @@ def _judged(take: Take, grid: Grid | None, scan: np.ndarray | None, offset_s: fl
 
 
 def _sentence(take: str, verdict: Verdict, offset_s: float, before: float, after: float) -> str:
-    if verdict == "not judgeable":
+    if verdict == "not identifiable":
         return f"Take {take}: the clocks cannot be judged; sensors played backwards fit nearly as well."
     if verdict == "range too small":
         return f"Take {take}: the best offset is at the end of ±{RANGE_S:g} s; the clocks differ by more."

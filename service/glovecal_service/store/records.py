@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import Handedness, Skeleton, hand_skeleton
-from glovecal_models.sampling.sampled_takes import is_lesson
+from glovecal_models.sampling.sampled_takes import is_labelled
 
 RecordingState = Literal["requested", "recording", "stopping", "repairing", "done", "failed"]
 """``repairing``: it is over and its take can be used, but frames may still come from the capture log."""
@@ -123,7 +123,7 @@ class TakeRecord:
     def teaches(self) -> bool:
         """Whether a calibration can learn from it: from angles, or as a part of a whole guided sampling (a
         check of a later wearing is none)."""
-        return self.has_reference or (self.sampling is not None and is_lesson(self.sampling))
+        return self.has_reference or (self.sampling is not None and is_labelled(self.sampling))
 
 
 def incomplete_sentences(takes: Iterable[TakeRecord]) -> list[str]:

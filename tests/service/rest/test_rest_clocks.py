@@ -59,7 +59,7 @@ def test_what_cannot_be_judged_stays(subject: RestClient, tmp_path: Path) -> Non
     file.write_text("time_s,s.A\n0,1\n1,2\n2,3\n")
     [take] = subject.upload_takes(file, subject="anna", layout="one")["takes"]
     [clock] = subject.post("/takes/clocks", {"takes": [take["id"]], "repair": True})
-    assert (clock["verdict"], clock["repaired"]) == ("not judgeable", False)
+    assert (clock["verdict"], clock["repaired"]) == ("not identifiable", False)
     with pytest.raises(Refused) as refused:
         subject.post("/takes/clocks", {"takes": ["0123456789ab"]})
     assert refused.value.status == 404

@@ -29,9 +29,9 @@ from glovecal_models.sampling.guided.second_pass import (
     LabelledSamples,
     SampleCount,
     counted,
-    known_lessons,
+    known_samples,
     labelled_layout,
-    touch_lessons,
+    touch_samples,
     with_open_variance,
 )
 from glovecal_models.sampling.guided.seen_touches import (
@@ -131,8 +131,8 @@ def guided_samples(
     if seen and skeleton is not None:
         posterior, seen, strange = closing_touches(priors, layout.sensors, skeleton, seen, cancelled)
         refused += strange
-    inferred, told = touch_lessons(seen, posterior, layout.rotations)
-    labelled_samples = (*known_lessons(known, posterior, told), *inferred)
+    inferred, told = touch_samples(seen, posterior, layout.rotations)
+    labelled_samples = (*known_samples(known, posterior, told), *inferred)
     if not labelled_samples:
         raise NotTrainable(nothing_left(skeleton is not None, len(touching), refused))
     say("how well the session tells what is left out of it", 0.8)

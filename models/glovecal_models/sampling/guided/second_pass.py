@@ -53,7 +53,7 @@ class LabelledSamples:
     """Rotations that nobody knows here but by rule: they keep a map from going astray between touches."""
 
 
-def known_lessons(
+def known_samples(
     takes: Iterable[LabelledTake], posterior: TouchPosterior, told: Iterable[str] = ()
 ) -> list[LabelledSamples]:
     """From takes with known angles. In held poses also joints without a sensor that touches ``told`` of: a
@@ -77,7 +77,7 @@ def known_lessons(
     return labelled_samples
 
 
-def touch_lessons(
+def touch_samples(
     seen: Sequence[SeenTouch], posterior: TouchPosterior, rotations: Sequence[str]
 ) -> tuple[list[LabelledSamples], dict[str, float]]:
     """From touches, those of ``rotations`` that each tells something of; and the share told of each."""

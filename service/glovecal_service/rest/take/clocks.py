@@ -31,7 +31,7 @@ class ClocksRequest(Wanted):
 class ClockView(BaseModel):
     id: str
     take: str
-    verdict: str = Field(description='"offset", "agrees", "not judgeable" or "range too small".')
+    verdict: str = Field(description='"offset", "agrees", "not identifiable" or "range too small".')
     offset_s: float | None = Field(description="Reference time = frame time + offset; 0 unless found.")
     low_s: float | None
     high_s: float | None
