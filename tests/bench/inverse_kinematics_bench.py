@@ -1,4 +1,4 @@
-"""Touching hands per second beside mink, on one core, in alternating runs.
+"""IK solves per second of touching hands beside mink, on one core, in alternating runs.
 
     python tests/bench/inverse_kinematics_bench.py [--quick | --smoke] [--json FILE]
 
@@ -41,7 +41,7 @@ def main() -> int:
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     options = parser.parse_args()
     pin_blas_to_one_thread()
-    print(f"{FRAMES} frames, hands per second (median); {', '.join(map(_named, ('mink', 'daqp')))}")
+    print(f"{FRAMES} frames, IK solves per second (median); {', '.join(map(_named, ('mink', 'daqp')))}")
     runs = 1 if options.smoke else 3 if options.quick else 15
     rows = [compared(finger, runs) for finger in ("I" if options.smoke else "IMR")]
     for row in rows:
