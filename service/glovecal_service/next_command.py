@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from glovecal_service.stored_documents import current
+from glovecal_service.views.renamed_keys import current
 
 SHORT = 12
 LONG_ENOUGH_S = 60

@@ -20,8 +20,7 @@ from glovecal_service.report.effects import effect_card
 from glovecal_service.report.error_fall import Fall, FloorBand
 from glovecal_service.report.html import counted_once
 from glovecal_service.report.improvement_page import improvement_page
-from glovecal_service.stored_documents import current
-from glovecal_service.views.renamed_keys import RENAMED
+from glovecal_service.views.renamed_keys import RENAMED, current
 
 MODEL_ID = "da3a26b60b009b5f723ad22934052eafaf153ce82b8234bd8d25d79c31c7f073"
 CAPTION = Caption(MODEL_ID, "pia", "linear", 2, date(2026, 11, 22))

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import ClassVar
 
 from glovecal_models.effects.base.effect import ColumnlessEffect
 from glovecal_models.effects.base.facts import Kind, Stage
-from glovecal_models.effects.base.signals import Signals
 
 
 class NoEffect(ColumnlessEffect):
@@ -16,6 +14,3 @@ class NoEffect(ColumnlessEffect):
     source = "the null hypothesis"
     kind: ClassVar[Kind] = "nothing"
     stage: ClassVar[Stage] = "never"
-
-    def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
-        return None

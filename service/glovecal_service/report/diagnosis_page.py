@@ -28,7 +28,7 @@ from glovecal_service.report.html import (
     paragraph,
     table,
 )
-from glovecal_service.stored_documents import current
+from glovecal_service.views.renamed_keys import current
 
 HEADS = ("effect", "where", "error before", "with the effect", "with its control", "significant")
 RESIDUAL_HEADS = (

@@ -18,7 +18,7 @@ from glovecal_models.comparison.noise_floor import reaches_floor
 from glovecal_models.comparison.residuals import Residuals, residuals
 from glovecal_models.takes.take import Take
 from glovecal_service.report.drawing import CONTROL, FLOOR, MODEL, QUIET, legend_above, svg
-from glovecal_service.stored_documents import current
+from glovecal_service.views.renamed_keys import current
 
 WIDE_RANGE = 15.0
 """From this ratio of the largest to the smallest error the axis is logarithmic."""

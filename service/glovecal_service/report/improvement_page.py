@@ -13,7 +13,7 @@ from glovecal_service.report.diagnosis_page import hold_table, next_take_note
 from glovecal_service.report.effects import effect_card
 from glovecal_service.report.error_fall import Fall, FloorBand, error_fall
 from glovecal_service.report.html import Fact, Section, counted, degrees, figure, folded, listed, page, table
-from glovecal_service.stored_documents import current
+from glovecal_service.views.renamed_keys import current
 
 STOPPED = {
     "noise_floor": "The error is at the noise floor.",

@@ -47,3 +47,13 @@ def current_verdict(verdict: Any) -> Any:
 def current_residual(residual: Any) -> Any:
     """An improvement's unexplained residual: once it was only whether there is one."""
     return {"is_significant": residual, "sentence": ""} if isinstance(residual, bool) else residual
+
+
+def current(document: Any) -> Any:
+    """A copy with today's keys at every depth. A document that has both keeps today's value."""
+    if isinstance(document, dict):
+        named = {RENAMED.get(key, key): current(value) for key, value in document.items()}
+        return named | {key: current(value) for key, value in document.items() if key in named}
+    if isinstance(document, list | tuple):
+        return [current(item) for item in document]
+    return document
