@@ -110,7 +110,7 @@ def _summary(main: ReportedModel, numbers: Comparison, where: WhereItFails) -> l
         Fact("Verdict", verdict),
         Fact("Size", size),
         Fact("Claimed SD", claimed),
-        Fact("Place", f"largest possible improvement at {worst.rotation}: {rotation_sentence(worst)}"),
+        Fact("Place", f"largest possible improvement: {rotation_sentence(worst)}"),
         Fact("Next", f"glovecal {verb} {main.id[:12]}", is_command=True),
     ]
 

@@ -37,7 +37,7 @@ def test_training_says_what_it_did(walked):
     models = by_method(run)
     assert set(models) == {"linear", "raw"}
     id = models["linear"]["id"]
-    assert linear.out.startswith(f"Model {id[:12]} (linear) for anna, error on left-out takes ")
+    assert linear.out.startswith(f"Model {id[:12]} (linear) for anna, held-out error ")
     assert linear.out.endswith("Active.\n")
     assert "2 takes" in linear.err
     assert "PALM_ARCH" in linear.err
@@ -181,7 +181,7 @@ def test_nothing_is_left_to_compare_with(run, tables):
     run("subject", "add", "ben")
     assert run("take", "import", tables / "other.parquet", "-s", "ben").code == 0
     trained = run("train", "-s", "ben", "--method", "raw", "--folds", 0, "--no-activate")
-    assert trained.out.endswith("error not estimated. Not active.\n")
+    assert trained.out.endswith("no cross-validation. Not active.\n")
     (model,) = run("model", "list", "--json").json
     refused = run("compare", model["id"])
     assert refused.code == 1

@@ -94,7 +94,7 @@ def _say_model(result: dict[str, Any], document: dict[str, Any]) -> None:
         err.print(sentence)
     error = result.get("held_out_rmse_deg")
     how = str(document["error_estimate"].get("how"))
-    told = f"error on left-out takes {error:.2f} degrees" if error is not None else "error not estimated"
+    told = f"held-out error {error:.2f} degrees" if error is not None else "no cross-validation"
     if error is not None and "takes" not in how:
         told = f"error on left-out parts of its takes {error:.2f} degrees"
     if error is not None and "widgets" in how:
