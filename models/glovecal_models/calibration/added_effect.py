@@ -1,18 +1,34 @@
-"""An effect that a calibration model holds: on which rotations, with which shape and weights."""
+"""An effect of a calibration model: on which rotations, in which form, with which shape and weights."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.effect import Effect, Stream
 from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.interval_effect import IntervalEffect
+from glovecal_models.effects.base.learned_form import OWN, LearnedForm
+from glovecal_models.effects.base.signals import GloveFrames, Signals
 from glovecal_models.effects.catalogue import stored_effect
 from glovecal_models.errors import BadInput
+
+FORM = "form"
+"""Where settings keep the learned form; without one the effect's own columns are all."""
+FRAMES_AT_ONCE = 2048
+
+
+class Contribution(NamedTuple):
+    """What one effect adds on its lanes."""
+
+    degrees: np.ndarray
+    """(N, L)."""
+    variance: np.ndarray | None
+    """(N, L), degrees squared, of its weights; None where the model does not hold their covariance."""
 
 
 @dataclass(frozen=True)
@@ -26,11 +42,14 @@ class AddedEffect:
     shape: np.ndarray
     """(L, P)."""
     weights: np.ndarray
-    """(L, C); no columns for an effect that repairs the reference."""
+    """(L, C); the effect's own columns first, then those of its learned form. No columns for an effect that
+    repairs the reference."""
     zero_deg: np.ndarray
     """(L,): the base's prediction at a raw reading of zero, by a straight line."""
     evidence: Mapping[str, Any] = field(default_factory=dict)
     """What it saved, beside its decoy, when it was added; plain JSON-able data."""
+    covariance: np.ndarray | None = None
+    """(L, C, C) of the weights; None in models that were stored without."""
 
     def __post_init__(self) -> None:
         lanes = len(self.rotations)
@@ -38,11 +57,26 @@ class AddedEffect:
             raise BadInput(f"effect {self.name!r}: shape {self.shape.shape} for {lanes} rotations")
         if len(self.weights) != lanes or self.zero_deg.shape != (lanes,):
             raise BadInput(f"effect {self.name!r}: weights {self.weights.shape} for {lanes} rotations")
+        expected = (*self.weights.shape, self.weights.shape[1])
+        if self.covariance is not None and self.covariance.shape != expected:
+            raise BadInput(
+                f"effect {self.name!r}: covariance {self.covariance.shape} of weights {self.weights.shape}"
+            )
 
     @property
     def effect(self) -> Effect:
         """From the catalogue. Raises BadInput when this machine does not have it."""
         return stored_effect(self.name, self.settings)
+
+    @cached_property
+    def form(self) -> LearnedForm | None:
+        """What was learned of how its inputs act, beyond its own columns. Raises BadInput."""
+        return LearnedForm.from_document(self.settings[FORM]) if FORM in self.settings else None
+
+    @property
+    def own_count(self) -> int:
+        """Columns that are not of the learned form."""
+        return self.weights.shape[1] - (self.form.count if self.form else 0)
 
     @property
     def active(self) -> tuple[str, ...]:
@@ -58,8 +92,89 @@ class AddedEffect:
         effect = self.effect
         if isinstance(effect, IntervalEffect):
             return {name: effect.described_on(self.settings, name) for name in self.rotations}
+        own = self.own_count
         return {
-            name: effect.described(self.settings, shape, weights)
+            name: effect.described(self.settings, shape, weights[:own])
             for name, shape, weights in zip(self.rotations, self.shape, self.weights, strict=True)
             if name in self.active
         }
+
+    def contribution(self, take: Signals) -> Contribution:
+        """To every frame of a take whose lanes are this effect's."""
+        effect, own = self.effect, self.own_count
+        plain = effect.columns(take, self.settings, self.shape)
+        factor = self.variance_factor
+        if self.form is None and factor is None:
+            return Contribution(np.einsum("nlc,lc->nl", plain, self.weights), None)
+        inputs = form_values(effect, take, plain, self.settings) if self.form else {}
+        degrees = np.empty(plain.shape[:2])
+        variance = None if factor is None else np.empty(plain.shape[:2])
+        for first in range(0, len(take), FRAMES_AT_ONCE):
+            rows = slice(first, first + FRAMES_AT_ONCE)
+            columns = plain[rows]
+            if self.form is not None:
+                learned = self.form.columns({name: values[rows] for name, values in inputs.items()})
+                columns = np.concatenate([columns, learned], axis=2)
+            degrees[rows] = np.einsum("nlc,lc->nl", columns[:, :, :own], self.weights[:, :own])
+            degrees[rows] += np.einsum("nlc,lc->nl", columns[:, :, own:], self.weights[:, own:])
+            if variance is not None and factor is not None:
+                variance[rows] = weight_variance(columns, factor)
+        return Contribution(degrees, variance)
+
+    @cached_property
+    def variance_factor(self) -> np.ndarray | None:
+        """(L, C, C): the covariance of the weights is this times its transpose. None where it is not held."""
+        if self.covariance is None or not self.covariance.size or self.effect.tells_own_uncertainty:
+            return None
+        values, vectors = np.linalg.eigh(self.covariance)
+        return vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+
+    def stream(self) -> Stream:
+        """All its columns, frame by frame."""
+        inner = self.effect.stream(self.settings, self.shape)
+        return inner if self.form is None else _FormedStream(self.effect, self.form, inner, self.settings)
+
+
+def weight_variance(columns: np.ndarray, factor: np.ndarray) -> np.ndarray:
+    """(N, L), degrees squared: of ``columns`` (N, L, C) with weights of covariance ``factor`` (L, C, C)."""
+    spread = np.matmul(columns.transpose(1, 0, 2), factor)
+    return np.einsum("lnc,lnc->nl", spread, spread)
+
+
+def form_values(
+    effect: Effect, take: Signals, columns: np.ndarray, settings: Settings
+) -> dict[str, np.ndarray]:
+    """(N, L) of every input of a learned form by name; empty for an effect that has none."""
+    inputs = effect.form_inputs(take, columns, settings)
+    return {OWN: take.own, **inputs} if inputs else {}
+
+
+class _FormedStream(Stream):
+    """An effect's columns and those of its learned form."""
+
+    def __init__(self, effect: Effect, form: LearnedForm, inner: Stream, settings: Settings) -> None:
+        self._effect, self._form, self._inner, self._settings = effect, form, inner, settings
+
+    @property
+    def undefined(self) -> str | None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return self._inner.undefined
+
+    def columns(self, frame: Signals) -> np.ndarray:
+        return self._with_form(frame, self._inner.columns(frame))
+
+    def reset(self) -> None:
+        self._inner.reset()
+
+    def _with_form(self, frame: Signals, plain: np.ndarray) -> np.ndarray:
+        inputs = form_values(self._effect, frame, plain, self._settings)
+        return np.concatenate([plain, self._form.columns(inputs)], axis=2)
+
+    @classmethod
+    def together(cls, streams: Sequence[Any], frames: GloveFrames) -> np.ndarray:
+        inner = [stream._inner for stream in streams]
+        plain = type(inner[0]).together(inner, frames)
+        signals = frames.as_one()
+        if signals is not None:
+            return streams[0]._with_form(signals, plain)
+        each = zip(streams, frames, plain, strict=True)
+        return np.concatenate([stream._with_form(frame, part[None]) for stream, frame, part in each])

@@ -54,6 +54,8 @@ def dump(model: CalibrationModel) -> bytes:
         tensors[f"effect{number}:shape"] = np.ascontiguousarray(added.shape, dtype=np.float64)
         tensors[f"effect{number}:weights"] = np.ascontiguousarray(added.weights, dtype=np.float64)
         tensors[f"effect{number}:zero_deg"] = np.ascontiguousarray(added.zero_deg, dtype=np.float64)
+        if added.covariance is not None:
+            tensors[f"effect{number}:covariance"] = np.ascontiguousarray(added.covariance, dtype=np.float64)
     if model.sensor_centre is not None and model.sensor_scale is not None:
         tensors["sensors:centre"] = np.ascontiguousarray(model.sensor_centre, dtype=np.float64)
         tensors["sensors:scale"] = np.ascontiguousarray(model.sensor_scale, dtype=np.float64)
@@ -160,6 +162,7 @@ def _restore_effect(number: int, item: Mapping[str, Any], tensors: Mapping[str, 
         weights=tensors[f"effect{number}:weights"],
         zero_deg=tensors[f"effect{number}:zero_deg"],
         evidence=dict(item["evidence"]),
+        covariance=tensors.get(f"effect{number}:covariance"),
     )
 
 

@@ -84,7 +84,9 @@ def kept_lanes(effects: Sequence[AddedEffect], relearned: Sequence[str]) -> list
         stays = np.array([name not in relearned for name in item.rotations])
         weights = np.where(stays[:, None], item.weights, 0.0)
         if weights.any():
-            kept.append(replace(item, weights=weights))
+            known = item.covariance
+            covariance = None if known is None else np.where(stays[:, None, None], known, 0.0)
+            kept.append(replace(item, weights=weights, covariance=covariance))
     return kept
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glovecal_models.calibration.added_effect import AddedEffect
+from glovecal_models.calibration.added_effect import AddedEffect, weight_variance
 from glovecal_models.calibration.interval_inflation import IntervalInflation, VarianceInflation
 from glovecal_models.effects.base.effect import Effect, Stream, Uncertainty
 from glovecal_models.effects.base.signals import GloveFrames, Signals
@@ -87,10 +87,7 @@ class EffectCorrection:
         self._lanes = [(item, _columns_of(item, rotations)) for item in effects if item.weights.any()]
         self._count, self._scale = len(rotations), scale
         self._effects = [_fitting(item) for item, _ in self._lanes]
-        self._streams = [
-            effect.stream(item.settings, item.shape)
-            for effect, (item, _) in zip(self._effects, self._lanes, strict=True)
-        ]
+        self._streams = [item.stream() for item, _ in self._lanes]
         self._uncertain: tuple[str, list[tuple[np.ndarray | slice, Uncertainty]]] | None = None
         """Of the wearing asked about last."""
         measured = np.zeros(len(rotations)) if noise is None else noise
@@ -164,11 +161,14 @@ class EffectCorrection:
             base, readings, inflation = self._inflated(time_s, base, readings)
         total = base - first
         others = self._scale.others(readings) if self._lanes else {}
+        unknown = self._unknown_variance(base, wearing)
         for item, lanes in self._lanes:
             take = Signals(time_s, base[:, lanes], others, context, wearing, zero_deg=item.zero_deg)
-            columns = item.effect.columns(take, item.settings, item.shape)
-            total[:, lanes] += np.einsum("nlc,lc->nl", columns, item.weights)
-        unknown = self._unknown_variance(base, wearing)
+            found = item.contribution(take)
+            total[:, lanes] += found.degrees
+            if found.variance is not None:
+                unknown = np.zeros_like(base) if unknown is None else unknown
+                unknown[:, lanes] += found.variance
         return Correction(total, inflation if unknown is None else VarianceInflation.more(inflation, unknown))
 
     @staticmethod
@@ -198,6 +198,10 @@ class EffectCorrection:
             streams = [glove._streams[number] for glove in gloves]
             columns = _columns(streams, frames, item.weights.shape, problems)
             total[:, lanes] += np.add.reduce(columns * item.weights, axis=2)
+            factor = item.variance_factor
+            if factor is not None:
+                inflation = inflation or VarianceInflation.none(base.shape)
+                inflation.variance[:, lanes] += weight_variance(columns, factor)
             without = [row for row, stream in enumerate(streams) if stream.undefined is not None]
             if without:
                 undefined = np.zeros(base.shape, dtype=bool) if undefined is None else undefined
@@ -208,9 +212,7 @@ class EffectCorrection:
         for row, glove in enumerate(gloves):
             unknown = glove._unknown_variance(base[row : row + 1], wearing[row])
             if unknown is not None:
-                inflation = inflation or VarianceInflation(
-                    np.zeros_like(base), np.zeros(base.shape, dtype=bool)
-                )
+                inflation = inflation or VarianceInflation.none(base.shape)
                 inflation.variance[row] += unknown[0]
         return Corrections(total, undefined, inflation, problems)
 
@@ -323,7 +325,7 @@ def _fitting(added: AddedEffect) -> Effect:
     """Its effect, if it still has the parameters and columns that the model learned."""
     effect = added.effect
     wanted = (len(effect.parameters), len(effect.weight_names(added.settings)))
-    learned = (added.shape.shape[1], added.weights.shape[1])
+    learned = (added.shape.shape[1], added.own_count)
     if learned != wanted:
         raise BadInput(
             f"effect {added.name!r} was learned with {learned[0]} parameters and {learned[1]} weights, "

@@ -8,21 +8,25 @@ three simulated gloves (hysteresis, creep, donning) a third changed the error by
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.calibration.added_effect import AddedEffect
+from glovecal_models.calibration.added_effect import FORM, AddedEffect, form_values
 from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.effect_shape import EffectGroup, best_shape
 from glovecal_models.calibration.fit_task import FitResult, run_task
-from glovecal_models.calibration.held_out import BaseFeatures, BaseProducts, Rows, held_out
+from glovecal_models.calibration.form_choice import EVERY as FORM_EVERY
+from glovecal_models.calibration.form_choice import FormRows, chosen_form
+from glovecal_models.calibration.held_out import BaseFeatures, Rows, WeightPosterior, weight_posterior
 from glovecal_models.calibration.model import restore_regressor
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.samples import Samples, linear_correspondence
 from glovecal_models.calibration.training_plan import task_for
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.effects.base.learned_form import LearnedForm
 from glovecal_models.layout import Correspondence
 from glovecal_models.progress import Cancel, stop_if
 from glovecal_models.regression.regressor import Regressor
@@ -58,13 +62,15 @@ def fit_with_effects(
     results: dict[str, FitResult] = {}
     effects: tuple[AddedEffect, ...] = ()
     regressors: dict[str, Regressor] = {}
-    for _ in range(TURNS if wanted else 1):
+    for turn in range(TURNS if wanted else 1):
         for name in rotations:
             stop_if(cancelled, "adding an effect")
             results[name] = _trained(takes, columns[name], corrected.get(name), settings, cancelled)
             regressors[name] = restore_regressor(results[name].arrays, results[name].settings)
         if wanted:
-            effects = _fitted_effects(takes, columns, regressors, wanted, settings, cancelled)
+            # While the base still holds a part of the effect, its form cannot be seen.
+            is_last = turn == TURNS - 1
+            effects = _fitted_effects(takes, columns, regressors, wanted, settings, is_last, cancelled)
             corrected = _explained(takes, columns, regressors, effects)
     if wanted:
         for name in rotations:
@@ -122,9 +128,10 @@ def _fitted_effects(
     regressors: Mapping[str, Regressor],
     wanted: Sequence[EffectRequest],
     settings: TrainingSettings,
+    with_forms: bool,
     cancelled: Cancel | None,
 ) -> tuple[AddedEffect, ...]:
-    """Shapes one effect after another, then all weights of a joint together."""
+    """Shapes and forms one effect after another, then all weights of a joint together."""
     touched = [name for name in columns if any(name in item.rotations for item in wanted)]
     own = {name: own_signals(takes, columns[name], regressors[name]) for name in touched}
     groups = [group for item in wanted for group in _groups(takes, item, columns, own)]
@@ -134,14 +141,20 @@ def _fitted_effects(
     extra: dict[str, list[list[np.ndarray]]] = {name: [] for name in touched}
     priors: dict[str, list[np.ndarray]] = {name: [] for name in touched}
     shapes: list[np.ndarray] = []
-    for group in groups:
+    for place, group in enumerate(groups):
         stop_if(cancelled, "adding an effect")
         shape = best_shape(group, rows, bases, extra, priors)
         shapes.append(shape)
-        found = [group.wanted.effect.columns(take, group.settings, shape) for take in group.signals]
+        effect = group.wanted.effect
+        found = [effect.columns(take, group.settings, shape) for take in group.signals]
+        own_prior = effect.prior_sd(group.settings)
         for lane, name in enumerate(group.lanes):
             extra[name].append([part[index, lane] for part, index in zip(found, rows[name], strict=True)])
-            priors[name].append(group.wanted.effect.prior_sd(group.settings))
+            priors[name].append(own_prior)
+        if with_forms:
+            form = _learned_form(group, found, rows, bases, extra, priors)
+            if form is not None:
+                groups[place] = replace(group, settings=group.settings | {FORM: form.to_document()})
     weights = {name: _weights(bases[name], extra[name], priors[name]) for name in touched}
     used = dict.fromkeys(touched, 0)
     added = []
@@ -151,8 +164,66 @@ def _fitted_effects(
             mine.append(weights[name][used[name]])
             used[name] += 1
         zero = np.array([own[name][1] for name in group.lanes])
-        added.append(AddedEffect(group.wanted.name, group.lanes, group.settings, shape, np.array(mine), zero))
+        mean = np.array([each.mean for each in mine])
+        is_told = group.wanted.effect.tells_own_uncertainty
+        covariance = None if is_told else np.array([each.covariance for each in mine])
+        added.append(
+            AddedEffect(
+                group.wanted.name, group.lanes, group.settings, shape, mean, zero, covariance=covariance
+            )
+        )
     return tuple(added)
+
+
+def _learned_form(
+    group: EffectGroup,
+    found: Sequence[np.ndarray],
+    rows: Mapping[str, Sequence[np.ndarray]],
+    bases: Mapping[str, list[Rows]],
+    extra: Mapping[str, list[list[np.ndarray]]],
+    priors: Mapping[str, list[np.ndarray]],
+) -> LearnedForm | None:
+    """What the takes ask for beyond the effect's own columns ``found``, which stand last in ``extra``; the
+    form's columns are joined to those."""
+    effect, lanes = group.wanted.effect, group.lanes
+    values = [
+        form_values(effect, take, part, group.settings)
+        for take, part in zip(group.signals, found, strict=True)
+    ]
+    if not values or not values[0]:
+        return None
+    problems = []
+    for lane, name in enumerate(lanes):
+        some = [index[::FORM_EVERY] for index in rows[name]]
+        own = [
+            np.column_stack([part[::FORM_EVERY] for part in parts])
+            for parts in zip(*extra[name], strict=True)
+        ]
+        inputs = {
+            key: np.concatenate([take[key][index, lane] for take, index in zip(values, some, strict=True)])
+            for key in values[0]
+        }
+        problems.append(
+            FormRows(
+                np.concatenate([unit.base[::FORM_EVERY] for unit in bases[name]]),
+                np.concatenate(own),
+                np.concatenate(priors[name]),
+                {key: column[:, None] for key, column in inputs.items()},
+                np.concatenate([unit.target[::FORM_EVERY] for unit in bases[name]]),
+            )
+        )
+    terms = chosen_form(problems)
+    if not terms:
+        return None
+    form = LearnedForm.over(terms, values)
+    for lane, name in enumerate(lanes):
+        for number, (take, index) in enumerate(zip(values, rows[name], strict=True)):
+            learned = form.of_lane(lane).columns(
+                {key: column[index][:, [lane]] for key, column in take.items()}
+            )
+            extra[name][-1][number] = np.column_stack([extra[name][-1][number], learned[:, 0, :]])
+        priors[name][-1] = np.concatenate([priors[name][-1], np.ones(form.count)])
+    return form
 
 
 def _groups(
@@ -183,15 +254,14 @@ def _base(
     ]
 
 
-def _weights(base: list[Rows], extra: list[list[np.ndarray]], priors: list[np.ndarray]) -> list[np.ndarray]:
-    """For each effect of one joint (C,), all fitted together."""
-    together = [np.column_stack(parts)[:, None, :] for parts in zip(*extra, strict=True)]
-    products, prior = BaseProducts(base), np.concatenate(priors)
-    # The base's error has the effects in it, as if they were noise: weights held by it stay too small.
-    first = held_out(products, together, prior)
-    found = held_out(products, together, prior, first.fitted / first.count.sum()).weights
-    ends = np.cumsum([len(part) for part in priors])[:-1]
-    return np.split(found, ends)
+def _weights(
+    base: list[Rows], extra: list[list[np.ndarray]], priors: list[np.ndarray]
+) -> list[WeightPosterior]:
+    """For each effect of one joint, all fitted together."""
+    together = [np.column_stack(parts) for parts in zip(*extra, strict=True)]
+    whole = weight_posterior(base, together, np.concatenate(priors))
+    ends = np.cumsum([0, *(len(part) for part in priors)])
+    return [whole.part(slice(start, end)) for start, end in itertools.pairwise(ends)]
 
 
 def _explained(
@@ -206,9 +276,7 @@ def _explained(
         own = [own_signals(takes, columns[name], regressors[name])[0] for name in added.rotations]
         values = [np.column_stack(parts) for parts in zip(*own, strict=True)]
         for number, take in enumerate(takes.signals(values, added.zero_deg, frozenset())):
-            part = np.einsum(
-                "nlc,lc->nl", added.effect.columns(take, added.settings, added.shape), added.weights
-            )
+            part = added.contribution(take).degrees
             for lane, name in enumerate(added.rotations):
                 sums = total.setdefault(name, [np.zeros(len(item.time_s)) for item in takes.takes])
                 sums[number] += part[:, lane]

@@ -18,6 +18,7 @@ from math import comb
 
 import numpy as np
 
+from glovecal_models.calibration.sample_weight import effective_sample_ratio
 from glovecal_models.effects.base.assessment import saved_share
 
 BASE_RIDGE = 1e-6
@@ -73,7 +74,8 @@ class HeldOut:
 class BaseProducts:
     """The part that all candidates share."""
 
-    def __init__(self, units: Sequence[Rows]) -> None:
+    def __init__(self, units: Sequence[Rows], prior_sd: np.ndarray | None = None) -> None:
+        """``prior_sd`` (P,) of the coefficients, infinite (default) for those that are free."""
         self.units = units
         self.gram = np.array([rows.base.T @ rows.base for rows in units])
         self.right = np.array([rows.base.T @ rows.target for rows in units])
@@ -81,6 +83,8 @@ class BaseProducts:
         self.count = np.array([len(rows.target) for rows in units])
         total, ridge = self.gram.sum(axis=0), BASE_RIDGE * np.trace(self.gram.sum(axis=0))
         self.ridge = ridge / len(total) * np.eye(len(total))
+        if prior_sd is not None and np.isfinite(prior_sd).any():
+            self.ridge += np.diag(self._held_by(prior_sd))
         left = total - self.gram + self.ridge
         self.coefficients = np.linalg.solve(left, (self.right.sum(axis=0) - self.right)[:, :, None])[:, :, 0]
         self.residual = tuple(
@@ -88,6 +92,13 @@ class BaseProducts:
         )
         self.error = np.array([r @ r for r in self.residual])
         self.whole = np.linalg.solve(total + self.ridge, self.right.sum(axis=0))
+
+    def _held_by(self, prior_sd: np.ndarray) -> np.ndarray:
+        """(P,) of the ridge, as for the columns of an effect; the noise is what all columns leave."""
+        total, right = self.gram.sum(axis=0), self.right.sum(axis=0)
+        beta = np.linalg.solve(total + self.ridge, right)
+        left = self.square.sum() + beta @ total @ beta - 2 * beta @ right
+        return ALIKE_ROWS * max(left / self.count.sum(), LEAST_VARIANCE_DEG2) / prior_sd**2
 
     def fitted(self, base: np.ndarray) -> np.ndarray:
         """The map of all units, (N,) degrees."""
@@ -149,6 +160,61 @@ def held_out(
         residual=products.residual,
         residual_added=residual,
     )
+
+
+@dataclass(frozen=True)
+class WeightPosterior:
+    """Weights of columns as all units tell them."""
+
+    mean: np.ndarray
+    """(C,)."""
+    covariance: np.ndarray
+    """(C, C), the base's free weights integrated out."""
+
+    def part(self, some: slice) -> WeightPosterior:
+        """Of some of the columns."""
+        return WeightPosterior(self.mean[some], self.covariance[some, some])
+
+
+def weight_posterior(
+    units: Sequence[Rows], columns: Sequence[np.ndarray], prior_sd: np.ndarray
+) -> WeightPosterior:
+    """``columns``: for each unit (N, C); ``prior_sd`` (C,) of their weights."""
+    both = [np.column_stack([rows.base, extra]) for rows, extra in zip(units, columns, strict=True)]
+    gram = np.sum([part.T @ part for part in both], axis=0)
+    right = np.sum([part.T @ rows.target for part, rows in zip(both, units, strict=True)], axis=0)
+    square = float(sum(rows.target @ rows.target for rows in units))
+    count = max(sum(len(rows.target) for rows in units), 1)
+    size = units[0].base.shape[1]
+    base = np.arange(len(gram)) < size
+    ridge = np.where(base, BASE_RIDGE * np.trace(gram[:size, :size]) / size, 0.0)
+    first = np.linalg.solve(gram[:size, :size] + np.diag(ridge[:size]), right[:size])
+    left = square + float(first @ gram[:size, :size] @ first - 2 * first @ right[:size])
+    beta, held, variance = first, gram, LEAST_VARIANCE_DEG2
+    # The base's error has the effects in it, as if they were noise: weights held by it stay too small.
+    for _ in range(2):
+        variance = max(left / count, LEAST_VARIANCE_DEG2)
+        prior = ALIKE_ROWS * variance / prior_sd**2
+        ridge[size:] = np.maximum(prior, LEAST_RIDGE * np.diagonal(gram)[size:])
+        held = gram + np.diag(ridge)
+        beta = _solved(held, right)
+        left = square + float(beta @ gram @ beta - 2 * beta @ right)
+    scale = np.sqrt(np.diagonal(held))
+    inverse = np.linalg.inv(held / (scale[:, None] * scale)) / (scale[:, None] * scale)
+    error = [rows.target - part @ beta for part, rows in zip(both, units, strict=True)]
+    # What is held against chance is held against ``ALIKE_ROWS``; what is left unknown is as it is: the noise
+    # of the rows that count as independent, and the prior's share of what the ridge pulls towards zero.
+    alike = min(1 / _effective_ratio(error), ALIKE_ROWS)
+    pulled = inverse * np.where(base, 0.0, ridge)
+    noise = alike * variance * inverse @ gram @ inverse
+    covariance = noise + ALIKE_ROWS * variance * pulled @ inverse
+    return WeightPosterior(beta[size:], covariance[size:, size:])
+
+
+def _effective_ratio(error: Sequence[np.ndarray]) -> float:
+    """Independent rows per row, from the errors (N,) of each unit."""
+    unit = np.repeat(np.arange(len(error)), [len(part) for part in error])
+    return effective_sample_ratio(np.concatenate(error), unit, np.arange(len(unit)))
 
 
 def _solved(gram: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -20,6 +20,11 @@ class VarianceInflation(NamedTuple):
     """(R,) whether a sensor that the rotation is read from fails now; the angle is the last good one."""
 
     @classmethod
+    def none(cls, shape: tuple[int, ...]) -> VarianceInflation:
+        """The claim as it is."""
+        return cls(np.zeros(shape), np.zeros(shape, dtype=bool))
+
+    @classmethod
     def more(cls, inflation: VarianceInflation | None, variance: np.ndarray) -> VarianceInflation:
         """``inflation``, or none yet, with ``variance`` of the same shape added."""
         if inflation is None:

@@ -85,14 +85,14 @@ def diagnose(
     impossible += [NotIdentifiable(item.name, SINGLE_POSES) for item in waiting]
     naming = _with_alikes_ordered(naming, beside, screened, by_name)
     lacking = [item for item in every if item.name not in has]
-    asked = signature_findings(takes, layout, problem.joints, naming, found, lacking)
+    asked = signature_findings(takes, layout, problem.joints, naming, found, lacking, known)
     findings = tuple(asked) if signatures else ()
     naming = beside_levels(naming, takes, findings, by_name)
     progress("testing the residual", 0.95)
     if problem.is_sparse or are_held_levels(takes):
         residual = UnexplainedResidual(obstacle="single poses")
     else:
-        rest = problem.with_first(naming, by_name).design()
+        rest = problem.with_first(naming, by_name, design).design()
         likely = [item.effect for item in impossible if item.saves_much]
         residual = unexplained_residual(rest, problem.even, layout, seed, undecided=likely)
     progress("done", 1.0)

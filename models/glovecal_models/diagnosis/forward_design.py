@@ -110,7 +110,7 @@ def forward(
         without = [_without(take, frozenset({rotation, *neighbours, *item.sensors})) for take in signals]
         extra = [found for each in known if (found := each.columns(without, column, rotation)) is not None]
         bases = [
-            np.column_stack([features.columns(part[:, columns]), *(found[number] for found in extra)])
+            np.column_stack([features.columns(part[:, columns]), *(found.parts[number] for found in extra)])
             for number, part in enumerate(filled)
         ]
         units = [
@@ -119,7 +119,9 @@ def forward(
         ]
         read.append(frozenset({rotation, *neighbours, *item.sensors}))
         used.append(tuple(index))
-        products.append(BaseProducts(units))
+        of_known = [found.prior_sd for found in extra]
+        free = np.full(units[0].base.shape[1] - sum(map(len, of_known)), np.inf)
+        products.append(BaseProducts(units, np.concatenate([free, *of_known])))
     return ForwardDesign(
         tuple(rotations), signals, tuple(read), unit_take, tuple(used), tuple(products), limits
     )

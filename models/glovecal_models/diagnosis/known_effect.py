@@ -4,12 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
+from glovecal_models.calibration.added_effect import form_values
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.learned_form import FormTerm, LearnedForm
 from glovecal_models.effects.base.signals import Signals
+
+
+class KnownColumns(NamedTuple):
+    """What an effect adds to the base of one joint."""
+
+    parts: list[np.ndarray]
+    """For each take (N, C)."""
+    prior_sd: np.ndarray
+    """(C,) of their weights; infinite for those of the effect's own columns."""
 
 
 @dataclass(frozen=True)
@@ -20,15 +32,31 @@ class KnownEffect:
     joints: tuple[str, ...]
     shapes: tuple[np.ndarray, ...]
     """For each joint (P,)."""
+    terms: tuple[tuple[FormTerm, ...], ...] = ()
+    """For each joint those of its learned form; none given: none was learned."""
 
-    def columns(self, takes: Sequence[Signals], lane: int, joint: str) -> list[np.ndarray] | None:
-        """For each take (N, C) of one joint, a lane of ``takes``; None when it is not concerned."""
+    def columns(self, takes: Sequence[Signals], lane: int, joint: str) -> KnownColumns | None:
+        """Of one joint, a lane of ``takes``; None when it is not concerned."""
         if joint not in self.joints:
             return None
+        place = self.joints.index(joint)
         single = [one_lane(take, lane) for take in takes]
         settings = self.effect.fit_constants(single)
-        shape = self.shapes[self.joints.index(joint)][None, :]
-        return [self.effect.columns(take, settings, shape)[:, 0, :] for take in single]
+        shape = self.shapes[place][None, :]
+        plain = [self.effect.columns(take, settings, shape) for take in single]
+        free = np.full(plain[0].shape[2], np.inf)
+        terms = self.terms[place] if self.terms else ()
+        pairs = zip(single, plain, strict=True)
+        values = [form_values(self.effect, take, part, settings) for take, part in pairs] if terms else []
+        terms = tuple(term for term in terms if set(term.inputs) <= set(values[0]))
+        if not terms:
+            return KnownColumns([part[:, 0, :] for part in plain], free)
+        form = LearnedForm.over(terms, values)
+        both = [
+            np.concatenate([part, form.columns(take)], axis=2)[:, 0, :]
+            for part, take in zip(plain, values, strict=True)
+        ]
+        return KnownColumns(both, np.concatenate([free, np.ones(form.count)]))
 
 
 def known_effects(model: CalibrationModel) -> tuple[KnownEffect, ...]:
@@ -37,7 +65,8 @@ def known_effects(model: CalibrationModel) -> tuple[KnownEffect, ...]:
     for item in model.effects:
         active = item.active if item.weights.shape[1] else ()
         shapes = tuple(item.shape[item.rotations.index(name)] for name in active)
-        found.append(KnownEffect(item.effect, active, shapes))
+        terms = (item.form.terms,) * len(active) if item.form else ()
+        found.append(KnownEffect(item.effect, active, shapes, terms))
     return tuple(found)
 
 

@@ -7,8 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from glovecal_models.calibration.added_effect import form_values
+from glovecal_models.calibration.form_choice import EVERY as FORM_EVERY
+from glovecal_models.calibration.form_choice import FormRows, chosen_form
 from glovecal_models.diagnosis.forward_design import EVERY, ForwardDesign, forward
-from glovecal_models.diagnosis.known_effect import KnownEffect
+from glovecal_models.diagnosis.known_effect import KnownEffect, one_lane
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.naming import Naming
 from glovecal_models.diagnosis.resampled import (
@@ -78,8 +81,13 @@ class DiagnosisProblem:
         """The same with further effects in the base."""
         return replace(self, known=(*self.known, *effects))
 
-    def with_first(self, naming: Naming, effects: Mapping[str, Effect]) -> DiagnosisProblem:
-        """The same with the first of the ranking in the base, or repaired: what is left after it."""
+    def with_first(
+        self, naming: Naming, effects: Mapping[str, Effect], design: ForwardDesign
+    ) -> DiagnosisProblem:
+        """The same with the first of the ranking in the base, or repaired: what is left after it.
+
+        ``design`` is the one without it.
+        """
         if not naming.ranked:
             return self
         first = naming.ranked[0]
@@ -90,7 +98,35 @@ class DiagnosisProblem:
             return replace(self, even=tuple(moved))
         where = tuple(first.joints[i] for i in first.significant_joints)
         shapes = tuple(first.shapes[i] for i in first.significant_joints)
-        return self.beside(KnownEffect(effects[first.effect], where, shapes))
+        return self.beside(_with_learned_terms(KnownEffect(effects[first.effect], where, shapes), design))
+
+
+def _with_learned_terms(known: KnownEffect, design: ForwardDesign) -> KnownEffect:
+    """The same in the form that the takes of ``design``, whose base does not have it, ask for."""
+    terms = []
+    for joint, shape in zip(known.joints, known.shapes, strict=True):
+        lane = design.rotations.index(joint)
+        without = [
+            replace(take, others={k: v for k, v in take.others.items() if k not in design.known[lane]})
+            for take in design.signals
+        ]
+        single = [one_lane(take, lane) for take in without]
+        settings = known.effect.fit_constants(single)
+        plain = [known.effect.columns(take, settings, shape[None, :]) for take in single]
+        values = [
+            form_values(known.effect, take, part, settings) for take, part in zip(single, plain, strict=True)
+        ]
+        some = [(take, index[::FORM_EVERY]) for take, index in design.units(lane)]
+        units = design.products[lane].units
+        rows = FormRows(
+            np.concatenate([unit.base[::FORM_EVERY] for unit in units]),
+            np.concatenate([plain[take][index, 0] for take, index in some]),
+            known.effect.prior_sd(settings),
+            {name: np.concatenate([values[take][name][index] for take, index in some]) for name in values[0]},
+            np.concatenate([unit.target[::FORM_EVERY] for unit in units]),
+        )
+        terms.append(chosen_form([rows]) if values[0] else ())
+    return replace(known, terms=tuple(terms))
 
 
 def _fitted_columns(even: Sequence[ResampledTake]) -> np.ndarray:

@@ -7,14 +7,21 @@ from dataclasses import replace
 
 import numpy as np
 
+from glovecal_models.calibration.effect_correction import SignalScale
 from glovecal_models.calibration.folds import held_levels
+from glovecal_models.calibration.held_out import BaseProducts, Rows
+from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.naming import Naming
 from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Stage
+from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.base.signature_effect import Finding, SignatureEffect
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
+
+FEWEST_ROWS = 50
+"""Measured frames of a joint; fewer tell no curve."""
 
 
 def may_explain(effect: Effect, naming: Naming) -> bool:
@@ -47,8 +54,10 @@ def signature_findings(
     naming: Naming,
     assessments: Sequence[Assessment],
     effects: Sequence[Effect],
+    known: Sequence[KnownEffect] = (),
 ) -> Iterator[Finding]:
-    """Largest first within each effect of ``effects``, those that the model does not have."""
+    """Largest first within each effect of ``effects``, those that the model does not have; ``known`` are
+    those that it has."""
     sensor_of = own_sensors(layout, joints)
     if not sensor_of:
         return
@@ -62,7 +71,7 @@ def signature_findings(
     for item in by_signature(effects, "last"):
         if may_explain(item, naming):
             plausible = _with_plausible_context(takes, assessments, effects)
-            yield from item.find(plausible, sensor_of, static_errors(takes, sensor_of))
+            yield from item.find(plausible, sensor_of, static_errors(takes, sensor_of, known))
 
 
 def are_held_levels(takes: Sequence[Take]) -> bool:
@@ -101,19 +110,61 @@ def _with_plausible_context(
     ]
 
 
-def static_errors(takes: Sequence[Take], sensor_of: dict[str, str]) -> list[np.ndarray]:
-    """For each take (N, joints): what a smooth curve of each joint's own sensor leaves, degrees."""
+def static_errors(
+    takes: Sequence[Take], sensor_of: Mapping[str, str], known: Sequence[KnownEffect] = ()
+) -> list[np.ndarray]:
+    """For each take (N, joints), degrees: what a smooth curve of each joint's own sensor leaves.
+
+    ``known``: effects that a model has already; they are fitted beside the curve, so that what they explain
+    is not asked about again.
+    """
     result = [np.full((len(take.time_s), len(sensor_of)), np.nan) for take in takes]
+    others = _others(takes) if known else [{} for _ in takes]
     for column, (rotation, sensor) in enumerate(sensor_of.items()):
         x = [take.readings[:, take.sensors.index(sensor)] for take in takes]
         y = [take.reference_at_frames([rotation])[:, 0] for take in takes]
-        every, target = np.concatenate(x), np.concatenate(y)
-        known = np.isfinite(target)
-        if known.sum() < 50 or np.ptp(every[known]) == 0:
+        rows = [np.flatnonzero(np.isfinite(part)) for part in y]
+        every = np.concatenate(x)
+        measured = np.concatenate([part[index] for part, index in zip(x, rows, strict=True)])
+        if len(measured) < FEWEST_ROWS or np.ptp(measured) == 0:
             continue
         low, span = float(every.min()), max(float(np.ptp(every)), 1e-9)
-        columns = np.polynomial.legendre.legvander(2 * (every[known] - low) / span - 1, 7)
-        curve = np.linalg.lstsq(columns, target[known], rcond=None)[0]
-        for part, reading, angle in zip(result, x, y, strict=True):
-            part[:, column] = np.polynomial.legendre.legval(2 * (reading - low) / span - 1, curve) - angle
+        curves = [np.polynomial.legendre.legvander(2 * (part - low) / span - 1, 7) for part in x]
+        here = [item for item in known if rotation in item.joints]
+        columns, fitted = curves, _fitted(curves, y, rows)
+        if here:
+            signals = [
+                Signals(
+                    take.time_s, (part @ fitted.whole)[:, None], other, take.context, take.wearing, take.name
+                )
+                for take, part, other in zip(takes, curves, others, strict=True)
+            ]
+            extra = [found for item in here if (found := item.columns(signals, 0, rotation)) is not None]
+            columns = [
+                np.column_stack([part, *(found.parts[number] for found in extra)])
+                for number, part in enumerate(curves)
+            ]
+            free = np.full(curves[0].shape[1], np.inf)
+            fitted = _fitted(columns, y, rows, np.concatenate([free, *(found.prior_sd for found in extra)]))
+        for part, found, angle in zip(result, columns, y, strict=True):
+            part[:, column] = found @ fitted.whole - angle
     return result
+
+
+def _others(takes: Sequence[Take]) -> list[dict[str, np.ndarray]]:
+    """Each sensor in standard deviations over all takes."""
+    sensors = takes[0].sensors
+    readings = [take.readings[:, [take.sensors.index(name) for name in sensors]] for take in takes]
+    every = np.concatenate(readings)
+    scale = SignalScale(sensors, every.mean(axis=0), every.std(axis=0))
+    return [scale.others(part) for part in readings]
+
+
+def _fitted(
+    columns: Sequence[np.ndarray],
+    target: Sequence[np.ndarray],
+    rows: Sequence[np.ndarray],
+    prior_sd: np.ndarray | None = None,
+) -> BaseProducts:
+    units = zip(columns, target, rows, strict=True)
+    return BaseProducts([Rows(part[index], angle[index]) for part, angle, index in units], prior_sd)

@@ -8,7 +8,7 @@ has to go (learned; the best guess without a recording of the time before).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -76,6 +76,9 @@ class Creep(ArrayStateEffect):
     ) -> np.ndarray:
         towards = own[:, :, None] * FOLLOWING
         return relax(state, elapsed_s, towards, np.tile(shape, 2)) - towards
+
+    def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
+        return {name: columns[:, :, at] for at, name in enumerate(("fast", "middle", "slow"))}
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         return (

@@ -6,7 +6,7 @@ Neff 2013, Table 1). Signals that the base already reads are left out by whoever
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -54,6 +54,9 @@ class CrossCoupling(InstantEffect):
         others = np.column_stack([take.others.get(name, rest) for name in settings["neighbours"]])[:, None, :]
         others = np.repeat(others, lanes, axis=1)
         return np.concatenate([others, others * joint], axis=2)
+
+    def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
+        return {name: columns[:, :, at] for at, name in enumerate(settings["neighbours"])}
 
     def prior_sd(self, settings: Settings) -> np.ndarray:
         return np.full(2 * len(settings["neighbours"]), PRIOR_DEG)

@@ -7,7 +7,7 @@ minus joint, which are bounded by r and zero for a width of zero.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -72,6 +72,9 @@ class Hysteresis(ArrayStateEffect):
             before = play
         state[...] = before.reshape(state.shape)
         return np.subtract(plays, joint, out=plays).reshape(len(own), *state.shape)
+
+    def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
+        return {f"play {width:g}": columns[:, :, at] for at, width in enumerate(WIDTHS)}
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         return tuple(f"play_{width:g}_of_widest_deg_per_deg" for width in WIDTHS)

@@ -6,7 +6,7 @@ its ends outside. Constant and slope are left out: the base has them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from glovecal_models.effects.base.effect import InstantEffect
 from glovecal_models.effects.base.facts import Control, Settings
 from glovecal_models.effects.base.joint_units import on_lanes
+from glovecal_models.effects.base.learned_form import OWN
 from glovecal_models.effects.base.motions import RAMPS
 from glovecal_models.effects.base.signals import Signals
 
@@ -52,6 +53,9 @@ class Nonlinearity(InstantEffect):
         low, high = on_lanes(settings["own_low_deg"], lanes), on_lanes(settings["own_high_deg"], lanes)
         place = np.clip(2.0 * (take.own - low) / np.maximum(high - low, 1e-6) - 1.0, -1.0, 1.0)
         return _legendre(place)
+
+    def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
+        return {OWN: take.own}
 
     def prior_sd(self, settings: Settings) -> np.ndarray:
         return PRIOR_DEG / np.array(DEGREES, dtype=float)

@@ -8,7 +8,7 @@ square of the palm sensor follows the hollow where it is a cylinder's.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -57,6 +57,9 @@ class PalmArch(InstantEffect):
             result[:, :, column] = np.clip(take.others.get(name, rest), low, high)[:, None]
         result[:, :, -1] = result[:, :, list(settings["signals"]).index(PALM)] ** 2
         return result
+
+    def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
+        return {name: columns[:, :, at] for at, name in enumerate(settings["signals"])}
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         return (*(f"deg_per_sd[{name}]" for name in settings["signals"]), f"deg_per_sd2[{PALM}]")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -30,6 +30,10 @@ class WarmupDrift(ContextEffect):
 
     def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
         return np.repeat(np.array(TAU_S)[:, None, None], takes[0].own.shape[1], axis=1)
+
+    def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
+        """How cold it still is: any function of the time since power-on is one of it."""
+        return {"coldness": columns[:, :, 0]}
 
     def functions(self, value: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
         warm = np.maximum((value[:, None] - settings["low"]) / shape[None, :, 0], -COLDEST)

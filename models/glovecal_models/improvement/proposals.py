@@ -76,7 +76,10 @@ def proposed(
 def recorded(model: CalibrationModel, takes: Sequence[Take]) -> Recorded:
     """Takes as effects look at them by their signature."""
     sensor_of = own_sensors(model.layout, trained_rotations(model))
-    return Recorded(tuple(takes), sensor_of, lambda: static_errors(takes, sensor_of), are_held_levels(takes))
+    known = known_effects(model)
+    return Recorded(
+        tuple(takes), sensor_of, lambda: static_errors(takes, sensor_of, known), are_held_levels(takes)
+    )
 
 
 def _looked_for(

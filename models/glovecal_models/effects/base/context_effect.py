@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -55,6 +55,10 @@ class ContextEffect(InstantEffect):
         value = np.where(np.isfinite(value), value, settings["usual"])
         beyond = BEYOND_SHARE * (settings["high"] - settings["low"])
         return np.clip(value, settings["low"] - beyond, settings["high"] + beyond)
+
+    def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
+        value = self.clipped(take, settings)
+        return {self.column: np.repeat(value[:, None], take.own.shape[1], axis=1)}
 
     def functions(self, value: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
         """(N, L, F) of the clipped context column (N,): its distance from the usual value, and the square."""

@@ -13,7 +13,7 @@ Lanes are joints (and, while a shape is searched, joints times shapes): everythi
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -89,9 +89,21 @@ class Effect(EffectFacts, ABC):
     def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
         """(N, L, C), degrees for a weight of one; ``shape`` is (L, P). Zero weight changes nothing."""
 
+    tells_own_uncertainty: ClassVar[bool] = False
+    """Whether ``uncertainty`` tells all that is unknown of its weights."""
+
     def uncertainty(self, settings: Settings, weights: np.ndarray, wearing: str) -> Uncertainty | None:
         """What is not known of its correction in a wearing, ``weights`` (L, C); None: nothing."""
         return None
+
+    def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
+        """The signals (N, L) that a learned form may be a function of, by name (``learned_form``).
+
+        ``columns`` (N, L, C) are the effect's own of ``take``. None: the columns are all there is to learn.
+        The joint's own signal among them (``OWN``) means that a function of it alone is part of the effect;
+        together with another input it always is.
+        """
+        return {}
 
     @abstractmethod
     def stream(self, settings: Settings, shape: np.ndarray) -> Stream:

@@ -8,7 +8,7 @@ so that a column's noise and steps of its last digit do not pass for a change.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -107,6 +107,10 @@ class SlowContextEffect(ContextEffect):
         steepness = np.clip(slope / settings["steepest_per_s"], -1.0, 1.0)
         each = np.repeat(steepness[:, None, None], len(shape), axis=1)
         return np.concatenate([super().columns(take, settings, shape), each], axis=2)
+
+    def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
+        """The column and how steeply it changes: together they tell how far the sensor is behind."""
+        return {**super().form_inputs(take, columns, settings), f"slope of {self.column}": columns[:, :, -1]}
 
     def stream(self, settings: Settings, shape: np.ndarray) -> Stream:
         return _SlowContextStream(self, settings, shape)

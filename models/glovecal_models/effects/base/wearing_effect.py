@@ -7,6 +7,7 @@ adds a wearing with the covariance of what its poses told (``checked``).
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import ClassVar
 
 import numpy as np
 
@@ -22,6 +23,8 @@ PRIOR_WEARINGS = 2.0
 
 class WearingEffect(InstantEffect):
     """What is common to such effects; the columns are to be implemented."""
+
+    tells_own_uncertainty: ClassVar[bool] = True
 
     def is_of_training(self, settings: Settings) -> bool:
         return bool(trained_wearings(settings))

@@ -1,0 +1,178 @@
+"""The learned form of an effect: what physics leaves open, a smooth function of the effect's inputs.
+
+An effect says which signals act; whether they act in proportion, one-sidedly, up to a limit or only together
+with the joint's own angle is learned. Each term is a Gaussian process of one or two inputs with a
+squared-exponential kernel, in the reduced-rank basis of Solin and Saerkkae (2020, Statistics and Computing
+30:419): sines on a box a little larger than what training saw, each with the standard deviation of its weight
+from the kernel's spectral density. It is linear in its weights, and of fixed cost frame by frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from glovecal_models.effects.base.joint_units import on_lanes
+from glovecal_models.errors import BadInput
+
+OWN = "own"
+"""The joint's own signal as an input."""
+BOX = 1.6
+"""Half-width of the box, in half ranges of training."""
+REACH = 1.3
+"""Inputs are followed so far, in half ranges; beyond they are held, and the variance is the prior's."""
+LEAST_SD_SHARE = 0.03
+"""Of the largest weight's standard deviation: sines that are expected smaller are left out."""
+LEAST_HALF_RANGE = 1e-6
+MOST_SINES = 24
+MOST_INPUTS = 3
+"""Of one effect on one joint."""
+LARGEST_DOCUMENT = 16
+"""Terms that a stored form may have."""
+
+
+@dataclass(frozen=True)
+class FormTerm:
+    """One Gaussian process of one or two inputs."""
+
+    inputs: tuple[str, ...]
+    lengthscale: float
+    """In half ranges of training."""
+    sd_deg: float
+    """Standard deviation of the function before any data, degrees."""
+
+    @cached_property
+    def _sines(self) -> np.ndarray:
+        """(K, D) numbers of half waves in the box, of each input."""
+        numbers = np.arange(1, MOST_SINES + 1)
+        if len(self.inputs) == 1:
+            every = numbers[:, None]
+        else:
+            every = np.stack(np.meshgrid(numbers, numbers, indexing="ij"), axis=-1).reshape(-1, 2)
+        sd = self._sd(every)
+        return every[sd >= LEAST_SD_SHARE * sd.max()]
+
+    def _sd(self, numbers: np.ndarray) -> np.ndarray:
+        """(K,) from the spectral density at each frequency."""
+        frequency = np.pi * numbers / (2 * BOX)
+        dimensions = numbers.shape[1]
+        density = (np.sqrt(2 * np.pi) * self.lengthscale) ** dimensions
+        square = density * np.exp(-0.5 * self.lengthscale**2 * np.sum(frequency**2, axis=1))
+        return self.sd_deg * np.sqrt(square)
+
+    @property
+    def count(self) -> int:
+        """Columns."""
+        return len(self._sines)
+
+    @cached_property
+    def weight_sd(self) -> np.ndarray:
+        """(K,) by which columns are multiplied, so that every weight is expected to be of size one."""
+        return self._sd(self._sines)
+
+    def columns(self, place: Sequence[np.ndarray]) -> np.ndarray:
+        """(N, L, K) of each input's place (N, L), -1 to 1 over the range of training."""
+        product: np.ndarray | None = None
+        for axis, values in enumerate(place):
+            numbers = self._sines[:, axis]
+            waves = np.sin((np.pi / (2 * BOX)) * (values[..., None] + BOX) * np.arange(1, numbers.max() + 1))
+            mine = waves[..., numbers - 1] / np.sqrt(BOX)
+            product = mine if product is None else product * mine
+        assert product is not None
+        return product * self.weight_sd
+
+    def to_document(self) -> dict[str, Any]:
+        return {"inputs": list(self.inputs), "lengthscale": self.lengthscale, "sd_deg": self.sd_deg}
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> FormTerm:
+        """Raises BadInput."""
+        inputs = tuple(str(name) for name in document["inputs"])
+        lengthscale, sd_deg = float(document["lengthscale"]), float(document["sd_deg"])
+        if len(inputs) not in (1, 2) or not 0.05 <= lengthscale <= 100 or not 0 < sd_deg <= 360:
+            raise BadInput(
+                f"a term of a learned form has 1 or 2 inputs, a lengthscale of 0.05 to 100 and a standard"
+                f" deviation up to 360 degrees, not {len(inputs)}, {lengthscale:g} and {sd_deg:g}"
+            )
+        return cls(inputs, lengthscale, sd_deg)
+
+
+@dataclass(frozen=True)
+class LearnedForm:
+    """The terms of one effect, the same on all of its lanes; their weights are each lane's own."""
+
+    terms: tuple[FormTerm, ...]
+    low: Mapping[str, tuple[float, ...]]
+    """For each input the smallest value in training, of each lane."""
+    high: Mapping[str, tuple[float, ...]]
+
+    @property
+    def count(self) -> int:
+        """Columns."""
+        return sum(term.count for term in self.terms)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names, the joint's own signal left out."""
+        return tuple(dict.fromkeys(name for term in self.terms for name in term.inputs if name != OWN))
+
+    @classmethod
+    def over(cls, terms: Sequence[FormTerm], takes: Sequence[Mapping[str, np.ndarray]]) -> LearnedForm:
+        """With the ranges of ``takes``: for each the values (N, L) of every input by name."""
+        names = dict.fromkeys(name for term in terms for name in term.inputs)
+        known = [take for take in takes if all(len(values) for values in take.values())]
+        return cls(
+            tuple(terms),
+            {name: tuple(np.min([take[name].min(axis=0) for take in known], axis=0)) for name in names},
+            {name: tuple(np.max([take[name].max(axis=0) for take in known], axis=0)) for name in names},
+        )
+
+    def columns(self, inputs: Mapping[str, np.ndarray]) -> np.ndarray:
+        """(N, L, C) in degrees for a weight of one, from the values (N, L) of every input."""
+        place = {name: self.place(name, inputs[name]) for name in self.low}
+        return np.concatenate(
+            [term.columns([place[name] for name in term.inputs]) for term in self.terms], axis=2
+        )
+
+    def place(self, name: str, values: np.ndarray) -> np.ndarray:
+        """(N, L) of an input's values (N, L): -1 to 1 over the range of training, held a little beyond."""
+        low, high = (np.array(on_lanes(end[name], values.shape[1])) for end in (self.low, self.high))
+        half = np.maximum((high - low) / 2, LEAST_HALF_RANGE)
+        return np.clip((values - (low + high) / 2) / half, -REACH, REACH)
+
+    def of_lane(self, lane: int) -> LearnedForm:
+        """The same with the range of one lane."""
+        low, high = (
+            {name: values[lane : lane + 1] for name, values in end.items()} for end in (self.low, self.high)
+        )
+        return LearnedForm(self.terms, low, high)
+
+    def to_document(self) -> dict[str, Any]:
+        """Plain data, as it stands in an effect's settings."""
+        return {
+            "terms": [term.to_document() for term in self.terms],
+            "low": {name: list(map(float, values)) for name, values in self.low.items()},
+            "high": {name: list(map(float, values)) for name, values in self.high.items()},
+        }
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> LearnedForm:
+        """Inverse of ``to_document``. Raises BadInput."""
+        try:
+            if not 0 < len(document["terms"]) <= LARGEST_DOCUMENT:
+                raise BadInput(f"a learned form has 1 to {LARGEST_DOCUMENT} terms")
+            low, high = (
+                {str(name): tuple(map(float, values)) for name, values in document[end].items()}
+                for end in ("low", "high")
+            )
+            terms = tuple(FormTerm.from_document(item) for item in document["terms"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise BadInput(f"not a learned form: {error!r}") from error
+        named = {name for term in terms for name in term.inputs}
+        if set(low) != named or set(high) != named:
+            raise BadInput(f"a learned form of {sorted(named)} has ranges of {sorted(low)}")
+        return cls(terms, low, high)
