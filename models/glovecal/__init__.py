@@ -19,6 +19,7 @@ from glovecal._additions import Addition, add_effect, remove_effect
 from glovecal._comparison import Comparison, compare
 from glovecal._diagnosis import Diagnosis, diagnose
 from glovecal._effects import Catalogue, effects, register_effect
+from glovecal._explanation import Explanation, explain
 from glovecal._failures import WhereItFails, where
 from glovecal._improvement import Improvement, improve
 from glovecal._layouts import read_layout
@@ -50,6 +51,7 @@ __all__ = [
     "ContextEffect",
     "Diagnosis",
     "Effect",
+    "Explanation",
     "GlovecalError",
     "HistoryEffect",
     "Improvement",
@@ -71,6 +73,7 @@ __all__ = [
     "compare",
     "diagnose",
     "effects",
+    "explain",
     "fit_joint_units",
     "improve",
     "in_joint_units",

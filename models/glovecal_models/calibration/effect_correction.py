@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect, weight_variance
+from glovecal_models.calibration.correction_parts import CorrectionParts
 from glovecal_models.calibration.interval_inflation import IntervalInflation, VarianceInflation
 from glovecal_models.effects.base.effect import Effect, Stream, Uncertainty
 from glovecal_models.effects.base.signals import GloveFrames, Signals
@@ -154,11 +155,15 @@ class EffectCorrection:
         readings: np.ndarray,
         context: Mapping[str, np.ndarray],
         wearing: str,
+        parts: CorrectionParts | None = None,
     ) -> Correction:
-        """For the base's prediction ``base`` (N, R), degrees, and ``readings`` (N, S), raw counts."""
+        """For the base's prediction ``base`` (N, R), degrees, and ``readings`` (N, S), raw counts.
+
+        ``parts`` are told what each effect adds.
+        """
         first, inflation = base, None
         if self._inflates and len(base):
-            base, readings, inflation = self._inflated(time_s, base, readings)
+            base, readings, inflation = self._inflated(time_s, base, readings, parts)
         total = base - first
         others = self._scale.others(readings) if self._lanes else {}
         unknown = self._unknown_variance(base, wearing)
@@ -169,6 +174,8 @@ class EffectCorrection:
             if found.variance is not None:
                 unknown = np.zeros_like(base) if unknown is None else unknown
                 unknown[:, lanes] += found.variance
+            if parts is not None:
+                parts.corrected(item, lanes, found.degrees, found.variance, base, [wearing])
         return Correction(total, inflation if unknown is None else VarianceInflation.more(inflation, unknown))
 
     @staticmethod
@@ -179,14 +186,16 @@ class EffectCorrection:
         readings: np.ndarray,
         context: Sequence[Mapping[str, float]],
         wearing: Sequence[str],
+        parts: CorrectionParts | None = None,
     ) -> Corrections:
         """The next frame of each of G gloves that share a model; what each would get in a take of its own.
 
-        ``time_s`` is (G,), ``base`` (G, R), ``readings`` (G, S). Raises nothing.
+        ``time_s`` is (G,), ``base`` (G, R), ``readings`` (G, S); ``parts`` are told what each effect adds.
+        Raises nothing.
         """
         of_all, first, inflation = gloves[0], base, None
         if of_all._inflates:
-            base, readings, inflation = _inflated_frames(gloves, time_s, base, readings)
+            base, readings, inflation = _inflated_frames(gloves, time_s, base, readings, parts)
         total = base - first
         if not of_all._lanes:
             return Corrections(total, None, inflation, {})
@@ -197,11 +206,15 @@ class EffectCorrection:
             frames = GloveFrames(time_s, base[:, lanes], others, context, wearing, item.zero_deg)
             streams = [glove._streams[number] for glove in gloves]
             columns = _columns(streams, frames, item.weights.shape, problems)
-            total[:, lanes] += np.add.reduce(columns * item.weights, axis=2)
+            added = np.add.reduce(columns * item.weights, axis=2)
+            total[:, lanes] += added
             factor = item.variance_factor
-            if factor is not None:
+            variance = None if factor is None else weight_variance(columns, factor)
+            if variance is not None:
                 inflation = inflation or VarianceInflation.none(base.shape)
-                inflation.variance[:, lanes] += weight_variance(columns, factor)
+                inflation.variance[:, lanes] += variance
+            if parts is not None:
+                parts.corrected(item, lanes, added, variance, base, wearing)
             without = [row for row, stream in enumerate(streams) if stream.undefined is not None]
             if without:
                 undefined = np.zeros(base.shape, dtype=bool) if undefined is None else undefined
@@ -235,14 +248,16 @@ class EffectCorrection:
         return [(lanes, variance) for lanes, variance in found if variance is not None]
 
     def _inflated(
-        self, time_s: np.ndarray, base: np.ndarray, readings: np.ndarray
+        self, time_s: np.ndarray, base: np.ndarray, readings: np.ndarray, parts: CorrectionParts | None
     ) -> tuple[np.ndarray, np.ndarray, VarianceInflation]:
         """The take without what failing sensors read, and the variance inflation of all its frames."""
-        variance = self._intervals.added_variance(time_s - time_s[0], readings)
+        variance = self._intervals.added_variance(time_s - time_s[0], readings, parts)
         is_faulty = np.zeros(base.shape, dtype=bool)
-        for _, hold in self._holds:
+        for name, hold in self._holds:
             hold.reset()
             held = [hold.frame(*frame) for frame in zip(time_s.tolist(), base, readings, strict=True)]
+            if parts is not None:
+                parts.held(name, held, base)
             base, readings = np.stack([item.base for item in held]), np.stack([i.readings for i in held])
             variance += np.stack([item.variance for item in held])
             is_faulty |= np.stack([item.is_faulty for item in held])
@@ -281,7 +296,11 @@ def _columns(
 
 
 def _inflated_frames(
-    gloves: Sequence[EffectCorrection], time_s: np.ndarray, base: np.ndarray, readings: np.ndarray
+    gloves: Sequence[EffectCorrection],
+    time_s: np.ndarray,
+    base: np.ndarray,
+    readings: np.ndarray,
+    parts: CorrectionParts | None,
 ) -> tuple[np.ndarray, np.ndarray, VarianceInflation]:
     """The next frames without what failing sensors read, and the variance inflation."""
     starts = []
@@ -290,7 +309,7 @@ def _inflated_frames(
             glove._started_s = time
         starts.append(glove._started_s)
     inflation = VarianceInflation(
-        gloves[0]._intervals.added_variance(time_s - np.array(starts), readings),
+        gloves[0]._intervals.added_variance(time_s - np.array(starts), readings, parts),
         np.zeros(base.shape, dtype=bool),
     )
     if not gloves[0]._holds:
@@ -298,8 +317,10 @@ def _inflated_frames(
     base, readings = base.copy(), readings.copy()
     for row, glove in enumerate(gloves):
         failing: list[str] = []
-        for _, hold in glove._holds:
+        for name, hold in glove._holds:
             held = hold.frame(float(time_s[row]), base[row], readings[row])
+            if parts is not None:
+                parts.held(name, [held], base, row)
             base[row], readings[row] = held.base, held.readings
             inflation.variance[row] += held.variance
             inflation.is_faulty[row] |= held.is_faulty

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect
+from glovecal_models.calibration.correction_parts import CorrectionParts
 from glovecal_models.effects.base.interval_effect import Interval, IntervalEffect
 
 
@@ -62,9 +63,14 @@ class IntervalInflation:
     def names(self) -> tuple[str, ...]:
         return tuple(effect.name for effect in self.effects)
 
-    def added_variance(self, since_start_s: np.ndarray, readings: np.ndarray) -> np.ndarray:
+    def added_variance(
+        self, since_start_s: np.ndarray, readings: np.ndarray, parts: CorrectionParts | None = None
+    ) -> np.ndarray:
         """(N, R) degrees squared, for frames ``since_start_s`` (N,) after a start; ``readings`` (N, S)."""
         total = np.zeros((len(readings), self._count))
-        for interval, rows in self._parts:
-            total[:, rows] += interval.added_variance(since_start_s, readings)
+        for name, (interval, rows) in zip(self.names, self._parts, strict=True):
+            added = interval.added_variance(since_start_s, readings)
+            total[:, rows] += added
+            if parts is not None:
+                parts.widened(name, rows, added)
         return total

@@ -53,7 +53,8 @@ class GlovePredictor:
             if not isinstance(item.regressor, RuleRegressor)
         ]
         self._groups, self._others = _split(model, measured)
-        self._rules = _ordered_rules(model)
+        self.rules = _ordered_rules(model)
+        """(row, rows of its sources, weights) of every rule, sources before those that need them."""
         self._model = model
         self.has_effects = not model.correction().is_empty
         items = model.rotations
@@ -126,7 +127,7 @@ class GlovePredictor:
         any_bad = bool(bad.any())
         if any_bad:
             flags = np.where(bad, flags | TOO_UNCERTAIN, flags).astype(np.uint8)
-        for row, sources, weights in self._rules:
+        for row, sources, weights in self.rules:
             mean[:, row] = mean[:, sources] @ weights
             if any_bad:
                 flags[:, row] |= np.bitwise_or.reduce(flags[:, sources] & TOO_UNCERTAIN, axis=1)
@@ -138,7 +139,7 @@ class GlovePredictor:
         flags = np.where(inflation.is_faulty, angles.flags | FAULTY_SENSOR, angles.flags).astype(np.uint8)
         is_old = inflation.is_faulty & (inflation.variance > self._largest_variance.T)
         np.bitwise_or(flags, TOO_UNCERTAIN, out=flags, where=is_old)
-        for row, sources, weights in self._rules:
+        for row, sources, weights in self.rules:
             variance[:, row] = variance[:, sources] @ (weights * weights)
             flags[:, row] |= np.bitwise_or.reduce(flags[:, sources], axis=1)
         return GloveAngles(angles.mean, np.sqrt(variance), flags)
@@ -150,7 +151,7 @@ class GlovePredictor:
     def _predict_block(self, readings: np.ndarray) -> GloveAngles:
         columns = readings.T
         mean = np.empty((len(self.rotations), len(readings)))
-        variance = np.empty_like(mean)
+        variance = np.zeros_like(mean)
         for rows, group in self._groups:
             mean[rows], variance[rows] = group.predict(columns)
         for row, predict in self._others:
@@ -158,7 +159,7 @@ class GlovePredictor:
         flags = self._range.flags(columns, len(mean))
         np.bitwise_or(flags, TOO_UNCERTAIN, out=flags, where=variance > self._largest_variance)
         variance += self._noise
-        for row, sources, weights in self._rules:
+        for row, sources, weights in self.rules:
             mean[row] = weights @ mean[sources]
             variance[row] = (weights * weights) @ variance[sources]
             flags[row] = np.bitwise_or.reduce(flags[sources], axis=0) | BY_RULE

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from glovecal_models.calibration.explanation import AngleTerms, FrameExplanation, Measured
+from glovecal_models.calibration.predictor import EXTRAPOLATING, FAULTY_SENSOR, TOO_UNCERTAIN
 from glovecal_models.calibration.training_plan import TrainingPlan
 from glovecal_models.calibration.usable_sensors import UsableSensors
 
@@ -56,3 +58,58 @@ def weight_sentence(rotation: str, evidence: Mapping[str, Any]) -> str | None:
         f"sensors do not read may affect it. Samples weighted {evidence['sample_weight']:g}: smallest "
         f"held-out error ({tried})."
     )
+
+
+def frame_sentences(frame: FrameExplanation) -> list[str]:
+    """What holds for all angles of a frame: a transient, failing sensors, effects without their inputs."""
+    sentences = []
+    if frame.transient_s is not None:
+        sentences.append(
+            f"Transient: {', '.join(frame.remembering)} began anew {frame.transient_s:.1f} s ago and settles "
+            f"after {frame.settling_s:.1f} s; until then the term is uncertain."
+        )
+    if frame.faulty_sensors:
+        several = len(frame.faulty_sensors) > 1
+        sentences.append(
+            f"Faulty sensor{'s' * several}: {', '.join(frame.faulty_sensors)}; rotations read from "
+            f"{'them' if several else 'it'} hold their last good angle."
+        )
+    return [*sentences, *(f"{sentence[0].upper()}{sentence[1:]}." for sentence in frame.silent)]
+
+
+def angle_sentences(angle: AngleTerms, measured: Measured | None) -> list[str]:
+    """What else there is to say about one explained angle."""
+    sentences = []
+    if angle.flags & FAULTY_SENSOR:
+        sentences.append("Held: a sensor that it is read from fails; this is the last good angle.")
+    if angle.flags & EXTRAPOLATING:
+        sentences.append("Extrapolating: a reading lies outside those of training.")
+    if not angle.is_corrected:
+        sentences.append(
+            "Not corrected: the corrections are not finite or beyond a full turn, and were left out."
+        )
+    elif angle.flags & TOO_UNCERTAIN:
+        sentences.append("Too uncertain to use.")
+    if angle.sources:
+        sentences.append(f"By rule from {', '.join(angle.sources)}: its terms are theirs, weighted.")
+    if any(item.variance is None for item in angle.terms):
+        sentences.append("Not stored: the model has no standard deviation of this term.")
+    if any(item.variance is not None and item.variance < 0 for item in angle.terms):
+        sentences.append("A term without a standard deviation explains a part of the measurement noise.")
+    unclaimed = [item.name for item in angle.terms if item.variance is not None and not item.is_claimed]
+    if unclaimed:
+        sentences.append(f"Not in the angle's standard deviation: that of {', '.join(unclaimed)}.")
+    return sentences + ([] if measured is None else [_measured_sentence(angle, measured)])
+
+
+def _measured_sentence(angle: AngleTerms, measured: Measured) -> str:
+    changes = [
+        f"{item.name} {item.degrees:+.2f}" if item.degrees is not None else f"{item.name} takes it away"
+        for item in measured.repairs
+        if item.degrees != 0.0
+    ]
+    repaired = f" (recorded {measured.recorded_deg:.2f}; {', '.join(changes)})" if changes else ""
+    if measured.degrees is None:
+        return f"Measured: not compared{repaired}."
+    error = angle.degrees - measured.degrees
+    return f"Measured: {measured.degrees:.2f} degrees{repaired}; error {error:+.2f} degrees."

@@ -23,7 +23,15 @@ from glovecal_service.rest.http.observation import PREFIX, Observation
 from glovecal_service.rest.http.request_guard import RequestGuard, is_loopback
 from glovecal_service.rest.http.upload_folder import UploadFolder
 from glovecal_service.rest.job import jobs
-from glovecal_service.rest.model import comparison, models, predictions, quick_check, training, where
+from glovecal_service.rest.model import (
+    comparison,
+    explanation,
+    models,
+    predictions,
+    quick_check,
+    training,
+    where,
+)
 from glovecal_service.rest.sampling import next_steps, samplings
 from glovecal_service.rest.subject import subjects
 from glovecal_service.rest.take import clocks, examination, holds, reference, table_import, takes, uploads
@@ -37,7 +45,7 @@ ROUTERS = (
     *(subjects, layouts, recordings, samplings),
     *(clocks, holds, examination, table_import, takes, reference, uploads),
     *(training, models, predictions, comparison, where, diagnosis, changes, catalogue, improvement),
-    *(quick_check, next_steps),
+    *(explanation, quick_check, next_steps),
     *(jobs, health),
 )
 

@@ -1,0 +1,338 @@
+"""What one angle is made of: the base's value and what each effect adds, each with its standard deviation.
+
+The terms are written down by the prediction that is served, so they add up to its angle. Rules are linear:
+the terms of a rotation by rule are those of the rotations that it follows, weighted alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from glovecal_models.calibration.correction_parts import CorrectionParts, PartKind
+from glovecal_models.calibration.effect_correction import EffectCorrection, usable_correction
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.predictor import GloveAngles, GlovePredictor
+from glovecal_models.calibration.samples import require_layout
+from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
+from glovecal_models.effects.base.signature_effect import SignatureEffect
+from glovecal_models.errors import BadInput
+from glovecal_models.takes.take import Take
+
+TermKind = Literal["base", "noise"] | PartKind
+BASE, NOISE = "base", "measurement noise"
+OUTSIDE_S = 0.05
+"""A time this little before or after a take is a rounded one."""
+ORDER: tuple[TermKind, ...] = ("base", "held", "correction", "noise", "interval")
+
+
+@dataclass(frozen=True)
+class Term:
+    """One term of one angle."""
+
+    name: str
+    """An effect's, or ``base``: the regressor alone, or ``measurement noise``."""
+    kind: TermKind
+    degrees: float
+    variance: float | None
+    """Degrees squared; None: the model does not store it. Negative: so much of the measurement noise is
+    explained."""
+    is_claimed: bool
+    """Whether its variance is in the claimed standard deviation of the angle."""
+
+    @property
+    def sd_deg(self) -> float | None:
+        """None where it is not stored, and where it takes away from the noise."""
+        return None if self.variance is None or self.variance < 0 else float(np.sqrt(self.variance))
+
+
+@dataclass(frozen=True)
+class AngleTerms:
+    """One rotation in one frame; the terms' degrees add up to the angle."""
+
+    rotation: str
+    degrees: float
+    sd_deg: float
+    """Claimed, of a measurement of the rotation: noise included."""
+    flags: int
+    """As in ``GloveAngles``."""
+    terms: tuple[Term, ...]
+    sources: tuple[str, ...]
+    """Rotations that it is computed from by rule; empty: it is read from sensors."""
+    readings: Mapping[str, float]
+    """Raw readings of the sensors that the base reads."""
+    is_corrected: bool
+    """False where the corrections were unusable and left out."""
+
+
+@dataclass(frozen=True)
+class MeasuredTerm:
+    """What one repair of the measurement changes of the measured angle."""
+
+    name: str
+    degrees: float | None
+    """None: the frame is not compared, as the repair takes the measurement there away."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """The measured angle at the frame, as it is compared with the model."""
+
+    recorded_deg: float
+    repairs: tuple[MeasuredTerm, ...]
+    degrees: float | None
+    """After the repairs; None: not compared."""
+
+
+@dataclass(frozen=True)
+class FrameExplanation:
+    """All rotations of one frame of a glove."""
+
+    time_s: float
+    angles: tuple[AngleTerms, ...]
+    faulty_sensors: tuple[str, ...]
+    transient_s: float | None
+    """How long ago effects with a memory began anew, where they have not settled yet; None: they have."""
+    settling_s: float
+    """How long they take; 0: nothing is remembered."""
+    remembering: tuple[str, ...]
+    """The effects that remember."""
+    silent: tuple[str, ...]
+    """A sentence for each effect that corrects nothing for want of something it is not told."""
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """One frame of a take."""
+
+    take: str
+    wearing: str
+    simulated: bool
+    asked_s: float
+    number: int
+    """Of the frame in the take, 0 for the first."""
+    frame: FrameExplanation
+    measured: Mapping[str, Measured]
+    """By rotation; only those that were measured there."""
+
+
+class FrameExplainer:
+    """Explains the frames of one glove one after another, as live poses are predicted."""
+
+    def __init__(self, model: CalibrationModel) -> None:
+        """Raises BadInput for an effect that this machine does not have."""
+        self._model, self._predictor = model, GlovePredictor(model)
+        self._stream = self._predictor.stream()
+        self._began_s = self._last_s = -np.inf
+
+    def frame(
+        self, time_s: float, readings: np.ndarray, context: Mapping[str, float], wearing: str
+    ) -> FrameExplanation:
+        """The next frame; ``readings`` (S,), raw, in the order of the model's sensors. Raises BadInput."""
+        if not 0.0 <= time_s - self._last_s <= LONGEST_GAP_S:
+            self._began_s = time_s
+        self._last_s = time_s
+        base = self._predictor.predict(readings[None])
+        parts = CorrectionParts(1, len(self._predictor.rotations))
+        found = EffectCorrection.of_frames(
+            [self._stream], np.array([time_s]), base.mean, readings[None], [context], [wearing], parts
+        )
+        angles = self._predictor.corrected(base, found.degrees, found.undefined, found.inflation)
+        known = [name for name, value in context.items() if np.isfinite(value)]
+        return _explained(
+            self._model, self._predictor, self._stream, (base, angles), found.degrees, parts,
+            readings, time_s, time_s - self._began_s, self._stream.silent(known, wearing),
+        )  # fmt: skip
+
+    def reset(self) -> None:
+        """A new run or wearing."""
+        self._stream.reset()
+        self._began_s = self._last_s = -np.inf
+
+
+def explain(model: CalibrationModel, take: Take, at_s: float) -> Explanation:
+    """The frame of ``take`` nearest to ``at_s``, seconds of the take's own clock.
+
+    Effects with a memory start at the take's first frame, as in ``GlovePredictor.predict_take``. Raises
+    BadInput for a time outside the take, LayoutMismatch.
+    """
+    require_layout(take, model.layout)
+    first, last = float(take.time_s[0]), float(take.time_s[-1])
+    if not first - OUTSIDE_S <= at_s <= last + OUTSIDE_S:
+        raise BadInput(f"take {take.name!r} lasts from {first:.3f} to {last:.3f} s; there is no {at_s:g} s")
+    number = int(np.argmin(np.abs(take.time_s - at_s)))
+    columns = [take.sensors.index(name) for name in model.layout.sensors]
+    # What comes later changes nothing: prediction is causal.
+    until = slice(0, number + 1)
+    time_s, readings = take.time_s[until], take.readings[until][:, columns]
+    context = {name: column[until] for name, column in take.context.items()}
+    predictor = GlovePredictor(model)
+    effects = predictor.stream()
+    base = predictor.predict(readings)
+    parts = CorrectionParts(len(time_s), len(predictor.rotations))
+    found = effects.of_take(time_s, base.mean, readings, context, take.wearing, parts)
+    angles = predictor.corrected(base, found.degrees, inflation=found.inflation)
+    gaps = np.flatnonzero(np.diff(time_s) > LONGEST_GAP_S)
+    began_s = float(time_s[gaps[-1] + 1]) if len(gaps) else first
+    known = [name for name, column in context.items() if np.isfinite(column[-1])]
+    frame = _explained(
+        model, predictor, effects, (_last(base), _last(angles)), found.degrees[-1:], parts,
+        readings[-1], float(time_s[-1]), float(time_s[-1]) - began_s, effects.silent(known, take.wearing),
+    )  # fmt: skip
+    measured = _measured(model, take, number, predictor)
+    return Explanation(take.name, take.wearing, take.simulated, at_s, number, frame, measured)
+
+
+def chosen_rotations(model: CalibrationModel, wanted: Sequence[str]) -> tuple[str, ...]:
+    """``wanted`` in the model's order, all where none is named. Raises BadInput for one it does not have."""
+    there = model.rotation_names
+    unknown = [name for name in wanted if name not in there]
+    if unknown:
+        raise BadInput(f"no rotation {unknown[0]!r} in this model; there are {', '.join(there)}")
+    return tuple(name for name in there if name in wanted) if wanted else there
+
+
+def _last(angles: GloveAngles) -> GloveAngles:
+    return GloveAngles(angles.mean[-1:], angles.sd[-1:], angles.flags[-1:])
+
+
+def _explained(
+    model: CalibrationModel,
+    predictor: GlovePredictor,
+    effects: EffectCorrection,
+    base_and_angles: tuple[GloveAngles, GloveAngles],
+    correction: np.ndarray,
+    parts: CorrectionParts,
+    readings: np.ndarray,
+    time_s: float,
+    since_start_s: float,
+    silent: Sequence[str],
+) -> FrameExplanation:
+    """Of the last frame that ``parts`` know; ``correction`` (1, R) is its sum."""
+    base, angles = base_and_angles
+    usable = usable_correction(correction[0])
+    noise = np.array([item.regressor.noise_variance for item in model.rotations])
+    every = np.ones(len(noise), dtype=bool)
+    sure = np.maximum(base.sd[0] ** 2 - noise, 0.0)
+    rows = [
+        _Row(BASE, "base", base.mean[0].copy(), sure, sure.copy(), every.copy()),
+        _Row(NOISE, "noise", 0.0 * noise, noise.copy(), noise.copy(), every.copy()),
+    ]
+    for part in parts.found:
+        degrees = np.where(usable, part.degrees[-1], 0.0)
+        rows.append(
+            _Row(
+                part.name,
+                part.kind,
+                degrees,
+                part.variance[-1].copy(),
+                part.claimed[-1],
+                part.acts[-1].copy(),
+            )
+        )
+    for target, sources, weights in predictor.rules:
+        for row in rows:
+            row.follow_rule(target, sources, weights)
+    rows.sort(key=lambda row: ORDER.index(row.kind))
+    names = predictor.rotations
+    by_rule = {target: tuple(names[at] for at in sources) for target, sources, _ in predictor.rules}
+    of_sensor = dict(zip(model.layout.sensors, readings.tolist(), strict=True))
+    found = tuple(
+        AngleTerms(
+            rotation=item.rotation,
+            degrees=float(angles.mean[0, at]),
+            sd_deg=float(angles.sd[0, at]),
+            flags=int(angles.flags[0, at]),
+            terms=tuple(row.term(at) for row in rows if row.acts[at]),
+            sources=by_rule.get(at, ()),
+            readings={} if at in by_rule else {name: of_sensor[name] for name in item.correspondence.sensors},
+            is_corrected=bool(usable[at]),
+        )
+        for at, item in enumerate(model.rotations)
+    )
+    settling_s = effects.settling_s
+    remembering = [item.name for item in model.effects if item.effect.has_memory and item.weights.any()]
+    return FrameExplanation(
+        time_s=time_s,
+        angles=found,
+        faulty_sensors=parts.faulty_sensors[-1],
+        transient_s=since_start_s if since_start_s < settling_s else None,
+        settling_s=settling_s,
+        remembering=tuple(dict.fromkeys(remembering)),
+        silent=tuple(silent),
+    )
+
+
+@dataclass
+class _Row:
+    """One term of all R rotations, each array (R,)."""
+
+    name: str
+    kind: TermKind
+    degrees: np.ndarray
+    variance: np.ndarray
+    claimed: np.ndarray
+    acts: np.ndarray
+
+    def follow_rule(self, target: int, sources: np.ndarray, weights: np.ndarray) -> None:
+        self.acts[target] = self.acts[sources].any()
+        self.degrees[target] = self.degrees[sources] @ weights
+        used = sources[self.acts[sources]]
+        share = weights[self.acts[sources]] ** 2
+        self.variance[target] = self.variance[used] @ share
+        self.claimed[target] = self.claimed[used] @ share
+
+    def term(self, at: int) -> Term:
+        variance = float(self.variance[at])
+        stored = None if np.isnan(variance) else variance
+        return Term(
+            self.name,
+            self.kind,
+            float(self.degrees[at]),
+            stored,
+            is_claimed=stored is not None and bool(np.isclose(self.claimed[at], variance)),
+        )
+
+
+def _measured(
+    model: CalibrationModel, take: Take, number: int, predictor: GlovePredictor
+) -> dict[str, Measured]:
+    """What was measured at the frame ``number``, with the repairs that a comparison makes, in its order."""
+    names = predictor.rotations
+    recorded = take.reference_at_frames(names)[number]
+    if not np.isfinite(recorded).any():
+        return {}
+    at_s, before = float(take.time_s[number]), recorded
+    repairs: list[tuple[str, np.ndarray]] = []
+    effects = [(item.effect, item.settings) for item in model.effects if item.effect.kind == "repair"]
+    for needs_prediction in (False, True):
+        for effect, settings in effects:
+            if not isinstance(effect, SignatureEffect) or effect.needs_prediction != needs_prediction:
+                continue
+            if needs_prediction:
+                columns = [take.sensors.index(name) for name in model.layout.sensors]
+                readings = take.readings[:, columns]
+                predicted = predictor.predict_take(take.time_s, readings, take.context, take.wearing).mean
+                take = effect.repaired_to(take, settings, names, predicted)
+            else:
+                take = effect.repaired([take], settings)[0]
+            kept = np.flatnonzero(take.time_s == at_s)
+            after = take.reference_at_frames(names)[kept[0]] if len(kept) else np.full(len(names), np.nan)
+            repairs.append((effect.name, after - before))
+            before = after
+    return {
+        name: Measured(
+            float(recorded[at]),
+            tuple(MeasuredTerm(effect, _number(change[at])) for effect, change in repairs),
+            _number(before[at]),
+        )
+        for at, name in enumerate(names)
+        if np.isfinite(recorded[at])
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
