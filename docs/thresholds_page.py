@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from glovecal_models.calibration.limits import TrainingLimits
 from glovecal_models.comparison.limits import ComparisonLimits
 from glovecal_models.diagnosis.limits import DiagnosisLimits
 from glovecal_models.effects.base.limits import SignificanceLimits
@@ -24,6 +25,7 @@ STAGES: Mapping[str, type[Any]] = {
     "Noise floors and where a model fails": ComparisonLimits,
     "Improvement": ImprovementLimits,
     "Sampling": SamplingLimits,
+    "Training": TrainingLimits,
 }
 ENTRY = """\
 # Thresholds

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from glovecal_models.calibration.explanation import AngleTerms, FrameExplanation, Measured
+from glovecal_models.calibration.order_confounding import OrderConfounding
 from glovecal_models.calibration.predictor import EXTRAPOLATING, FAULTY_SENSOR, TOO_UNCERTAIN
 from glovecal_models.calibration.training_plan import TrainingPlan
 from glovecal_models.calibration.usable_sensors import UsableSensors
@@ -43,6 +44,23 @@ def dead_sensor_sentences(usable: UsableSensors, rotations: Sequence[str]) -> li
     lost = [name for name in usable.unreadable if name in rotations]
     if lost:
         sentences.append(f"No working sensor measures {', '.join(lost)}: not in the model.")
+    return sentences
+
+
+def order_sentences(found: Sequence[OrderConfounding]) -> list[str]:
+    """One for each wearing in which the order of the session and its postures cannot be told apart."""
+    sentences = []
+    for wearing in dict.fromkeys(item.wearing for item in found if item.is_confounded):
+        own = [item for item in found if item.is_confounded and item.wearing == wearing]
+        each = ", ".join(f"{item.rotation} {item.r2:.2f}" for item in own)
+        shifted = max(item.shifted_r2 for item in own)
+        several = len(own) > 1
+        sentences.append(
+            f"In {wearing} posture goes with time: R2 of time by angle is {each}; 95 % of circularly "
+            f"shifted sessions stay below {shifted:.2f}. A drift of the readings would look like posture "
+            f"there. Add a take with {'these rotations' if several else 'it'} in random order (glovecal "
+            "sample asks so), or up and down again."
+        )
     return sentences
 
 

@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
+from glovecal_models.sampling.order import in_random_order
 from glovecal_models.sampling.protocol import Protocol, Step
 from glovecal_models.sampling.steps import (
     KEY_POSES,
@@ -52,13 +53,22 @@ class Equipment:
         return cls(**({**document, "rod_mm": tuple(document["rod_mm"])} if document else {}))
 
 
-def make_protocol(name: str, layout: Layout, equipment: Equipment | None = None) -> Protocol:
+def make_protocol(
+    name: str, layout: Layout, equipment: Equipment | None = None, *, seed: int | None = None
+) -> Protocol:
     """One of ``PROTOCOLS``, without what the layout has no sensor or rotation for.
+
+    ``seed``: poses and widgets in random order, the first again at the end (``order.py``); None: in the
+    paper's order.
 
     ``fk_only`` and ``ik_only`` are the paper's accuracy adaptation (section 8.2); ``active`` begins with free
     motion and grows (``active_sampling``). Raises BadInput.
     """
-    own = equipment or Equipment()
+    protocol = _in_fixed_order(name, layout, equipment or Equipment())
+    return protocol if seed is None else in_random_order(protocol, seed)
+
+
+def _in_fixed_order(name: str, layout: Layout, own: Equipment) -> Protocol:
     _check(own)
     if name == "active":
         first = [_loosen(6.0), *verification_steps("start")]

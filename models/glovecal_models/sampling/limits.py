@@ -78,6 +78,24 @@ class SamplingLimits:
         "A sensor that differs by more in every pose at the end has moved on the hand.",
         "With 2.5 degrees from time to time, a hundred degrees repeat within 3.5 %.",
     )
+    repeat_deg: float = limit(
+        2.5,
+        "degrees",
+        "A person repeats a pose about so well; the scale of a step that is asked twice.",
+        "The same as for held poses in training.",
+    )
+    repeat_percent: float = limit(
+        3.5,
+        "% of the active range",
+        "The same where the sampling knows no counts per degree.",
+        "2.5 degrees from time to time, of a hundred.",
+    )
+    repeat_times: float = limit(
+        2.0,
+        "times `repeat_deg` or `repeat_percent`",
+        "A step that differs by more the second time tells of slip or drift.",
+        "Not tuned; chosen with the random order (2026-11-22).",
+    )
     touch_most_left_mm: float = limit(
         8.0,
         "mm",

@@ -41,6 +41,8 @@ class Step:
     """Digits (T, I, M, R, P) whose tips are held together, or against the ends of the rod."""
     rod_mm: float | None = None
     """Distance of the two tips; None: they touch."""
+    repeats: str = ""
+    """Name of the step that this one does again, as a check; "" for none."""
 
     def to_document(self) -> dict[str, Any]:
         return asdict(self) | {"angles": dict(self.angles)}
@@ -71,6 +73,8 @@ class Protocol:
     """Further steps are chosen when these are done."""
     equipment: Mapping[str, Any] = field(default_factory=dict)
     """What the person has (``Equipment.to_document()``), for steps that are still to be chosen."""
+    seed: int | None = None
+    """Of the random order of poses and widgets; None: they are in their fixed order."""
 
     def __post_init__(self) -> None:
         names = [step.name for step in self.steps]
@@ -99,10 +103,10 @@ class Protocol:
     def to_document(self) -> dict[str, Any]:
         steps = [step.to_document() for step in self.steps]
         document = {"name": self.name, "steps": steps, "grows": self.grows}
-        return document | {"equipment": dict(self.equipment)}
+        return document | {"equipment": dict(self.equipment), "seed": self.seed}
 
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> Protocol:
         steps = tuple(Step.from_document(step) for step in document["steps"])
         grows, equipment = document.get("grows", False), document.get("equipment", {})
-        return cls(document["name"], steps, bool(grows), equipment)
+        return cls(document["name"], steps, bool(grows), equipment, document.get("seed"))

@@ -45,7 +45,7 @@ class SampledTake:
                 {
                     "name": step.name,
                     "pose": step.pose,
-                    "angles": dict(step.angles),
+                    "angles": {} if step.repeats else dict(step.angles),
                     "touches": list(step.touches),
                     "rod_mm": step.rod_mm,
                 }
@@ -123,11 +123,12 @@ def _cut(whole: Take, marks: list[tuple[Step, Attempt]], name: str) -> SampledTa
     begins_s = float(whole.time_s[rows[0][0]])
     first = int(np.searchsorted(whole.time_s, begins_s - PRE_ROLL_S))
     last = int(rows[-1][-1]) + 1
-    rotations = tuple(dict.fromkeys(rotation for step, _ in marks for rotation in step.angles))
+    taught = [{} if step.repeats else step.angles for step, _ in marks]  # a check teaches nothing
+    rotations = tuple(dict.fromkeys(rotation for angles in taught for rotation in angles))
     reference = np.full((last - first, len(rotations)), np.nan)
     poses = [""] * (last - first)
-    for (step, _), frames in zip(marks, rows, strict=True):
-        for rotation, angle in step.angles.items():
+    for (step, _), angles, frames in zip(marks, taught, rows, strict=True):
+        for rotation, angle in angles.items():
             reference[frames - first, rotations.index(rotation)] = angle
         for frame in (frames - first).tolist():
             poses[frame] = step.pose

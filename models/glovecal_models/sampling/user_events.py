@@ -11,6 +11,7 @@ from glovecal_models.sampling.limits import SAMPLING_LIMITS, SamplingLimits
 from glovecal_models.sampling.protocol import Protocol, Step
 from glovecal_models.sampling.quality import moved_since_start
 from glovecal_models.sampling.reading import ActiveRanges, GloveReading, RecentReadings
+from glovecal_models.sampling.repeatability import repeatability
 from glovecal_models.sampling.state import OVER, RUNNING, Attempt, Phase, SamplingState
 from glovecal_models.sampling.steps import WIDEST_DEG
 
@@ -56,7 +57,11 @@ class Transitions:
         self._enter("waiting", now_s, f"{said} {asked}".strip())
 
     def _end(self, phase: Phase, now_s: float, said: str) -> None:
-        self.state.sentences = moved_since_start(self.state, self._ranges, self.limits)
+        found = repeatability(self.state, self.limits)
+        self.state.sentences = [
+            *moved_since_start(self.state, self._ranges, self.limits),
+            *([] if found is None else [found.sentence(self.limits)]),
+        ]
         self._recent.forget()
         self._enter(phase, now_s, said)
 
@@ -160,7 +165,11 @@ def _with_angle(protocol: Protocol, step: Step, angle_deg: float) -> Protocol:
         raise BadInput(f"step {step.name} has no widget whose angle could be corrected")
     (rotation,) = step.angles
     widget = f"the {angle_deg:g} degree widget"
-    changed = replace(
-        step, angles={rotation: angle_deg}, ask=step.ask.replace(step.needs, widget), needs=widget
-    )
-    return replace(protocol, steps=tuple(changed if each is step else each for each in protocol.steps))
+    ask, angles = step.ask.replace(step.needs, widget), {rotation: angle_deg}
+    steps = [
+        replace(each, angles=angles, ask=ask, needs=widget)
+        if step.name in (each.name, each.repeats)
+        else each
+        for each in protocol.steps
+    ]
+    return replace(protocol, steps=tuple(steps))

@@ -78,7 +78,9 @@ def _contradictions(
 ) -> tuple[str, ...]:
     """What only the other steps, or inverse kinematics, can tell."""
     step, sentence = state.now(), None
-    if step.kind == "fk_cross_couple":
+    if step.repeats and step.motion == "move":
+        attempt.response = response(state.protocol.step(step.repeats), readings, state.sensors, ranges)
+    elif step.kind == "fk_cross_couple":
         attempt.response = response(step, readings, state.sensors, ranges)
         (rotation,) = step.angles
         sentence = inconsistent_widgets(rotation, _responses(state, rotation, attempt), limits)

@@ -11,7 +11,8 @@ from glovecal_models.calibration.artifact import dump
 from glovecal_models.calibration.fit_task import FitResult, FitTask
 from glovecal_models.calibration.fit_task import run_task as run_fit
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.text import plan_sentences, weight_sentence
+from glovecal_models.calibration.order_confounding import OrderConfounding, order_confounding
+from glovecal_models.calibration.text import order_sentences, plan_sentences, weight_sentence
 from glovecal_models.calibration.training import assemble
 from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
 from glovecal_models.calibration.training_settings import TrainingSettings
@@ -33,7 +34,7 @@ class TrainJob:
     ``parent`` (model id or None), and any of ``TrainingSettings``.
 
     Result: ``model``, ``held_out_rmse_deg``, ``per_rotation`` (held-out degrees, None for a rule),
-    ``sentences``, ``active``.
+    ``sentences``, ``confounded_order`` (rotations of wearings in which posture goes with time), ``active``.
     """
 
     def plan(self, store: Store, job: JobRecord) -> JobPlan:
@@ -53,7 +54,10 @@ class TrainJob:
             hashes = [record.artifact for record in records]
             fits = [_fit_result(result) for result in results]
             model = taught.finished(assemble(plan, fits, take_hashes=hashes, parent=parent))
-            facts = _facts(model, plan, records, taught.sentences) | {"settings": asdict(settings)}
+            order = order_confounding(taught.takes)
+            said = [*taught.sentences, *order_sentences(order)]
+            facts = _facts(model, plan, records, said) | {"settings": asdict(settings)}
+            facts["confounded_order"] = _confounded(order)
             return _keep(store, model, layout_name, facts, activate=bool(payload.get("activate", False)))
 
         return JobPlan(
@@ -162,6 +166,11 @@ def _facts(
     }
 
 
+def _confounded(order: Sequence[OrderConfounding]) -> list[dict[str, Any]]:
+    """Rotations of wearings in which a drift would look like posture."""
+    return [asdict(item) for item in order if item.is_confounded]
+
+
 def _kernel_sentences(model: CalibrationModel) -> list[str]:
     choices = {item.rotation: choice_of(item.regressor) for item in model.rotations}
     return kernel_sentences({name: found for name, found in choices.items() if found is not None})
@@ -189,7 +198,9 @@ def _keep(
     )
     if activate:
         store.models.activate(record.id)
-    said = {name: facts[name] for name in ("held_out_rmse_deg", "per_rotation", "sentences")}
+    said = {
+        name: facts[name] for name in ("held_out_rmse_deg", "per_rotation", "sentences", "confounded_order")
+    }
     return {"model": record.id, **said, "active": activate}
 
 

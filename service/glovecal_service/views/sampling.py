@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import asdict
 from datetime import datetime
 from typing import Any
 
@@ -10,6 +11,7 @@ from pydantic import BaseModel, Field
 
 from glovecal_models.sampling.limits import SAMPLING_LIMITS
 from glovecal_models.sampling.protocol import COUNTDOWN_S, SETTLE_S, Kind, Motion
+from glovecal_models.sampling.repeatability import repeatability
 from glovecal_models.sampling.state import Phase, SamplingState, Trigger
 from glovecal_service.store.records import SamplingRecord
 
@@ -27,6 +29,7 @@ class StepNow(BaseModel):
     moves: list[str] = Field(description="Sensors that have to move.")
     touches: list[str]
     rod_mm: float | None
+    repeats: str = Field(description="Step that this one does again, as a check; empty for none.")
 
 
 class StepDone(BaseModel):
@@ -34,6 +37,23 @@ class StepDone(BaseModel):
     kind: Kind
     outcome: str = Field(description="`good`, `bad`, `skipped`, or `` when it was not done yet.")
     reasons: list[str] = Field(description="Why it is bad, or was left out.")
+
+
+class SensorChangeView(BaseModel):
+    sensor: str
+    counts: float = Field(description="At the end less at the start.")
+    percent: float = Field(description="The same, of the sensor's active range.")
+    degrees: float | None = Field(description="By this sampling's known angles; None: too few.")
+
+
+class RepeatabilityView(BaseModel):
+    step: str
+    apart_s: float = Field(description="Between the two visits.")
+    sensors: list[SensorChangeView]
+    rms_deg: float | None
+    rms_percent: float
+    usual_deg: float = Field(SAMPLING_LIMITS.repeat_deg, description="How well a person repeats a pose.")
+    is_much: bool = Field(description="More than a person's own repetition explains.")
 
 
 class SamplingView(BaseModel):
@@ -44,6 +64,7 @@ class SamplingView(BaseModel):
     layout: str
     protocol: str
     trigger: Trigger
+    seed: int | None = Field(description="Of the random order of poses and widgets; None: a fixed order.")
     phase: Phase
     phase_s: float = Field(description="Seconds in this phase until now.")
     phase_of_s: float | None = Field(description="Seconds that it takes; None: until something happens.")
@@ -61,6 +82,9 @@ class SamplingView(BaseModel):
         description="Protocol `active`: what the chosen step is expected to teach, and its rivals."
     )
     sentences: list[str] = Field(description="What the end found.")
+    repeatability: RepeatabilityView | None = Field(
+        description="The first pose or widget against itself at the end; None until it was done twice."
+    )
     problem: str
     open: bool = Field(description="Until its takes are stored.")
     recordings: list[str]
@@ -79,6 +103,7 @@ def sampling_view(record: SamplingRecord) -> SamplingView:
         layout=record.layout,
         protocol=state.protocol.name,
         trigger=state.trigger,
+        seed=state.protocol.seed,
         phase=state.phase,
         phase_s=round(max(0.0, time.time() - state.since_s), 2),
         phase_of_s=_length(state),
@@ -92,6 +117,7 @@ def sampling_view(record: SamplingRecord) -> SamplingView:
         capture_of_s=round(state.protocol.capture_s, 2),
         expected=state.expected,
         sentences=state.sentences,
+        repeatability=_repeatability(state),
         problem=record.problem,
         open=record.open,
         recordings=record.recordings,
@@ -99,6 +125,11 @@ def sampling_view(record: SamplingRecord) -> SamplingView:
         created_at=record.created_at,
         updated_at=record.updated_at,
     )
+
+
+def _repeatability(state: SamplingState) -> RepeatabilityView | None:
+    found = repeatability(state)
+    return None if found is None else RepeatabilityView.model_validate(asdict(found))
 
 
 def _length(state: SamplingState) -> float | None:

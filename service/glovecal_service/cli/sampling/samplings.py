@@ -13,6 +13,7 @@ import typer
 from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier
 from glovecal_models.sampling.catalogue import PROTOCOLS
+from glovecal_models.sampling.order import Order
 from glovecal_models.sampling.state import TRIGGERS
 from glovecal_service.cli.sampling.dialogue import walk
 from glovecal_service.cli.sampling.next_steps import next_steps
@@ -54,6 +55,14 @@ def sample(
     poses: Annotated[
         Path | None, typer.Option(help="JSON file of measured angles: pose, rotation, degrees.")
     ] = None,
+    order: Annotated[
+        Order,
+        typer.Option(
+            help="Of poses and widgets. random: the first again at the end, so that drift cannot look like "
+            "posture. fixed: the paper's."
+        ),
+    ] = "random",
+    seed: Annotated[int | None, typer.Option(min=0, help="Of the random order; default: a new one.")] = None,
     rod: Annotated[list[float] | None, typer.Option(help="Length of a rod in mm; repeatable.")] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -66,6 +75,7 @@ def sample(
             raise typer.BadParameter(f"give --{what}")
     check_identifier(glove, "glove")
     wanted: dict[str, Any] = {"glove": glove, "subject": subject, "protocol": protocol, "trigger": trigger}
+    wanted |= {"order": order, "seed": seed}
     wanted["widget_deg"] = _widget_angles(widget or [])
     wanted["pose_deg"] = _pose_angles(poses)
     if rod:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import secrets
 import time
 from collections.abc import AsyncIterator
 from typing import Annotated
@@ -14,6 +15,7 @@ from pydantic import BaseModel, Field, FiniteFloat
 from glovecal_models.sampling.catalogue import ROD_MM, Equipment, ProtocolName, make_protocol
 from glovecal_models.sampling.engine import Sampling, begin_sampling
 from glovecal_models.sampling.guided.touch_watch import require_possible_touches
+from glovecal_models.sampling.order import Order
 from glovecal_models.sampling.state import SamplingState, Trigger
 from glovecal_models.sampling.user_events import Event, NotNow
 from glovecal_service.rest.http.answers import change_problems, problems
@@ -40,6 +42,7 @@ LOOK_EVERY_S = 0.1
 LONGEST_STREAM_S = 3600.0
 """After this the stream ends; listeners connect again."""
 MOST_TRIES = 20
+LARGEST_SEED = 2**31 - 1
 Angles = Annotated[list[FiniteFloat], Field(max_length=20)]
 PoseAngles = Annotated[dict[Channel, FiniteFloat], Field(max_length=100)]
 
@@ -55,6 +58,14 @@ class NewSampling(StrictBody):
     )
     pose_deg: Annotated[dict[Identifier, PoseAngles], Field(max_length=20)] = Field(
         default_factory=dict, description="Measured angles by pose, instead of the usual; new poses too."
+    )
+    order: Order = Field(
+        "random",
+        description="Of poses and widgets: `random`, the first again at the end, so that a drift cannot look "
+        "like posture; or `fixed`, the paper's. Protocol `active` chooses its own.",
+    )
+    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] | None = Field(
+        None, description="Of the random order; None: a new one. It is kept with the sampling."
     )
     rod_mm: Annotated[list[FiniteFloat], Field(max_length=5)] = Field(
         default_factory=lambda: [ROD_MM], description="Rods to hold between the fingertips."
@@ -93,7 +104,8 @@ def start_sampling(body: NewSampling, store: StoreNeeded, response: Response) ->
         raise Conflict(f"glove {glove.name!r} has not said which layout it has; is its capture running?")
     layout = store.layouts.get(glove.layout)
     equipment = Equipment(body.widget_deg, body.pose_deg, tuple(body.rod_mm))
-    protocol = make_protocol(body.protocol, layout, equipment)
+    seed = body.seed if body.seed is not None else secrets.randbelow(LARGEST_SEED + 1)
+    protocol = make_protocol(body.protocol, layout, equipment, seed=seed if body.order == "random" else None)
     person = store.subjects.get(body.subject)
     if person.dimensions:
         require_possible_touches(protocol, person.skeleton())
