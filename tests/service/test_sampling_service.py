@@ -150,7 +150,7 @@ def test_a_sampling_survives_the_death_of_the_recorder_and_a_pause(
 ) -> None:
     """kill -9 in the middle of a step: it begins again, no step is lost, and the takes are whole."""
     own = {"widget_deg": {"IM_ABD": [0, 25]}, "pose_deg": {"flat": {"I_MCP": 3.0, "IM_ABD": 2.0}}}
-    id = start(service, protocol="fk_only", **own)
+    id = start(service, protocol="fk_only", order="fixed", **own)
     for done in walk(service, id, DONE):
         if done == "flat-start":
             kill_recorder(place)
@@ -177,6 +177,21 @@ def test_a_sampling_survives_the_death_of_the_recorder_and_a_pause(
     assert {take["kind"] for take in rough} == set(REUSABLE)
     assert {(take["rough"], take["from_subject"]) for take in rough} == {(True, "anna")}
     assert len(reused["left_out"]) == 1
+
+
+def test_the_order_is_random_unless_asked_otherwise_and_its_seed_is_kept(service: RestClient) -> None:
+    names = {}
+    for order, seed in (("random", None), ("random", 7), ("fixed", None)):
+        id = start(service, protocol="fk_only", order=order, seed=seed)
+        view = service.post(f"/sampling/{id}/stop")
+        assert (view["seed"] is None) == (order == "fixed")
+        assert seed in (None, view["seed"])
+        assert view["repeatability"] is None
+        names[order, seed] = [step["name"] for step in view["steps"]]
+        over(service, id)
+    assert names["random", 7][-1].endswith("-again")
+    assert sorted(names["random", 7][:-1]) == sorted(names["fixed", None])
+    assert names["random", None][:-1] != names["fixed", None]
 
 
 def kill_recorder(place: DemoPlace) -> None:

@@ -20,8 +20,8 @@ from glovecal_models.takes.take import Take
 SHIFTS = 199
 NEAREST_SHIFT = 0.1
 """Of a stretch's samples: a session that is hardly shifted is the same one."""
-MOST_SAMPLES = 400
-"""Of a stretch: neighbouring frames say the same."""
+SAMPLES_A_STRETCH = 400
+"""At most: neighbouring frames say the same."""
 FEWEST_SAMPLES = 20
 
 
@@ -83,7 +83,7 @@ def _stretches(takes: Sequence[Take], rotation: str) -> list[_Stretch]:
 
 def _thinned(part: _Stretch) -> _Stretch:
     count = len(part[0])
-    chosen = np.linspace(0, count - 1, min(count, MOST_SAMPLES)).round().astype(int)
+    chosen = np.linspace(0, count - 1, min(count, SAMPLES_A_STRETCH)).round().astype(int)
     return part[0][chosen], part[1][chosen]
 
 

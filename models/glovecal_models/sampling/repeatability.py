@@ -12,7 +12,7 @@ from glovecal_models.sampling.reading import ActiveRanges
 from glovecal_models.sampling.state import Attempt, SamplingState
 from glovecal_models.sampling.steps import usual_angles
 
-LEAST_APART_DEG = 5.0
+ANGLES_APART_DEG = 5.0
 """Angles that lie closer together give no counts per degree."""
 
 
@@ -112,7 +112,7 @@ def _counts_per_degree(state: SamplingState, rotation: str) -> float | None:
         if reading is not None:
             known.append((step.angles[rotation], reading))
     angles, readings = np.array(known).reshape(-1, 2).T
-    if len(angles) < 2 or np.ptp(angles) < LEAST_APART_DEG:
+    if len(angles) < 2 or np.ptp(angles) < ANGLES_APART_DEG:
         return None
     slope = float(np.polyfit(angles, readings, 1)[0])
     return slope if slope else None
