@@ -18,6 +18,7 @@ import safetensors.numpy
 
 from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.model import CalibrationModel, RotationModel, restore_regressor
+from glovecal_models.calibration.unseen_wearing import UnseenWearing
 from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.layout import Layout
 from glovecal_models.regression.kernel_scores import choice_of
@@ -81,6 +82,8 @@ def dump(model: CalibrationModel) -> bytes:
             }
             for added in model.effects
         ]
+    if model.unseen_wearing is not None:
+        manifest["unseen_wearing"] = model.unseen_wearing.to_document()
     text = json.dumps(manifest, sort_keys=True, allow_nan=False)
     return safetensors.numpy.save(tensors, metadata={"manifest": text})
 
@@ -129,6 +132,7 @@ def _restore(manifest: Mapping[str, Any], tensors: Mapping[str, np.ndarray], nam
         ),
         sensor_centre=tensors.get("sensors:centre"),
         sensor_scale=tensors.get("sensors:scale"),
+        unseen_wearing=UnseenWearing.from_document(manifest.get("unseen_wearing")),
         takes=tuple(str(item) for item in manifest["takes"]),
         parent=manifest["parent"],
         error_estimate=manifest["error_estimate"],

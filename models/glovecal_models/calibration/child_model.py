@@ -12,10 +12,13 @@ from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.effect_fit import EffectFit, correspondence_for
 from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.held_out_check import HeldOutErrors
+from glovecal_models.calibration.left_out_wearings import left_out_wearings
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.calibration.prepared_takes import PreparedTakes
-from glovecal_models.calibration.training import uncertain_above
+from glovecal_models.calibration.training import noise_of, uncertain_above
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.calibration.unseen_wearing import unseen_wearing
+from glovecal_models.progress import Cancel
 from glovecal_models.regression.kernel_scores import keeping_choice
 
 
@@ -28,10 +31,18 @@ def child_model(
     errors: HeldOutErrors,
     settings: TrainingSettings,
     take_hashes: Sequence[str],
+    wanted: Sequence[EffectRequest] = (),
+    cancelled: Cancel | None = None,
 ) -> CalibrationModel:
-    """``parent`` with the regressors of ``fit`` in place of its own, and with ``effects``."""
+    """``parent`` with the regressors of ``fit`` in place of its own, and with ``effects``.
+
+    ``wanted``: with which the error in a wearing not seen is measured anew. Raises Cancelled.
+    """
     fresh = {name: _rotation_model(takes, name, fit, errors, settings) for name in fit.results}
     rotations = tuple(_renewed(item, fresh.get(item.rotation)) for item in parent.rotations)
+    left_out = left_out_wearings(takes, tuple(fresh), wanted, settings, cancelled=cancelled)
+    if parent.unseen_wearing is not None:
+        left_out += [item for item in parent.unseen_wearing.left_out if item.rotation not in fresh]
     estimate: Mapping[str, Any] = {
         "how": "whole takes left out" if len(takes.takes) > 1 else "stretches of the only take left out",
         "folds": max(settings.folds, 2),
@@ -47,6 +58,7 @@ def child_model(
         sensor_centre=takes.scale.centre,
         sensor_scale=takes.scale.scale,
         simulated=parent.simulated or any(take.simulated for take in takes.takes),
+        unseen_wearing=unseen_wearing([take.wearing for take in takes.takes], left_out, noise_of(rotations)),
     )
 
 

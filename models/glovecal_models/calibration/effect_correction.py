@@ -10,6 +10,7 @@ import numpy as np
 from glovecal_models.calibration.added_effect import AddedEffect, weight_variance
 from glovecal_models.calibration.correction_parts import CorrectionParts
 from glovecal_models.calibration.interval_inflation import IntervalInflation, VarianceInflation
+from glovecal_models.calibration.unseen_wearing import UnseenWearing
 from glovecal_models.effects.base.effect import Effect, Stream, Uncertainty
 from glovecal_models.effects.base.signals import GloveFrames, Signals
 from glovecal_models.effects.base.signature_effect import Hold, SignatureEffect
@@ -79,9 +80,11 @@ class EffectCorrection:
         rotations: Sequence[str],
         scale: SignalScale,
         noise: np.ndarray | None = None,
+        unseen: UnseenWearing | None = None,
     ) -> None:
         """``rotations``: the columns of the base's prediction; ``noise`` (R,) degrees squared, claimed for
-        their measurement, which effects that widen the interval build on.
+        their measurement, which effects that widen the interval build on; ``unseen`` what to add to it in a
+        wearing that training did not see.
 
         Raises BadInput for an effect that this machine does not have, or has in another version.
         """
@@ -89,6 +92,10 @@ class EffectCorrection:
         self._count, self._scale = len(rotations), scale
         self._effects = [_fitting(item) for item, _ in self._lanes]
         self._streams = [item.stream() for item, _ in self._lanes]
+        self._unseen = None if unseen is None or not any(unseen.added_variance.values()) else unseen
+        self._between = np.array(
+            [unseen.added_variance.get(name, 0.0) for name in rotations] if unseen else []
+        )
         self._uncertain: tuple[str, list[tuple[np.ndarray | slice, Uncertainty]]] | None = None
         """Of the wearing asked about last."""
         measured = np.zeros(len(rotations)) if noise is None else noise
@@ -110,7 +117,7 @@ class EffectCorrection:
 
     @property
     def is_empty(self) -> bool:
-        return not self._lanes and not self._inflates
+        return not self._lanes and not self._inflates and self._unseen is None
 
     @property
     def _inflates(self) -> bool:
@@ -198,7 +205,7 @@ class EffectCorrection:
             base, readings, inflation = _inflated_frames(gloves, time_s, base, readings, parts)
         total = base - first
         if not of_all._lanes:
-            return Corrections(total, None, inflation, {})
+            return Corrections(total, None, _with_unknown(gloves, base, wearing, inflation), {})
         others = _Others(of_all._scale, readings)
         problems: dict[int, str] = {}
         undefined: np.ndarray | None = None
@@ -222,11 +229,7 @@ class EffectCorrection:
                     undefined[row, lanes] = True
         for row in problems:
             total[row, of_all.rows] = np.nan
-        for row, glove in enumerate(gloves):
-            unknown = glove._unknown_variance(base[row : row + 1], wearing[row])
-            if unknown is not None:
-                inflation = inflation or VarianceInflation.none(base.shape)
-                inflation.variance[row] += unknown[0]
+        inflation = _with_unknown(gloves, base, wearing, inflation)
         return Corrections(total, undefined, inflation, problems)
 
     def _unknown_variance(self, base: np.ndarray, wearing: str) -> np.ndarray | None:
@@ -245,7 +248,25 @@ class EffectCorrection:
             (lanes, effect.uncertainty(item.settings, item.weights, wearing))
             for effect, (item, lanes) in zip(self._effects, self._lanes, strict=True)
         ]
-        return [(lanes, variance) for lanes, variance in found if variance is not None]
+        uncertain = [(lanes, variance) for lanes, variance in found if variance is not None]
+        if self._unseen is None:
+            return uncertain
+        if self._unseen.is_seen(wearing):
+            return []
+        if any(
+            effect.knows_wearing(item.settings, wearing)
+            for effect, (item, _) in zip(self._effects, self._lanes, strict=True)
+        ):
+            return uncertain
+
+        def beyond(own: np.ndarray) -> np.ndarray:
+            said = np.zeros_like(own)
+            for lanes, each in uncertain:
+                said[:, lanes] += each(own[:, lanes])
+            # Both are of the same differences between wearings: the larger counts, never their sum.
+            return np.maximum(self._between - said, 0.0)
+
+        return [*uncertain, (slice(None), beyond)]
 
     def _inflated(
         self, time_s: np.ndarray, base: np.ndarray, readings: np.ndarray, parts: CorrectionParts | None
@@ -270,6 +291,21 @@ class EffectCorrection:
         self._started_s = None
         for _, hold in self._holds:
             hold.reset()
+
+
+def _with_unknown(
+    gloves: Sequence[EffectCorrection],
+    base: np.ndarray,
+    wearing: Sequence[str],
+    inflation: VarianceInflation | None,
+) -> VarianceInflation | None:
+    """``inflation`` of one frame of each glove, with what is not known of their wearings."""
+    for row, glove in enumerate(gloves):
+        unknown = glove._unknown_variance(base[row : row + 1], wearing[row])
+        if unknown is not None:
+            inflation = inflation or VarianceInflation(np.zeros_like(base), np.zeros(base.shape, dtype=bool))
+            inflation.variance[row] += unknown[0]
+    return inflation
 
 
 def _columns_of(item: AddedEffect, rotations: Sequence[str]) -> np.ndarray | slice:

@@ -27,7 +27,8 @@ from glovecal_models.regression.spgp import fit_spgp
 
 @dataclass(frozen=True)
 class FitTask:
-    """One fit: the whole of a rotation's samples (``fold`` None), or all but a held-out fold."""
+    """One fit: the whole of a rotation's samples (``fold`` None), all but a held-out fold, or all but some
+    wearings, whose error is measured when the fits are assembled."""
 
     rotation: str
     fold: int | None
@@ -41,6 +42,8 @@ class FitTask:
     held_out_target: np.ndarray
     sensors: tuple[str, ...]
     settings: TrainingSettings
+    without: tuple[str, ...] = ()
+    """Wearings that were left out whole."""
     key: str = field(default="")
 
     def __post_init__(self) -> None:
@@ -59,6 +62,8 @@ class FitResult:
     held_out_squared_error: float
     """Sum of squared errors on the held-out samples, degrees squared."""
     held_out_count: int
+    without: tuple[str, ...] = ()
+    """Wearings that were left out whole."""
 
 
 def run_task(task: FitTask, *, cancelled: Cancel | None = None, report: Report | None = None) -> FitResult:
@@ -74,6 +79,7 @@ def run_task(task: FitTask, *, cancelled: Cancel | None = None, report: Report |
         settings=regressor.settings(),
         held_out_squared_error=error,
         held_out_count=len(task.held_out_target),
+        without=task.without,
     )
 
 
@@ -116,6 +122,8 @@ def _key(task: FitTask) -> str:
         "settings": asdict(task.settings),
         "software": version("glovecal-models"),
     }
+    if task.without:
+        facts["without"] = task.without
     digest.update(json.dumps(facts, sort_keys=True).encode())
     samples = (task.inputs, task.target, task.take, task.position)
     for array in (*samples, task.held_out_inputs, task.held_out_target):

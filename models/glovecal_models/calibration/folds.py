@@ -18,6 +18,8 @@ SHORT_S = 10.0
 FEWEST_LEVELS, MOST_LEVELS = 4, 40
 SHORTEST_LEVEL = 5
 """Rows."""
+MOST_WEARING_GROUPS = 4
+"""Each is one more fit of every rotation."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,18 @@ def folds_over_takes(take: np.ndarray, count: int) -> list[Fold]:
         Fold((stretch % count) == fold, f"stretches of the only take, one in {count}")
         for fold in range(count)
     ]
+
+
+def wearing_groups(wearings: Sequence[str]) -> list[tuple[str, ...]]:
+    """Wearings that are left out together, so that each is left out once; empty with a single one.
+
+    ``wearings``: of each take.
+    """
+    names = list(dict.fromkeys(wearings))
+    if len(names) < 2:
+        return []
+    count = min(len(names), MOST_WEARING_GROUPS)
+    return [tuple(names[start::count]) for start in range(count)]
 
 
 def are_short(times: Sequence[np.ndarray]) -> bool:

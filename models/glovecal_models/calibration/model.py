@@ -10,6 +10,7 @@ import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.effect_correction import EffectCorrection, SignalScale
+from glovecal_models.calibration.unseen_wearing import UnseenWearing
 from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.regression.linear_regressor import LinearRegressor
@@ -79,6 +80,8 @@ class CalibrationModel:
     """Mean reading of each sensor in training, (S,) raw counts; only where effects need it."""
     sensor_scale: np.ndarray | None = None
     """Standard deviation of each sensor's readings in training, (S,) raw counts."""
+    unseen_wearing: UnseenWearing | None = None
+    """Wearings of training, and the error in another; None: a model of before this was estimated."""
 
     def __post_init__(self) -> None:
         names = [item.rotation for item in self.rotations]
@@ -105,7 +108,11 @@ class CalibrationModel:
         spread = nothing + 1 if self.sensor_scale is None else self.sensor_scale
         noise = np.array([item.regressor.noise_variance for item in self.rotations])
         return EffectCorrection(
-            self.effects, self.rotation_names, SignalScale(sensors, centre, spread), noise
+            self.effects,
+            self.rotation_names,
+            SignalScale(sensors, centre, spread),
+            noise,
+            self.unseen_wearing,
         )
 
     def with_sensor_order(self, sensors: Sequence[str]) -> CalibrationModel:

@@ -11,6 +11,7 @@ from glovecal_models.calibration.fit_task import FitResult, run_task
 from glovecal_models.calibration.model import CalibrationModel, RotationModel, restore_regressor
 from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.calibration.unseen_wearing import LeftOutWearing, UnseenWearing, unseen_wearing
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.progress import Cancel, Report
 from glovecal_models.regression.regressor import RuleRegressor
@@ -69,7 +70,38 @@ def assemble(
         parent=parent,
         error_estimate=estimate,
         simulated=plan.simulated,
+        unseen_wearing=_unseen_wearing(plan, rotations, results),
     )
+
+
+def _unseen_wearing(
+    plan: TrainingPlan, rotations: Sequence[RotationModel], results: Sequence[FitResult]
+) -> UnseenWearing:
+    """From the fits that some wearings were left out of."""
+    wearings, left_out = np.array(plan.wearings, dtype=object), []
+    for result in results:
+        for wearing in result.without:
+            samples = plan.samples[result.rotation]
+            left = samples.select(wearings[samples.take] == wearing)
+            if len(left):
+                regressor = restore_regressor(result.arrays, result.settings)
+                predicted, noise = regressor.predict(left.inputs), float(regressor.noise_variance)
+                trained = len(set(plan.wearings) - set(result.without))
+                square = float(np.sum((predicted.mean - left.target) ** 2))
+                claimed = float(predicted.variance.mean()) + noise
+                left_out.append(
+                    LeftOutWearing(result.rotation, wearing, trained, square, len(left), claimed, noise)
+                )
+    return unseen_wearing(plan.wearings, left_out, noise_of(rotations))
+
+
+def noise_of(rotations: Sequence[RotationModel]) -> dict[str, float]:
+    """Claimed measurement noise of the rotations with a regressor of their own, degrees squared."""
+    return {
+        item.rotation: float(item.regressor.noise_variance)
+        for item in rotations
+        if not isinstance(item.regressor, RuleRegressor)
+    }
 
 
 def _rule_model(correspondence: Correspondence, rule: RuleRegressor) -> RotationModel:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from glovecal_models.calibration.fit_task import FitTask
-from glovecal_models.calibration.folds import folds_over_takes
+from glovecal_models.calibration.folds import folds_over_takes, wearing_groups
 from glovecal_models.calibration.samples import (
     Samples,
     gather_samples,
@@ -16,7 +16,7 @@ from glovecal_models.calibration.samples import (
     linear_samples,
     representative_index,
 )
-from glovecal_models.calibration.training_settings import METHODS, TrainingSettings
+from glovecal_models.calibration.training_settings import METHODS, TrainingSettings, left_out_settings
 from glovecal_models.calibration.usable_sensors import UsableSensors, usable_sensors
 from glovecal_models.errors import NotTrainable
 from glovecal_models.layout import Correspondence, Layout
@@ -46,6 +46,10 @@ class TrainingPlan:
     take_count: int
     frame_count: int
     simulated: bool
+    wearings: tuple[str, ...] = ()
+    """Of each take."""
+    samples: Mapping[str, Samples] = field(default_factory=dict)
+    """All samples of each trained rotation, where a wearing is left out."""
 
 
 def plan_training(
@@ -70,6 +74,8 @@ def plan_training(
     unmeasured: list[Correspondence] = []
     at_one_angle: list[tuple[Correspondence, Samples]] = []
     unreadable: list[str] = []
+    wearings = tuple(take.wearing for take in takes)
+    gathered: dict[str, Samples] = {}
     for correspondence in layout.correspondences:
         if settings.method in ("raw", "linear"):
             correspondence = linear_correspondence(correspondence)
@@ -87,6 +93,10 @@ def plan_training(
         chosen[correspondence.rotation] = correspondence
         ranges[correspondence.rotation] = (samples.inputs.min(axis=0), samples.inputs.max(axis=0))
         tasks.extend(_tasks(correspondence, samples, settings))
+        without = _without_wearings(correspondence, samples, wearings, settings)
+        tasks.extend(without)
+        if without:
+            gathered[correspondence.rotation] = samples
     for correspondence, samples in at_one_angle if not tasks else ():
         check_samples(samples.inputs, samples.target, correspondence.inputs)
     if not tasks and unreadable:
@@ -115,6 +125,8 @@ def plan_training(
         take_count=len(takes),
         frame_count=sum(len(take.time_s) for take in takes),
         simulated=any(take.simulated for take in takes),
+        wearings=wearings,
+        samples=gathered,
     )
 
 
@@ -128,6 +140,26 @@ def _tasks(correspondence: Correspondence, samples: Samples, settings: TrainingS
             continue  # what is left of the fold cannot carry a model: it says nothing about the error
         task = task_for(correspondence, kept, number, settings, held_out=samples.select(fold.held_out))
         tasks.append(task)
+    return tasks
+
+
+def _without_wearings(
+    correspondence: Correspondence, samples: Samples, wearings: Sequence[str], settings: TrainingSettings
+) -> list[FitTask]:
+    """Fits that have not seen some wearings; none without an error estimate."""
+    if settings.folds < 1:
+        return []
+    tasks, owner = [], np.array(wearings, dtype=object)[samples.take]
+    for number, group in enumerate(wearing_groups(wearings)):
+        is_left_out = np.isin(owner, group)
+        kept = samples.select(~is_left_out)
+        try:
+            check_samples(kept.inputs, kept.target, correspondence.inputs)
+        except NotTrainable:
+            continue  # what is left cannot carry a model: it says nothing about the error
+        if is_left_out.any():
+            task = task_for(correspondence, kept, settings.folds + number, left_out_settings(settings))
+            tasks.append(replace(task, without=group, key=""))
     return tasks
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from glovecal_models.calibration.samples import DEFAULT_SAMPLES
@@ -42,3 +42,12 @@ class TrainingSettings:
                 f"folds is {self.folds}: one fold would hold out everything; 0 trains without an error "
                 "estimate, 2 or more with one"
             )
+
+
+LEFT_OUT_SAMPLES = 500
+"""For one rotation: what wearings differ by is far above what more samples would save."""
+
+
+def left_out_settings(settings: TrainingSettings) -> TrainingSettings:
+    """How the fits without a wearing are trained."""
+    return replace(settings, samples=min(settings.samples, LEFT_OUT_SAMPLES))

@@ -108,7 +108,9 @@ def add_effect(
     effects = [*kept_lanes(model.effects, chosen), *fit.effects, *columnless_effects(wanted, model.effects)]
     effects = [replace(item, evidence=evidence) if item.name == name else item for item in effects]
     whole = before.with_those_of(after)
-    child = child_model(model, parent_id, prepared, fit, effects, whole, settings, take_hashes)
+    child = child_model(
+        model, parent_id, prepared, fit, effects, whole, settings, take_hashes, wanted, cancelled
+    )
     mine = [item.described() for item in fit.effects if item.name == name]
     described = {key: value for each in mine for key, value in each.items()}
     return replace(undone, added=True, model=child, wanted=tuple(wanted), parameters=described)

@@ -62,7 +62,9 @@ def remove_effect(
     fit = fit_with_effects(prepared, every, wanted, settings, cancelled=cancelled)
     errors = held_out_errors(prepared, every, wanted, settings, cancelled=cancelled)
     effects = [*fit.effects, *columnless_effects(wanted, model.effects)]
-    return child_model(model, parent_id, prepared, fit, effects, errors, settings, take_hashes)
+    return child_model(
+        model, parent_id, prepared, fit, effects, errors, settings, take_hashes, wanted, cancelled
+    )
 
 
 def without_redundant(

@@ -223,7 +223,7 @@ def test_a_stored_covariance_of_weights_gives_a_standard_deviation() -> None:
     model = model_with(("cross_coupling",), 9, extra=False)
     item = model.effects[0]
     lanes, count = item.weights.shape
-    known = replace(item, weight_covariance=np.tile(0.04 * np.eye(count), (lanes, 1, 1)))
+    known = replace(item, covariance=np.tile(0.04 * np.eye(count), (lanes, 1, 1)))
     take, rotation = recorded(9, "monday"), item.rotations[0]
     angle = angle_of(replace(model, effects=(known,)), take, 30, rotation)
     term = next(one for one in angle.terms if one.name == "cross_coupling")
@@ -231,9 +231,8 @@ def test_a_stored_covariance_of_weights_gives_a_standard_deviation() -> None:
     base = next(one for one in angle.terms if one.kind == "base").degrees
     expected = 0.2 * np.hypot(z, z * (base - 20.0) / 30.0)
     assert term.sd_deg == pytest.approx(expected)
-    assert not term.is_claimed
+    assert term.is_claimed
     is_whole(angle)
-    assert "Not in the angle's standard deviation: that of cross_coupling." in angle_sentences(angle, None)
 
 
 def test_a_correction_that_is_absurd_is_left_out_and_said() -> None:

@@ -70,6 +70,10 @@ class Effect(EffectFacts, ABC):
         unknown = [name for name in self.context if name not in context]
         return f"context {unknown[0]} is not sent" if unknown else None
 
+    def knows_wearing(self, settings: Settings, wearing: str) -> bool:
+        """Whether it learned what is special about this wearing."""
+        return False
+
     def transient_s(self, shape: np.ndarray) -> float:
         """How long a state started anew still shows, for lanes of ``shape`` (L, P); 0 without a memory."""
         if not self.has_memory or not len(shape):

@@ -34,6 +34,9 @@ class WearingEffect(InstantEffect):
             return None
         return f"wearing {wearing!r} was not in training" if wearing else "nobody said which wearing this is"
 
+    def knows_wearing(self, settings: Settings, wearing: str) -> bool:
+        return wearing in settings["wearings"]
+
     def uncertainty(self, settings: Settings, weights: np.ndarray, wearing: str) -> Uncertainty | None:
         covariance = shift_covariance(settings, weights, wearing)
         if covariance is None:
