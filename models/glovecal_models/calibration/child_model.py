@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -43,11 +43,15 @@ def child_model(
     left_out = left_out_wearings(takes, tuple(fresh), wanted, settings, cancelled=cancelled)
     if parent.unseen_wearing is not None:
         left_out += [item for item in parent.unseen_wearing.left_out if item.rotation not in fresh]
-    estimate: Mapping[str, Any] = {
+    wearings = [take.wearing for take in takes.takes]
+    unseen = unseen_wearing(wearings, left_out, noise_of(rotations))
+    estimate: dict[str, Any] = {
         "how": "whole takes left out" if len(takes.takes) > 1 else "stretches of the only take left out",
         "folds": max(settings.folds, 2),
         "rmse_deg": errors.overall_deg,
     }
+    if unseen.rmse_deg is not None:
+        estimate["rmse_unseen_wearing_deg"] = unseen.rmse_deg
     return replace(
         parent,
         rotations=rotations,
@@ -58,7 +62,7 @@ def child_model(
         sensor_centre=takes.scale.centre,
         sensor_scale=takes.scale.scale,
         simulated=parent.simulated or any(take.simulated for take in takes.takes),
-        unseen_wearing=unseen_wearing([take.wearing for take in takes.takes], left_out, noise_of(rotations)),
+        unseen_wearing=unseen,
     )
 
 

@@ -131,6 +131,12 @@ class CalibrationModel:
             sensor_scale=None if self.sensor_scale is None else self.sensor_scale[columns],
         )
 
+    def has_seen(self, wearing: str) -> bool | None:
+        """Whether the wearing was in training, or in a quick check; None: the model does not say."""
+        if any(item.effect.knows_wearing(item.settings, wearing) for item in self.effects):
+            return True
+        return None if self.unseen_wearing is None else self.unseen_wearing.is_seen(wearing)
+
     @property
     def rotation_names(self) -> tuple[str, ...]:
         return tuple(item.rotation for item in self.rotations)

@@ -8,8 +8,11 @@ from typing import Any
 from glovecal_models.calibration.explanation import AngleTerms, FrameExplanation, Measured
 from glovecal_models.calibration.order_confounding import OrderConfounding
 from glovecal_models.calibration.predictor import EXTRAPOLATING, FAULTY_SENSOR, TOO_UNCERTAIN
+from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training_plan import TrainingPlan
+from glovecal_models.calibration.unseen_wearing import UnseenWearing
 from glovecal_models.calibration.usable_sensors import UsableSensors
+from glovecal_models.effects.catalogue import wearing_effect
 
 
 def plan_sentences(plan: TrainingPlan) -> list[str]:
@@ -131,3 +134,46 @@ def _measured_sentence(angle: AngleTerms, measured: Measured) -> str:
         return f"Measured: not compared{repaired}."
     error = angle.degrees - measured.degrees
     return f"Measured: {measured.degrees:.2f} degrees{repaired}; error {error:+.2f} degrees."
+
+
+def wearing_sentences(model: CalibrationModel, seen_deg: float | None) -> list[str]:
+    """The error in a wearing not seen, then that in wearings seen (``seen_deg``), and what to do.
+
+    None for a model of before this was estimated.
+    """
+    found = model.unseen_wearing
+    if found is None:
+        return []
+    if found.rmse_deg is None or found.interval_deg is None:
+        return _not_estimated(found)
+    low, high = found.interval_deg
+    sentences = [
+        f"In a wearing not seen: {found.rmse_deg:.2f} degrees ({len(found.per_wearing)} wearings, each left "
+        f"out whole; 95 % interval {low:.1f} to {high:.1f})."
+    ]
+    if seen_deg is not None:
+        sentences.append(f"In the wearings seen: {seen_deg:.2f} degrees (takes left out).")
+    if found.is_much_worse_than(seen_deg):
+        sentences.append(_next_step(model))
+    return sentences
+
+
+def _not_estimated(found: UnseenWearing) -> list[str]:
+    if len(found.wearings) > 1:
+        return ["In a wearing not seen: not estimated."]
+    return [
+        "In a wearing not seen: unknown, all takes are of one wearing. Take the glove off, put it on again "
+        "and record a second one."
+    ]
+
+
+def _next_step(model: CalibrationModel) -> str:
+    shift = wearing_effect().name
+    has_shift = any(item.name == shift for item in model.effects)
+    check = (
+        "each time the glove is put on, hold three to five poses and run glovecal quick-check; more wearings "
+        "in training make the next one better known"
+    )
+    if has_shift:
+        return f"The next wearing is much worse than those seen: {check}."
+    return f"The next wearing is much worse than those seen: add {shift} (glovecal add-effect); {check}."

@@ -58,9 +58,12 @@ def assemble(
             rotation, error, held_out = _rotation_model(plan, name, own)
             rotations.append(rotation)
             squared, count = squared + error, count + held_out
+    unseen = _unseen_wearing(plan, rotations, results)
     estimate: dict[str, Any] = {"how": _how_held_out(plan), "folds": plan.settings.folds}
     if count:
         estimate["rmse_deg"] = float(np.sqrt(squared / count))
+    if unseen.rmse_deg is not None:
+        estimate["rmse_unseen_wearing_deg"] = unseen.rmse_deg
     return CalibrationModel(
         layout=plan.layout,
         subject=plan.subject,
@@ -70,7 +73,7 @@ def assemble(
         parent=parent,
         error_estimate=estimate,
         simulated=plan.simulated,
-        unseen_wearing=_unseen_wearing(plan, rotations, results),
+        unseen_wearing=unseen,
     )
 
 

@@ -22,6 +22,8 @@ from glovecal_models.effects.base.wearing_effect import PRIOR_DEG, PRIOR_WEARING
 
 LEVEL = 0.95
 """Of the interval of the error."""
+MUCH_WORSE = 1.5
+"""Times the error in wearings seen: from here on the difference is of the wearing, not of chance in takes."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,10 @@ class UnseenWearing:
 
     def is_seen(self, wearing: str) -> bool:
         return wearing in self.wearings
+
+    def is_much_worse_than(self, seen_deg: float | None) -> bool:
+        """Whether the error in the next wearing is another one than ``seen_deg``, in wearings seen."""
+        return self.rmse_deg is not None and seen_deg is not None and self.rmse_deg > MUCH_WORSE * seen_deg
 
     def to_document(self) -> dict[str, Any]:
         """Plain JSON-able data."""

@@ -66,6 +66,12 @@ class Comparison:
     """Rotations the takes measured that the model does not predict."""
     fingertips: FingertipErrors | None
     """None where no finger's chain was predicted and measured."""
+    unseen_wearing: RotationErrors | None = None
+    """Overall, on takes of wearings not seen in training; None: there are none, or the model does not say."""
+    seen_wearing: RotationErrors | None = None
+    """Overall, on takes of the wearings it knows."""
+    unseen_wearings: tuple[str, ...] = ()
+    seen_wearings: tuple[str, ...] = ()
     excluded: dict[str, int] = field(default_factory=dict)
     """Measured frames, by rotation, that are not compared: faulty sensors, repeated frames."""
 
@@ -102,8 +108,28 @@ def summed_up(
         not_measured=tuple(name for name in found.rotations if name not in measured),
         not_predicted=tuple(sorted(in_takes - set(found.rotations))),
         fingertips=fingertip_errors(found, {name: noise[name].floor for name in measured}, dimensions),
+        unseen_wearing=_errors_where(found, is_seen=False),
+        seen_wearing=_errors_where(found, is_seen=True),
+        unseen_wearings=_wearings_where(found, is_seen=False),
+        seen_wearings=_wearings_where(found, is_seen=True),
         excluded=found.excluded,
     )
+
+
+def _wearings_where(found: Residuals, *, is_seen: bool) -> tuple[str, ...]:
+    chosen = [
+        item for item in found.takes if item.has_seen_wearing is is_seen and np.isfinite(item.error).any()
+    ]
+    return tuple(dict.fromkeys(item.take.wearing for item in chosen))
+
+
+def _errors_where(found: Residuals, *, is_seen: bool) -> RotationErrors | None:
+    """Overall, of the takes whose wearing the model knows, or does not know."""
+    chosen = tuple(item for item in found.takes if item.has_seen_wearing is is_seen)
+    if not any(np.isfinite(item.error).any() for item in chosen):
+        return None
+    part = Residuals(found.rotations, chosen)
+    return _errors(part.stacked("error"), part.stacked("sd"), part.stacked("measured"), None)
 
 
 def _poses(take: Take) -> np.ndarray:

@@ -26,6 +26,8 @@ class TakeResiduals:
     """Claimed standard deviation of a measurement, (N, R), degrees."""
     measured: np.ndarray
     """Reference at the frames, (N, R), degrees."""
+    has_seen_wearing: bool | None = None
+    """Whether the model knows the take's wearing; None: it does not say."""
     excluded: tuple[int, ...] = ()
     """For each rotation the measured frames that are not compared: its sensor failed. Empty: none."""
 
@@ -84,7 +86,16 @@ def residuals(model: CalibrationModel, takes: Sequence[Take]) -> Residuals:
         for effect, settings in repairs:
             if isinstance(effect, SignatureEffect) and effect.needs_prediction:
                 take = effect.repaired_to(take, settings, names, angles.mean)
-        found.append(TakeResiduals(take, angles.mean, angles.sd, take.reference_at_frames(names), excluded))
+        found.append(
+            TakeResiduals(
+                take,
+                angles.mean,
+                angles.sd,
+                take.reference_at_frames(names),
+                model.has_seen(take.wearing),
+                excluded,
+            )
+        )
     result = Residuals(names, tuple(found))
     if not found or not result.measured_rotations:
         raise BadInput(

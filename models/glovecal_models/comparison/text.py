@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from glovecal_models.comparison.compare import Comparison
 from glovecal_models.comparison.fingertips import FingertipErrors, TipErrors
 from glovecal_models.comparison.wearings import WearingErrors
 from glovecal_models.comparison.where_it_fails import RotationFindings
@@ -80,3 +81,18 @@ def _scale(errors: TipErrors) -> str:
 
 def _listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def wearing_error_sentences(found: Comparison) -> list[str]:
+    """The error in wearings not seen in training, then in those seen; none where the model cannot say."""
+    parts = (
+        ("In wearings not seen", found.unseen_wearing, found.unseen_wearings),
+        ("In the wearings seen", found.seen_wearing, found.seen_wearings),
+    )
+    return [
+        f"{where}: {errors.rmse_deg:.2f} degrees "
+        f"({len(names)} {'wearing' if len(names) == 1 else 'wearings'}; "
+        f"{100 * errors.coverage:.0f} % of errors within one claimed SD, expected: 68 %)."
+        for where, errors, names in parts
+        if errors is not None
+    ]

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from glovecal_models.calibration.held_out_check import HeldOutErrors, held_out_errors
+from glovecal_models.calibration.left_out_wearings import left_out_wearings
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.model_recipe import (
     repaired_takes,
@@ -15,8 +16,9 @@ from glovecal_models.calibration.model_recipe import (
     trained_rotations,
 )
 from glovecal_models.calibration.prepared_takes import PreparedTakes
-from glovecal_models.calibration.training import train
+from glovecal_models.calibration.training import noise_of, train
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.calibration.unseen_wearing import unseen_wearing
 from glovecal_models.calibration.usable_sensors import usable_sensors
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.noise_floor import rotation_noise
@@ -115,6 +117,7 @@ class _Loop:
         self.settings = settings_of(model, self.settings)
         self._say("measuring the base on held-out takes", 0.1)
         self.errors = self._held_out(model)
+        model = self._with_unseen_wearing(model)
         self._step(model, None)
         found = residuals(model, self.takes)
         noise = rotation_noise(found, seed=self.seed, limits=self.limits.comparison)
@@ -241,6 +244,14 @@ class _Loop:
             prepared, trained_rotations(model), [], self.settings, cancelled=self.cancelled
         )
 
+    def _with_unseen_wearing(self, model: CalibrationModel) -> CalibrationModel:
+        """The base with its error in a wearing that it has not seen."""
+        prepared = PreparedTakes.of(self.takes, self.layout)
+        names = trained_rotations(model)
+        left_out = left_out_wearings(prepared, names, [], self.settings, cancelled=self.cancelled)
+        wearings = [take.wearing for take in self.takes]
+        return replace(model, unseen_wearing=unseen_wearing(wearings, left_out, noise_of(model.rotations)))
+
     def _step(
         self, model: CalibrationModel, added: AddedInStep | None, diagnosis: Diagnosis | None = None
     ) -> None:
@@ -249,7 +260,8 @@ class _Loop:
         if diagnosis is not None and added is not None:
             share = share_in(diagnosis, added.effect, added.where)
             control = None if share is None else share * self.steps[-1].rmse_deg
-        self.steps.append(Step(model, added, overall, per_rotation, control))
+        held_out = self.errors.overall_deg
+        self.steps.append(Step(model, added, overall, per_rotation, control, held_out))
 
     def _say(self, text: str, share: float) -> None:
         if self.report:

@@ -61,6 +61,14 @@ class Step:
     per_rotation: dict[str, float]
     control_rmse_deg: float | None = None
     """With the effect's control instead: the share it leaves, of the step before."""
+    rmse_seen_wearing_deg: float | None = None
+    """On held-out takes of the wearings seen in training, also where ``rmse_deg`` is of other takes."""
+
+    @property
+    def rmse_unseen_wearing_deg(self) -> float | None:
+        """Each wearing left out whole; None: there is only one."""
+        found = self.model.unseen_wearing
+        return None if found is None else found.rmse_deg
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from glovecal_models.calibration.text import dead_sensor_sentences
+from glovecal_models.calibration.text import dead_sensor_sentences, wearing_sentences
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.text import (
@@ -77,6 +77,8 @@ def improvement_sentences(improvement: Improvement) -> list[str]:
             f"There is only one take, of {improvement.only_take_s:.0f} s: errors are on held-out pieces"
             " of it and say nothing about another take or wearing. Record a second one."
         )
+    final = improvement.steps[-1]
+    sentences = [*wearing_sentences(final.model, final.rmse_seen_wearing_deg), *sentences]
     for trial in improvement.trials:
         sentences += [item for item in _trial_sentences(trial) if item not in sentences]
     if last is not None:

@@ -44,6 +44,7 @@ def keep_child(
             {
                 "takes": [{"id": take.id, "name": take.name, "artifact": take.artifact} for take in takes],
                 "held_out_rmse_deg": model.error_estimate.get("rmse_deg"),
+                "rmse_unseen_wearing_deg": model.error_estimate.get("rmse_unseen_wearing_deg"),
                 "held_out_how": model.error_estimate.get("how"),
                 "per_rotation": {item.rotation: item.held_out_rmse_deg for item in model.rotations},
                 "effects": list(dict.fromkeys(item.name for item in model.effects)),

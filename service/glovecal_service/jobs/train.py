@@ -33,8 +33,9 @@ class TrainJob:
     """Payload: ``subject``, ``layout``, ``takes`` (ids, or None for all that teach), ``activate``,
     ``parent`` (model id or None), and any of ``TrainingSettings``.
 
-    Result: ``model``, ``held_out_rmse_deg``, ``per_rotation`` (held-out degrees, None for a rule),
-    ``sentences``, ``confounded_order`` (rotations of wearings in which posture goes with time), ``active``.
+    Result: ``model``, ``held_out_rmse_deg``, ``rmse_unseen_wearing_deg``, ``per_rotation`` (held-out
+    degrees, None for a rule), ``sentences``, ``confounded_order`` (rotations of wearings in which posture
+    goes with time), ``active``.
     """
 
     def plan(self, store: Store, job: JobRecord) -> JobPlan:
@@ -81,6 +82,7 @@ def fit(task: FitTask, cancelled: Callable[[], bool], report: Report) -> TaskRes
         "settings": result.settings,
         "held_out_squared_error": result.held_out_squared_error,
         "held_out_count": result.held_out_count,
+        "without": result.without,
     }
     return TaskResult(result.arrays, facts)
 
@@ -91,7 +93,7 @@ def _effort(task: FitTask) -> float:
 
 
 def _fit_result(result: TaskResult) -> FitResult:
-    return FitResult(arrays=result.arrays, **result.facts)
+    return FitResult(arrays=result.arrays, **{**result.facts, "without": tuple(result.facts["without"])})
 
 
 def _stepper(plan: TrainingPlan) -> Callable[[int, Mapping[int, TaskResult]], Step]:
@@ -159,6 +161,7 @@ def _facts(
     return {
         "takes": [{"id": record.id, "name": record.name, "artifact": record.artifact} for record in records],
         "held_out_rmse_deg": model.error_estimate.get("rmse_deg"),
+        "rmse_unseen_wearing_deg": model.error_estimate.get("rmse_unseen_wearing_deg"),
         "held_out_how": model.error_estimate.get("how"),
         "per_rotation": {item.rotation: item.held_out_rmse_deg for item in model.rotations},
         "sentences": [*said, *plan_sentences(plan), *_kernel_sentences(model), *_weight_sentences(model)],
@@ -198,9 +201,8 @@ def _keep(
     )
     if activate:
         store.models.activate(record.id)
-    said = {
-        name: facts[name] for name in ("held_out_rmse_deg", "per_rotation", "sentences", "confounded_order")
-    }
+    names = ("held_out_rmse_deg", "rmse_unseen_wearing_deg", "per_rotation", "sentences", "confounded_order")
+    said = {name: facts[name] for name in names}
     return {"model": record.id, **said, "active": activate}
 
 
@@ -212,4 +214,6 @@ def _text(payload: Mapping[str, Any], name: str) -> str:
 
 
 def _label(task: FitTask) -> str:
+    if task.without:
+        return f"{task.rotation}, without {', '.join(task.without)}"
     return task.rotation if task.fold is None else f"{task.rotation}, fold {task.fold + 1}"

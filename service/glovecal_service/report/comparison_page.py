@@ -11,7 +11,7 @@ from glovecal_models.comparison.compare import Comparison, summed_up
 from glovecal_models.comparison.floor_estimate import ORDER, NoiseFloor
 from glovecal_models.comparison.noise_floor import RotationNoise, rotation_noise
 from glovecal_models.comparison.residuals import Residuals, residuals
-from glovecal_models.comparison.text import rotation_sentence
+from glovecal_models.comparison.text import rotation_sentence, wearing_error_sentences
 from glovecal_models.comparison.where_it_fails import RotationFindings, WhereItFails, where_it_fails
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.takes.take import Take
@@ -106,8 +106,10 @@ def _summary(main: ReportedModel, numbers: Comparison, where: WhereItFails) -> l
     )
     claimed = f"{100 * overall.coverage:.0f} % of errors within one claimed SD (expected: 68 %)"
     verb = "model activate" if is_done else "diagnose"
+    wearings = wearing_error_sentences(numbers)
     return [
         Fact("Verdict", verdict),
+        *([Fact("Wearings", " ".join(wearings))] if wearings else []),
         Fact("Size", size),
         Fact("Claimed SD", claimed),
         Fact("Place", f"largest possible improvement: {rotation_sentence(worst)}"),

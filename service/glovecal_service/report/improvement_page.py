@@ -69,6 +69,9 @@ def _summary(found: Mapping[str, Any], method: str) -> list[Fact]:
             f"held-out error reduced from {degrees(first['rmse_deg'])} to {degrees(last['rmse_deg'])} "
             f"degrees{floor}"
         )
+    unseen = last.get("rmse_unseen_wearing_deg")
+    if unseen is not None:
+        size = f"{unseen:.2f} degrees in a wearing not seen; in the wearings seen: {size}"
     errors = {name: error for name, error in last["per_rotation"].items() if error is not None}
     facts = [Fact("Verdict", f"{verdict}. {STOPPED.get(found['stopped'], '')}".strip()), Fact("Size", size)]
     if errors:

@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field
 
 from glovecal_models.comparison.compare import Comparison
 from glovecal_models.comparison.fingertips import FingertipErrors
-from glovecal_models.comparison.text import fingertips_sentence
+from glovecal_models.comparison.text import fingertips_sentence, wearing_error_sentences
 from glovecal_service.plain import plain
 from glovecal_service.views.noise_floor import NoiseFloorView
 
@@ -91,6 +91,14 @@ class ComparisonView(BaseModel):
     model: str
     overall: ErrorsView
     rotations: dict[str, ErrorsView]
+    rmse_unseen_wearing_deg: float | None = Field(
+        description="Of the takes whose wearing the model has not seen; null: there are none, or unknown."
+    )
+    unseen_wearing: ErrorsView | None = Field(description="Overall, in wearings that the model has not seen.")
+    seen_wearing: ErrorsView | None = Field(description="Overall, in wearings that it knows.")
+    unseen_wearings: list[str]
+    seen_wearings: list[str]
+    sentences: list[str] = Field(description="The errors in wearings not seen, and in those seen.")
     poses: list[PoseErrorsView]
     not_measured: list[str]
     not_predicted: list[str]
@@ -106,6 +114,11 @@ class ComparisonView(BaseModel):
 def comparison_view(found: Comparison, model: str, trained_on: Sequence[str]) -> ComparisonView:
     """Of the model with the id ``model``."""
     facts = plain(asdict(found))
+    unseen = found.unseen_wearing
+    facts |= {
+        "rmse_unseen_wearing_deg": None if unseen is None else plain(unseen.rmse_deg),
+        "sentences": wearing_error_sentences(found),
+    }
     facts |= {"fingertips": _fingertips(found.fingertips), "model": model, "trained_on": list(trained_on)}
     return ComparisonView.model_validate(facts)
 

@@ -48,6 +48,9 @@ class StepView(View):
     rmse_deg: float | None = Field(description="Over all rotations.")
     per_rotation: dict[str, float | None]
     control_rmse_deg: float | None = Field(None, description="With the control of the effect instead.")
+    rmse_unseen_wearing_deg: float | None = Field(
+        None, description="In a wearing that training did not see; null: one wearing only."
+    )
 
     @classmethod
     def of(cls, step: Step, model: str | None) -> StepView:
@@ -57,6 +60,7 @@ class StepView(View):
             rmse_deg=step.rmse_deg,
             per_rotation=dict(step.per_rotation),
             control_rmse_deg=step.control_rmse_deg,
+            rmse_unseen_wearing_deg=step.rmse_unseen_wearing_deg,
         )
 
 

@@ -35,7 +35,12 @@ STOPPED = {
     "ambiguous": "these takes cannot tell the causes apart",
     "not_better": "the next effect did not reduce the held-out error enough and was undone",
 }
-STEPS = {"model": "model", "added": "added", "rmse_deg": "error (°)"}
+STEPS = {
+    "model": "model",
+    "added": "added",
+    "rmse_unseen_wearing_deg": "next wearing (°)",
+    "rmse_deg": "error (°)",
+}
 Method = Literal["lmc_gpr", "linear", "spgp", "auto", "polynomial_gpr", "general_gpr"]
 
 
@@ -170,7 +175,12 @@ def _poses_instead(rows: Sequence[Mapping[str, Any]], subject: str | None) -> st
 
 def _print(subject: str, method: str, result: Mapping[str, Any], *, active: bool) -> None:
     rows = [
-        {"model": step["model"][:12], "added": _added(step["added"], method), "rmse_deg": step["rmse_deg"]}
+        {
+            "model": step["model"][:12],
+            "added": _added(step["added"], method),
+            "rmse_unseen_wearing_deg": step["rmse_unseen_wearing_deg"],
+            "rmse_deg": step["rmse_deg"],
+        }
         for step in result["steps"]
     ]
     print_table(rows, STEPS, empty="", folds="added")

@@ -71,6 +71,10 @@ def _print(
     poses: bool,
 ) -> None:
     out.print(f"Against {', '.join(row['name'] for row in takes)}:")
+    for name, result in results.items():
+        of_model = "" if len(results) == 1 else f"Model {name[:12]}: "
+        for sentence in result["sentences"]:
+            out.print(f"{of_model}{sentence}")
     if len(results) == 1:
         rows = [{**row, "floor": _interval(row["floor"])} for row in _rows(next(iter(results.values())))]
         print_table(rows, COLUMNS, empty="Nothing was measured.")

@@ -38,6 +38,7 @@ def list_models(subject: OnlySubject = None, layout: OnlyLayout = None, as_json:
         "subject": "subject",
         "layout": "layout",
         "method": "method",
+        "rmse_unseen_wearing_deg": "next wearing (°)",
         "held_out_rmse_deg": "error (°)",
         "active": "active",
         "created_at": "trained",
@@ -58,6 +59,8 @@ def show(model: Model, as_json: AsJson = False) -> None:
         print_json({**document, "lineage": [row["id"] for row in lineage]})
         return
     print_facts(_facts(document, lineage))
+    for sentence in (document["unseen_wearing"] or {}).get("sentences", ()):
+        out.print(sentence)
     out.print()
     columns = {
         "rotation": "rotation",
@@ -94,6 +97,7 @@ def _facts(document: dict[str, Any], lineage: list[dict[str, Any]]) -> dict[str,
         "layout": document["layout"],
         "method": document["method"],
         "active": document["active"],
+        "next wearing (°)": (document["unseen_wearing"] or {}).get("rmse_unseen_wearing_deg"),
         "error (°)": document["held_out_rmse_deg"],
         "estimated on": document["error_estimate"].get("how"),
         "trained on": [take["name"] for take in document["facts"].get("takes", [])],

@@ -26,6 +26,7 @@ from glovecal_service.rest.http.request_types import (
 from glovecal_service.store.errors import StoreDamaged
 from glovecal_service.store.records import Activation, ModelRecord
 from glovecal_service.views.training import EffectView, KernelChoiceView, effect_view, kernel_view
+from glovecal_service.views.unseen_wearing import UnseenWearingView, unseen_wearing_view
 
 router = APIRouter(prefix="/models", tags=["models"])
 
@@ -43,6 +44,9 @@ class Model(BaseModel):
         description="Of an active model in a list: why its artifact cannot be loaded, and what to do."
     )
     held_out_rmse_deg: float | None = Field(description="Error on takes left out of training, degrees.")
+    rmse_unseen_wearing_deg: float | None = Field(
+        description="Error in a wearing not seen in training, degrees; null: one wearing only, or unknown."
+    )
     effects: list[str] = Field(description="Names of its effects, in the order in which they were added.")
     facts: dict[str, Any] = Field(description="Takes trained on, errors, how long it took ...")
     created_at: datetime
@@ -65,6 +69,7 @@ class ModelInFull(Model):
     effect_details: list[EffectView]
     simulated: bool = Field(description="Whether any training take came from a simulated glove.")
     error_estimate: dict[str, Any]
+    unseen_wearing: UnseenWearingView | None = Field(description="Null for a model of an earlier version.")
 
 
 class ActivationView(BaseModel):
@@ -129,6 +134,7 @@ def get_model(id: ModelInPath, parts: PartsNeeded) -> dict[str, Any]:
         "simulated": model.simulated,
         "error_estimate": plain(model.error_estimate),
         "held_out_rmse_deg": plain(model.error_estimate.get("rmse_deg")),
+        "unseen_wearing": unseen_wearing_view(model),
     }
 
 
@@ -181,7 +187,9 @@ def _row(record: ModelRecord, active: bool, damage: str = "") -> dict[str, Any]:
     effects = list(record.facts.get("effects", ()))
     row = {**record.__dict__, "active": active, "effects": effects, "facts": plain(record.facts)}
     row["damage"] = damage or None
-    return row | {"held_out_rmse_deg": plain(record.facts.get("held_out_rmse_deg"))}
+    return row | {
+        name: plain(record.facts.get(name)) for name in ("held_out_rmse_deg", "rmse_unseen_wearing_deg")
+    }
 
 
 def _rotation(item: RotationModel) -> dict[str, Any]:
