@@ -14,6 +14,9 @@ from glovecal_models.quick_check.wearing_shift import WearingShift, sensor_shift
 
 UNINFORMED = 0.8
 """Share of the prior's variance above which the poses are uninformative."""
+FULL_CALIBRATION_TIMES = 2.0
+"""Times what model and hand are off by in a pose: five independent errors of a sound model exceed it by
+chance in 1 of 800 checks (chi-squared, 5 degrees of freedom)."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,14 @@ class ShiftReport:
     """RMS error of the poses used, with the model as it was."""
     poses_held_out_deg: float | None
     """RMS error of each pose with the shift learned from the others; None with a single pose."""
+    pose_noise_deg: float
+    """RMS of what model and hand are off by in one pose, when the wearing is known."""
+
+    @property
+    def is_full_calibration_due(self) -> bool:
+        """Whether the check leaves more than model and hand explain: it no longer puts the model right."""
+        left = self.poses_held_out_deg
+        return left is not None and left > FULL_CALIBRATION_TIMES * self.pose_noise_deg
 
     @property
     def expected(self) -> dict[str, float]:
@@ -89,7 +100,8 @@ def shift_report(
     before = _rms([item.before_deg for item in poses])
     left = [item.held_out_deg for item in poses if item.held_out_deg is not None]
     sensors = _sensors(sensitivity, prior, shift)
-    return ShiftReport(rotations, sensors, before, _rms(left) if left else None)
+    noise = np.concatenate([item.witness.variance[item.witness.known] for item in poses])
+    return ShiftReport(rotations, sensors, before, _rms(left) if left else None, float(np.sqrt(noise.mean())))
 
 
 def _rotations(

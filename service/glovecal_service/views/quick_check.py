@@ -67,6 +67,12 @@ class QuickCheckView(BaseModel):
     poses: list[CheckedPoseView]
     refused: list[RefusedPoseView] = Field(description="Poses that were not used, and why.")
     expected: ExpectedErrorView
+    as_found_deg: float = Field(description="RMS error of the poses with the old model, in this wearing.")
+    as_left_deg: float | None = Field(
+        description="After the check, each pose predicted from the others; null with one pose."
+    )
+    is_full_calibration_due: bool
+    pose_noise_deg: float = Field(description="What model and hand are off by in one pose, RMS.")
     poses_before_deg: float
     poses_held_out_deg: float | None = Field(
         description="RMS error of each pose with the shift learned from the others; null with one pose."
@@ -88,11 +94,21 @@ def quick_check_view(found: QuickCheck, model: str, parent: str, *, active: bool
         "poses": [_pose(item) for item in found.poses],
         "refused": [{"pose": item.label, "reason": item.reason} for item in found.refused],
         **asdict(report),
+        **found_and_left(found),
         "expected": report.expected,
         "uninformed": report.uninformed,
         "sentences": quick_check_sentences(found),
     }
     return QuickCheckView.model_validate(plain(facts))
+
+
+def found_and_left(found: QuickCheck) -> dict[str, Any]:
+    """The error before and after the check, as it is kept with the model."""
+    return {
+        "as_found_deg": found.report.poses_before_deg,
+        "as_left_deg": found.report.poses_held_out_deg,
+        "is_full_calibration_due": found.report.is_full_calibration_due,
+    }
 
 
 def _pose(item: CheckedPose) -> dict[str, Any]:

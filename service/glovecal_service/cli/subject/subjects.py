@@ -12,7 +12,7 @@ from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import Handedness
 from glovecal_service.cli.terminal.connection import connect
-from glovecal_service.cli.terminal.options import AsJson, subject_named
+from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, subject_named
 from glovecal_service.cli.terminal.printing import moment, out, print_facts, print_json, print_table, text
 from glovecal_service.cli.terminal.refusal import Refusal
 
@@ -40,6 +40,16 @@ DimensionsFile = Annotated[
         dir_okay=False,
     ),
 ]
+HISTORY = {
+    "made_at": "when",
+    "kind": "what",
+    "wearing": "wearing",
+    "as_found_deg": "as found (°)",
+    "as_left_deg": "as left (°)",
+    "rmse_unseen_wearing_deg": "next wearing (°)",
+    "held_out_rmse_deg": "error (°)",
+    "short": "model",
+}
 Hand = Annotated[Handedness | None, typer.Option("--hand", help="right or left.")]
 
 
@@ -74,6 +84,20 @@ def measure(
         hand = hand or service.get(f"/subjects/{name}")["hand"]
         service.put(f"/subjects/{name}/hand", {"dimensions": measured, "hand": hand})
     out.print(f"Subject {name}: {hand} hand, {text(measured)} mm.")
+
+
+@app.command("history")
+def history(name: Name, layout: OnlyLayout = None, as_json: AsJson = False) -> None:
+    """Show calibrations and quick checks in order of time: errors as found, as left, and what is due."""
+    with connect() as service:
+        found = service.get(f"/subjects/{name}/history", {"layout": layout} if layout else None)
+    if as_json:
+        print_json(found)
+        return
+    rows = [{**row, "short": row["model"][:12], "made_at": moment(row["made_at"])} for row in found["rows"]]
+    print_table(rows, HISTORY, empty=f"No models yet. Train one: glovecal train --subject {name}")
+    for sentence in found["sentences"]:
+        out.print(sentence)
 
 
 @app.command("skeleton")

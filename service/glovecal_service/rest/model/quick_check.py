@@ -19,7 +19,7 @@ from glovecal_service.rest.http.request_types import ModelInPath, StrictBody
 from glovecal_service.rest.model.model_takes import TakesNamed, takes_named
 from glovecal_service.store.errors import NotFound
 from glovecal_service.store.records import ModelRecord, TakeRecord
-from glovecal_service.views.quick_check import QuickCheckView, quick_check_view
+from glovecal_service.views.quick_check import QuickCheckView, found_and_left, quick_check_view
 
 router = APIRouter(prefix="/models", tags=["models"])
 
@@ -86,6 +86,7 @@ def _keep(parts: Parts, parent: ModelRecord, found: QuickCheck, rows: list[TakeR
     check = {
         "wearing": found.wearing,
         "takes": [row.id for row in rows],
+        **found_and_left(found),
         "expected": found.report.expected,
         "sentences": quick_check_sentences(found),
     }

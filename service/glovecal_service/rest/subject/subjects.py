@@ -15,6 +15,7 @@ from glovecal_service.rest.http.answers import change_problems, problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
 from glovecal_service.rest.http.request_types import (
     Channel,
+    LayoutFilter,
     Millimetres,
     StrictBody,
     SubjectInPath,
@@ -22,6 +23,7 @@ from glovecal_service.rest.http.request_types import (
     Title,
 )
 from glovecal_service.store.records import SubjectRecord
+from glovecal_service.views.history import HistoryView, history_view
 
 router = APIRouter(prefix="/subjects", tags=["subjects"])
 
@@ -123,6 +125,18 @@ def list_subjects(store: StoreNeeded) -> list[SubjectRecord]:
 @router.get("/{name}", response_model=Subject, summary="One subject", responses=problems())
 def get_subject(name: SubjectInPath, store: StoreNeeded) -> SubjectRecord:
     return store.subjects.get(name)
+
+
+@router.get(
+    "/{name}/history",
+    response_model=HistoryView,
+    summary="Calibrations and quick checks in order of time",
+    responses=problems(),
+)
+def get_history(name: SubjectInPath, store: StoreNeeded, layout: LayoutFilter = None) -> HistoryView:
+    """Errors of each quick check as found and as left, and whether a full calibration is due."""
+    subject = store.subjects.get(name)
+    return history_view(subject.name, store.models.list(subject=subject.name, layout=layout))
 
 
 @router.put(
