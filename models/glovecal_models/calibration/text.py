@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from glovecal_models.calibration.explanation import AngleTerms, FrameExplanation, Measured
+from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.order_confounding import OrderConfounding
 from glovecal_models.calibration.predictor import EXTRAPOLATING, FAULTY_SENSOR, TOO_UNCERTAIN
-from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training_plan import TrainingPlan
 from glovecal_models.calibration.unseen_wearing import UnseenWearing
 from glovecal_models.calibration.usable_sensors import UsableSensors

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from glovecal_models.comparison.compare import Comparison
+from glovecal_models.comparison.cross_validation_difference import CrossValidationDifference
 from glovecal_models.comparison.fingertips import FingertipErrors, TipErrors
 from glovecal_models.comparison.wearings import WearingErrors
 from glovecal_models.comparison.where_it_fails import RotationFindings
@@ -96,3 +97,25 @@ def wearing_error_sentences(found: Comparison) -> list[str]:
         for where, errors, names in parts
         if errors is not None
     ]
+
+
+MOST_REGIONS = 3
+
+
+def cross_validation_sentences(found: CrossValidationDifference | None) -> list[str]:
+    """Where two models of disjoint halves differ by more than they claim."""
+    if found is None:
+        return ["Cross-validation difference: not estimated, each half needs two takes."]
+    what = "wearings" if found.are_wearings else "takes"
+    start = f"Cross-validation difference (two models, trained on disjoint {what})"
+    wrong = [item for item in found.regions if item.is_significant]
+    if not wrong:
+        largest = "" if not found.regions else f", at most {found.regions[0].ratio:.1f} times"
+        return [f"{start}: nowhere far above the claimed standard deviations{largest}."]
+    each = "; ".join(
+        f"{item.rotation} at {item.low_deg:.0f} to {item.high_deg:.0f} degrees: "
+        f"{item.difference_deg:.1f} degrees apart, {item.ratio:.1f} times the claimed"
+        for item in wrong[:MOST_REGIONS]
+    )
+    more = f"; {len(wrong) - MOST_REGIONS} more" if len(wrong) > MOST_REGIONS else ""
+    return [f"{start}: the model, not the noise, is wrong here. {each}{more}."]

@@ -8,7 +8,8 @@ from typing import Any
 
 from pydantic import BaseModel, Field
 
-from glovecal_models.comparison.text import rotation_sentence, wearings_sentence
+from glovecal_models.comparison.cross_validation_difference import CrossValidationDifference
+from glovecal_models.comparison.text import cross_validation_sentences, rotation_sentence, wearings_sentence
 from glovecal_models.comparison.where_it_fails import RotationFindings, WhereItFails, is_structure
 from glovecal_service.plain import plain
 from glovecal_service.views.noise_floor import NoiseFloorView
@@ -67,11 +68,48 @@ class StretchView(BaseModel):
     pose: str
 
 
+class RegionDifferenceView(BaseModel):
+    rotation: str
+    low_deg: float = Field(description="Range of the predicted angle.")
+    high_deg: float
+    difference_deg: float = Field(description="RMS difference of the two models' predictions.")
+    claimed_deg: float = Field(description="Root of their summed claimed variances.")
+    ratio: float
+    is_significant: bool = Field(description="The model, not the noise, is wrong there.")
+
+
+class CrossValidationDifferenceView(BaseModel):
+    """Two models trained on disjoint halves of the model's training takes."""
+
+    halves: list[list[str]] = Field(description="Wearings, or takes, of the two models.")
+    are_wearings: bool
+    regions: list[RegionDifferenceView] = Field(description="The largest ratio first.")
+
+
 class FailuresView(BaseModel):
     model: str
     rotations: list[RotationView] = Field(description="The one farthest above its noise floor first.")
     stretches: list[StretchView] = Field(description="The worst seconds, worst first.")
     trained_on: list[str] = Field(description="Takes among those given that the model was trained on.")
+    cross_validation_difference: CrossValidationDifferenceView | None = Field(
+        None, description="Null where it was not asked for, or there are no two halves."
+    )
+    sentences: list[str] = Field([], description="About the cross-validation difference, if asked for.")
+
+
+def with_cross_validation(view: FailuresView, found: CrossValidationDifference | None) -> FailuresView:
+    """``view`` with what two models of disjoint halves differ by."""
+    shown = None
+    if found is not None:
+        regions = [
+            {**plain(asdict(item)), "ratio": item.ratio, "is_significant": item.is_significant}
+            for item in found.regions
+        ]
+        shown = CrossValidationDifferenceView.model_validate(
+            {"halves": found.halves, "are_wearings": found.are_wearings, "regions": regions}
+        )
+    sentences = cross_validation_sentences(found)
+    return view.model_copy(update={"cross_validation_difference": shown, "sentences": sentences})
 
 
 def failures_view(found: WhereItFails, model: str, trained_on: Sequence[str]) -> FailuresView:

@@ -45,6 +45,8 @@ def test_a_new_wearing_is_checked_from_the_command_line(tmp_path: Path) -> None:
     assert "3 poses: the expected error in this wearing falls from" in answer.out
     assert f"made from {record.id[:12]}. Active.\n" in answer.out
     assert "full calibration (°)" in answer.out
+    assert "As found: " in answer.out
+    assert "as left (°)" in run("subject", "history", "anna").out
     document = run("quick-check", "-s", "anna", "-t", "late", "--json").json
     assert document["parent"] != record.id, "the active model: what was learned of tuesday stays"
     by_sensor = {item["sensor"]: item["readings"] for item in document["sensors"]}

@@ -76,6 +76,15 @@ def test_a_check_stores_a_child_that_predicts_the_wearing_better(worn: Worn) -> 
         for model in (worn.model, child["id"])
     )
     assert after < 0.7 * before
+    assert found["as_found_deg"] > found["as_left_deg"]
+    assert found["sentences"][0].startswith(f"As found: {found['as_found_deg']:.1f} degrees in wearing")
+    history = worn.client.get("/subjects/anna/history")
+    first, checked = history["rows"][0], next(row for row in history["rows"] if row["model"] == child["id"])
+    assert (first["kind"], first["as_found_deg"]) == ("calibration", None)
+    assert first["rmse_unseen_wearing_deg"] > first["held_out_rmse_deg"]
+    assert (checked["kind"], checked["wearing"]) == ("quick check", TUESDAY)
+    assert (checked["as_found_deg"], checked["as_left_deg"]) == (found["as_found_deg"], found["as_left_deg"])
+    assert not history["is_full_calibration_due"]
 
 
 def test_activated_at_once_and_undone_by_rolling_back(worn: Worn) -> None:

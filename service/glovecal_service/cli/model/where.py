@@ -43,6 +43,14 @@ def where(
     floors: Annotated[
         bool, typer.Option("--floors", help="Every estimate of the noise floors, and how slow errors are.")
     ] = False,
+    cross_validation: Annotated[
+        bool,
+        typer.Option(
+            "--cross-validation",
+            help="Also train two models on disjoint halves of the training takes, and show where they differ "
+            "by more than they claim.",
+        ),
+    ] = False,
     report: Report = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
@@ -53,7 +61,7 @@ def where(
     with connect() as service:
         document = service.get(f"/models/{model}")
         takes = held_out_takes(service, [document], take or [])
-        body = {"takes": [row["id"] for row in takes]}
+        body = {"takes": [row["id"] for row in takes], "cross_validation": cross_validation}
         found = service.post(f"/models/{model}/where", body)
         page = fetch_report(service, [model], takes) if report is not None else b""
     if report is not None:
@@ -77,6 +85,8 @@ def _print(
         out.print(f"  {item['sentence']}")
         if item["wearings"] is not None:
             out.print(f"    {item['wearings']['sentence']}")
+    for sentence in found["sentences"]:
+        out.print(sentence)
     if floors:
         _print_floors(found)
     out.print("\nThe worst seconds:")
