@@ -16,7 +16,10 @@ from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.base.wearing_effect import WearingEffect
-from glovecal_models.effects.context_dependence import PREFIX, ContextDependence, unfamiliar_columns
+from glovecal_models.effects.column_dependence import PREFIX as COLUMN
+from glovecal_models.effects.column_dependence import ColumnDependence
+from glovecal_models.effects.context_dependence import PREFIX as CONTEXT
+from glovecal_models.effects.context_dependence import ContextDependence, unfamiliar_columns
 from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
 
@@ -45,8 +48,9 @@ def catalogue() -> dict[str, Effect]:
 def effect(name: str) -> Effect:
     """One effect by its name. Raises BadInput that lists those there are."""
     known = catalogue()
-    if name.startswith(PREFIX) and len(name) > len(PREFIX):
-        return ContextDependence(name.removeprefix(PREFIX))
+    for prefix, of_column in ((CONTEXT, ContextDependence), (COLUMN, ColumnDependence)):
+        if name.startswith(prefix) and len(name) > len(prefix):
+            return of_column(name.removeprefix(prefix))
     if name not in known:
         raise BadInput(f"no effect {name!r}; there are {', '.join(known)}")
     return known[name]
@@ -58,6 +62,16 @@ def candidates(takes: Sequence[Signals]) -> list[Effect]:
     familiar = sorted({name for item in known for name in item.context})
     unfamiliar = unfamiliar_columns(takes, familiar)
     return [*known, *(ContextDependence.of(name, takes) for name in unfamiliar)]
+
+
+def explaining(column: str, sensor: str | None) -> list[Effect]:
+    """Effects that may be behind an error that goes along with ``column``, as ``glovecal where`` calls it:
+    those of the catalogue, and last what only names the column. ``sensor`` reads it, where one does."""
+    found = [item for item in catalogue().values() if item.has_columns and item.may_show_in(column)]
+    kind, _, name = column.partition(" ")
+    if kind == "context":
+        return found or [ContextDependence(name)]
+    return [*found, ColumnDependence(sensor)] if sensor is not None else found
 
 
 def wearing_effect() -> WearingEffect:

@@ -7,6 +7,7 @@ joint beside them. Which physics lies behind it the user has to say.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 
@@ -23,6 +24,8 @@ MOSTLY_WITHIN = 0.5
 
 class ContextDependence(ContextEffect):
     """One for each unfamiliar column."""
+
+    is_physical: ClassVar[bool] = False
 
     source = "smooth dependence on a recorded column; no physics is claimed"
 

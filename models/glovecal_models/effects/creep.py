@@ -34,6 +34,7 @@ class Creep(ArrayStateEffect):
     explanation = "After a movement the reading goes on drifting for seconds although the joint is held."
     source = "standard linear solid, relaxations of 1 to 40 s: Springer 10.1007/978-3-030-25261-8_34"
     shown_by: ClassVar = RAMPS
+    shows_in: ClassVar = ("direction", "time in take")
     drift_in_holds: ClassVar = "begins anew with each hold"
     parameters: ClassVar = (
         Parameter("fast_tau", "s", 0.4, 60.0, "1 to 60 s"),

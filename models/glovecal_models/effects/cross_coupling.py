@@ -27,6 +27,7 @@ class CrossCoupling(InstantEffect):
     explanation = "Moving a neighbouring joint changes what this sensor reads."
     source = "Wang & Neff 2013, section 3.1 and Table 1; Kahlesz, Zachmann, Klein 2004"
     one_joint_at_a_time: ClassVar[bool] = True
+    shows_in: ClassVar = ("joint", "sensor")
     shown_by: ClassVar = ONE_FINGER
     rivals: ClassVar = (Rival("palm_arch", ONE_FINGER), Rival("contact_pressure", ONE_FINGER))
     caveat = "a common cause that was not recorded, such as grip pressure or a strap, looks the same"

@@ -30,6 +30,7 @@ class Hysteresis(ArrayStateEffect):
     )
     source = "Prandtl-Ishlinskii: Kuhnen 2003, European Journal of Control 9(4) 407; size: Mattmann 2008"
     shown_by: ClassVar = RAMPS
+    shows_in: ClassVar = ("direction", "speed")
     rivals: ClassVar = (Rival("creep", RAMPS),)
     parameters: ClassVar = (Parameter("widest_play", "deg", 0.2, 30.0, "1 to 7 deg in bend sensors"),)
 

@@ -30,6 +30,7 @@ class Nonlinearity(InstantEffect):
     explanation = "The sensor is not proportional: the same movement reads differently in another posture."
     source = "smooth curve of the joint; bend sensors are curved: Kahlesz, Zachmann, Klein 2004"
     shown_by: ClassVar = RAMPS
+    shows_in: ClassVar = ("angle",)
     control: ClassVar[Control] = "circularly shifted"
 
     def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:

@@ -22,6 +22,7 @@ class WarmupDrift(ContextEffect):
     explanation = "The reading drifts during the first minutes after the glove is switched on."
     source = "exponential approach to the warm state, 1 to 15 min"
     shown_by: ClassVar = CROSSED
+    shows_in: ClassVar = ("time since power-on",)
     rivals: ClassVar = tuple(Rival(name, CROSSED) for name in ("temperature", "humidity", "supply_sag"))
     plain_name = "warm-up"
     drift_in_holds: ClassVar = "slows down"

@@ -33,16 +33,27 @@ def control_columns(
 
     Raises BadInput when the takes allow no control: wearings with no other permutation.
     """
+    if effect.control == "none":
+        return [np.zeros_like(effect.columns(take, settings, shape)) for take in takes]
+    step = -1 if effect.control == "time-reversed" else 1
+    wrong = control_signals(effect, takes, generator)
+    return [effect.columns(take, settings, shape)[::step] for take in wrong]
+
+
+def control_signals(
+    effect: Effect, takes: Sequence[Signals], generator: np.random.Generator
+) -> list[Signals]:
+    """Inputs of the effect that cannot be right: takes played backwards (their rows are then in reverse),
+    shifted in time, or with the context or the wearing of other takes. Raises BadInput as above."""
     if effect.control == "time-reversed":
-        return [effect.columns(_reversed(take), settings, shape)[::-1] for take in takes]
+        return [_reversed(take) for take in takes]
     if effect.control == "circularly shifted":
-        return [effect.columns(_shifted(take, generator), settings, shape) for take in takes]
+        return [_shifted(take, generator) for take in takes]
     if effect.control == "context of other takes":
-        swapped = _with_other_context(takes, generator)
-        return [effect.columns(take, settings, shape) for take in swapped]
+        return _with_other_context(takes, generator)
     if effect.control == "permuted wearings":
-        return [effect.columns(take, settings, shape) for take in _with_permuted_wearings(takes, generator)]
-    return [np.zeros_like(effect.columns(take, settings, shape)) for take in takes]
+        return _with_permuted_wearings(takes, generator)
+    return list(takes)
 
 
 def _reversed(take: Signals) -> Signals:

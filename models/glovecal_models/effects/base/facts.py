@@ -104,6 +104,12 @@ class EffectFacts:
     """Effects that what a correction leaves of this one looks like: not asked for once a model has this."""
     alike_between_levels: ClassVar[tuple[str, ...]] = ()
     """Effects that one pass over known angles, held one after another, cannot tell it from."""
+    shows_in: ClassVar[tuple[str, ...]] = ()
+    """What an error that it leaves goes along with, as ``glovecal where`` calls it: "angle", "speed",
+    "direction", "time in take", "wearing", and "joint" or "sensor" for any other one. Context columns that it
+    reads count by themselves."""
+    is_physical: ClassVar[bool] = True
+    """Whether its name says what happens; not where only a recorded column is named."""
     also_explained_by: ClassVar[tuple[str, ...]] = ()
     """Of an effect asked for last: effects that seem to explain a part of it."""
     also_explained_share: ClassVar[float] = 0.0
@@ -132,6 +138,13 @@ class EffectFacts:
     def changes_between_takes(self) -> bool:
         """Whether it differs between takes, not inside them: only whole takes are witnesses for it."""
         return self.control in CHANGES_BETWEEN_TAKES
+
+    def may_show_in(self, column: str) -> bool:
+        """Whether an error that goes along with ``column``, as ``glovecal where`` calls it, may be of it."""
+        kind, _, name = column.partition(" ")
+        if kind == "context":
+            return name in self.context
+        return column in self.shows_in or (kind in self.shows_in and bool(name))
 
     @property
     def spoken(self) -> str:

@@ -40,6 +40,7 @@ class Lag(ArrayStateEffect):
     parameters: ClassVar = (Parameter("tau", "s", 0.005, 0.15, "5 to 150 ms"),)
     alike: ClassVar = (CLOCK,)
     shown_by: ClassVar = FAST
+    shows_in: ClassVar = ("speed", "direction")
     rivals: ClassVar = (
         Rival(CLOCK, FAST),
         Rival("hysteresis", FAST),
