@@ -123,13 +123,13 @@ def diagnose(
     own = declared(also)
     with library_call(progress) as report, known_by_name([*declared_effects(inner), *own]):
         report("measuring the noise floors", 0.0)
-        noise = rotation_noise(residuals(inner, takes), seed=seed)
+        noise = rotation_noise(residuals(inner, takes))
         found = diagnose_inner(
             repaired_takes(takes, requested_effects(inner)),
             inner.layout,
             linear=inner.method in ("raw", "linear"),
             known=known_effects(inner),
-            noise_floor_deg={n: item.floor.floor_deg for n, item in noise.items() if item.floor is not None},
+            noise_floors={n: item.floor for n, item in noise.items() if item.floor is not None},
             seed=seed,
             cancelled=cancelled,
             report=report,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections import defaultdict
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -142,8 +142,10 @@ def test_another_set_is_made_by_name_and_unknown_names_are_refused():
 
 def test_one_rule_says_what_is_at_the_floor():
     floor = NoiseFloor(1.0, 0.9, 1.1, 0.0, "still hand", 20)
-    assert is_at_floor(1.26, floor)
-    assert not is_at_floor(1.27, floor)
+    assert is_at_floor(1.09, floor)
+    assert not is_at_floor(1.11, floor), "only inside the floor's own interval"
     assert is_at_floor(1.27, floor, with_limits(ComparisonLimits(), {"at_floor_times": 1.2}))
+    assert not is_at_floor(0.5, floor), "an estimate above the error is wrong"
+    assert not is_at_floor(1.09, replace(floor, reasons=("the clocks are not repaired",)))
     assert not is_at_floor(0.5, NoiseFloor(1.0, 0.9, 1.1, 0.0, "spectrum", 20))
     assert not is_at_floor(0.5, None)

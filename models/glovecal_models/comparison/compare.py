@@ -98,16 +98,17 @@ def summed_up(
     measured = found.measured_rotations
     columns = {name: [found.column(name)] for name in measured}
     in_takes = {name for item in found.takes for name in item.take.rotations}
+    rotations = {
+        name: _errors(error[:, column], spread[:, column], reference[:, column], noise[name].floor)
+        for name, column in columns.items()
+    }
     return Comparison(
-        overall=_errors(error, spread, reference, _floor_of_all(found, noise)),
-        rotations={
-            name: _errors(error[:, column], spread[:, column], reference[:, column], noise[name].floor)
-            for name, column in columns.items()
-        },
+        overall=_errors(error, spread, reference, _floor_of_all(rotations)),
+        rotations=rotations,
         poses=_pose_errors(error, np.concatenate([_poses(item.take) for item in found.takes])),
         not_measured=tuple(name for name in found.rotations if name not in measured),
         not_predicted=tuple(sorted(in_takes - set(found.rotations))),
-        fingertips=fingertip_errors(found, {name: noise[name].floor for name in measured}, dimensions),
+        fingertips=fingertip_errors(found, {name: one.floor for name, one in rotations.items()}, dimensions),
         unseen_wearing=_errors_where(found, is_seen=False),
         seen_wearing=_errors_where(found, is_seen=True),
         unseen_wearings=_wearings_where(found, is_seen=False),
@@ -136,12 +137,10 @@ def _poses(take: Take) -> np.ndarray:
     return np.array(take.poses if take.poses is not None else [""] * len(take.time_s), dtype=object)
 
 
-def _floor_of_all(found: Residuals, noise: Mapping[str, RotationNoise]) -> NoiseFloor | None:
+def _floor_of_all(rotations: Mapping[str, RotationErrors]) -> NoiseFloor | None:
     """None when that of some rotation is unknown."""
-    counts = np.isfinite(found.stacked("error")).sum(axis=0)
-    pairs = [(noise[name].floor, counts[found.column(name)]) for name in found.measured_rotations]
-    known = [(floor, count) for floor, count in pairs if floor is not None]
-    return joined(*zip(*known, strict=True)) if known and len(known) == len(pairs) else None
+    known = [(one.floor, one.count) for one in rotations.values() if one.floor is not None]
+    return joined(*zip(*known, strict=True)) if known and len(known) == len(rotations) else None
 
 
 def _errors(
@@ -151,16 +150,17 @@ def _errors(
     values, claimed = error[usable], spread[usable]
     counts = np.maximum(usable.sum(axis=0), 1)
     centred = reference - np.where(usable, reference, 0.0).sum(axis=0) / counts
+    rmse = float(np.sqrt(np.mean(values**2)))
     return RotationErrors(
         count=len(values),
-        rmse_deg=float(np.sqrt(np.mean(values**2))),
+        rmse_deg=rmse,
         mae_deg=float(np.mean(np.abs(values))),
         bias_deg=float(np.mean(values)),
         percentile_95_deg=float(np.percentile(np.abs(values), 95)),
         coverage=float(np.mean(np.abs(values) <= claimed)),
         nlpd=_nlpd(values, claimed),
         baseline_deg=float(np.sqrt(np.mean(centred[usable] ** 2))),
-        floor=floor,
+        floor=None if floor is None else floor.beside(rmse),
     )
 
 

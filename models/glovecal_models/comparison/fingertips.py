@@ -7,7 +7,7 @@ independent, so their squares add up. Neighbours that share a sensor's noise are
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,6 +35,13 @@ class FingertipFloor:
     high_mm: float
     is_lower_bound: bool
     """That of some joint is one: noise with a memory is not in it."""
+    is_reliable: bool = True
+    """That of every joint is."""
+
+    def beside(self, rmse_mm: float) -> FingertipFloor:
+        """The floor of an error of ``rmse_mm``, never above it."""
+        ends = {name: min(getattr(self, name), rmse_mm) for name in ("floor_mm", "low_mm", "high_mm")}
+        return replace(self, **ends, is_reliable=self.is_reliable and self.low_mm <= rmse_mm)
 
 
 class CarriedFloors:
@@ -83,6 +90,7 @@ class CarriedFloors:
             float(low),
             float(high),
             any(one is not None and one.is_lower_bound for one in known),
+            all(one is not None and one.is_reliable for one in known),
         )
 
     def _sizes(self, end: str, moving: np.ndarray) -> np.ndarray:
@@ -197,12 +205,13 @@ def _errors(
     off: np.ndarray, mean_off: np.ndarray, floor: FingertipFloor | None, assumed_equal: tuple[str, ...]
 ) -> TipErrors:
     known = off[np.isfinite(off)]
+    rmse = float(np.sqrt(np.mean(known**2)))
     return TipErrors(
         count=len(known),
-        rmse_mm=float(np.sqrt(np.mean(known**2))),
+        rmse_mm=rmse,
         percentile_95_mm=float(np.percentile(known, 95)),
         baseline_mm=float(np.sqrt(np.nanmean(mean_off**2))),
-        floor=floor,
+        floor=None if floor is None else floor.beside(rmse),
         assumed_equal=assumed_equal,
     )
 

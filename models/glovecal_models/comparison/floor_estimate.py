@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -29,11 +29,39 @@ class NoiseFloor:
     how: How
     pieces: int
     """Holds, repeats or blocks of time that it was pooled from, and resampled for the interval."""
+    reasons: tuple[str, ...] = ()
+    """Why it is not reliable, each as the end of a sentence; none where it is."""
+    estimate_deg: float | None = None
+    """The estimate itself, where it lies above the error beside which the floor stands."""
     is_lower_bound: bool = field(init=False)
     """Noise with a memory is not in it."""
+    is_reliable: bool = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "is_lower_bound", self.how in LOWER_BOUNDS)
+        object.__setattr__(self, "is_reliable", not self.reasons)
+
+    def beside(self, rmse_deg: float) -> NoiseFloor:
+        """The floor of an error of ``rmse_deg``, never above it: not its value, not its interval.
+
+        An estimate whose whole interval lies above the error is wrong, and marked as such.
+        """
+        if self.high_deg <= rmse_deg:
+            return self
+        reasons, estimate = self.reasons, self.estimate_deg
+        if self.floor_deg > rmse_deg:
+            estimate = self.floor_deg
+        if self.low_deg > rmse_deg:
+            why = f"the estimate ({self.floor_deg:.2f} degrees) lies above the error ({rmse_deg:.2f})"
+            reasons = (*reasons, why)
+        return replace(
+            self,
+            floor_deg=min(self.floor_deg, rmse_deg),
+            low_deg=min(self.low_deg, rmse_deg),
+            high_deg=rmse_deg,
+            reasons=reasons,
+            estimate_deg=estimate,
+        )
 
 
 def pooled(
@@ -60,6 +88,7 @@ def joined(floors: Sequence[NoiseFloor], weights: Sequence[float]) -> NoiseFloor
 
     how = ORDER[max(ORDER.index(one.how) for one in floors)]
     pieces = min(one.pieces for one in floors)
+    reasons = tuple(dict.fromkeys(reason for one in floors for reason in one.reasons))
     return NoiseFloor(
-        root("floor_deg"), root("low_deg"), root("high_deg"), root("prediction_deg"), how, pieces
+        root("floor_deg"), root("low_deg"), root("high_deg"), root("prediction_deg"), how, pieces, reasons
     )

@@ -31,6 +31,7 @@ class Hold:
     time_s: np.ndarray
     error: np.ndarray
     predicted: np.ndarray
+    measured: np.ndarray
     hand_is_still: bool
 
     @property
@@ -42,6 +43,11 @@ class Hold:
         time, values = self.time_s - self.time_s.mean(), values - values.mean()
         slope = float(time @ values) / float(time @ time)
         return float(np.sum((values - slope * time) ** 2))
+
+    def drift_deg(self, values: np.ndarray) -> float:
+        """How far the straight line of ``values`` goes over the hold."""
+        time = self.time_s - self.time_s.mean()
+        return float(time @ values) / float(time @ time) * float(np.ptp(time))
 
 
 def holds(item: TakeResiduals, column: int, limits: ComparisonLimits = COMPARISON_LIMITS) -> list[Hold]:
@@ -59,7 +65,7 @@ def holds(item: TakeResiduals, column: int, limits: ComparisonLimits = COMPARISO
             if end - settled >= limits.fewest_hold_frames:
                 rows = slice(settled, end)
                 still = _is_still(readings[rows], limits.still_share * spread)
-                found.append(Hold(frames[rows], time[rows], error[rows], predicted[rows], still))
+                found.append(Hold(frames[rows], time[rows], error[rows], predicted[rows], angle[rows], still))
             start = end
         else:
             start += max(1, (end - start) // 2)

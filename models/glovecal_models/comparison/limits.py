@@ -14,10 +14,10 @@ class ComparisonLimits:
     """Of noise floors and of what is said where a model fails."""
 
     at_floor_times: float = limit(
-        1.15,
+        1.0,
         "times the upper end of the floor's interval",
         "An error up to this is at the noise floor: nothing is left to gain.",
-        "Not tuned; chosen with the first version (2026-11-21).",
+        "An error is called noise only where it lies within the floor's own interval; 1.15 before.",
     )
     restless_times: float = limit(
         1.5,
@@ -69,6 +69,36 @@ class ComparisonLimits:
     )
     fewest_hold_frames: int = limit(5, "frames", "A hold with fewer is not used.", _CHOSEN)
     fewest_holds: int = limit(4, "holds", "With fewer there is no floor from holds.", _CHOSEN)
+    enough_holds: int = limit(
+        8, "holds", "A floor from fewer is not reliable.", "Chosen: with 8 the interval spans about 20 %."
+    )
+    disturbed_hold_times: float = limit(
+        4.0,
+        "times the median variance of all holds",
+        "A hold that spreads more is left out: something happened in it.",
+        "Of holds of 5 white frames 2 % spread as much by chance; the value is chosen, not tuned.",
+    )
+    slowest_hz: float = limit(
+        15.0,
+        "frames/s",
+        "A floor from fewer frames a second is not reliable.",
+        "At 9 Hz a hold of half a second has 5 frames, and the hand moves between any two of them.",
+    )
+    clock_least_s: float = limit(
+        0.08, "s", "Readings and angles so far apart in time are not aligned.", _CHOSEN
+    )
+    clock_least_share: float = limit(
+        0.25,
+        "share of the unexplained variance",
+        "Moving the reference must save so much.",
+        "The value is chosen, not tuned.",
+    )
+    wander_times: float = limit(
+        2.0,
+        "times the floor",
+        "A reference that moves more within holds in which no sensor moves wanders.",
+        _CHOSEN,
+    )
     fewest_repeats: int = limit(
         4,
         "repeats beyond the first of their pose",

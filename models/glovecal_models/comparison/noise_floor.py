@@ -15,46 +15,84 @@ that holds the least a better model could still take away:
   the reference differs between frames with nearly the same readings, the half of all frames with the nearest
   neighbours. Rough, and from above: what the readings still differ by is included.
 
-The floor is that of this model: one that follows its sensors too closely amplifies their noise. The
-prediction's own jitter is reported beside it.
+The floor belongs to the takes and not to a model: errors are those of a plain additive map of all sensors
+(``additive_fit``), so that every verb tells the same floor for the same takes. Only the jitter beside it is
+of the model at hand. ``floor_doubts`` says when a floor is not reliable.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from glovecal_models.comparison.additive_fit import additive_fit
 from glovecal_models.comparison.error_spectrum import ErrorSpectrum, error_spectrum
+from glovecal_models.comparison.floor_doubts import clock_doubts, hold_doubts, slow_sampling
 from glovecal_models.comparison.floor_estimate import How, NoiseFloor, pooled
 from glovecal_models.comparison.holds import Hold, from_repeated_poses, holds
 from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
+from glovecal_models.comparison.near_readings import from_near_readings
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
+from glovecal_models.takes.take import Take
 
 CHI_SQUARED_MEDIAN = 0.4549
 """With one degree of freedom."""
-MOST_FRAMES = 1500
 
 
-def noise_floor(found: Residuals, rotation: str, generator: np.random.Generator) -> NoiseFloor | None:
+@dataclass(frozen=True)
+class _PlainResiduals(TakeResiduals):
+    """What the plain map leaves; ``predicted`` stays the model's, for its jitter."""
+
+    left: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
+
+    @property
+    def error(self) -> np.ndarray:
+        return self.left
+
+
+def plain_residuals(takes: Sequence[Take], rotations: Sequence[str]) -> Residuals:
+    """Of the plain map alone, for takes without a model."""
+    measured = [take.reference_at_frames(rotations) for take in takes]
+    mapped = additive_fit(takes, measured)
+    parts = zip(takes, mapped, measured, strict=True)
+    return Residuals(
+        tuple(rotations),
+        tuple(TakeResiduals(take, angles, np.zeros_like(angles), known) for take, angles, known in parts),
+    )
+
+
+def _of_plain_map(found: Residuals) -> Residuals:
+    """The same takes and predictions beside the errors of the plain map."""
+    mapped = additive_fit([item.take for item in found.takes], [item.measured for item in found.takes])
+    return Residuals(
+        found.rotations,
+        tuple(
+            _PlainResiduals(item.take, item.predicted, item.sd, item.measured, left=angles - item.measured)
+            for item, angles in zip(found.takes, mapped, strict=True)
+        ),
+    )
+
+
+def noise_floor(found: Residuals, rotation: str) -> NoiseFloor | None:
     """The best estimate; None when the rotation was measured in fewer than three frames in a row."""
-    return next(iter(noise_floors(found, rotation, generator)), None)
+    return rotation_noise(found)[rotation].floor if rotation in found.measured_rotations else None
 
 
-def noise_floors(
+def _estimates(
     found: Residuals,
     rotation: str,
+    doubts: Sequence[str],
     generator: np.random.Generator,
-    spectrum: ErrorSpectrum | None = None,
-    limits: ComparisonLimits = COMPARISON_LIMITS,
+    limits: ComparisonLimits,
 ) -> tuple[NoiseFloor, ...]:
-    """Every estimate that the takes allow, the best first. ``spectrum`` spares its computation."""
+    """Every estimate that the takes allow, the best first. ``found``: of the plain map."""
     column = found.column(rotation)
     held = [holds(item, column, limits) for item in found.takes]
     every = [hold for of_take in held for hold in of_take]
     still = [hold for hold in every if hold.hand_is_still]
-    spectrum = spectrum or error_spectrum(found, rotation, generator, limits)
+    spectrum = error_spectrum(found, rotation, generator, limits)
     estimates = (
         _from_holds(still, "still hand", generator, limits),
         _from_holds(every, "still joint", generator, limits),
@@ -63,21 +101,37 @@ def noise_floors(
         _from_differences(found, column, generator, limits),
     )
     some = tuple(one for one in estimates if one is not None)
-    if some or any(_has_neighbours(item.take.time_s, limits) for item in found.takes):
-        return some
-    single = from_near_readings(found.takes, column, generator, limits)
-    return () if single is None else (single,)
+    if not some and not any(_has_neighbours(item.take.time_s, limits) for item in found.takes):
+        single = from_near_readings(found.takes, column, generator, limits)
+        some = () if single is None else (single,)
+    wandering = hold_doubts(still, some[0].floor_deg, limits) if some else ()
+    slow = slow_sampling(found.takes, limits)
+    return tuple(
+        replace(one, reasons=(*doubts, *_of_estimate(one, slow, limits), *wandering)) for one in some
+    )
+
+
+def _of_estimate(floor: NoiseFloor, slow: Sequence[str], limits: ComparisonLimits) -> tuple[str, ...]:
+    """Single poses are compared with one another, not with the frames beside them."""
+    if floor.how in ("repeated poses", "near readings"):
+        return ()
+    if floor.how not in ("still hand", "still joint") or floor.pieces >= limits.enough_holds:
+        return tuple(slow)
+    return (*slow, f"only {floor.pieces} holds, {limits.enough_holds} are needed")
 
 
 def _from_holds(
     held: Sequence[Hold], how: How, generator: np.random.Generator, limits: ComparisonLimits
 ) -> NoiseFloor | None:
+    """Without the holds that spread far more than most: something happened in them, which is no noise."""
     if len(held) < limits.fewest_holds:
         return None
     squares = np.array([hold.square(hold.error) for hold in held])
     freedom = np.array([hold.freedom for hold in held])
-    jitter = float(np.sqrt(sum(hold.square(hold.predicted) for hold in held) / freedom.sum()))
-    return pooled(squares, freedom, jitter, how, generator)
+    usual = squares / freedom <= limits.disturbed_hold_times * np.median(squares / freedom)
+    kept = [hold for hold, is_usual in zip(held, usual, strict=True) if is_usual]
+    jitter = float(np.sqrt(sum(hold.square(hold.predicted) for hold in kept) / freedom[usual].sum()))
+    return pooled(squares[usual], freedom[usual], jitter, how, generator)
 
 
 def _from_differences(
@@ -117,66 +171,39 @@ class RotationNoise:
 
 
 def rotation_noise(
-    found: Residuals, *, seed: int = 0, limits: ComparisonLimits = COMPARISON_LIMITS
+    found: Residuals, *, limits: ComparisonLimits = COMPARISON_LIMITS
 ) -> dict[str, RotationNoise]:
-    """Of every measured rotation. A rotation's intervals do not depend on which others were measured."""
-    result = {}
+    """Of every measured rotation. Floors depend on the takes alone, spectra on the model's errors.
+
+    A rotation's intervals do not depend on which others were measured.
+    """
+    plain, result = _of_plain_map(found), {}
+    doubts = clock_doubts(found.takes, limits)
     for rotation in found.measured_rotations:
-        generator = np.random.default_rng([seed, *rotation.encode()])
-        spectrum = error_spectrum(found, rotation, generator, limits)
-        floors = noise_floors(found, rotation, generator, spectrum, limits)
-        result[rotation] = RotationNoise(floors, spectrum)
+        floors = _estimates(plain, rotation, doubts, _generator(rotation), limits)
+        result[rotation] = RotationNoise(
+            floors, error_spectrum(found, rotation, _generator(rotation), limits)
+        )
     return result
 
 
-def from_near_readings(
-    takes: Sequence[TakeResiduals],
-    column: int,
-    generator: np.random.Generator,
-    limits: ComparisonLimits = COMPARISON_LIMITS,
-) -> NoiseFloor | None:
-    """From pairs of frames of any take; None with fewer than ``fewest_pairs``."""
-    error = np.concatenate([item.error[:, column] for item in takes])
-    predicted = np.concatenate([item.predicted[:, column] for item in takes])
-    names = takes[0].take.sensors
-    if any(set(item.take.sensors) != set(names) for item in takes):
-        return None
-    readings = np.concatenate(
-        [item.take.readings[:, [item.take.sensors.index(name) for name in names]] for item in takes]
-    )
-    rows = np.flatnonzero(np.isfinite(error))
-    if len(rows) > MOST_FRAMES:
-        rows = np.sort(generator.choice(rows, MOST_FRAMES, replace=False))
-    first, second = _nearest_pairs(readings[rows])
-    if len(first) < limits.fewest_pairs:
-        return None
-    first, second = rows[first], rows[second]
-    jitter = float(np.sqrt(np.mean((predicted[first] - predicted[second]) ** 2) / 2))
-    squares = (error[first] - error[second]) ** 2 / 2
-    return pooled(squares, np.ones(len(squares)), jitter, "near readings", generator)
+def takes_noise(
+    takes: Sequence[Take], rotations: Sequence[str], limits: ComparisonLimits = COMPARISON_LIMITS
+) -> dict[str, NoiseFloor]:
+    """The floor of each rotation of which it is known: as ``rotation_noise`` has it, without a model."""
+    noise = rotation_noise(plain_residuals(takes, rotations), limits=limits)
+    return {name: item.floor for name, item in noise.items() if item.floor is not None}
 
 
-def _nearest_pairs(readings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Both members of each pair: a frame and the one nearest to it, where that is nearer than for most."""
-    spread = readings.std(axis=0) if len(readings) else np.zeros(0)
-    scaled = readings[:, spread > 0] / spread[spread > 0]
-    if len(scaled) < 2 or not scaled.shape[1]:
-        return np.empty(0, dtype=int), np.empty(0, dtype=int)
-    squares = np.sum(scaled**2, axis=1)
-    distance = squares[:, None] + squares[None] - 2 * scaled @ scaled.T
-    np.fill_diagonal(distance, np.inf)
-    nearest = distance.argmin(axis=1)
-    closest = distance[np.arange(len(scaled)), nearest]
-    chosen = np.flatnonzero(closest <= np.median(closest))
-    pairs = np.unique(np.sort(np.column_stack([chosen, nearest[chosen]]), axis=1), axis=0)
-    return pairs[:, 0], pairs[:, 1]
+def _generator(rotation: str) -> np.random.Generator:
+    return np.random.default_rng([0, *rotation.encode()])
 
 
 def is_at_floor(
     rmse_deg: float, floor: NoiseFloor | None, limits: ComparisonLimits = COMPARISON_LIMITS
 ) -> bool:
-    """False where no floor is known, or only a lower bound of one."""
-    if floor is None or floor.is_lower_bound:
+    """False where no floor is known, or only a lower bound of one, or one that is not reliable."""
+    if floor is None or floor.is_lower_bound or not floor.beside(rmse_deg).is_reliable:
         return False
     return reaches_floor(rmse_deg, floor.high_deg, limits)
 

@@ -9,6 +9,7 @@ import numpy as np
 from glovecal_models.comparison.compare import Comparison
 from glovecal_models.comparison.cross_validation_difference import CrossValidationDifference
 from glovecal_models.comparison.fingertips import FingertipErrors, TipErrors
+from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.wearings import WearingErrors
 from glovecal_models.comparison.where_it_fails import RotationFindings
 
@@ -17,15 +18,15 @@ def rotation_sentence(item: RotationFindings) -> str:
     """The error of one rotation, its noise floor and what it depends on."""
     start = f"{item.rotation}: RMSE {item.rmse_deg:.1f} degrees"
     if item.floor is not None:
-        bound = "lower bound " if item.floor.is_lower_bound else ""
-        start += f" (noise floor {bound}{item.floor.floor_deg:.1f})"
-        if item.is_near_floor:
+        start += f" (noise floor {floor_text(item.floor, 1)})"
+        if item.is_own_jitter or item.is_near_floor:
             return f"{start}: {_at_floor(item)}."
     if abs(item.bias_deg) >= item.limits.mostly_bias_share * item.rmse_deg:
         start += f", mostly a constant {item.bias_deg:+.1f}"
     if not item.structure:
         slow = "" if item.slow is None else f"; {100 * item.slow.share:.0f} % of its variance is below 1 Hz"
-        return f"{start}; no recorded column explains it{slow}."
+        times = "" if item.times_floor is None else f"; the error is {item.times_floor:.1f} times the floor"
+        return f"{start}; no recorded column explains it{times}{slow}."
     first, *rest = item.structure
     low, high = float(np.min(first.mean_deg)), float(np.max(first.mean_deg))
     also = f"; {len(rest)} other column{'s' if len(rest) > 1 else ''} significant" if rest else ""
@@ -33,6 +34,13 @@ def rotation_sentence(item: RotationFindings) -> str:
         f"{start}. It depends on {first.phrase}: from {low:+.1f} to {high:+.1f} degrees, "
         f"RMS contribution {first.explained_deg:.1f} degrees{also}."
     )
+
+
+def floor_text(floor: NoiseFloor, digits: int = 2) -> str:
+    """A floor in degrees and how far it can be trusted, as it stands behind "noise floor"."""
+    bound = "lower bound " if floor.is_lower_bound else ""
+    doubt = f", not reliable: {'; '.join(floor.reasons)}" if floor.reasons else ""
+    return f"{bound}{floor.floor_deg:.{digits}f}{doubt}"
 
 
 def wearings_sentence(item: WearingErrors) -> str:
@@ -65,7 +73,7 @@ def fingertips_sentence(errors: FingertipErrors) -> str:
 
 
 def _at_floor(item: RotationFindings) -> str:
-    if item.is_jittery and item.floor is not None:
+    if item.is_own_jitter and item.floor is not None:
         return (
             f"no more than the prediction's own jitter of {item.floor.prediction_deg:.1f} while the hand is "
             "still; the model follows its sensors too closely"

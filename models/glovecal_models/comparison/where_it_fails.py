@@ -56,6 +56,22 @@ class RotationFindings:
         return _is_jittery(self.floor, self.limits)
 
     @property
+    def is_own_jitter(self) -> bool:
+        """The error is no larger than the noise floor and the prediction's own jitter together."""
+        if self.floor is None or not self.is_jittery:
+            return False
+        most = float(np.hypot(self.floor.high_deg, self.floor.prediction_deg))
+        return self.rmse_deg <= self.limits.at_floor_times * most
+
+    @property
+    def times_floor(self) -> float | None:
+        """The error over its noise floor; None where that is unknown, not reliable or a lower bound."""
+        floor = self.floor
+        if floor is None or floor.is_lower_bound or not floor.is_reliable or floor.floor_deg <= 0:
+            return None
+        return self.rmse_deg / floor.floor_deg
+
+    @property
     def is_at_floor(self) -> bool:
         """Only noise remains, and it is not the prediction's own."""
         return self.is_near_floor and not self.is_jittery
@@ -93,7 +109,7 @@ def where_it_fails(
 ) -> WhereItFails:
     """Every measured rotation against every column; same seed, same answer. ``noise`` spares its time."""
     generator = np.random.default_rng(seed)
-    noise = rotation_noise(found, seed=seed, limits=limits) if noise is None else noise
+    noise = rotation_noise(found, limits=limits) if noise is None else noise
     findings = [_findings(found, name, noise[name], generator, limits) for name in found.measured_rotations]
     findings.sort(key=lambda item: -_above_floor(item))
     return WhereItFails(tuple(findings), worst_stretches(found))
@@ -112,11 +128,11 @@ def _findings(
     ranked = sorted((item for item in tested if item is not None), key=lambda item: -item.explained_deg)
     every = np.concatenate(errors)
     rmse, bias = float(np.sqrt(np.nanmean(every**2))), float(np.nanmean(every))
-    floor, slow = noise.floor, _slow_share(noise.spectrum)
+    slow = _slow_share(noise.spectrum)
+    floors = [one.beside(rmse) for one in noise.floors]
+    floor, others = (floors[0] if floors else None), tuple(floors[1:])
     wearings = wearing_errors(found, rotation, generator, limits)
-    return RotationFindings(
-        rotation, rmse, bias, floor, noise.floors[1:], slow, tuple(ranked), wearings, limits
-    )
+    return RotationFindings(rotation, rmse, bias, floor, others, slow, tuple(ranked), wearings, limits)
 
 
 def _slow_share(spectrum: ErrorSpectrum | None) -> SlowShare | None:

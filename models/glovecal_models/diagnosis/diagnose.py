@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_models.comparison.noise_floor import takes_noise
 from glovecal_models.diagnosis.candidates import assessed
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.forward_design import ForwardDesign
@@ -44,13 +46,15 @@ def diagnose(
     known: Sequence[KnownEffect] = (),
     effects: Sequence[Effect] | None = None,
     signatures: bool = True,
-    noise_floor_deg: Mapping[str, float] | None = None,
+    noise_floors: Mapping[str, NoiseFloor] | None = None,
     seed: int = 0,
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
     cancelled: Cancel | None = None,
     report: Report | None = None,
 ) -> Diagnosis:
     """``known``: effects the model has already; they are part of the base. ``limits`` decide the verdicts.
+
+    ``noise_floors``: of these takes, where they were measured before; None: they are measured.
 
     Raises BadInput, Cancelled.
     """
@@ -69,6 +73,8 @@ def diagnose(
     by_name = {item.name: item for item in (*every, *tried)}
     if are_pose_labels(takes):
         return _of_pose_labels(takes, layout, design, tried, problems, seed, limits)
+    if noise_floors is None:
+        noise_floors = takes_noise(takes, problem.joints)
     has = _has(known)
     waiting = [item for item in tried if problem.is_sparse and item.needs_movement]
     judged = [item for item in tried if item not in waiting]
@@ -94,12 +100,14 @@ def diagnose(
     else:
         rest = problem.with_first(naming, by_name, design).design()
         likely = [item.effect for item in impossible if item.saves_much]
-        residual = unexplained_residual(rest, problem.even, layout, seed, undecided=likely)
+        residual = unexplained_residual(
+            rest, problem.even, layout, seed, floors=noise_floors, undecided=likely
+        )
     progress("done", 1.0)
     return Diagnosis(
         joints=problem.joints,
         rmse_deg=_held_out_errors(design),
-        noise_floor_deg={name: float(value) for name, value in (noise_floor_deg or {}).items()},
+        noise_floors=dict(noise_floors),
         naming=naming,
         assessments=tuple(found),
         not_identifiable=tuple(impossible),
@@ -166,7 +174,7 @@ def _of_pose_labels(
     return Diagnosis(
         joints=design.rotations,
         rmse_deg=_held_out_errors(design),
-        noise_floor_deg={},
+        noise_floors={},
         naming=Naming((), ()),
         assessments=(),
         not_identifiable=tuple(

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.diagnosis.hold_drift import HoldDrift
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.naming import Naming
@@ -51,7 +52,8 @@ class Diagnosis:
     joints: tuple[str, ...]
     rmse_deg: dict[str, float]
     """Held-out error of each joint without any further effect, on smoothed signals."""
-    noise_floor_deg: dict[str, float]
+    noise_floors: dict[str, NoiseFloor]
+    """Of the takes, as every other verb tells it."""
     naming: Naming
     assessments: tuple[Assessment, ...]
     """Every identifiable effect."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from glovecal_models.diagnosis.diagnosis import Diagnosis
+from glovecal_models.diagnosis.floor_ratio import FloorRatio
 from glovecal_models.diagnosis.hold_drift import HAND, HoldDrift, PoseDrift, drifting
 from glovecal_models.diagnosis.next_take import NextTake
 from glovecal_models.diagnosis.not_identifiable import SINGLE_POSES, NotIdentifiable
@@ -90,15 +91,19 @@ def not_identifiable_sentences(items: Sequence[NotIdentifiable]) -> list[str]:
     return [f"Not identifiable: {', '.join(effects)}. Reason: {why}." for why, effects in reasons.items()]
 
 
-def residual_sentence(residual: UnexplainedResidual) -> str:
-    """Whether the residual is significant, and what it is associated with."""
+def residual_sentence(residual: UnexplainedResidual, is_noise: bool | None = None) -> str:
+    """Whether the residual is significant, and what it is associated with.
+
+    ``is_noise``: whether every error that a reader sees beside it lies within its floor's interval; None: the
+    residual's own errors.
+    """
     obstacle = residual_obstacle(residual)
     if obstacle is not None:
         return f"An unexplained residual cannot be judged: {obstacle}."
     if not residual.is_significant:
-        largest = max(item.size_deg for item in residual.judged)
-        return f"The residual looks like noise: slow errors (over 1 s) of at most {largest:.1f} degrees RMS."
+        return _not_significant(residual, is_noise)
     parts = [] if residual.excess is None else [_excess(residual.excess)]
+    parts += [_above_floor(name, residual.floor_ratios[name]) for name in residual.above_floor[:1]]
     if residual.is_shared:
         shared = residual.shared
         parts.append(f"joints share an error of {shared.size_deg:.1f} degrees (p = {shared.p_value:.2g})")
@@ -109,6 +114,27 @@ def residual_sentence(residual: UnexplainedResidual) -> str:
     undecided = " or ".join(residual.undecided)
     return (
         f"{sentence} Possible cause that these takes cannot decide: {undecided}." if undecided else sentence
+    )
+
+
+def _not_significant(residual: UnexplainedResidual, is_noise: bool | None) -> str:
+    """Noise is only said of errors within their floors' intervals."""
+    largest = max(item.size_deg for item in residual.judged)
+    slow = f"slow errors (over 1 s) of at most {largest:.1f} degrees RMS"
+    if residual.is_within_floors if is_noise is None else is_noise:
+        return f"The residual looks like noise: {slow}."
+    known = [item for item in residual.floor_ratios.values() if item.is_judgeable]
+    times = (
+        f"; errors of at most {max(item.times for item in known):.1f} times the noise floor" if known else ""
+    )
+    return f"The residual is no larger than in healthy gloves: {slow}{times}."
+
+
+def _above_floor(name: str, item: FloorRatio) -> str:
+    return (
+        f"the held-out error of {name} is {item.rmse_deg:.2f} degrees, {item.times:.1f} times its noise floor"
+        f" of {item.floor.floor_deg:.2f} (lower 95 % bound {item.lower_times:.1f}; healthy gloves: at most"
+        f" {item.limits.healthy_floors:g})"
     )
 
 

@@ -1,7 +1,8 @@
 """Is a residual significant that no known effect explains, and what is it associated with?
 
-Slow errors, and errors that joints share, are no noise. A healthy glove has them too: it slips a little while
-it is worn, and its calibration is unsure where training data are few. Significant is what exceeds both.
+Slow errors, errors that joints share, and errors far above the noise floor are no noise. A healthy glove has
+them too: it slips a little while it is worn, and its calibration is unsure where training data are few.
+Significant is what exceeds a healthy glove's.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from typing import Literal
 
 import numpy as np
 
+from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_models.diagnosis.floor_ratio import FloorRatio, floor_ratios
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.resampled import ResampledTake
@@ -59,6 +62,10 @@ class UnexplainedResidual:
     """The same without each take's mean and straight line."""
     excess: SlowExcess | None = None
     """Of the joint that exceeds a healthy glove most; None where none does, or where one may."""
+    floor_ratios: Mapping[str, FloorRatio] = field(default_factory=dict)
+    """The error of each joint whose floor is known, in floors."""
+    above_floor: tuple[str, ...] = ()
+    """Joints whose error exceeds its floor by more than a healthy glove's, the farthest first."""
     shared: SharedError = NOTHING_SHARED
     is_shared: bool = False
     """Whether joints share significantly more than in a healthy glove."""
@@ -67,6 +74,12 @@ class UnexplainedResidual:
     undecided: tuple[str, ...] = ()
     """Effects that these takes cannot decide and that may explain it."""
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS
+
+    @property
+    def is_within_floors(self) -> bool:
+        """Whether every error lies in the interval of its noise floor: only then is it noise."""
+        every = self.floor_ratios.values()
+        return len(every) == len(self.slow) > 0 and all(item.is_within_floor for item in every)
 
     @property
     def judged(self) -> tuple[SlowError, ...]:
@@ -80,12 +93,13 @@ def unexplained_residual(
     layout: Layout,
     seed: int = 0,
     *,
+    floors: Mapping[str, NoiseFloor] | None = None,
     undecided: Sequence[str] = (),
 ) -> UnexplainedResidual:
     """Judge the held-out residuals of ``design``, known effects included in its base.
 
-    ``even``: its takes, for their readings. ``undecided``: effects that save much and that these takes cannot
-    decide; they are not in the base.
+    ``even``: its takes, for their readings; ``floors``: of each joint where it is known. ``undecided``:
+    effects that save much and that these takes cannot decide; they are not in the base.
     """
     generator, limits = np.random.default_rng(seed), design.limits
     means = [second_means(design, joint) for joint in range(len(design.rotations))]
@@ -94,19 +108,24 @@ def unexplained_residual(
     found = UnexplainedResidual(
         slow=dict(zip(design.rotations, slow, strict=True)),
         within_takes=dict(zip(design.rotations, within, strict=True)),
+        floor_ratios=floor_ratios(design, floors or {}),
         undecided=tuple(undecided),
         limits=limits,
     )
+    above = [name for name, item in found.floor_ratios.items() if item.exceeds > 1]
+    above.sort(key=lambda name: -found.floor_ratios[name].exceeds)
+    found = replace(found, above_floor=tuple(above))
     if not found.judged:
         return replace(found, obstacle="few stretches")
     found = replace(found, shared=shared_error(means, generator, limits))
     ratios = [_ratio(*items, limits) for items in zip(slow, within, strict=True)]
     exceeding = sorted((i for i, ratio in enumerate(ratios) if ratio > 1), key=lambda i: -ratios[i])
     is_shared = _is_shared(found)
-    if not exceeding and not is_shared:
+    if not exceeding and not is_shared and not above:
         possible = _possible_excess(found)
         return replace(found, excess=possible, obstacle="wide interval") if possible else found
-    chosen = (exceeding or list(range(len(slow))))[:MOST_JOINTS]
+    farthest = [design.rotations.index(name) for name in above]
+    chosen = (list(dict.fromkeys([*exceeding, *farthest])) or list(range(len(slow))))[:MOST_JOINTS]
     return replace(
         found,
         is_significant=True,

@@ -61,9 +61,9 @@ def add_effect(
     clocks' offsets (default: as they are found in the takes). ``before`` saves measuring the parent,
     ``control_share`` (of the error that is left with the control instead) screening it. Undone, with
     the reason, unless the held-out RMSE of the ``judged`` rotations (default: all chosen) falls by
-    ``least_gain`` (default: of ``limits``); an effect that widens the interval is judged by its claim
-    (``add_interval``). Raises BadInput for an unknown effect or rotation, or when the takes cannot carry it;
-    Cancelled.
+    ``least_gain`` (default: of ``limits``), and where the control leaves less than the effect; an effect
+    that widens the interval is judged by its claim (``add_interval``). Raises BadInput for an unknown effect
+    or rotation, or when the takes cannot carry it; Cancelled.
     """
     effect = known_effect(name)
     settings = settings_of(model, settings)
@@ -97,13 +97,17 @@ def add_effect(
     )
     if undone.gain < least_gain:
         return undone
-    if report:
-        report(f"learning {name} from all takes", 0.85)
-    fit = fit_with_effects(prepared, chosen, wanted, settings, cancelled=cancelled)
     if control_share is None and fresh.has_columns:
         control_share = share_left_by_control(
             model, repaired_takes(takes, has), effect, chosen, cancelled, limits.diagnosis
         )
+    if control_share is not None:
+        undone = replace(undone, control_rmse_deg=control_share * total_rmse_deg(before, chosen))
+    if undone.is_beaten_by_control:
+        return undone
+    if report:
+        report(f"learning {name} from all takes", 0.85)
+    fit = fit_with_effects(prepared, chosen, wanted, settings, cancelled=cancelled)
     evidence = _evidence(before, after, chosen, control_share) | dict(live.evidence if live else {})
     effects = [*kept_lanes(model.effects, chosen), *fit.effects, *columnless_effects(wanted, model.effects)]
     effects = [replace(item, evidence=evidence) if item.name == name else item for item in effects]

@@ -66,6 +66,14 @@ class Addition:
     """How the effect acts on live frames, where it does."""
     claim: ClaimCheck | None = None
     """Of an effect that widens the interval: the claim decides instead of the error."""
+    control_rmse_deg: float | None = None
+    """Held-out error of the rotations with its control instead; None where there is none."""
+
+    @property
+    def is_beaten_by_control(self) -> bool:
+        """Whether the control, which cannot be right, leaves a smaller held-out error than the effect."""
+        control = self.control_rmse_deg
+        return control is not None and control < total_rmse_deg(self.after, self.rotations)
 
     @property
     def gain(self) -> float:

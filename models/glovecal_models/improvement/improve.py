@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from glovecal_models.calibration.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.calibration.left_out_wearings import left_out_wearings
 from glovecal_models.calibration.model import CalibrationModel
@@ -103,12 +105,11 @@ class _Loop:
         self.trials: list[Trial] = []
         self.stopped: Stop = "nothing_named"
         self.diagnosis: Diagnosis | None = None
-        self.floors: dict[str, NoiseFloor] = {}
         self.errors = HeldOutErrors({}, {})
         self.has_looked = False
 
     def start(self) -> None:
-        """The base model, its error and its floor."""
+        """The base model and its error."""
         self._say("training the base", 0.02)
         model = train(
             self.takes, self.layout, self.subject, replace(self.settings, folds=0),
@@ -119,9 +120,6 @@ class _Loop:
         self.errors = self._held_out(model)
         model = self._with_unseen_wearing(model)
         self._step(model, None)
-        found = residuals(model, self.takes)
-        noise = rotation_noise(found, seed=self.seed, limits=self.limits.comparison)
-        self.floors = {name: item.floor for name, item in noise.items() if item.floor is not None}
 
     def go_on(self) -> bool:
         """One round; False when the loop is over."""
@@ -133,11 +131,9 @@ class _Loop:
             return True
         self._say("diagnosing the residual", share)
         takes = self._repaired()
-        floors = {name: floor.floor_deg for name, floor in self.floors.items()}
         self.diagnosis = diagnose(
             takes, self.layout, linear=self.settings.method in ("raw", "linear"), known=known_effects(model),
-            noise_floor_deg=floors, seed=self.seed, limits=self.limits.diagnosis,
-            cancelled=self.cancelled,
+            seed=self.seed, limits=self.limits.diagnosis, cancelled=self.cancelled,
         )  # fmt: skip
         tried = self._tried
         for item in self.diagnosis.naming.ranked:
@@ -161,16 +157,31 @@ class _Loop:
 
     def finished(self) -> Improvement:
         """Sum up."""
-        limits = self.limits.comparison
-        stopped = why_stopped(self.stopped, self.steps, self.floors, self.diagnosis, limits)
+        floors, limits = self._floors(), self.limits.comparison
+        stopped = why_stopped(self.stopped, self.steps, floors, self.diagnosis, limits)
         names = trained_rotations(self.steps[0].model)
         scale = baselines(self.takes, self.layout, names, self.settings, self.holdout)
         self._say("done", 1.0)
         return Improvement(
-            tuple(self.steps), self.floors, stopped, self.diagnosis, tuple(self.trials), scale,
+            tuple(self.steps), floors, stopped, self.diagnosis, tuple(self.trials), scale,
             tuple(take_warnings(self.takes)), self.usable,
             self.takes[0].duration_s if len(self.takes) == 1 and not self.holdout else None,
         )  # fmt: skip
+
+    def _floors(self) -> dict[str, NoiseFloor]:
+        """Of the takes on which errors are measured, repaired as the last model repairs them.
+
+        Those of the takes as they came would hold what has been repaired.
+        """
+        last = self.steps[-1]
+        noise = rotation_noise(
+            residuals(last.model, self.holdout or self.takes), limits=self.limits.comparison
+        )
+        known = {name: item.floor for name, item in noise.items() if item.floor is not None}
+        return {
+            name: floor.beside(last.per_rotation[name]) if name in last.per_rotation else floor
+            for name, floor in known.items()
+        }
 
     def _add(
         self,
@@ -259,9 +270,18 @@ class _Loop:
         control = None
         if diagnosis is not None and added is not None:
             share = share_in(diagnosis, added.effect, added.where)
-            control = None if share is None else share * self.steps[-1].rmse_deg
+            control = None if share is None else self._with_control(added.where, share)
         held_out = self.errors.overall_deg
         self.steps.append(Step(model, added, overall, per_rotation, control, held_out))
+
+    def _with_control(self, rotations: Sequence[str], share: float) -> float:
+        """Error over all rotations where a control leaves ``share`` of that of ``rotations``."""
+        before, count = self.steps[-1].per_rotation, self.errors.count
+        squares = {
+            name: count.get(name, 0) * (error * (share if name in rotations else 1.0)) ** 2
+            for name, error in before.items()
+        }
+        return float(np.sqrt(sum(squares.values()) / max(sum(count.get(name, 0) for name in squares), 1)))
 
     def _say(self, text: str, share: float) -> None:
         if self.report:

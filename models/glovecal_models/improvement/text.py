@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 
 from glovecal_models.calibration.text import dead_sensor_sentences, wearing_sentences
 from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_models.comparison.noise_floor import is_at_floor
+from glovecal_models.comparison.text import floor_text
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.text import (
     UNITS,
@@ -17,7 +19,7 @@ from glovecal_models.diagnosis.text import (
 )
 from glovecal_models.effects.base.interval_effect import IntervalEffect
 from glovecal_models.improvement.addition import Addition, ClaimCheck, total_rmse_deg
-from glovecal_models.improvement.improvement import Improvement, Step, Trial
+from glovecal_models.improvement.improvement import Improvement, Trial
 
 MOST_NAMED = 4
 
@@ -28,6 +30,12 @@ def addition_sentence(addition: Addition) -> str:
         return _interval_sentence(addition, addition.claim)
     name, gain = _on(addition.effect, addition.judged), 100 * addition.gain
     before, after = (total_rmse_deg(item, addition.judged) for item in (addition.before, addition.after))
+    if addition.is_beaten_by_control and not addition.added:
+        after = total_rmse_deg(addition.after, addition.rotations)
+        return (
+            f"{_on(addition.effect, addition.rotations)} was undone: its control leaves"
+            f" {addition.control_rmse_deg:.2f} degrees of held-out error, less than its own {after:.2f}."
+        )
     sentence = (
         f"{name} reduces the held-out error from {before:.2f} to {after:.2f} degrees ({gain:.0f} %)."
         if addition.added
@@ -82,7 +90,7 @@ def improvement_sentences(improvement: Improvement) -> list[str]:
     for trial in improvement.trials:
         sentences += [item for item in _trial_sentences(trial) if item not in sentences]
     if last is not None:
-        sentences += _closing_sentences(last, improvement.steps[-1], improvement.noise_floor)
+        sentences += _closing_sentences(last, improvement)
     return sentences
 
 
@@ -96,15 +104,22 @@ def _trial_sentences(trial: Trial) -> list[str]:
     return sentences
 
 
-def _closing_sentences(diagnosis: Diagnosis, last: Step, floors: Mapping[str, NoiseFloor]) -> list[str]:
+def is_noise(improvement: Improvement) -> bool:
+    """Whether every error of the last step lies within the interval of its floor."""
+    errors, floors = improvement.steps[-1].per_rotation, improvement.noise_floor
+    return all(is_at_floor(error, floors.get(name)) for name, error in errors.items())
+
+
+def _closing_sentences(diagnosis: Diagnosis, improvement: Improvement) -> list[str]:
     """What was found beside the added effects, what could not be judged, and what remains."""
+    last, floors = improvement.steps[-1], improvement.noise_floor
     held = diagnosis.hold_drift
     sentences = [] if held is None else [hold_sentence(held), UNITS]
     sentences += [item.sentence for item in diagnosis.findings]
     if held is None and not diagnosis.findings and not diagnosis.naming.ranked:
         sentences.append(nothing_named_sentence(diagnosis))
     sentences += not_identifiable_sentences(diagnosis.not_identifiable)
-    sentences.append(residual_sentence(diagnosis.residual))
+    sentences.append(residual_sentence(diagnosis.residual, is_noise(improvement)))
     if held is None:
         sentences += [*_repeatability_sentences(floors), _remaining_sentence(last.per_rotation, floors)]
     return sentences
@@ -121,9 +136,7 @@ def _remaining_sentence(per_rotation: Mapping[str, float], floors: Mapping[str, 
 
 
 def _floor(floor: NoiseFloor | None) -> str:
-    if floor is None:
-        return "noise floor unknown"
-    return f"noise floor {'at least ' if floor.is_lower_bound else ''}{floor.floor_deg:.2f}"
+    return "noise floor unknown" if floor is None else f"noise floor {floor_text(floor)}"
 
 
 def _repeatability_sentences(floors: Mapping[str, NoiseFloor]) -> list[str]:

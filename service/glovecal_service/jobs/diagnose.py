@@ -8,6 +8,7 @@ from typing import Any
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.model_recipe import declared_effects, repaired_takes, requested_effects
+from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.noise_floor import rotation_noise
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.known_effect import known_effects
@@ -65,7 +66,7 @@ def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> T
 
     model = work.on.model
     report("measuring the noise floors", 0.0)
-    floors = floors_deg(model, work.on.takes, work.seed)
+    floors = floors_of(model, work.on.takes)
     own = [effect_of_declaration(item) for item in work.declarations]
     with known_by_name([*declared_effects(model), *own]):
         found = diagnose(
@@ -73,7 +74,7 @@ def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> T
             model.layout,
             linear=model.method in ("raw", "linear"),
             known=known_effects(model),
-            noise_floor_deg=floors,
+            noise_floors=floors,
             seed=work.seed,
             cancelled=cancelled,
             report=report,
@@ -81,7 +82,7 @@ def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> T
     return TaskResult({}, DiagnosisView.of(found).document())
 
 
-def floors_deg(model: CalibrationModel, takes: Sequence[Take], seed: int) -> dict[str, float]:
-    """How small the model's errors can get on these takes, for each rotation of which that is known."""
-    noise = rotation_noise(residuals(model, takes), seed=seed)
-    return {name: item.floor.floor_deg for name, item in noise.items() if item.floor is not None}
+def floors_of(model: CalibrationModel, takes: Sequence[Take]) -> dict[str, NoiseFloor]:
+    """How small errors can get on these takes, for each rotation of which that is known."""
+    noise = rotation_noise(residuals(model, takes))
+    return {name: item.floor for name, item in noise.items() if item.floor is not None}

@@ -26,7 +26,18 @@ from glovecal_service.report.comparison_pictures import (
 from glovecal_service.report.effects import effect_card, parameters_of
 from glovecal_service.report.error_fall import lineage_fall
 from glovecal_service.report.fingertips import fingertips_part
-from glovecal_service.report.html import Fact, Section, beside, counted, figure, note, page, paragraph, table
+from glovecal_service.report.html import (
+    Fact,
+    Section,
+    beside,
+    counted,
+    figure,
+    listed,
+    note,
+    page,
+    paragraph,
+    table,
+)
 from glovecal_service.report.rotation_pictures import (
     error_against,
     error_by_wearing,
@@ -211,7 +222,7 @@ def _floor(floor: NoiseFloor | None) -> str:
     if floor is None:
         return "unknown"
     least = "at least " if floor.is_lower_bound else ""
-    return f"{least}{_with_interval(floor)}"
+    return f"{least}{_with_interval(floor)}{'' if floor.is_reliable else ', not reliable'}"
 
 
 def _with_interval(floor: NoiseFloor) -> str:
@@ -224,7 +235,12 @@ def _floors(where: WhereItFails) -> list[Markup]:
         every = (item.floor, *item.other_floors) if item.floor is not None else ()
         cells = {one.how: _with_interval(one) for one in every}
         rows.append((item.rotation, *(cells.get(how, "-") for how in ORDER)))
-    return [table(("rotation", *ORDER), rows), paragraph(FLOORS)]
+    doubts: dict[str, list[str]] = {}
+    for item in where.rotations:
+        for reason in item.floor.reasons if item.floor is not None else ():
+            doubts.setdefault(reason, []).append(item.rotation)
+    told = [f"Not reliable ({', '.join(names)}): {reason}." for reason, names in doubts.items()]
+    return [table(("rotation", *ORDER), rows), paragraph(FLOORS), *([listed(told)] if told else [])]
 
 
 def _stretches(where: WhereItFails) -> Markup:

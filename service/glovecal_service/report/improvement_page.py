@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
 from markupsafe import Markup
 
 from glovecal_service.report.caption import Caption
@@ -118,20 +117,11 @@ def band_of(found: Mapping[str, Any]) -> FloorBand | None:
 
 
 def _with_control(before: Mapping[str, Any], step: Mapping[str, Any]) -> float | None:
-    """Over all rotations, degrees: those the effect is on with its control, the others as they were.
-
-    Not above the error before: what made it worse would have been undone.
-    """
-    control, added = step.get("control_rmse_deg"), step["added"]
-    if control is None or not added or not before["rmse_deg"]:
+    """Over all rotations, degrees; not above the error before: what made it worse would have been undone."""
+    control = step.get("control_rmse_deg")
+    if control is None or not step["added"] or not before["rmse_deg"]:
         return None
-    share = control / before["rmse_deg"]
-    squares = [
-        (share * error) ** 2 if name in added["where"] else error**2
-        for name, error in before["per_rotation"].items()
-        if error is not None
-    ]
-    return min(float(np.sqrt(np.mean(squares))), before["rmse_deg"]) if squares else None
+    return min(control, before["rmse_deg"])
 
 
 def _steps(steps: Sequence[Mapping[str, Any]], method: str) -> Markup:

@@ -46,6 +46,7 @@ class TipFloorView(BaseModel):
     low_mm: float | None = Field(description="From the ends of the joints' 95 % intervals.")
     high_mm: float | None
     is_lower_bound: bool = Field(description="That of some joint is one.")
+    is_reliable: bool = Field(True, description="That of every joint is.")
 
 
 class TipErrorsView(BaseModel):

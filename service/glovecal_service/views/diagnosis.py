@@ -6,7 +6,9 @@ from typing import Any
 
 from pydantic import Field
 
+from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.diagnosis.diagnosis import Diagnosis, Verdict
+from glovecal_models.diagnosis.floor_ratio import FloorRatio
 from glovecal_models.diagnosis.text import (
     candidate_sentence,
     diagnosis_sentences,
@@ -19,12 +21,24 @@ from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.signature_effect import Finding
 from glovecal_service.views.hold_drift import HoldDriftView
 from glovecal_service.views.next_take import NextTakeView
+from glovecal_service.views.noise_floor import NoiseFloorView
 from glovecal_service.views.view import View
 
 
 class RotationErrorView(View):
     rmse_deg: float | None
     noise_floor_deg: float | None = None
+    floor: NoiseFloorView | None = Field(
+        None, description="Of errors that are not smoothed, as `compare` tells it of the same takes."
+    )
+
+
+def _rotation(rmse_deg: float, floor: NoiseFloor | None) -> RotationErrorView:
+    if floor is None:
+        return RotationErrorView(rmse_deg=rmse_deg, floor=None)
+    return RotationErrorView(
+        rmse_deg=rmse_deg, noise_floor_deg=floor.floor_deg, floor=NoiseFloorView.of(floor)
+    )
 
 
 class NamedEffectView(View):
@@ -129,17 +143,40 @@ class AssociationView(View):
     p_value: float | None = Field(description="Corrected for all columns and rotations tested.")
 
 
+class FloorRatioView(View):
+    """An error that is left, beside its noise floor."""
+
+    rmse_deg: float | None = Field(description="Held-out error, readings and reference smoothed.")
+    times_floor: float | None = Field(description="Over the noise floor.")
+    lower_times_floor: float | None = Field(
+        description="Its lower 95 % bound over the upper end of the floor's interval."
+    )
+    is_judgeable: bool = Field(description="Whether the floor is reliable and enough was measured.")
+
+    @classmethod
+    def of(cls, item: FloorRatio) -> FloorRatioView:
+        return cls(
+            rmse_deg=item.rmse_deg,
+            times_floor=item.times,
+            lower_times_floor=item.lower_times,
+            is_judgeable=item.is_judgeable,
+        )
+
+
 class UnexplainedResidualView(View):
     is_significant: bool
     sentence: str
     not_identifiable: str | None = Field(None, description="Why these takes cannot tell.")
     associations: list[AssociationView] = Field([])
+    floor_ratios: dict[str, FloorRatioView] = Field({}, description="For each rotation with a known floor.")
 
     @classmethod
-    def of(cls, residual: UnexplainedResidual) -> UnexplainedResidualView:
+    def of(cls, residual: UnexplainedResidual, is_noise: bool | None = None) -> UnexplainedResidualView:
+        """``is_noise``: of the errors shown beside it; None: the residual's own."""
         return cls(
             is_significant=residual.is_significant,
-            sentence=residual_sentence(residual),
+            sentence=residual_sentence(residual, is_noise),
+            floor_ratios={name: FloorRatioView.of(item) for name, item in residual.floor_ratios.items()},
             not_identifiable=residual_obstacle(residual),
             associations=[
                 AssociationView(
@@ -171,7 +208,7 @@ class DiagnosisView(View):
         held = diagnosis.hold_drift
         return cls(
             rotations={
-                name: RotationErrorView(rmse_deg=value, noise_floor_deg=diagnosis.noise_floor_deg.get(name))
+                name: _rotation(value, diagnosis.noise_floors.get(name))
                 for name, value in diagnosis.rmse_deg.items()
             },
             named=NamedEffectView.of(diagnosis),

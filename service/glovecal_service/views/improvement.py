@@ -9,11 +9,12 @@ from pydantic import BeforeValidator, Field
 
 from glovecal_models.diagnosis.diagnosis import Verdict
 from glovecal_models.improvement.improvement import AddedInStep, Improvement, Step
-from glovecal_models.improvement.text import improvement_sentences
+from glovecal_models.improvement.text import improvement_sentences, is_noise
 from glovecal_service.views.addition import AdditionView, ClaimView
 from glovecal_service.views.diagnosis import UnexplainedResidualView
 from glovecal_service.views.hold_drift import HoldDriftView
 from glovecal_service.views.next_take import NextTakeView
+from glovecal_service.views.noise_floor import NoiseFloorView
 from glovecal_service.views.renamed_keys import current_residual
 from glovecal_service.views.view import View
 
@@ -69,6 +70,9 @@ class ImprovementView(View):
     baselines: dict[str, float | None] = Field({}, description="Errors of simpler calibrations, degrees.")
     noise_floor_deg: dict[str, float | None]
     noise_floor_interval_deg: dict[str, list[float | None]] = Field({})
+    noise_floors: dict[str, NoiseFloorView] = Field(
+        {}, description="The same with how it was found and how far it can be trusted."
+    )
     stopped: str = Field(description="noise_floor, nothing_named, ambiguous or not_better.")
     undone: list[AdditionView]
     hold_drift: HoldDriftView | None = None
@@ -90,10 +94,13 @@ class ImprovementView(View):
             baselines=dict(found.baselines),
             noise_floor_deg={name: floor.floor_deg for name, floor in floors},
             noise_floor_interval_deg={name: [floor.low_deg, floor.high_deg] for name, floor in floors},
+            noise_floors={name: NoiseFloorView.of(floor) for name, floor in floors},
             stopped=found.stopped,
             undone=[AdditionView.of(item) for item in found.undone],
             hold_drift=None if held is None else HoldDriftView.of(held),
-            unexplained_residual=None if last is None else UnexplainedResidualView.of(last.residual),
+            unexplained_residual=None
+            if last is None
+            else UnexplainedResidualView.of(last.residual, is_noise(found)),
             next_take=NextTakeView.of(found.next_take),
             sentences=improvement_sentences(found),
         )

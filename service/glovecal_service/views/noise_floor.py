@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 from pydantic import BaseModel, Field
+
+from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_service.plain import plain
 
 
 class NoiseFloorView(BaseModel):
@@ -16,3 +21,12 @@ class NoiseFloorView(BaseModel):
     )
     pieces: int = Field(description="Holds, repeats or blocks of time that it was pooled from.")
     is_lower_bound: bool = Field(description="Autocorrelated noise is not included.")
+    is_reliable: bool = Field(True, description="Whether nothing speaks against it.")
+    reasons: list[str] = Field([], description="Why it is not reliable, each as the end of a sentence.")
+    estimate_deg: float | None = Field(
+        None, description="The estimate itself, where it lies above the error; a floor is never above it."
+    )
+
+    @classmethod
+    def of(cls, floor: NoiseFloor) -> NoiseFloorView:
+        return cls.model_validate(plain(asdict(floor)))

@@ -28,14 +28,17 @@ def slow() -> Series:
 
 @pytest.fixture
 def take_residuals() -> Callable[..., TakeResiduals]:
-    """A take of one rotation "A" and two sensors "A" and "B" from its angle, error and second sensor."""
+    """A take of one rotation "A" and two sensors "A" and "B" from its angle, error and second sensor.
+
+    Both sensors read the error too: no map of them is better than that.
+    """
 
     def make(
         angle: np.ndarray, error: np.ndarray, other: np.ndarray, name: str = "one", wearing: str = "monday",
         context: dict[str, np.ndarray] | None = None, poses: tuple[str, ...] | None = None,
     ) -> TakeResiduals:  # fmt: skip
         time = np.arange(len(angle)) / RATE_HZ
-        readings = np.column_stack([100 + np.nan_to_num(angle), 100 + other])
+        readings = np.column_stack([100 + np.nan_to_num(angle + error), 100 + np.nan_to_num(other + error)])
         take = Take(
             name=name, wearing=wearing, sensors=("A", "B"), time_s=time, readings=readings, rotations=("A",),
             reference_time_s=time, reference=angle[:, None], context=context or {}, poses=poses,

@@ -36,7 +36,7 @@ def fitted(takes: list[Take], layout: Layout) -> Residuals:
 
 @pytest.mark.parametrize("noise", [1.0, 6.0])
 def test_the_spread_of_like_poses_is_found(noise):
-    found = rotation_noise(fitted([poses(noise)], Layout.from_columns("x", "AB", ["BEND"])), seed=0)
+    found = rotation_noise(fitted([poses(noise)], Layout.from_columns("x", "AB", ["BEND"])))
     floor = found["BEND"].floor
     assert floor is not None
     assert floor.how == "near readings"
@@ -51,7 +51,7 @@ def test_a_robot_thumb_repeats_only_to_about_six_degrees():
     usable = usable_sensors(layout, takes)
     assert [item.sensor for item in usable.dead] == ["G08", "G15", "G16"]
     assert dead_sensor_sentences(usable, layout.rotations)[0].startswith("Dead sensors in these takes: G08")
-    found = rotation_noise(fitted(takes, usable.layout), seed=0)
+    found = rotation_noise(fitted(takes, usable.layout))
     floors = [found[name].floor for name in ("A12", "A13", "A14", "A15")]
     assert np.median([floor.floor_deg for floor in floors if floor is not None]) == pytest.approx(
         6.5, abs=1.5

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from glovecal_models.comparison.floor_estimate import NoiseFloor
-from glovecal_models.comparison.noise_floor import noise_floor, noise_floors
+from glovecal_models.comparison.noise_floor import noise_floor, rotation_noise
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 
 LEVELS = {"flat": 0.0, "fist": 80.0, "ok": 45.0}
@@ -28,13 +28,13 @@ def visited(
         pose = list(LEVELS)[visit % len(LEVELS)]
         off = 4.0 * (pose == "fist") + between * generator.normal()
         angle += [np.full(STAY, LEVELS[pose]), np.linspace(LEVELS[pose], 20, 15)]
-        error += [off + within * generator.normal(size=STAY), np.full(15, 9.0)]
+        error += [off + within * generator.normal(size=STAY), np.full(15, off)]
         poses += [pose] * STAY + [""] * 15
     return np.concatenate(angle), np.concatenate(error), tuple(poses)
 
 
 def by_poses(found: Residuals) -> NoiseFloor:
-    floors = noise_floors(found, "A", np.random.default_rng(3))
+    floors = rotation_noise(found)["A"].floors
     return next(floor for floor in floors if floor.how == "repeated poses")
 
 
@@ -85,7 +85,7 @@ def test_recordings_of_one_frame_a_pose_have_a_floor(
     angle = np.array([LEVELS[name] for name in names]) + 2.0 * generator.normal(size=len(names))
     error = 3.0 * generator.normal(size=len(names))
     found = together(take_residuals(angle, error, angle, poses=tuple(names.tolist())))
-    floor = noise_floor(found, "A", generator)
+    floor = noise_floor(found, "A")
     assert floor is not None
     assert floor.how == "repeated poses"
     assert floor.low_deg < 3.0 < floor.high_deg
@@ -96,5 +96,5 @@ def test_two_visits_are_too_few(
 ) -> None:
     angle, error, poses = visited(np.random.default_rng(7), 5, 0.5, 0.1)
     found = together(take_residuals(angle, error, angle, poses=poses))
-    floors = noise_floors(found, "A", np.random.default_rng(0))
+    floors = rotation_noise(found)["A"].floors
     assert "repeated poses" not in [floor.how for floor in floors]

@@ -93,8 +93,8 @@ def test_fingertips_of_a_whole_glove():
 
 def test_diagnose(diagnosis, model, takes):
     noise = rotation_noise(residuals(model.inner, takes))
-    floors = {name: item.floor.floor_deg for name, item in noise.items() if item.floor is not None}
-    theirs = diagnose(takes, model.layout, noise_floor_deg=floors)
+    floors = {name: item.floor for name, item in noise.items() if item.floor is not None}
+    theirs = diagnose(takes, model.layout, noise_floors=floors)
     ours = diagnosis.inner
     assert [item.rmse_deg for item in ours.assessments] == [item.rmse_deg for item in theirs.assessments]
     assert diagnosis_sentences(ours) == diagnosis_sentences(theirs)

@@ -1,7 +1,7 @@
 """All causes that can be hidden, by name, and the forms of each.
 
 Causes outside every catalogue of effects are here too: honest answers to them are "something is left that I
-do not know". They sit on one sensor or on all. Three have nothing recorded that could explain them; one
+do not know". They sit on one sensor or on all. Most have nothing recorded that could explain them; one
 follows a context column of an unfamiliar name, in a curve that rises and falls.
 """
 
@@ -93,6 +93,23 @@ def tilt(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np
     return signal + size * draws.signs() * np.sin(turn + draws.one("mounted_at", -1.5, 1.5))
 
 
+@form(Stage.WEARING, "Unrecorded bumps of a second on one sensor (ours).", touches="one")
+def short_bumps(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The glove catches now and then: one sensor is pushed for a second, at random times and either way."""
+    width_s, every_s = draws.one("width_s", 0.8, 1.2), draws.one("every_s", 6.0, 12.0)
+    pushed = np.zeros(scene.session_s.shape)
+    for row, start in enumerate(scene.starts):
+        random = draws.stream("bumps", start.key)
+        count = max(1, int(random.poisson(float(np.ptp(scene.time_s)) / every_s)))
+        for at, way in zip(
+            random.uniform(scene.time_s[0], scene.time_s[-1], count), random.choice([-1.0, 1.0], count),
+            strict=True,
+        ):  # fmt: skip
+            away = np.abs(scene.time_s - at) / width_s
+            pushed[row] += way * np.where(away < 0.5, np.cos(np.pi * away) ** 2, 0.0)
+    return signal + size * pushed[:, :, None]
+
+
 def _column_values(scene: Scene, draws: Draws) -> np.ndarray:
     """Another level in every take and a slow wander around it, shape (T, N)."""
     level = np.array([draws.stream("level", start.key).uniform(-1, 1) for start in scene.starts])
@@ -116,6 +133,7 @@ FORMS_BY_NAME: dict[str, tuple[Form, ...]] = {
     "posture_locked": (grip_pressure, thumb_across),
     "context": (context_hump, context_wave),
     "tilt": (tilt,),
+    "bumps": (short_bumps,),
 }
 
 

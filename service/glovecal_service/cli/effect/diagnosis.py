@@ -9,6 +9,7 @@ import typer
 
 from glovecal_service.cli.take.rows import find_takes
 from glovecal_service.cli.terminal.connection import connect
+from glovecal_service.cli.terminal.floor_doubts import print_floor_doubts
 from glovecal_service.cli.terminal.options import AsJson, Model
 from glovecal_service.cli.terminal.printing import err, out, print_json, print_table, text
 from glovecal_service.cli.terminal.waiting import wait_for_job
@@ -39,7 +40,8 @@ ASSOCIATIONS = {
 }
 LEGEND = (
     "Held-out error in degrees, readings and reference identically smoothed. A control has the same freedom "
-    "as its effect and cannot be right: what it saves, flexibility saves."
+    "as its effect and cannot be right: what it saves, flexibility saves. Noise floors are of "
+    "errors that are not smoothed."
 )
 Expressions = Annotated[
     list[str] | None,
@@ -89,6 +91,7 @@ def print_diagnosis(found: Mapping[str, Any]) -> None:
     out.print()
     rows = [{"rotation": name, **values} for name, values in rotations.items()]
     print_table(rows, ROTATIONS, empty="Nothing was measured.")
+    print_floor_doubts({name: values.get("floor") for name, values in rotations.items()})
     if found.get("hold_drift"):
         out.print(f"\n{found['hold_drift']['sentence']}")
     else:

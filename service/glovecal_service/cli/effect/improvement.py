@@ -13,6 +13,7 @@ from glovecal_service.cli.glove.layouts import layout_named
 from glovecal_service.cli.take.files import FileSubject
 from glovecal_service.cli.take.rows import find_takes
 from glovecal_service.cli.terminal.connection import connect
+from glovecal_service.cli.terminal.floor_doubts import print_floor_doubts
 from glovecal_service.cli.terminal.options import AsJson, subject_named
 from glovecal_service.cli.terminal.printing import err, out, print_json, print_table
 from glovecal_service.cli.terminal.refusal import Refusal
@@ -186,6 +187,7 @@ def _print(subject: str, method: str, result: Mapping[str, Any], *, active: bool
     print_table(rows, STEPS, empty="", folds="added")
     floors = ", ".join(f"{name} {value:.2f}" for name, value in (result["noise_floor_deg"] or {}).items())
     out.print(f"Noise floors (°): {floors or 'unknown'}")
+    print_floor_doubts(result["noise_floors"])
     out.print(f"Stopped: {STOPPED.get(result['stopped'], result['stopped'])}.")
     for sentence in result["sentences"]:
         err.print(sentence)

@@ -9,6 +9,7 @@ import typer
 from glovecal_service.cli.model.fingertips import print_fingertips, print_fingertips_beside
 from glovecal_service.cli.model.held_out_takes import HeldOutTakes, held_out_takes, warn_trained_on
 from glovecal_service.cli.terminal.connection import connect
+from glovecal_service.cli.terminal.floor_doubts import print_floor_doubts
 from glovecal_service.cli.terminal.options import AsJson, Models
 from glovecal_service.cli.terminal.printing import err, out, print_json, print_table
 from glovecal_service.cli.terminal.writing import Overwrite, Report, fetch_report, require_place, write_report
@@ -25,7 +26,10 @@ COLUMNS = {
     "baseline_deg": "spread",
     "count": "frames",
 }
-FLOOR = "95 % interval of the noise floor, how small the RMSE can get on these takes (> for a lower bound)"
+FLOOR = (
+    "95 % interval of the noise floor, how small the RMSE can get on these takes (>: a lower bound; ?: not "
+    "reliable)"
+)
 LEGEND = (
     f"Degrees. floor: {FLOOR}; mean: of |error|; 95 %: of frames are below; in sd: share of errors within "
     "the claimed standard deviation, 0.68 is truthful; NLPD: mean negative log predictive density in nats, "
@@ -79,6 +83,7 @@ def _print(
         rows = [{**row, "floor": _interval(row["floor"])} for row in _rows(next(iter(results.values())))]
         print_table(rows, COLUMNS, empty="Nothing was measured.")
         err.print(LEGEND)
+        print_floor_doubts({row["rotation"]: row["floor"] for row in _rows(next(iter(results.values())))[1:]})
         [(name, result)] = results.items()
         print_fingertips(result["fingertips"], documents[name]["subject"])
     else:
@@ -99,9 +104,10 @@ def _rows(result: dict[str, Any]) -> list[dict[str, Any]]:
 def _interval(floor: dict[str, Any] | None) -> str | None:
     if floor is None:
         return None
+    doubt = "" if floor["is_reliable"] else "?"
     if floor["is_lower_bound"]:
-        return f">{floor['floor_deg']:.2f}"
-    return f"{floor['low_deg']:.2f}-{floor['high_deg']:.2f}"
+        return f">{floor['floor_deg']:.2f}{doubt}"
+    return f"{floor['low_deg']:.2f}-{floor['high_deg']:.2f}{doubt}"
 
 
 def _print_side_by_side(documents: dict[str, dict[str, Any]], results: dict[str, dict[str, Any]]) -> None:

@@ -1,0 +1,94 @@
+"""When a noise floor is not reliable: what holds and repeats say then is not the noise of the measurement.
+
+* Clocks that disagree: while the reference says that a joint is still, the readings come from another moment.
+* Few frames a second: the hand moves between any two of them.
+* A wandering reference: it moves while no sensor does, which a hold's straight line takes out of the floor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from glovecal_models.comparison.holds import Hold
+from glovecal_models.comparison.limits import ComparisonLimits
+from glovecal_models.comparison.residuals import TakeResiduals
+from glovecal_models.takes.take import Take
+
+FURTHEST_S = 1.5
+SHIFT_S = 0.03
+SHORTEST_S = 4.0
+"""Of a take, below which nothing is said of its clocks."""
+MOST_ROWS_S = 30.0
+"""Rows a second; more say nothing new of a shift."""
+RIDGE = 1e-3
+FEWEST_WANDERING = 4
+"""Holds."""
+
+
+def slow_sampling(takes: Sequence[TakeResiduals], limits: ComparisonLimits) -> tuple[str, ...]:
+    """Ends of sentences about estimates from neighbouring frames."""
+    times = [item.take.time_s for item in takes if len(item.take.time_s) > 2]
+    rate = float(np.median([1.0 / np.median(np.diff(time)) for time in times])) if times else 0.0
+    if not 0 < rate < limits.slowest_hz:
+        return ()
+    return (f"only {rate:.2g} frames a second were recorded",)
+
+
+def clock_doubts(takes: Sequence[TakeResiduals], limits: ComparisonLimits) -> tuple[str, ...]:
+    """Ends of sentences about every estimate."""
+    apart = [_apart_s(item.take, item.measured, limits) for item in takes]
+    judged = [one for one in apart if one is not None]
+    moved = [one for one in judged if abs(one) >= limits.clock_least_s]
+    if not moved or 2 * len(moved) < len(judged):
+        return ()
+    size = float(np.median(np.abs(moved)))
+    return (
+        f"the clocks are not repaired: readings and angles are {size:.2f} s apart in {len(moved)} of"
+        f" {len(judged)} takes",
+    )
+
+
+def _apart_s(take: Take, measured: np.ndarray, limits: ComparisonLimits) -> float | None:
+    """By how much the reference has to be moved to fit a straight line of all sensors best; 0 where that
+    hardly helps, None where the take is too short or stands still to tell."""
+    furthest = min(FURTHEST_S, 0.25 * take.duration_s)
+    usable = np.flatnonzero(np.isfinite(measured).sum(axis=0) >= 0.8 * len(measured))
+    if take.duration_s < SHORTEST_S or not len(usable):
+        return None
+    step = 1.0 / MOST_ROWS_S
+    time = np.arange(take.time_s[0] + furthest, take.time_s[-1] - furthest, step)
+    moving = np.flatnonzero(np.ptp(take.readings, axis=0) > 0)
+    if len(time) < 10 * (len(moving) + 1) or not len(moving):
+        return None
+    read = np.column_stack([np.interp(time, take.time_s, take.readings[:, at]) for at in moving])
+    read = (read - read.mean(axis=0)) / np.maximum(read.std(axis=0), 1e-9)
+    inverse = np.linalg.inv(read.T @ read + RIDGE * len(time) * np.eye(len(moving)))
+    count = int(furthest / SHIFT_S)
+    shifts = SHIFT_S * np.arange(-count, count + 1)
+    left = np.zeros(len(shifts))
+    for column in usable:
+        known = np.isfinite(measured[:, column])
+        angle = np.array([np.interp(time + by, take.time_s[known], measured[known, column]) for by in shifts])
+        angle = angle - angle.mean(axis=1, keepdims=True)
+        square = np.einsum("dn,dn->d", angle, angle)
+        crossed = angle @ read
+        explained = np.einsum("dp,pq,dq->d", crossed, inverse, crossed)
+        left += 1.0 - explained / np.maximum(square, 1e-9)
+    best = int(np.argmin(left))
+    saved = 1.0 - left[best] / max(left[count], 1e-12)
+    return float(shifts[best]) if saved >= limits.clock_least_share else 0.0
+
+
+def hold_doubts(still: Sequence[Hold], floor_deg: float, limits: ComparisonLimits) -> tuple[str, ...]:
+    """Of one rotation; ``still``: its holds in which no sensor moves."""
+    if len(still) < FEWEST_WANDERING:
+        return ()
+    angle = [hold.drift_deg(hold.measured) for hold in still]
+    error = [hold.drift_deg(hold.error) for hold in still]
+    mapped = [one + other for one, other in zip(angle, error, strict=True)]
+    moves, misses, follows = (float(np.sqrt(np.mean(np.square(each)))) for each in (angle, error, mapped))
+    if misses < limits.wander_times * floor_deg or moves < 2.0 * follows:
+        return ()
+    return (f"the reference wanders: {moves:.2f} degrees within holds in which no sensor moves",)
