@@ -24,7 +24,7 @@ from glovecal_models.takes.take import Take
 
 MODELS = Path(glovecal_models.__file__).parent
 APART = ("effects", "covariance", "regression")
-MOST_IN_DIAGNOSE = 31
+MOST_IN_DIAGNOSE = 33
 """Six of them are the noise floor, which every verb asks for in the same way."""
 MOST_IN_TRAIN = 14
 SENSORS = ("I_MCP", "I_PIP")

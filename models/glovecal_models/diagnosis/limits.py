@@ -77,8 +77,8 @@ class DiagnosisLimits(SignificanceLimits):
         1.45,
         "times the upper end of the noise floor's interval",
         "A smoothed held-out error whose lower bound is above this is no healthy glove's.",
-        "Lower bounds of 8 simulated gloves without a cause: 0.72 to 1.16; of 10 with bumps of a second every 6"
-        " to 12 s on one sensor, 1 and 2 degrees, 1.57 to 3.5 (2026-11-22).",
+        "Lower bounds of 11 simulated gloves without a cause: 0.69 to 1.16; of 10 with bumps of a second"
+        " every 6 to 12 s on one sensor, 1 and 2 degrees, 1.57 to 3.5 (2026-11-22).",
     )
     healthy_shared_deg: float = limit(
         0.35, "degrees", "What several joints share is no healthy glove's above this.", CHOSEN

@@ -14,6 +14,7 @@ from glovecal_models.diagnosis.slow_error import SecondMeans, shared_error, slow
 from glovecal_models.diagnosis.text import residual_obstacle, residual_sentence
 from glovecal_models.diagnosis.unexplained_residual import UnexplainedResidual
 from glovecal_models.layout import Layout
+from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 from glovecal_models.takes.take import Take
@@ -154,6 +155,17 @@ def test_without_its_column_the_cause_was_not_recorded(healthy):
     assert found.is_significant
     assert found.associations == ()
     assert residual_sentence(found).endswith("it is associated with none of the recorded columns.")
+
+
+def test_short_bumps_on_one_sensor_are_no_noise():
+    """They are rare, on one joint alone and gone within a second: only their size beside the floor tells."""
+    plan = SessionPlan(seed=22, sensors=SENSORS, wearings=3, takes_per_wearing=3, take_s=30.0)
+    takes = record_session(plan, (Cause("unknown:bumps", strength_deg=2.0, channels=("I_PIP",)),)).takes
+    found = residual_of(takes)
+    assert found.is_significant
+    assert found.above_floor == ("I_PIP",)
+    assert not found.is_within_floors
+    assert "times its noise floor" in residual_sentence(found)
 
 
 def test_a_column_that_wanders_by_itself_is_not_accused(healthy):
