@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from glovecal_models.calibration.limits import TrainingLimits
+from glovecal_models.ceiling.limits import CeilingLimits
 from glovecal_models.comparison.limits import ComparisonLimits
 from glovecal_models.diagnosis.limits import DiagnosisLimits
 from glovecal_models.effects.base.limits import SignificanceLimits
@@ -23,6 +24,7 @@ STAGES: Mapping[str, type[Any]] = {
     "Effects": SignificanceLimits,
     "Diagnosis": DiagnosisLimits,
     "Noise floors and where a model fails": ComparisonLimits,
+    "Ceiling": CeilingLimits,
     "Improvement": ImprovementLimits,
     "Sampling": SamplingLimits,
     "Training": TrainingLimits,

@@ -122,13 +122,16 @@ def improve(
     samples: int = 2000,
     max_steps: int = 6,
     seed: int = 0,
+    ceiling: bool = False,
     cancelled: Cancel | None = None,
     progress: Progress = None,
 ) -> Improvement:
     """Train, then diagnose, add and verify until the noise floor, or until nothing more can be named.
 
     ``layout`` and ``method`` as for ``train``. Errors are on ``held_out`` when it is given, else on takes
-    held out of each fit. At most ``max_steps`` effects are added. Raises NotTrainable, BadInput, Cancelled.
+    held out of each fit. At most ``max_steps`` effects are added.
+    ``ceiling``: see whether anything is left to gain at the end (pip extra ``ceiling``).
+    Raises NotTrainable, BadInput, Cancelled.
     """
     from glovecal_models.calibration.training_settings import TrainingSettings
     from glovecal_models.improvement.improve import improve as improve_inner
@@ -143,6 +146,7 @@ def improve(
             holdout=() if held_out is None else takes_in(held_out),
             max_steps=max_steps,
             seed=seed,
+            ceiling=ceiling,
             cancelled=cancelled,
             report=report,
         )

@@ -95,21 +95,27 @@ def errors_of(
     fit: EffectFit, takes: PreparedTakes, rotations: Sequence[str], settings: TrainingSettings
 ) -> dict[str, np.ndarray]:
     """For each rotation the errors (predicted minus measured) of all measured frames, degrees."""
+    errors = np.concatenate(frame_errors_of(fit, takes, rotations, settings))
+    return {name: part[np.isfinite(part)] for name, part in zip(rotations, errors.T, strict=True)}
+
+
+def frame_errors_of(
+    fit: EffectFit, takes: PreparedTakes, rotations: Sequence[str], settings: TrainingSettings
+) -> list[np.ndarray]:
+    """For each take (N, R), predicted minus measured, degrees; NaN where nothing was measured."""
     base = {
         name: own_signals(takes, correspondence_for(takes, name, settings), fit.regressor(name))[0]
         for name in rotations
     }
-    found: dict[str, list[np.ndarray]] = {name: [] for name in rotations}
     correction = EffectCorrection(fit.effects, list(rotations), takes.scale)
     targets = {name: takes.target(name) for name in rotations}
+    found = []
     for number, take in enumerate(takes.takes):
         mean = np.column_stack([base[name][number] for name in rotations])
         readings = takes.readings[number]
         mean += correction.of_take(take.time_s, mean, readings, take.context, take.wearing).degrees
-        for column, name in enumerate(rotations):
-            error = mean[:, column] - targets[name][number]
-            found[name].append(error[np.isfinite(error)])
-    return {name: np.concatenate(parts) for name, parts in found.items()}
+        found.append(mean - np.column_stack([targets[name][number] for name in rotations]))
+    return found
 
 
 def _cut(takes: PreparedTakes) -> tuple[PreparedTakes, np.ndarray]:

@@ -22,6 +22,8 @@ from glovecal_models.calibration.training import noise_of, train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.calibration.unseen_wearing import unseen_wearing
 from glovecal_models.calibration.usable_sensors import usable_sensors
+from glovecal_models.ceiling.black_box_ceiling import black_box_ceiling
+from glovecal_models.ceiling.ceiling import Ceiling
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.noise_floor import rotation_noise
 from glovecal_models.comparison.residuals import residuals
@@ -38,7 +40,7 @@ from glovecal_models.improvement.proposals import Proposed, repairs, widenings
 from glovecal_models.improvement.remove_effect import without_redundant
 from glovecal_models.improvement.step_errors import baselines, step_errors, why_stopped
 from glovecal_models.layout import Layout
-from glovecal_models.progress import Cancel, Report
+from glovecal_models.progress import Cancel, Report, part
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.take_warnings import take_warnings
 
@@ -54,12 +56,14 @@ def improve(
     seed: int = 0,
     take_hashes: Sequence[str] = (),
     limits: ImprovementLimits = IMPROVEMENT_LIMITS,
+    ceiling: bool = False,
     cancelled: Cancel | None = None,
     report: Report | None = None,
 ) -> Improvement:
     """Train, then add what the diagnosis names while it pays. Raises NotTrainable, BadInput, Cancelled.
 
-    Errors are on ``holdout`` when given, else on held-out takes.
+    Errors are on ``holdout`` when given, else on held-out takes. ``ceiling``: see at the end whether anything
+    is left to gain from what was recorded; needs the extra ``ceiling`` of this package.
     """
     settings = settings or TrainingSettings()
     loop = _Loop(
@@ -77,7 +81,7 @@ def improve(
     loop.start()
     while len(loop.steps) <= max_steps and loop.go_on():
         pass
-    return loop.finished()
+    return loop.finished(ceiling=ceiling)
 
 
 class _Loop:
@@ -155,17 +159,24 @@ class _Loop:
         self.stopped = "nothing_named"
         return self._add_widenings()
 
-    def finished(self) -> Improvement:
+    def finished(self, *, ceiling: bool) -> Improvement:
         """Sum up."""
         floors, limits = self._floors(), self.limits.comparison
         stopped = why_stopped(self.stopped, self.steps, floors, self.diagnosis, limits)
         names = trained_rotations(self.steps[0].model)
         scale = baselines(self.takes, self.layout, names, self.settings, self.holdout)
+        found = self._ceiling() if ceiling else None
         self._say("done", 1.0)
         return Improvement(
             tuple(self.steps), floors, stopped, self.diagnosis, tuple(self.trials), scale,
             tuple(take_warnings(self.takes)), self.usable,
-            self.takes[0].duration_s if len(self.takes) == 1 and not self.holdout else None,
+            self.takes[0].duration_s if len(self.takes) == 1 and not self.holdout else None, found,
+        )  # fmt: skip
+
+    def _ceiling(self) -> Ceiling:
+        return black_box_ceiling(
+            self.steps[-1].model, self.takes, self.settings, seed=self.seed,
+            cancelled=self.cancelled, report=part(self.report, 0.9, 1.0, "ceiling"),
         )  # fmt: skip
 
     def _floors(self) -> dict[str, NoiseFloor]:

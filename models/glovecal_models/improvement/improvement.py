@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.usable_sensors import UsableSensors
+from glovecal_models.ceiling.ceiling import Ceiling
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.diagnosis.diagnosis import Diagnosis, Verdict
 from glovecal_models.diagnosis.next_take import NextTake
@@ -101,6 +102,8 @@ class Improvement:
     usable_sensors: UsableSensors | None = None
     only_take_s: float | None = None
     """Length of the only take, where errors are on held-out pieces of it."""
+    ceiling: Ceiling | None = None
+    """Of the last model; None: not asked for."""
 
     @property
     def models(self) -> tuple[CalibrationModel, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from glovecal_models.calibration.text import dead_sensor_sentences, wearing_sentences
+from glovecal_models.ceiling.text import ceiling_sentence, not_left_to_gain
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.noise_floor import is_at_floor
 from glovecal_models.comparison.text import floor_text
@@ -91,6 +92,8 @@ def improvement_sentences(improvement: Improvement) -> list[str]:
         sentences += [item for item in _trial_sentences(trial) if item not in sentences]
     if last is not None:
         sentences += _closing_sentences(last, improvement)
+    if improvement.ceiling is not None:
+        sentences.append(ceiling_sentence(improvement.ceiling))
     return sentences
 
 
@@ -120,6 +123,8 @@ def _closing_sentences(diagnosis: Diagnosis, improvement: Improvement) -> list[s
         sentences.append(nothing_named_sentence(diagnosis))
     sentences += not_identifiable_sentences(diagnosis.not_identifiable)
     sentences.append(residual_sentence(diagnosis.residual, is_noise(improvement)))
+    if diagnosis.residual.is_significant:
+        sentences += not_left_to_gain(improvement.ceiling)
     if held is None:
         sentences += [*_repeatability_sentences(floors), _remaining_sentence(last.per_rotation, floors)]
     return sentences

@@ -19,7 +19,7 @@ from glovecal_service.cli import demo, serve
 from glovecal_service.cli.effect import catalogue, changes, diagnosis, improvement
 from glovecal_service.cli.glove import capture, find_port, layouts, recordings, watch
 from glovecal_service.cli.job import jobs
-from glovecal_service.cli.model import comparison, explain, models, quick_check, training, where
+from glovecal_service.cli.model import ceiling, comparison, explain, models, quick_check, training, where
 from glovecal_service.cli.sampling import samplings
 from glovecal_service.cli.subject import subjects
 from glovecal_service.cli.take import takes
@@ -51,6 +51,7 @@ app.command("quick-check")(quick_check.quick_check)
 app.command("compare")(comparison.compare)
 app.command("where")(where.where)
 app.command("explain")(explain.explain)
+app.command("ceiling")(ceiling.ceiling)
 app.command("diagnose")(diagnosis.diagnose)
 app.command("add-effect")(changes.add_effect)
 app.command("remove-effect")(changes.remove_effect)

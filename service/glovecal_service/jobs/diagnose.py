@@ -15,6 +15,7 @@ from glovecal_models.diagnosis.known_effect import known_effects
 from glovecal_models.effects.catalogue import effect_of_declaration, known_by_name
 from glovecal_models.progress import Report
 from glovecal_models.takes.take import Take
+from glovecal_service.jobs.ceiling import known_ceiling
 from glovecal_service.jobs.job_kind import JobPlan, Step, Task, TaskResult
 from glovecal_service.jobs.model_work import ModelWork, takes_of, text_in
 from glovecal_service.jobs.task_key import task_key
@@ -50,6 +51,7 @@ class DiagnoseJob:
         def finish(results: Sequence[TaskResult]) -> dict[str, Any]:
             named = [{"id": take.id, "name": take.name} for take in takes]
             facts = {**results[0].facts, "model": record.id, "takes": named}
+            facts["ceiling"] = known_ceiling(store, record)
             return DiagnosisResult.model_validate(facts).document()
 
         return JobPlan(

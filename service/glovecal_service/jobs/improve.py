@@ -36,11 +36,12 @@ class ImprovementWork:
     settings: TrainingSettings
     most_steps: int
     seed: int
+    ceiling: bool
 
 
 class ImproveJob:
     """Payload: ``subject``, ``layout``, ``takes`` and ``holdout`` (ids), ``method``, ``samples``,
-    ``max_steps``, ``seed``, ``activate`` (the last model).
+    ``max_steps``, ``seed``, ``ceiling`` (whether to ask for it at the end), ``activate`` (the last model).
 
     Result: ``ImprovementView``; every step's model is stored, each the next one's parent.
     """
@@ -60,6 +61,7 @@ class ImproveJob:
             "settings": asdict(work.settings),
             "most_steps": work.most_steps,
             "seed": work.seed,
+            "ceiling": work.ceiling,
         }
 
         def finish(results: Sequence[TaskResult]) -> dict[str, Any]:
@@ -89,6 +91,7 @@ def run(work: ImprovementWork, cancelled: Callable[[], bool], report: Report) ->
         max_steps=work.most_steps,
         seed=work.seed,
         take_hashes=work.take_hashes,
+        ceiling=work.ceiling,
         cancelled=cancelled,
         report=report,
     )
@@ -111,6 +114,7 @@ def _work(
         TrainingSettings(**chosen),
         int(payload.get("max_steps", MOST_STEPS)),
         int(payload.get("seed", 0)),
+        bool(payload.get("ceiling", False)),
     )
 
 
@@ -131,6 +135,8 @@ def _keep(
         facts: dict[str, Any] = {"held_out_rmse_deg": step["rmse_deg"], "per_rotation": step["per_rotation"]}
         if step["added"] is not None:
             facts["addition"] = step["added"]
+        if number == len(result.facts["steps"]) - 1 and result.facts.get("ceiling"):
+            facts["ceiling"] = result.facts["ceiling"]
         content = np.frombuffer(dump(model), np.uint8)
         parent = keep_child(store, content, layout, takes, settings, facts).id
         steps.append({**step, "model": parent})

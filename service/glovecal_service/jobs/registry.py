@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from glovecal_service.jobs.add_effect import AddEffectJob
+from glovecal_service.jobs.ceiling import CeilingJob
 from glovecal_service.jobs.diagnose import DiagnoseJob
 from glovecal_service.jobs.improve import ImproveJob
 from glovecal_service.jobs.job_kind import JobKind
@@ -12,6 +13,7 @@ from glovecal_service.jobs.train import TrainJob
 KINDS: dict[str, JobKind] = {
     "train": TrainJob(),
     "diagnose": DiagnoseJob(),
+    "ceiling": CeilingJob(),
     "add_effect": AddEffectJob(),
     "remove_effect": RemoveEffectJob(),
     "improve": ImproveJob(),

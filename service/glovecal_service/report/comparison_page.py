@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from markupsafe import Markup
 
@@ -72,11 +73,12 @@ def report_page(
     ancestors: Sequence[CalibrationModel] = (),
     simpler: Mapping[str, CalibrationModel] | None = None,
     dimensions: HandDimensions | None = None,
+    ceiling: Mapping[str, Any] | None = None,
 ) -> str:
     """HTML, ``main`` looked at closely. Raises LayoutMismatch, and BadInput when nothing was measured.
 
     ``ancestors``, oldest first, and ``simpler`` calibrations show how the error fell down to ``main``.
-    ``dimensions`` of the subject's hand, for the errors of fingertips.
+    ``dimensions`` of the subject's hand, for the errors of fingertips; ``ceiling`` of ``main``, where known.
     """
     found = residuals(main.model, takes)
     noise = rotation_noise(found)
@@ -97,7 +99,10 @@ def report_page(
         Section("Details", [_details(main, others, takes)]),
     ]
     title = f"Errors of {main.title} ({counted(len(takes), 'take')})"
-    return page(title, _summary(main, numbers, where), sections, notes=_notes(main, others, takes))
+    summary = _summary(main, numbers, where)
+    if ceiling is not None:
+        summary.insert(-1, Fact("Ceiling", ceiling["sentence"]))
+    return page(title, summary, sections, notes=_notes(main, others, takes))
 
 
 def _summary(main: ReportedModel, numbers: Comparison, where: WhereItFails) -> list[Fact]:

@@ -125,6 +125,8 @@ def _summary(found: Mapping[str, Any]) -> list[Fact]:
         name, error, floor = _worst(rotations)
         beside = "" if floor is None else f" (noise floor {floor:.2f})"
         facts += [Fact("Size", f"{error:.2f} degrees{beside}"), Fact("Place", f"largest error at {name}")]
+    if found.get("ceiling"):
+        facts.append(Fact("Ceiling", found["ceiling"]["sentence"]))
     return [*facts, Fact("Next", next_command(str(found.get("model", "MODEL")), found), is_command=True)]
 
 

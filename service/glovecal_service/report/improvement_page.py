@@ -76,6 +76,8 @@ def _summary(found: Mapping[str, Any], method: str) -> list[Fact]:
     if errors:
         worst = max(errors, key=lambda name: errors[name])
         facts.append(Fact("Place", f"largest remaining error at {worst}: {errors[worst]:.2f} degrees"))
+    if found.get("ceiling"):
+        facts.append(Fact("Ceiling", found["ceiling"]["sentence"]))
     return [*facts, Fact("Next", _next(found), is_command=True)]
 
 

@@ -24,6 +24,7 @@ from glovecal_service.rest.http.request_guard import RequestGuard, is_loopback
 from glovecal_service.rest.http.upload_folder import UploadFolder
 from glovecal_service.rest.job import jobs
 from glovecal_service.rest.model import (
+    ceiling,
     comparison,
     explanation,
     models,
@@ -44,7 +45,7 @@ BODY_PATIENCE_S = 30.0
 ROUTERS = (
     *(subjects, layouts, recordings, samplings),
     *(clocks, holds, examination, table_import, takes, reference, uploads),
-    *(training, models, predictions, comparison, where, diagnosis, changes, catalogue, improvement),
+    *(training, models, predictions, comparison, where, ceiling, diagnosis, changes, catalogue, improvement),
     *(explanation, quick_check, next_steps),
     *(jobs, health),
 )

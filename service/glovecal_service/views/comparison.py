@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -12,6 +12,7 @@ from glovecal_models.comparison.compare import Comparison
 from glovecal_models.comparison.fingertips import FingertipErrors
 from glovecal_models.comparison.text import fingertips_sentence, wearing_error_sentences
 from glovecal_service.plain import plain
+from glovecal_service.views.ceiling import CeilingView, ceiling_view
 from glovecal_service.views.noise_floor import NoiseFloorView
 
 
@@ -110,9 +111,17 @@ class ComparisonView(BaseModel):
         description="Measured frames, by rotation, that are not compared: faulty sensors, repeated frames."
     )
     trained_on: list[str] = Field(description="Takes among those given that the model was trained on.")
+    ceiling: CeilingView | None = Field(
+        None, description="On the takes it was asked for; null: not asked for yet."
+    )
 
 
-def comparison_view(found: Comparison, model: str, trained_on: Sequence[str]) -> ComparisonView:
+def comparison_view(
+    found: Comparison,
+    model: str,
+    trained_on: Sequence[str],
+    ceiling: Mapping[str, Any] | None = None,
+) -> ComparisonView:
     """Of the model with the id ``model``."""
     facts = plain(asdict(found))
     unseen = found.unseen_wearing
@@ -121,6 +130,7 @@ def comparison_view(found: Comparison, model: str, trained_on: Sequence[str]) ->
         "sentences": wearing_error_sentences(found),
     }
     facts |= {"fingertips": _fingertips(found.fingertips), "model": model, "trained_on": list(trained_on)}
+    facts["ceiling"] = ceiling_view(ceiling)
     return ComparisonView.model_validate(facts)
 
 

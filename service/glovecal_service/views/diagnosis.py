@@ -19,6 +19,7 @@ from glovecal_models.diagnosis.text import (
 from glovecal_models.diagnosis.unexplained_residual import UnexplainedResidual
 from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.signature_effect import Finding
+from glovecal_service.views.ceiling import CeilingView
 from glovecal_service.views.hold_drift import HoldDriftView
 from glovecal_service.views.next_take import NextTakeView
 from glovecal_service.views.noise_floor import NoiseFloorView
@@ -235,3 +236,4 @@ class DiagnosisResult(DiagnosisView):
 
     model: str
     takes: list[TakeNamed] = Field([])
+    ceiling: CeilingView | None = Field(None, description="Of the model; null: not asked for yet.")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -12,6 +12,7 @@ from glovecal_models.comparison.cross_validation_difference import CrossValidati
 from glovecal_models.comparison.text import cross_validation_sentences, rotation_sentence, wearings_sentence
 from glovecal_models.comparison.where_it_fails import RotationFindings, WhereItFails, is_structure
 from glovecal_service.plain import plain
+from glovecal_service.views.ceiling import CeilingView, ceiling_view
 from glovecal_service.views.noise_floor import NoiseFloorView
 
 
@@ -95,6 +96,9 @@ class FailuresView(BaseModel):
         None, description="Null where it was not asked for, or there are no two halves."
     )
     sentences: list[str] = Field([], description="About the cross-validation difference, if asked for.")
+    ceiling: CeilingView | None = Field(
+        None, description="On the takes it was asked for; null: not asked for yet."
+    )
 
 
 def with_cross_validation(view: FailuresView, found: CrossValidationDifference | None) -> FailuresView:
@@ -112,7 +116,12 @@ def with_cross_validation(view: FailuresView, found: CrossValidationDifference |
     return view.model_copy(update={"cross_validation_difference": shown, "sentences": sentences})
 
 
-def failures_view(found: WhereItFails, model: str, trained_on: Sequence[str]) -> FailuresView:
+def failures_view(
+    found: WhereItFails,
+    model: str,
+    trained_on: Sequence[str],
+    ceiling: Mapping[str, Any] | None = None,
+) -> FailuresView:
     """Of the model with the id ``model``."""
     return FailuresView.model_validate(
         {
@@ -120,6 +129,7 @@ def failures_view(found: WhereItFails, model: str, trained_on: Sequence[str]) ->
             "rotations": [_rotation(item) for item in found.rotations],
             "stretches": plain([asdict(item) for item in found.stretches]),
             "trained_on": list(trained_on),
+            "ceiling": ceiling_view(ceiling),
         }
     )
 

@@ -11,6 +11,7 @@ from glovecal_models.diagnosis.diagnosis import Verdict
 from glovecal_models.improvement.improvement import AddedInStep, Improvement, Step
 from glovecal_models.improvement.text import improvement_sentences, is_noise
 from glovecal_service.views.addition import AdditionView, ClaimView
+from glovecal_service.views.ceiling import CeilingView
 from glovecal_service.views.diagnosis import UnexplainedResidualView
 from glovecal_service.views.hold_drift import HoldDriftView
 from glovecal_service.views.next_take import NextTakeView
@@ -79,6 +80,7 @@ class ImprovementView(View):
     unexplained_residual: Annotated[UnexplainedResidualView | None, BeforeValidator(current_residual)] = (
         Field(None, description="Of the last diagnosis.")
     )
+    ceiling: CeilingView | None = Field(None, description="Of the last model; null: not asked for.")
     next_take: NextTakeView | None
     sentences: list[str]
 
@@ -102,5 +104,6 @@ class ImprovementView(View):
             if last is None
             else UnexplainedResidualView.of(last.residual, is_noise(found)),
             next_take=NextTakeView.of(found.next_take),
+            ceiling=CeilingView.of(found.ceiling),
             sentences=improvement_sentences(found),
         )

@@ -8,12 +8,14 @@ from typing import Any
 from pydantic import ValidationError
 
 from glovecal_service.views.addition import AdditionResult
+from glovecal_service.views.ceiling import CeilingResult
 from glovecal_service.views.diagnosis import DiagnosisResult
 from glovecal_service.views.improvement import ImprovementView
 from glovecal_service.views.view import View
 
 VIEW_OF: Mapping[str, type[View]] = {
     "diagnose": DiagnosisResult,
+    "ceiling": CeilingResult,
     "improve": ImprovementView,
     "add_effect": AdditionResult,
 }

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from glovecal_service.cli.model.ceiling import Ceiling, print_ceiling, wait_for_ceiling
 from glovecal_service.cli.take.rows import find_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.floor_doubts import print_floor_doubts
@@ -57,6 +58,7 @@ def diagnose(
     ] = None,
     expression: Expressions = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the controls.")] = 0,
+    ceiling: Ceiling = False,
     report: Report = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
@@ -68,6 +70,8 @@ def diagnose(
         document = service.get(f"/models/{model}")
         rows = find_takes(service.get("/takes"), take or [])
         body: dict[str, Any] = {"takes": [row["id"] for row in rows] or None, "seed": seed}
+        if ceiling:
+            wait_for_ceiling(service, model, [row["id"] for row in rows], quiet=as_json)
         body["effects"] = [{"declaration": item} for item in expression or []]
         job = service.post(f"/models/{model}/diagnose", body)["id"]
         found = wait_for_job(service, job, quiet=as_json)["result"]
@@ -80,6 +84,7 @@ def diagnose(
         takes = found.get("takes") or []
         out.print(f"Model {model[:12]} ({document['method']}) of {document['subject']}, {len(takes)} takes:")
         print_diagnosis(found)
+        print_ceiling(found.get("ceiling"))
         out.print(f"\nNext: {next_command(document['id'], found)}")
 
 

@@ -90,6 +90,9 @@ def improve(
     samples: Annotated[int, typer.Option(min=10, max=5000, help="Most samples for one rotation.")] = 2000,
     max_steps: Annotated[int, typer.Option(min=0, max=20, help="Effects to add at most.")] = 6,
     seed: Annotated[int, typer.Option(min=0, help="Of what is chosen at random.")] = 0,
+    ceiling: Annotated[
+        bool, typer.Option(help="Ask at the end whether anything is left to gain from what was recorded.")
+    ] = True,
     spread_equal_times: Annotated[
         bool,
         typer.Option("--spread-equal-times", help="Frames stamped in batches: spread each up to the next."),
@@ -112,6 +115,7 @@ def improve(
             service, takes or [], holdout or [], take or [], subject, layout, spread=spread_equal_times
         )
         options = {"method": method, "samples": samples, "max_steps": max_steps, "seed": seed}
+        options["ceiling"] = ceiling
         job = service.post("/improve", {**chosen, **options, "activate": activate})["id"]
         result = wait_for_job(service, job, quiet=as_json)["result"]
         page = fetch_job_report(service, job) if report is not None else b""

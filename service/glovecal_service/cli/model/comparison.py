@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
+from glovecal_service.cli.model.ceiling import Ceiling, print_ceiling, wait_for_ceiling
 from glovecal_service.cli.model.fingertips import print_fingertips, print_fingertips_beside
 from glovecal_service.cli.model.held_out_takes import HeldOutTakes, held_out_takes, warn_trained_on
 from glovecal_service.cli.terminal.connection import connect
@@ -46,6 +47,7 @@ def compare(
     model: Models,
     take: HeldOutTakes = None,
     poses: Annotated[bool, typer.Option("--poses", help="Errors of each pose too.")] = False,
+    ceiling: Ceiling = False,
     report: Report = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
@@ -57,6 +59,8 @@ def compare(
         documents = {name: service.get(f"/models/{name}") for name in dict.fromkeys(model)}
         takes = held_out_takes(service, list(documents.values()), take or [])
         body = {"takes": [row["id"] for row in takes]}
+        for name in documents if ceiling else ():
+            wait_for_ceiling(service, name, quiet=as_json)
         results = {name: service.post(f"/models/{name}/compare", body) for name in documents}
         page = fetch_report(service, list(documents), takes) if report is not None else b""
     if report is not None:
@@ -93,6 +97,7 @@ def _print(
             out.print(f"\nModel {name[:12]} ({documents[name]['method']}), each pose:")
             print_table(result["poses"], POSES, empty="No frame of these takes has the name of a pose.")
     for name, result in results.items():
+        print_ceiling(result["ceiling"])
         _warn(name, result, takes)
 
 

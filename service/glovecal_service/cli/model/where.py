@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
+from glovecal_service.cli.model.ceiling import Ceiling, print_ceiling, wait_for_ceiling
 from glovecal_service.cli.model.held_out_takes import HeldOutTakes, held_out_takes, warn_trained_on
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Model
@@ -51,6 +52,7 @@ def where(
             "by more than they claim.",
         ),
     ] = False,
+    ceiling: Ceiling = False,
     report: Report = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
@@ -62,6 +64,8 @@ def where(
         document = service.get(f"/models/{model}")
         takes = held_out_takes(service, [document], take or [])
         body = {"takes": [row["id"] for row in takes], "cross_validation": cross_validation}
+        if ceiling:
+            wait_for_ceiling(service, model, quiet=as_json)
         found = service.post(f"/models/{model}/where", body)
         page = fetch_report(service, [model], takes) if report is not None else b""
     if report is not None:
@@ -92,6 +96,7 @@ def _print(
     out.print("\nThe worst seconds:")
     rows = [{**one, "when": f"{one['start_s']:.1f} to {one['end_s']:.1f}"} for one in found["stretches"]]
     print_table(rows, STRETCHES, empty="No take is long enough.")
+    print_ceiling(found["ceiling"])
     warn_trained_on(model, found["trained_on"], takes)
 
 

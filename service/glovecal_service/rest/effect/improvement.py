@@ -34,6 +34,7 @@ class ImprovementRequest(StrictBody):
     samples: Annotated[int, Field(ge=10, le=5000)] = Field(2000, description="At most, for one rotation.")
     max_steps: Annotated[int, Field(ge=0, le=20)] = Field(6, description="Effects to add at most.")
     seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(0, description="Of controls and floors.")
+    ceiling: bool = Field(True, description="Ask at the end whether anything is left to gain.")
     activate: bool = Field(False, description="Predict live with the last model.")
 
 

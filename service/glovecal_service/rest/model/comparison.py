@@ -12,6 +12,7 @@ from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.comparison.compare import compare
 from glovecal_models.hand.dimensions import HandDimensions
+from glovecal_service.jobs.ceiling import known_ceiling
 from glovecal_service.jobs.model_work import trained_ids
 from glovecal_service.report.caption import ReportedModel, caption_of
 from glovecal_service.rest.http.answers import change_problems
@@ -48,7 +49,7 @@ def compare_model(id: ModelInPath, body: Against, parts: PartsNeeded) -> Compari
     record, model, wanted, seen = chosen(id, body, parts)
     takes = [parts.store.takes.load(take) for take in wanted]
     found = compare(model, takes, dimensions=_hand_of(record, parts))
-    return comparison_view(found, record.id, seen)
+    return comparison_view(found, record.id, seen, known_ceiling(parts.store, record))
 
 
 @router.post(
@@ -82,6 +83,7 @@ def report_on_model(id: ModelInPath, body: AgainstBeside, parts: PartsNeeded) ->
         ancestors=ancestors,
         simpler=simpler,
         dimensions=_hand_of(record, parts),
+        ceiling=known_ceiling(parts.store, record),
     )
     return Response(page, media_type="text/html; charset=utf-8")
 

@@ -8,6 +8,7 @@ from pydantic import Field
 from glovecal_models.comparison.cross_validation_difference import cross_validation_difference
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.comparison.where_it_fails import where_it_fails
+from glovecal_service.jobs.ceiling import known_ceiling
 from glovecal_service.jobs.model_work import trained_ids
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import PartsNeeded
@@ -37,7 +38,7 @@ def where_model_fails(id: ModelInPath, body: Failures, parts: PartsNeeded) -> Fa
     """
     record, model, wanted, seen = chosen(id, body, parts)
     found = residuals(model, [parts.store.takes.load(take) for take in wanted])
-    view = failures_view(where_it_fails(found), record.id, seen)
+    view = failures_view(where_it_fails(found), record.id, seen, known_ceiling(parts.store, record))
     if not body.cross_validation:
         return view
     takes = [parts.store.takes.load(id) for id in trained_ids(parts.store, record)]

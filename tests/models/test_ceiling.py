@@ -1,0 +1,80 @@
+"""The black-box ceiling: none on a clean glove, gain where an effect is hidden, undecided on few takes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.training import train
+from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.ceiling.black_box_ceiling import black_box_ceiling
+from glovecal_models.ceiling.ceiling import Gain, sign_flip_p_value, verdict_of
+from glovecal_models.ceiling.limits import CEILING_LIMITS
+from glovecal_models.ceiling.text import ceiling_sentence, not_left_to_gain
+from glovecal_models.errors import Cancelled
+from glovecal_models.layout import Layout
+from glovecal_models.simulation.causes.form import Cause
+from glovecal_models.simulation.session import record_session
+from glovecal_models.simulation.session_plan import SessionPlan
+from glovecal_models.takes.take import Take
+
+SENSORS = ("I_MCP", "I_PIP")
+
+
+def session(*causes: Cause) -> tuple[list[Take], CalibrationModel]:
+    plan = SessionPlan(
+        seed=5, sensors=SENSORS, bits=12, nuisance="white", wearings=2, takes_per_wearing=4, take_s=25.0
+    )
+    takes = list(record_session(plan, causes).takes)
+    layout = Layout.from_document(
+        {"name": "two", "sensors": list(SENSORS), "rotations": {name: [name] for name in SENSORS}}
+    )
+    return takes, train(takes, layout, "simulated", TrainingSettings(folds=0, samples=300))
+
+
+def test_nothing_is_left_to_gain_on_a_clean_glove() -> None:
+    takes, model = session()
+    found = black_box_ceiling(model, takes)
+    assert found.verdict == "none"
+    assert found.overall is not None
+    assert found.overall.high_share < CEILING_LIMITS.none_below
+    assert ceiling_sentence(found).startswith("Nothing is left to gain")
+    assert not_left_to_gain(found)
+
+
+def test_an_unmodelled_lag_is_left_to_gain_from_the_history_and_the_answer_repeats() -> None:
+    takes, model = session(Cause("lag", "one_pole", 1.5))
+    found = black_box_ceiling(model, takes, seed=1)
+    assert found.verdict == "gain"
+    assert found.overall is not None
+    assert found.overall.ceiling_deg < 0.85 * found.overall.rmse_deg
+    assert next(iter(found.groups)) == "history"
+    assert set(found.gaining) == set(SENSORS)
+    assert black_box_ceiling(model, takes, seed=1) == found
+    assert not not_left_to_gain(found)
+
+
+def test_few_takes_are_undecided_and_a_cancel_stops_it() -> None:
+    takes, model = session()
+    found = black_box_ceiling(model, takes[:4])
+    assert found.verdict == "undecided"
+    assert "4 takes were measured, 6 are needed" in ceiling_sentence(found)
+    with pytest.raises(Cancelled):
+        black_box_ceiling(model, takes, cancelled=lambda: True)
+
+
+def test_flipping_signs_of_whole_takes() -> None:
+    assert sign_flip_p_value(np.ones(6), 0) == pytest.approx(1 / 64)
+    assert sign_flip_p_value(np.tile([1.0, -1.0], 10), 0) > 0.4
+    assert sign_flip_p_value(np.ones(20), 0) < 1e-3
+
+
+def test_the_verdict_follows_the_interval() -> None:
+    wide, one = np.array([3.0, -3.0] * 4), np.full(8, 0.5)
+    steady, nothing = Gain.of(one, 1.0, 0), Gain.of(0.001 * wide, 1.0, 0)
+    assert verdict_of(steady, {"a": steady}, CEILING_LIMITS) == "gain"
+    assert verdict_of(nothing, {"a": nothing}, CEILING_LIMITS) == "none"
+    assert verdict_of(nothing, {"a": nothing, "b": steady}, CEILING_LIMITS) == "gain"
+    unsure = Gain.of(wide, 1.0, 0)
+    assert verdict_of(unsure, {"a": unsure}, CEILING_LIMITS) == "undecided"
