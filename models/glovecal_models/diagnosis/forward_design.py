@@ -89,6 +89,7 @@ def forward(
             take.wearing,
             take.name,
             np.array([item.zero_deg for item in sensor]),
+            take.glove_latency,
         )
         for take, angles, values in zip(takes, filled, standard, strict=True)
     )

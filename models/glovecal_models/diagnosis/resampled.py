@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
+from glovecal_models.takes.known_latency import KnownLatency
 from glovecal_models.takes.take import Take
 
 RATE_HZ = 50.0
@@ -47,6 +48,7 @@ class ResampledTake:
     """(N,) each, NaN where unknown."""
     is_sparse: bool = False
     """Single frames, too far apart for anything between them to be known: left as they are."""
+    glove_latency: KnownLatency | None = None
 
 
 def bridge_s(takes: Sequence[Take]) -> float:
@@ -101,7 +103,7 @@ def resampled(
     read = np.isfinite(readings).all(axis=1)
     return ResampledTake(
         take.name, take.wearing, time[read], readings[read], reference[read],
-        {name: values[read] for name, values in context.items()},
+        {name: values[read] for name, values in context.items()}, glove_latency=take.glove_latency,
     )  # fmt: skip
 
 

@@ -53,11 +53,11 @@ def ranked_sentence(diagnosis: Diagnosis) -> str:
         f"{item.effect} on {where} reduces the held-out error from {rmse.before:.2f} to {rmse.after:.2f}"
         f" degrees (control: {rmse.control:.2f}{p_value})"
     )
-    rivals = diagnosis.naming.confidence_set[1:]
+    named, rivals = diagnosis.effects[item.effect], diagnosis.naming.confidence_set[1:]
+    more = named.consequence(item, diagnosis.naming.confidence_set)
     if rivals:
-        return f"{start}; ambiguous with {', '.join(rivals)}."
-    caveat = diagnosis.effects[item.effect].caveat
-    return f"{start}; {caveat}." if caveat else f"{start}."
+        return f"{start}; ambiguous with {', '.join(rivals)}. {more}".rstrip()
+    return f"{start}; {named.caveat}. {more}".rstrip() if named.caveat else f"{start}. {more}".rstrip()
 
 
 def nothing_named_sentence(diagnosis: Diagnosis) -> str:

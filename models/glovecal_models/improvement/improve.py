@@ -201,6 +201,7 @@ class _Loop:
         constants: dict[str, Any] | None,
         diagnosis: Diagnosis | None,
         reasons: tuple[str, ...] = (),
+        confidence_set: tuple[str, ...] = (),
     ) -> bool:
         model = self.steps[-1].model
         every = trained_rotations(model)
@@ -228,7 +229,7 @@ class _Loop:
             addition, self.takes, self.errors, self.settings, self.hashes, self.cancelled, self.limits
         )
         self.trials.append(Trial(addition, reasons, removed, diagnosis))
-        self._step(model, AddedInStep.of(addition, constants, diagnosis), diagnosis)
+        self._step(model, AddedInStep.of(addition, constants, diagnosis, confidence_set), diagnosis)
         return True
 
     def _add_widenings(self) -> bool:
@@ -238,7 +239,8 @@ class _Loop:
     def _add_first(self, steps: Sequence[Proposed]) -> bool:
         """The first of them that stays."""
         for name, proposal in steps:
-            if self._add(name, proposal.rotations, proposal.constants, None, proposal.sentences):
+            where, alike = proposal.rotations, proposal.confidence_set
+            if self._add(name, where, proposal.constants, None, proposal.sentences, alike):
                 return True
         return False
 

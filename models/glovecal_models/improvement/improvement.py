@@ -11,10 +11,10 @@ from glovecal_models.calibration.usable_sensors import UsableSensors
 from glovecal_models.ceiling.ceiling import Ceiling
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.diagnosis.diagnosis import Diagnosis, Verdict
-from glovecal_models.diagnosis.next_take import NextTake
+from glovecal_models.diagnosis.next_take import NextTake, next_take
 from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.signature_effect import SignatureEffect
-from glovecal_models.effects.catalogue import effect
+from glovecal_models.effects.catalogue import catalogue, effect
 from glovecal_models.improvement.addition import Addition, ClaimCheck
 
 Stop = Literal["noise_floor", "nothing_named", "ambiguous", "not_better"]
@@ -39,15 +39,23 @@ class AddedInStep:
         return "named" if len(self.confidence_set) < 2 else "ambiguous"
 
     @classmethod
-    def of(cls, addition: Addition, constants: Settings | None, diagnosis: Diagnosis | None) -> AddedInStep:
-        """``constants``: with which it was added; ``diagnosis``: by which it was chosen."""
+    def of(
+        cls,
+        addition: Addition,
+        constants: Settings | None,
+        diagnosis: Diagnosis | None,
+        confidence_set: tuple[str, ...] = (),
+    ) -> AddedInStep:
+        """``constants``: with which it was added; ``diagnosis``: by which it was chosen, else with
+        ``confidence_set`` by its signature."""
         name, known = addition.effect, effect(addition.effect)
-        rivals = (name,) if diagnosis is None else diagnosis.naming.confidence_set
+        rivals = confidence_set if diagnosis is None else diagnosis.naming.confidence_set
         rivals = rivals if name in rivals else (name,)
         parameters: Mapping[str, Any] = addition.parameters
         if constants is not None and addition.claim is None and isinstance(known, SignatureEffect):
             parameters = known.described_constants(constants)
-        following = diagnosis.next_take if diagnosis is not None and len(rivals) > 1 else None
+        following = next_take(rivals, catalogue()) if diagnosis is None else diagnosis.next_take
+        following = following if len(rivals) > 1 else None
         where = tuple((constants or {}).get("where", addition.rotations))
         return cls(name, where, rivals, parameters, addition.claim, following)
 

@@ -92,6 +92,11 @@ def aligned(take: Take, offset_s: float) -> Take:
     return replace(take, reference_time_s=take.reference_time_s - offset_s)
 
 
+def without_reference(take: Take) -> Take:
+    """The take as if nothing had been measured."""
+    return replace(take, reference=np.full_like(take.reference, np.nan))
+
+
 def on_grid(take: Take) -> Grid | None:
     """None when the take is too short, nothing was measured, or nothing moves."""
     if take.duration_s < SHORTEST_SCANNED_S or len(take.reference_time_s) < 10:

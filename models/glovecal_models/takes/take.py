@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from glovecal_models.errors import BadInput
+from glovecal_models.takes.known_latency import KnownLatency
 
 LONGEST_INTERPOLATED_GAP_S = 0.1
 """A reference is interpolated between its own samples only when they are closer than this."""
@@ -42,6 +43,8 @@ class Take:
     """Frames before this time are a pre-roll: recorded before the take was asked for, they tell effects with
     a memory where they stand. No reference is read there, as other takes may hold the same frames. None: all
     frames are asked for."""
+    glove_latency: KnownLatency | None = None
+    """How late the glove's frames are known to be, against the hand; ``time_s`` is as they were stamped."""
 
     def __post_init__(self) -> None:
         frames, rows = len(self.time_s), len(self.reference_time_s)

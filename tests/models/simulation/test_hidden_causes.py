@@ -17,6 +17,8 @@ from glovecal_models.takes.take_check import check_take
 
 PLAN = SessionPlan(seed=5, takes_per_wearing=2, take_s=20.0, bits=12)
 STRENGTH_DEG = 1.5
+OPEN = ("glove_latency",)
+"""Nothing of them is kept for final tests."""
 ALL_FORMS = [(name, form) for name in KNOWN_CAUSES + UNKNOWN_CAUSES for form in forms(name)]
 
 
@@ -90,7 +92,7 @@ def test_a_known_cause_has_three_forms_and_one_set_aside(name):
     assert len(known) >= 3
     assert len({form.name for form in known}) == len(known)
     assert len({form.effect for form in known}) == len(known)
-    assert [form.set_aside for form in known].count(True) == 1
+    assert [form.set_aside for form in known].count(True) == (0 if name in OPEN else 1)
 
 
 def test_a_form_that_is_set_aside_is_never_drawn():

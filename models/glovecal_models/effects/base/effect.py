@@ -62,6 +62,11 @@ class Effect(EffectFacts, ABC):
         matter of time."""
         return None
 
+    def consequence(self, found: Assessment, confidence_set: Sequence[str]) -> str:
+        """What else a user has to know where it is named, with all that the takes cannot tell from it: a
+        sentence, or "" for nothing."""
+        return ""
+
     def unavailable_inputs(self, settings: Settings, context: Collection[str], wearing: str) -> str | None:
         """What it would have to be told and is not, so that it corrects nothing; None if nothing.
 

@@ -56,14 +56,10 @@ class SignificanceLimits:
     delay_clear_se: float = limit(
         3.0,
         "standard errors",
-        "By so much the shape of a delay must speak for a lag to be told from a clock offset.",
-        "Not tuned; chosen on 2026-11-21, beside the scores of `delay_middle_se`.",
-    )
-    delay_middle_se: float = limit(
-        1.5,
-        "standard errors",
-        "Where the shape does not decide, a score above this puts lag first, below it clock offset.",
-        "Simulated gloves with 25 ms: clock offsets reach -3 to 2, lags 0 to 10 (2026-11-21).",
+        "A form of delay (none but a delay, one or two poles, moving average, symmetric window) that leaves so"
+        " much more error than the best is ruled out; delays that differ between joints by half as much again"
+        " are a lag.",
+        "Simulated gloves with 12 to 100 ms, seeds 1 to 3 (2026-11-22).",
     )
     per_take_offset_share: float = limit(
         0.02,

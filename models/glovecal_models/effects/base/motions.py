@@ -32,3 +32,9 @@ CROSSED = Motion(
     " without switching off, switch off and on without taking it off; 40 s of free motion after each.",
     120,
 )
+TAPS = Motion(
+    "taps",
+    "Measure the glove's own delay, which no take with a reference can show: glovecal take latency, and tap"
+    " a key at least 20 times with one finger.",
+    40,
+)

@@ -8,6 +8,8 @@ from typing import overload
 
 import numpy as np
 
+from glovecal_models.takes.known_latency import KnownLatency
+
 
 @dataclass(frozen=True)
 class Signals:
@@ -26,6 +28,8 @@ class Signals:
     """Name of the take; it may tell which motion was done."""
     zero_deg: np.ndarray | None = None
     """(L,): where on the scale of ``own`` a raw reading of zero lies, by a straight line; None if unknown."""
+    glove_latency: KnownLatency | None = None
+    """How late the glove is known to be; None if nobody measured it."""
 
     def __len__(self) -> int:
         return len(self.time_s)

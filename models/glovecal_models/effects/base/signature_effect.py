@@ -72,6 +72,8 @@ class Proposal:
     rotations: tuple[str, ...] | None = None
     """None: all."""
     sentences: tuple[str, ...] = ()
+    confidence_set: tuple[str, ...] = ()
+    """It and all that the recording cannot tell from it; empty: it alone."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import numpy as np
 
 from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.facts import Control, Kind, Parameter, Rival, Settings, Stage
-from glovecal_models.effects.base.motions import FAST
+from glovecal_models.effects.base.motions import FAST, TAPS
 from glovecal_models.effects.base.problem import Problem
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.base.signature_effect import (
@@ -27,8 +27,16 @@ from glovecal_models.effects.base.signature_effect import (
 )
 from glovecal_models.effects.delay.clock_drift import LARGEST_PPM, ClockDrift, clock_drift, without_drift
 from glovecal_models.effects.delay.delay_grid import delay_errors, held_out_beside, why_no_delay_shows
-from glovecal_models.effects.delay.delay_verdict import CLOCK, LAG, clock_choice, first_delay
-from glovecal_models.takes.clock_scan import RANGE_S, ClockOffset, aligned, clock_offsets
+from glovecal_models.effects.delay.delay_verdict import (
+    CLOCK,
+    LAG,
+    LATENCY,
+    clock_choice,
+    first_delay,
+    if_the_glove_is_late,
+)
+from glovecal_models.effects.delay.large_delay import is_one_latency, large_latency_s, large_offsets
+from glovecal_models.takes.clock_scan import RANGE_S, ClockOffset, aligned, clock_offsets, without_reference
 from glovecal_models.takes.take import Take
 
 COARSE_S, FINE_S = 0.04, 0.002
@@ -63,8 +71,6 @@ def offset_to(take: Take, rotations: Sequence[str], predicted: np.ndarray, width
     return float(fine[int(np.argmin([misfit(offset) for offset in fine]))])
 
 
-BEYOND_DELAYS_S = 0.15
-"""Smaller offsets are left to the comparison, which tells them from a lag."""
 NEAR_S = 0.3
 """When training's offsets all lie within this, so will another take's."""
 
@@ -98,9 +104,9 @@ class ClockOffsetEffect(SignatureEffect):
     kind: ClassVar[Kind] = "repair"
     stage: ClassVar[Stage] = "compared"
     control: ClassVar[Control] = "time-reversed"
-    alike: ClassVar = (LAG,)
+    alike: ClassVar = (LAG, LATENCY)
     shown_by: ClassVar = FAST
-    rivals: ClassVar = (Rival("hysteresis", FAST), Rival("creep", FAST))
+    rivals: ClassVar = (Rival(LATENCY, TAPS), Rival("hysteresis", FAST), Rival("creep", FAST))
     looked_for_once: ClassVar[bool] = True
     needs_prediction: ClassVar[bool] = True
     parameters: ClassVar = (
@@ -131,6 +137,10 @@ class ClockOffsetEffect(SignatureEffect):
     def reference_delay_s(self, found: Assessment) -> np.ndarray:
         return found.shapes[0]
 
+    def consequence(self, found: Assessment, confidence_set: Sequence[str]) -> str:
+        late = if_the_glove_is_late(float(np.median(found.shapes[0])), confidence_set)
+        return f"{offsets_sentence(-found.shapes[0])} {late}".rstrip()
+
     def constants_of(self, found: Assessment, takes: Sequence[str]) -> Settings | None:
         """None when the clocks agree."""
         if not found.shapes[0].any():
@@ -144,18 +154,28 @@ class ClockOffsetEffect(SignatureEffect):
 
     def proposed(self, recorded: Recorded) -> Proposal | None:
         """Large offsets, each take its own; None unless most takes that can be judged have one."""
-        found = clock_offsets(recorded.takes)
-        judged = [item for item in found if item.verdict in ("offset", "agrees")]
-        large = [item for item in judged if item.verdict == "offset" and abs(item.offset_s) > BEYOND_DELAYS_S]
-        if not large or 2 * len(large) < len(judged):
+        if large_latency_s(recorded.takes) is not None:
             return None
-        offsets = {item.take: item.offset_s for item in found if item.verdict == "offset"}
+        found = clock_offsets(recorded.takes)
+        offsets = large_offsets(found)
+        if not offsets:
+            return None
         common = float(np.median(list(offsets.values())))
-        each = {take.name: offsets.get(take.name, common) for take in recorded.takes}
-        return Proposal({"offset_s": each, "common_s": common, "per_take": True})
+        each = {item.take: _offset_of(item, common) for item in found if not _is_unknown(item)}
+        unknown = [item.take for item in found if _is_unknown(item)]
+        settings: Settings = {"offset_s": each, "common_s": common, "per_take": True}
+        if unknown:
+            settings["left_out"] = unknown
+        sentences = [offsets_sentence(list(each.values())), *map(_left_out_sentence, unknown)]
+        if recorded.takes[0].glove_latency is not None or not is_one_latency(found):
+            return Proposal(settings, None, tuple(sentences))
+        both = (self.name, LATENCY)
+        return Proposal(settings, None, (*sentences, if_the_glove_is_late(-common, both)), both)
 
     def described_constants(self, constants: Settings) -> dict[str, Any]:
-        return {"offset_s": constants["offset_s"] if constants["per_take"] else constants["common_s"]}
+        offset = constants["offset_s"] if constants["per_take"] else constants["common_s"]
+        left_out = constants.get("left_out", [])
+        return {"offset_s": offset, **({"left_out": left_out} if left_out else {})}
 
     def clocks(self, takes: Sequence[Take], *, drift: bool = True) -> tuple[TakeClock, ...]:
         """One answer per take, in their order; takes of one wearing are judged together."""
@@ -179,7 +199,13 @@ class ClockOffsetEffect(SignatureEffect):
         if settings is None:
             return tuple(clock.repaired(take) for take, clock in zip(takes, self.clocks(takes), strict=True))
         offsets, common = settings["offset_s"], float(settings["common_s"])
-        return tuple(aligned(take, float(offsets.get(take.name, common))) for take in takes)
+        left_out = set(settings.get("left_out", ()))
+        return tuple(
+            without_reference(take)
+            if take.name in left_out
+            else aligned(take, float(offsets.get(take.name, common)))
+            for take in takes
+        )
 
     def repaired_to(
         self, take: Take, settings: Settings, rotations: Sequence[str], predicted: np.ndarray
@@ -196,6 +222,33 @@ class ClockOffsetEffect(SignatureEffect):
         largest = max((abs(value) for value in offsets.values()), default=NEAR_S)
         width = NEAR_S if largest < 0.5 * NEAR_S else RANGE_S
         return aligned(take, offset_to(take, rotations, predicted, width))
+
+
+def offsets_sentence(offsets_s: Sequence[float] | np.ndarray) -> str:
+    """How far the reference clock is off, in seconds."""
+    offsets = np.asarray(offsets_s, dtype=float)
+    low, high, middle = float(offsets.min()), float(offsets.max()), float(np.median(offsets))
+    if high - low < FINE_S:
+        return f"Offset of the reference clock: {middle:+.3f} s."
+    return (
+        f"Offset of the reference clock: {low:+.3f} to {high:+.3f} s, median {middle:+.3f} s, each of"
+        f" {len(offsets)} takes its own."
+    )
+
+
+def _is_unknown(scan: ClockOffset) -> bool:
+    """Whether the reference moves and yet its clock was not found."""
+    moves = scan.unexplained_reversed < 1.0
+    return scan.verdict == "range too small" or (scan.verdict == "not identifiable" and moves)
+
+
+def _offset_of(scan: ClockOffset, common_s: float) -> float:
+    """Of a take without movement the offset does not matter much."""
+    return scan.offset_s if scan.verdict in ("offset", "agrees") else common_s
+
+
+def _left_out_sentence(take: str) -> str:
+    return f"The reference of take {take} is left out: its clock offset was not found within ±{RANGE_S:g} s."
 
 
 def _drift(take: Take, scan: ClockOffset) -> ClockDrift | None:

@@ -1,8 +1,9 @@
-"""Lag or clock offset: how long a sensor's answer comes after the angle, and how much it is spread out.
+"""How long a sensor's answer comes after the angle, and how much it is spread out.
 
-A lag delays and smooths; clocks that disagree only delay, or advance. In the direction sensor-from-angle a
-grid of (pure delay d) x (low pass tau) is tried on all joints; negative tau is the low pass run backwards in
-time, which no sensor can do: the control. The base bends with the angle: a delayed angle enters by the base's
+Clocks that disagree only delay, or advance, and so does a transport; filters smooth too. In the direction
+sensor-from-angle several forms of delay are tried on all joints: a pure delay, one and two poles, a moving
+average, and a delayed symmetric window, shorter than a moving average as late. Filters run backwards in time,
+which no sensor can do, are the control. The base bends with the angle: a delayed angle enters by the base's
 slope. All cells are compared at once by projecting them off the base.
 """
 
@@ -10,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
 from scipy.signal import lfilter
@@ -19,44 +21,67 @@ from glovecal_models.effects.base.problem import Problem
 from glovecal_models.effects.base.signals import Signals
 
 STEP_S = 0.005
+FILTER_STEP_S = 0.01
 LARGEST_DELAY_S = 0.2
-TAU_S = (0.005, 0.01, 0.015, 0.02, 0.025, 0.03, 0.035, 0.04, 0.05, 0.06, 0.07, 0.08, 0.1, 0.12, 0.15, 0.2)
-BOTH_TAU_S = (0.02, 0.04, 0.07, 0.12)
-BOTH_STEP_S = 0.02
+FIRST_POLE_SHARE = 0.65
+"""Of the delay of two poles."""
+WINDOW_SHARE = 0.6
+"""Length of a delayed window, of that of a moving average as late: a raised cosine has 0.63."""
 FAST_SHARE = 1.0
 """Per second: a joint is moved fast when its speed reaches so many of its own standard deviations."""
 
 
+class DelayForm(IntEnum):
+    """What a cell does to the angle; its delay is the mean time it takes."""
+
+    PURE = 0
+    ONE_POLE = 1
+    TWO_POLES = 2
+    MOVING_AVERAGE = 3
+    DELAYED_WINDOW = 4
+
+
+FILTERS = (DelayForm.ONE_POLE, DelayForm.TWO_POLES, DelayForm.MOVING_AVERAGE)
+"""Those that a lag may have."""
+RUN_BACKWARDS = (DelayForm.PURE, DelayForm.ONE_POLE, DelayForm.MOVING_AVERAGE)
+
+
 @dataclass(frozen=True)
 class DelayErrors:
-    """Squared errors of one joint for each pair of delay and low pass."""
+    """Squared errors of one joint for each form and delay."""
 
-    cells: np.ndarray
-    """(K, 2): delay (s), tau (s); a negative tau runs backwards in time."""
+    form: np.ndarray
+    """(K,) ``DelayForm``."""
+    delay_s: np.ndarray
+    """(K,), evenly spaced and rising within each form; of a filter below zero: run backwards in time."""
     blocks: np.ndarray
     """(B, K), degrees squared, summed over the rows of each block."""
     unmoved: np.ndarray
-    """(B,), without delay and low pass."""
+    """(B,), without any delay."""
     take: np.ndarray
     """(B,), the take each block lies in."""
 
     @property
     def whole(self) -> float:
-        """The sum without delay and low pass, to tell shares of it; 1 where there is no error at all."""
+        """The sum without any delay, to tell shares of it; 1 where there is no error at all."""
         return float(self.unmoved.sum()) or 1.0
 
     @property
     def clock(self) -> np.ndarray:
         """Cells of a mere delay."""
-        return np.flatnonzero(self.cells[:, 1] == 0)
+        return self.cells(DelayForm.PURE)
 
     @property
     def lag(self) -> np.ndarray:
-        return np.flatnonzero((self.cells[:, 0] == 0) & (self.cells[:, 1] >= 0))
+        return np.flatnonzero(np.isin(self.form, FILTERS) & (self.delay_s >= 0))
 
     @property
     def reversed_lag(self) -> np.ndarray:
-        return np.flatnonzero((self.cells[:, 0] == 0) & (self.cells[:, 1] <= 0))
+        return np.flatnonzero(np.isin(self.form, FILTERS) & (self.delay_s <= 0))
+
+    def cells(self, form: DelayForm) -> np.ndarray:
+        """Those of one form, by rising delay."""
+        return np.flatnonzero(self.form == form)
 
 
 def why_no_delay_shows(takes: Sequence[Signals]) -> str | None:
@@ -79,8 +104,8 @@ def delay_errors(problem: Problem) -> tuple[DelayErrors, ...]:
 
 
 def _delay_errors(problem: Problem) -> tuple[DelayErrors, ...]:
-    cells = _cells()
-    return tuple(_joint(problem, joint, cells) for joint in range(len(problem.rotations)))
+    form, delay = _cells()
+    return tuple(_joint(problem, joint, form, delay) for joint in range(len(problem.rotations)))
 
 
 def held_out_beside(
@@ -100,22 +125,27 @@ def held_out_beside(
     return tuple(found)
 
 
-def _cells() -> np.ndarray:
-    steps = round(LARGEST_DELAY_S / STEP_S)
-    cells = [(STEP_S * k, 0.0) for k in range(-steps, steps + 1)]
-    cells += [(0.0, sign * tau) for tau in TAU_S for sign in (1, -1)]
-    coarse = round(0.1 / BOTH_STEP_S)
-    cells += [(BOTH_STEP_S * k, tau) for k in range(-coarse, coarse + 1) if k for tau in BOTH_TAU_S]
-    return np.array(cells)
+def _cells() -> tuple[np.ndarray, np.ndarray]:
+    """Form and delay (K,) of each."""
+    form, delay = [], []
+    for item in DelayForm:
+        step = STEP_S if item == DelayForm.PURE else FILTER_STEP_S
+        steps = round(LARGEST_DELAY_S / step)
+        delays = step * np.arange(-steps if item in RUN_BACKWARDS else 0, steps + 1)
+        form.append(np.full(len(delays), item))
+        delay.append(delays)
+    return np.concatenate(form), np.concatenate(delay)
 
 
-def _joint(problem: Problem, joint: int, cells: np.ndarray) -> DelayErrors:
+def _joint(problem: Problem, joint: int, form: np.ndarray, delay: np.ndarray) -> DelayErrors:
     products = problem.products[joint]
     base = np.concatenate([unit.base for unit in products.units])
     orthogonal, _ = np.linalg.qr(base)
     target = np.concatenate([unit.target for unit in products.units])
     used = [(problem.signals[take], rows) for take, rows in problem.units(joint)]
-    moved = np.concatenate([_moved(take.time_s, take.own[:, joint], rows, cells) for take, rows in used])
+    moved = np.concatenate(
+        [_moved(take.time_s, take.own[:, joint], rows, form, delay) for take, rows in used]
+    )
     own = np.concatenate([take.own[rows, joint] for take, rows in used])
     moved *= _slope(base, products.whole, own)[:, None]
     left = target - orthogonal @ (orthogonal.T @ target)
@@ -125,7 +155,8 @@ def _joint(problem: Problem, joint: int, cells: np.ndarray) -> DelayErrors:
     starts = block_starts(lengths)
     ends = np.cumsum(lengths)
     return DelayErrors(
-        cells,
+        form,
+        delay,
         np.add.reduceat(moved * moved, starts, axis=0),
         np.add.reduceat(left * left, starts),
         np.array(problem.unit_take)[np.searchsorted(ends, starts, side="right")],
@@ -141,22 +172,39 @@ def _slope(base: np.ndarray, coefficients: np.ndarray, own: np.ndarray) -> np.nd
     return slope / max(float(own.std()), 1e-9)
 
 
-def _moved(time: np.ndarray, own: np.ndarray, rows: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """(rows, K): delayed and low-passed angle minus the angle itself."""
+def _moved(
+    time: np.ndarray, own: np.ndarray, rows: np.ndarray, form: np.ndarray, delay: np.ndarray
+) -> np.ndarray:
+    """(rows, K): the angle after each form of delay, minus the angle itself."""
     if len(time) < 2:
-        return np.zeros((len(rows), len(cells)))
-    result = np.empty((len(rows), len(cells)))
-    factor = max(1, round(float(np.median(np.diff(time))) / STEP_S)) if len(time) > 1 else 1
+        return np.zeros((len(rows), len(form)))
+    factor = max(1, round(float(np.median(np.diff(time))) / STEP_S))
     fine_time = time[0] + STEP_S * np.arange((len(time) - 1) * factor + 1)
     fine = np.interp(fine_time, time, own)
-    at = np.searchsorted(fine_time, time[rows] - 1e-6)
-    shifts = np.round(cells[:, 0] / STEP_S).astype(int)
-    for tau in np.unique(cells[:, 1]):
-        passed = fine if tau == 0 else _low_pass(fine, tau) if tau > 0 else _low_pass(fine[::-1], -tau)[::-1]
-        some = np.flatnonzero(cells[:, 1] == tau)
-        index = np.clip(at[:, None] - shifts[None, some], 0, len(fine) - 1)
-        result[:, some] = passed[index] - own[rows, None]
+    at = np.clip(np.searchsorted(fine_time, time[rows] - 1e-6), 0, len(fine) - 1)
+    result = np.empty((len(rows), len(form)))
+    pure = form == DelayForm.PURE
+    shifts = np.round(delay[pure] / STEP_S).astype(int)
+    result[:, pure] = fine[np.clip(at[:, None] - shifts, 0, len(fine) - 1)]
+    for cell in np.flatnonzero(~pure):
+        late, kind = float(delay[cell]), DelayForm(form[cell])
+        passed = _filtered(fine, kind, late) if late >= 0 else _filtered(fine[::-1], kind, -late)[::-1]
+        result[:, cell] = passed[at]
+    result -= own[rows, None]
     return result
+
+
+def _filtered(signal: np.ndarray, form: DelayForm, late_s: float) -> np.ndarray:
+    """The signal (N,) on the fine times through a filter that is ``late_s`` late in the mean."""
+    if late_s == 0:
+        return signal
+    if form == DelayForm.ONE_POLE:
+        return _low_pass(signal, late_s)
+    if form == DelayForm.TWO_POLES:
+        first = _low_pass(signal, FIRST_POLE_SHARE * late_s)
+        return _low_pass(first, (1 - FIRST_POLE_SHARE) * late_s)
+    length = 2 * late_s * (WINDOW_SHARE if form == DelayForm.DELAYED_WINDOW else 1.0)
+    return _window(signal, late_s - length / 2, late_s + length / 2)
 
 
 def _low_pass(signal: np.ndarray, tau: float) -> np.ndarray:
@@ -165,3 +213,15 @@ def _low_pass(signal: np.ndarray, tau: float) -> np.ndarray:
     e = np.exp(-h)
     gain = (1 - e) / h
     return lfilter([1 - gain, gain - e], [1, -e], signal - signal[0]) + signal[0]
+
+
+def _window(signal: np.ndarray, from_s: float, to_s: float) -> np.ndarray:
+    """The mean of what was between ``from_s`` and ``to_s`` ago."""
+    rows = np.arange(len(signal), dtype=float)
+    sums = np.concatenate([[0.0], np.cumsum(0.5 * (signal[1:] + signal[:-1]))])
+
+    def sum_until(ago_s: float) -> np.ndarray:
+        at = rows - ago_s / STEP_S
+        return np.interp(at, rows, sums) + signal[0] * np.minimum(at, 0.0)
+
+    return (sum_until(from_s) - sum_until(to_s)) / ((to_s - from_s) / STEP_S)

@@ -1,28 +1,42 @@
-"""Lag or clock offset? By the shape of the delay, its sign, and whether joints differ in it.
+"""Which delay it is: a lag, clocks that disagree, or a glove that is late as a whole.
 
-A common filter delays all joints alike, so equal delays are no mark of clocks; joints that differ are a mark
-of lag. A reading that comes before the angle cannot be lag. Otherwise the shape decides: a lag smooths too.
-That is judged on strongly smoothed signals, on which a low pass gains nothing by removing noise.
+A reading that comes before the angle can only come from the clocks, and so can a delay that differs from take
+to take. Joints that differ are a mark of a lag: a transport and a clock delay all alike. Otherwise the form
+decides, by what it leaves of the error: filters flatten fast motion, a mere delay does not. Clocks and a
+transport are the same in every take; only a latency that was measured tells them apart. Forms are judged on
+strongly smoothed signals, on which a low pass gains nothing by removing noise.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from glovecal_models.effects.base.assessment import over_joints
 from glovecal_models.effects.base.limits import SIGNIFICANCE_LIMITS, SignificanceLimits
 from glovecal_models.effects.base.problem import Problem
-from glovecal_models.effects.delay.delay_grid import DelayErrors, delay_errors
+from glovecal_models.effects.delay.delay_grid import DelayErrors, DelayForm, delay_errors
+from glovecal_models.takes.known_latency import KnownLatency
 
 SMOOTHING, SHAPE_SMOOTHING = 13, 25
 """Even times. With 13 a low pass still gains by taking noise from the reference: 4 standard errors."""
 
-LAG, CLOCK = "lag", "clock_offset"
-DelayKind = Literal["lag", "clock_offset", "either"]
+LAG, CLOCK, LATENCY = "lag", "clock_offset", "glove_latency"
+APART_TIMES = 1.5
+"""Delays of one size for all joints reach 2.3 standard errors (24 simulated gloves), lags of several sizes mostly
+6 to 17."""
+KEYS_LATE_S = 0.015
+"""Keyboards report a key 5 to 20 ms after it was hit: so much a measured latency may be wrong."""
+ACCOUNTS_FOR = {
+    DelayForm.PURE: (CLOCK, LATENCY),
+    DelayForm.ONE_POLE: (LAG,),
+    DelayForm.TWO_POLES: (LAG,),
+    DelayForm.MOVING_AVERAGE: (LAG, LATENCY),
+    DelayForm.DELAYED_WINDOW: (LATENCY, LAG),
+}
+"""The likelier first; a symmetric filter may be in the sensors' electronics or on the way."""
 
 
 @dataclass(frozen=True)
@@ -64,10 +78,19 @@ def clock_choice(
     common = int(np.argmin(each.sum(axis=0)))
     own = np.array([int(np.argmin(row)) if row.any() else common for row in each])
     gain = each.sum(axis=0)[common] - _judged_on_other_blocks(share, grids, takes, common)
-    delays = grids[0].cells[clock, 0]
+    delays = grids[0].delay_s[clock]
     if takes > 1 and gain > limits.per_take_offset_share * len(grids):
         return ClockChoice(delays[own], own)
     return ClockChoice(delays[[common]], np.full(takes, common))
+
+
+def common_choice(grids: Sequence[DelayErrors]) -> ClockChoice:
+    """The delay of all takes that explains most, never an advance."""
+    clock, takes = grids[0].clock, int(max(grid.take.max() for grid in grids)) + 1
+    total = sum(grid.blocks[:, clock].sum(axis=0) / grid.whole for grid in grids)
+    delays = grids[0].delay_s[clock]
+    best = int(np.argmin(np.where(delays > -1e-9, total, np.inf)))
+    return ClockChoice(np.abs(delays[[best]]), np.full(takes, best))
 
 
 def _judged_on_other_blocks(
@@ -88,53 +111,153 @@ def _judged_on_other_blocks(
 
 def first_delay(problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]]:
     """The delay to be named first, and all that remain possible; ``problem`` by the rows smoothed over."""
-    usual, strongly = problem(SMOOTHING), problem(SHAPE_SMOOTHING)
-    limits = usual.limits
-    kind, score = delay_kind(delay_errors(usual), delay_errors(strongly), limits)
-    if kind != "either":
-        return kind, (kind,)
-    return (LAG, (LAG, CLOCK)) if score > limits.delay_middle_se else (CLOCK, (CLOCK, LAG))
+    usual = problem(SMOOTHING)
+    grids = delay_errors(usual)
+    possible = possible_delays(grids, delay_errors(problem(SHAPE_SMOOTHING)), usual.limits)
+    latency = usual.signals[0].glove_latency
+    if latency is not None and {CLOCK, LATENCY} <= set(possible):
+        possible = _told_by_latency(possible, common_delay(grids), latency, usual.limits.delay_clear_se)
+    return possible[0], possible
 
 
-def delay_kind(
+def possible_delays(
     grids: Sequence[DelayErrors],
     strongly_smoothed: Sequence[DelayErrors],
     limits: SignificanceLimits = SIGNIFICANCE_LIMITS,
-) -> tuple[DelayKind, float]:
-    """The kind, and a score in standard errors: above ``delay_middle_se`` speaks for lag.
+) -> tuple[str, ...]:
+    """The effects that these delays may come from, the likeliest first.
 
     ``grids`` are those of ``SMOOTHING``, the others of ``SHAPE_SMOOTHING``.
     """
     clear = limits.delay_clear_se
     clock = clock_choice(grids, limits)
-    if np.median(clock.offset_s) <= 0:
-        return "clock_offset", -np.inf
+    if np.median(clock.offset_s) < 0:
+        return (CLOCK,)
+    together = {form: _together(strongly_smoothed, form) for form in DelayForm}
+    best = min(together, key=lambda form: float(together[form].sum()))
     if clock.is_per_take:
-        return "clock_offset", -clear
+        each_take = _over_joints(strongly_smoothed, clock.errors(strongly_smoothed)[0])
+        if _score(together[best], each_take) > clear:
+            return (CLOCK,)
+    apart = min((_apart(strongly_smoothed, form) for form in DelayForm), key=np.sum)
+    if _score(together[best], apart) > APART_TIMES * clear:
+        return (LAG,)
+    kept = [form for form in DelayForm if _score(together[form], together[best]) <= clear]
+    kept.sort(key=lambda form: float(together[form].sum()))
+    if DelayForm.PURE in kept and DelayForm.DELAYED_WINDOW in kept:
+        kept.remove(DelayForm.DELAYED_WINDOW)  # hardly told from a mere delay
+    return tuple(dict.fromkeys(name for form in kept for name in ACCOUNTS_FOR[form]))
+
+
+@dataclass(frozen=True)
+class CommonDelay:
+    """One delay of all joints and takes, as a mere delay."""
+
+    seconds: float
+    se_s: float
+    """Standard error, by leaving out take after take."""
+
+
+def common_delay(grids: Sequence[DelayErrors]) -> CommonDelay:
+    """How much later than the reference the readings come."""
     cells = grids[0].clock
-    takes = [grid.take for grid in grids]
-    own = [grid.blocks[:, cells[np.argmin(grid.blocks[:, cells].sum(axis=0))]] / grid.whole for grid in grids]
-    shared = [grid.blocks[:, cells[clock.cell[0]]] / grid.whole for grid in grids]
-    differ = _score(over_joints(shared, takes), over_joints(own, takes))
-    shape = _shape_score(strongly_smoothed)
-    if differ > 2 * clear and shape > -clear:
-        return "lag", differ
-    if shape > clear:
-        return "lag", shape
-    if shape < -clear + limits.delay_middle_se:
-        return "clock_offset", shape
-    return "either", shape
+    delay, takes = grids[0].delay_s[cells], int(max(grid.take.max() for grid in grids)) + 1
+    each = np.array(
+        [
+            sum(grid.blocks[grid.take == take][:, cells].sum(axis=0) / grid.whole for grid in grids)
+            for take in range(takes)
+        ]
+    )
+    whole = each.sum(axis=0)
+    without = np.array([_least(whole - part).at(delay) for part in each if part.any()])
+    spread = np.sqrt((len(without) - 1) * without.var()) if len(without) > 1 else np.inf
+    return CommonDelay(_least(whole).at(delay), float(spread))
 
 
-def _shape_score(grids: Sequence[DelayErrors]) -> float:
-    """How much better one low pass for all joints does than one delay for all, in standard errors."""
-    takes = [grid.take for grid in grids]
-    clock = over_joints([grid.blocks[:, grid.clock] / grid.whole for grid in grids], takes)
-    lag = over_joints([grid.blocks[:, grid.lag] / grid.whole for grid in grids], takes)
-    return _score(clock[:, np.argmin(clock.sum(axis=0))], lag[:, np.argmin(lag.sum(axis=0))])
+def if_the_glove_is_late(late_s: float, confidence_set: Sequence[str]) -> str:
+    """What follows for live poses, as a sentence; "" where no glove can be late."""
+    if LATENCY not in confidence_set or late_s <= 0:
+        return ""
+    if len(confidence_set) == 1:
+        return f"Live poses are {1000 * late_s:.0f} ms late; their time and age say so."
+    return (
+        f"If it is the glove, live poses are {1000 * late_s:.0f} ms late: glovecal take latency measures the"
+        " glove's own delay and decides."
+    )
+
+
+def _told_by_latency(
+    possible: tuple[str, ...], delay: CommonDelay, latency: KnownLatency, clear_se: float
+) -> tuple[str, ...]:
+    """``possible`` with what a measured latency rules out left out.
+
+    A glove that is as late as its readings says that the clocks agree, and another latency that they do not:
+    what taps measure holds the sensors' lag too.
+    """
+    within = max(KEYS_LATE_S, clear_se * float(np.hypot(delay.se_s, latency.sd_s)))
+    if abs(delay.seconds - latency.seconds) <= within:
+        if abs(delay.seconds) <= within:
+            return possible
+        left = tuple(name for name in possible if name != CLOCK)
+        return (LATENCY, *(name for name in left if name != LATENCY))
+    return (CLOCK,)
+
+
+@dataclass(frozen=True)
+class _Least:
+    """The least of a curve over even cells, between them."""
+
+    cells: np.ndarray
+    """Three neighbours; one at an end of the curve."""
+    weights: np.ndarray
+    """Of their values in that of the parabola through them, where it is least."""
+
+    def at(self, values: np.ndarray) -> float:
+        return float(values[self.cells] @ self.weights)
+
+
+def _least(curve: np.ndarray) -> _Least:
+    """Cells are up to 10 ms apart, and long takes tell one from two."""
+    at = int(np.argmin(curve))
+    if at in (0, len(curve) - 1):
+        return _Least(np.array([at]), np.ones(1))
+    before, here, after = (float(value) for value in curve[at - 1 : at + 2])
+    bend = before - 2 * here + after
+    x = 0.5 * (before - after) / bend if bend > 0 else 0.0
+    return _Least(np.arange(at - 1, at + 2), np.array([x * (x - 1) / 2, 1 - x * x, x * (x + 1) / 2]))
+
+
+def _forward(grid: DelayErrors, form: DelayForm) -> np.ndarray:
+    """Cells of a form that are late, or not at all."""
+    cells = grid.cells(form)
+    return cells[grid.delay_s[cells] >= -1e-9]
+
+
+def _together(grids: Sequence[DelayErrors], form: DelayForm) -> np.ndarray:
+    """(B,) shares of the error with one delay for all joints."""
+    every = _over_joints(grids, [grid.blocks[:, _forward(grid, form)] for grid in grids])
+    least = _least(every.sum(axis=0))
+    return every[:, least.cells] @ least.weights
+
+
+def _apart(grids: Sequence[DelayErrors], form: DelayForm) -> np.ndarray:
+    """(B,) shares of the error with a delay of each joint."""
+    found = []
+    for grid in grids:
+        blocks = grid.blocks[:, _forward(grid, form)]
+        least = _least(blocks.sum(axis=0))
+        found.append(blocks[:, least.cells] @ least.weights)
+    return _over_joints(grids, found)
+
+
+def _over_joints(grids: Sequence[DelayErrors], errors: Sequence[np.ndarray]) -> np.ndarray:
+    """``errors`` (B, ...) of each joint as shares of its error, summed over joints."""
+    shares = [part / grid.whole for grid, part in zip(grids, errors, strict=True)]
+    return over_joints(shares, [grid.take for grid in grids])
 
 
 def _score(worse: np.ndarray, better: np.ndarray) -> float:
+    """How much more error ``worse`` (B,) leaves than ``better``, in standard errors."""
     gain = worse - better
     if len(gain) < 2:
         return 0.0

@@ -25,7 +25,7 @@ from glovecal_models.effects.delay.delay_grid import (
     held_out_beside,
     why_no_delay_shows,
 )
-from glovecal_models.effects.delay.delay_verdict import CLOCK, first_delay
+from glovecal_models.effects.delay.delay_verdict import CLOCK, LATENCY, first_delay
 
 MULTIPLES = np.array([0.5, 1.0, 2.0, 4.0, 8.0])
 TAU_S = (0.02, 0.03, 0.045, 0.065, 0.1, 0.15)
@@ -38,11 +38,12 @@ class Lag(ArrayStateEffect):
     explanation = "The sensor follows the joint late: fast movements come out smaller and delayed."
     source = "first-order low pass, 5 to 150 ms (facts: rate-dependent flex sensors)"
     parameters: ClassVar = (Parameter("tau", "s", 0.005, 0.15, "5 to 150 ms"),)
-    alike: ClassVar = (CLOCK,)
+    alike: ClassVar = (CLOCK, LATENCY)
     shown_by: ClassVar = FAST
     shows_in: ClassVar = ("speed", "direction")
     rivals: ClassVar = (
         Rival(CLOCK, FAST),
+        Rival(LATENCY, FAST),
         Rival("hysteresis", FAST),
         Rival("creep", FAST),
     )
@@ -59,7 +60,7 @@ class Lag(ArrayStateEffect):
             for cells in (lags, mirrored)
         )
         errors = held_out_beside(problem, right, control)
-        taus = tuple(np.array([grid.cells[cell, 1]]) for grid, cell in zip(grids, lags, strict=True))
+        taus = tuple(np.array([grid.delay_s[cell]]) for grid, cell in zip(grids, lags, strict=True))
         nothing = tuple(np.empty(0) for _ in grids)
         return Assessment(
             self.name, problem.rotations, errors, taus, nothing, None, ("tau_s",), limits=problem.limits

@@ -1,0 +1,103 @@
+"""Glove latency: transport, buffers and linear-phase filters make the whole glove late by the same time.
+
+In takes it looks the same as a reference clock that is behind. The measurement is repaired as for the clock:
+the reference is read when the hand was where the frame says. Only here live poses are late too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from glovecal_models.effects.base.assessment import Assessment
+from glovecal_models.effects.base.facts import Control, Kind, Parameter, Rival, Settings, Stage
+from glovecal_models.effects.base.motions import FAST, TAPS
+from glovecal_models.effects.base.problem import Problem
+from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.signature_effect import Finding, Proposal, Recorded, SignatureEffect
+from glovecal_models.effects.delay.delay_grid import delay_errors, held_out_beside, why_no_delay_shows
+from glovecal_models.effects.delay.delay_verdict import (
+    CLOCK,
+    LAG,
+    LATENCY,
+    common_choice,
+    first_delay,
+    if_the_glove_is_late,
+)
+from glovecal_models.effects.delay.large_delay import large_latency_s
+from glovecal_models.takes.clock_scan import aligned
+from glovecal_models.takes.take import Take
+
+LONGEST_S = 0.5
+
+
+class GloveLatency(SignatureEffect):
+    name = LATENCY
+    explanation = "The whole glove is late by the same time: its transport, buffers and filters."
+    source = "wireless gloves: 10 to 40 ms (Santos, NIME 2021); a linear-phase filter: half its length"
+    kind: ClassVar[Kind] = "repair"
+    stage: ClassVar[Stage] = "compared"
+    control: ClassVar[Control] = "time-reversed"
+    alike: ClassVar = (CLOCK, LAG)
+    shown_by: ClassVar = FAST
+    rivals: ClassVar = (Rival(CLOCK, TAPS), Rival(LAG, FAST), Rival("hysteresis", FAST))
+    looked_for_once: ClassVar[bool] = True
+    parameters: ClassVar = (Parameter("latency", "s", 0.0, LONGEST_S, "10 to 100 ms"),)
+
+    @property
+    def needs_movement(self) -> bool:
+        return True
+
+    def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
+        return why_no_delay_shows(takes)
+
+    def assess(self, problem: Problem) -> Assessment:
+        """One delay of all joints and takes, never an advance; the control is as early."""
+        grids = delay_errors(problem)
+        delay = common_choice(grids)
+        errors = held_out_beside(problem, *delay.errors(grids))
+        late, nothing = tuple(delay.offset_s for _ in grids), tuple(np.empty(0) for _ in grids)
+        return Assessment(
+            self.name, problem.rotations, errors, late, nothing, None, ("latency_s",), limits=problem.limits
+        )
+
+    def told_from_alikes(self, problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]]:
+        return first_delay(problem)
+
+    def reference_delay_s(self, found: Assessment) -> np.ndarray:
+        return found.shapes[0]
+
+    def consequence(self, found: Assessment, confidence_set: Sequence[str]) -> str:
+        return if_the_glove_is_late(float(np.median(found.shapes[0])), confidence_set)
+
+    def constants_of(self, found: Assessment, takes: Sequence[str]) -> Settings | None:
+        """None when the glove is not late."""
+        return {"latency_s": float(found.shapes[0][0])} if found.shapes[0].any() else None
+
+    def proposed(self, recorded: Recorded) -> Proposal | None:
+        """A latency too large for the comparison, where it was measured."""
+        late = large_latency_s(recorded.takes)
+        return None if late is None else Proposal({"latency_s": late})
+
+    def find(
+        self,
+        takes: Sequence[Take],
+        sensor_of: Mapping[str, str],
+        errors: Sequence[np.ndarray] | None = None,
+    ) -> tuple[Finding, ...]:
+        """Nothing: it is compared, or measured with taps."""
+        return ()
+
+    def described_constants(self, constants: Settings) -> dict[str, Any]:
+        return {"latency_s": constants["latency_s"]}
+
+    def repaired(self, takes: Sequence[Take], settings: Settings | None = None) -> tuple[Take, ...]:
+        """Without settings by what was measured of the glove."""
+        if settings is not None:
+            return tuple(aligned(take, -float(settings["latency_s"])) for take in takes)
+        return tuple(
+            take if take.glove_latency is None else aligned(take, -take.glove_latency.seconds)
+            for take in takes
+        )

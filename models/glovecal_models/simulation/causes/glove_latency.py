@@ -1,0 +1,71 @@
+"""Glove latency: the whole glove is late by the same time, because of its transport, buffers and filters.
+
+Wireless sensors come 10 to 40 ms late (Santos, NIME 2021), play-out buffers against radio jitter add some tens
+of milliseconds, and a linear-phase filter half its length. No sensor is later than another.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.signal import lfilter
+
+from glovecal_models.simulation.causes.form import Draws, Stage, form
+from glovecal_models.simulation.scene import Scene
+from glovecal_models.simulation.signals import at_times
+
+SIZES_S = (0.002, 0.4)
+
+
+@form(
+    Stage.COUNTS,
+    "Every reading comes late by the same time (wireless transport; Santos, NIME 2021).",
+    sizes=SIZES_S,
+    shared=True,
+)
+def transport(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """One delay of ``size`` seconds for all sensors and the whole session."""
+    return _late(signal, scene, np.full(scene.session_s.shape, size[0]))
+
+
+@form(
+    Stage.COUNTS,
+    "A play-out buffer that fills and empties a little, as the glove's clock and the computer's differ.",
+    sizes=SIZES_S,
+    shared=True,
+)
+def buffered(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A delay around ``size`` seconds that grows and falls back, batch by batch of some seconds."""
+    depth, period_s = draws.one("depth_share", 0.05, 0.2), draws.one("period_s", 5.0, 20.0)
+    sawtooth = np.mod(scene.session_s / period_s + draws.one("phase", 0.0, 1.0), 1.0) - 0.5
+    return _late(signal, scene, size[0] * (1 + depth * sawtooth))
+
+
+@form(
+    Stage.COUNTS,
+    "A linear-phase filter, the same for all sensors: late by half its length (firmware).",
+    sizes=SIZES_S,
+    shared=True,
+)
+def linear_phase(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A symmetric raised-cosine window, late by ``size`` seconds."""
+    half = max(float(size[0]), 1e-6) * scene.rate_hz
+    ago = np.arange(int(np.ceil(2 * half)) + 1)
+    weights = 1 + np.cos(np.pi * np.clip((ago - half) / (half + 0.5), -1.0, 1.0))
+    weights /= weights.sum()
+    centre = float(weights @ ago)
+    start = signal[:, :1]
+    passed = lfilter(weights, [1.0], signal - start, axis=1) + start
+    # the window has whole frames, its middle is where the size says
+    return _late(passed, scene, np.full(scene.session_s.shape, (half - centre) / scene.rate_hz))
+
+
+def _late(signal: np.ndarray, scene: Scene, delay_s: np.ndarray) -> np.ndarray:
+    return np.stack(
+        [
+            at_times(scene.time_s, values, scene.time_s - delay)
+            for values, delay in zip(signal, delay_s, strict=True)
+        ]
+    )
+
+
+FORMS = (transport, buffered, linear_phase)
