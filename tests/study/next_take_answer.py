@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, cast, get_args
 
+import numpy as np
 from blind_glove import BlindGlove
 
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.next_take import NextTake
+from glovecal_models.effects.base.motions import TAPS
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 from glovecal_models.simulation.session_plan import TakeMotion
+from glovecal_models.takes.known_latency import KnownLatency
 from glovecal_models.takes.take import Take
 
 MOST_TAKES = 2
 NEW_WEARING_S = 40.0
+TAPS_SD_S = 0.003
 
 
 def next_take_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_LIMITS) -> dict[str, Any]:
@@ -24,10 +29,19 @@ def next_take_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_
     sets, motions = [list(found.naming.confidence_set)], []
     while len(motions) < MOST_TAKES and len(sets[-1]) > 1 and found.next_take is not None:
         motions.append(found.next_take.motion)
-        takes.append(_recorded(glove, found.next_take, len(motions) - 1))
+        if found.next_take.motion == TAPS.name:
+            takes = [replace(take, glove_latency=_tapped(glove)) for take in takes]
+        else:
+            takes.append(_recorded(glove, found.next_take, len(motions) - 1))
         found: Diagnosis = diagnose(takes, glove.layout, linear=glove.linear, limits=limits.diagnosis)
         sets.append(list(found.naming.confidence_set))
     return {"confidence_sets": sets, "motions": motions, **glove.told()}
+
+
+def _tapped(glove: BlindGlove) -> KnownLatency:
+    """What taps on a key measure: how late the whole glove is, its sensors' lag included."""
+    late = [item for item in glove.session.causes if item.name in ("glove_latency", "lag")]
+    return KnownLatency(float(sum(np.mean(list(item.sizes.values())) for item in late)), TAPS_SD_S)
 
 
 def _recorded(glove: BlindGlove, asked: NextTake, repeat: int) -> Take:

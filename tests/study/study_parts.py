@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from blind_glove import BlindGlove
 from diagnosis_answer import diagnosis_answer
+from delay_gloves import delay_figures, delay_gloves
 from glove_choices import clean, effect_names, pair, undecided, unknown, unknown_names, with_cause
 from glove_jobs import Job, Row
 from naming_figures import (
@@ -130,6 +131,13 @@ PARTS: dict[str, StudyPart] = {
         _sizes,
         diagnosis_answer,
         sizes_figures,
+    ),
+    "delays": StudyPart(
+        "constant delays of nine kinds: does a single name ever go wrong?",
+        lambda choices: delay_gloves(choices.gloves),
+        diagnosis_answer,
+        delay_figures,
+        confusion=False,
     ),
     "clean": StudyPart(
         "healthy gloves: is anything named, or said to be left?",

@@ -36,8 +36,8 @@ EFFECTS = [*catalogue().values(), *DECLARED]
 WITH_COLUMNS = [item for item in EFFECTS if not isinstance(item, ColumnlessEffect)]
 FIXED_NAMES = [
     "nonlinearity", "cross_coupling", "palm_arch", "hysteresis", "creep", "lag", "clock_offset",
-    "glove_latency", "repeated_samples", "warmup_drift", "temperature", "humidity", "donning_shift", "garment_slip",
-    "supply_sag", "saturation", "contact_pressure", "sensor_fault",
+    "glove_latency", "repeated_samples", "warmup_drift", "temperature", "humidity", "donning_shift",
+    "garment_slip", "supply_sag", "saturation", "contact_pressure", "sensor_fault",
 ]  # fmt: skip
 UNIT = re.compile(r"_(deg|s|ppm|1)(?=$|[_\[])|_per_")
 

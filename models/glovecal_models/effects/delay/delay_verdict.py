@@ -25,8 +25,8 @@ SMOOTHING, SHAPE_SMOOTHING = 13, 25
 
 LAG, CLOCK, LATENCY = "lag", "clock_offset", "glove_latency"
 APART_TIMES = 1.5
-"""Delays of one size for all joints reach 2.3 standard errors (24 simulated gloves), lags of several sizes mostly
-6 to 17."""
+"""Delays of one size for all joints reach 2.3 standard errors (24 simulated gloves), lags of several sizes
+mostly 6 to 17."""
 KEYS_LATE_S = 0.015
 """Keyboards report a key 5 to 20 ms after it was hit: so much a measured latency may be wrong."""
 ACCOUNTS_FOR = {

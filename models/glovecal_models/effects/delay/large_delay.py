@@ -30,7 +30,7 @@ def large_offsets(found: Sequence[ClockOffset]) -> dict[str, float]:
 
 
 def is_one_latency(found: Sequence[ClockOffset]) -> bool:
-    """Whether large offsets may be the latency of a glove: all takes share one, and their readings are late."""
+    """Whether large offsets may be a glove's latency: all takes share one, and their readings are late."""
     judged = [item for item in found if item.verdict in ("offset", "agrees")]
     offsets = np.array([item.offset_s for item in judged])
     if len(judged) < FEWEST_ALIKE or (offsets >= 0).any() or offsets.min() < -LATEST_GLOVE_S:

@@ -139,8 +139,8 @@ FORMS_BY_NAME: dict[str, tuple[Form, ...]] = {
 
 KNOWN_CAUSES = (
     "nonlinearity", "cross_coupling", "palm_arch", "hysteresis", "creep", "lag", "clock_offset",
-    "glove_latency", "repeated_samples", "warmup_drift", "temperature", "humidity", "donning_shift", "garment_slip",
-    "supply_sag", "saturation", "contact_pressure", "sensor_fault",
+    "glove_latency", "repeated_samples", "warmup_drift", "temperature", "humidity", "donning_shift",
+    "garment_slip", "supply_sag", "saturation", "contact_pressure", "sensor_fault",
 )  # fmt: skip
 """Those with an effect's name; each lives in the file of that name."""
 UNKNOWN_CAUSES = tuple(f"unknown:{name}" for name in FORMS_BY_NAME)

@@ -1,7 +1,7 @@
 """Glove latency: the whole glove is late by the same time, because of its transport, buffers and filters.
 
-Wireless sensors come 10 to 40 ms late (Santos, NIME 2021), play-out buffers against radio jitter add some tens
-of milliseconds, and a linear-phase filter half its length. No sensor is later than another.
+Wireless sensors come 10 to 40 ms late (Santos, NIME 2021), play-out buffers against radio jitter add some
+tens of milliseconds, and a linear-phase filter half its length. No sensor is later than another.
 """
 
 from __future__ import annotations
@@ -59,6 +59,21 @@ def linear_phase(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draw
     return _late(passed, scene, np.full(scene.session_s.shape, (half - centre) / scene.rate_hz))
 
 
+@form(
+    Stage.COUNTS,
+    "A moving average in the firmware, the same for all sensors: late by half its window.",
+    sizes=SIZES_S,
+    shared=True,
+)
+def common_average(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The mean of the last whole frames, late by ``size`` seconds."""
+    frames = max(1, round(2 * float(size[0]) * scene.rate_hz) + 1)
+    start = signal[:, :1]
+    passed = lfilter(np.full(frames, 1 / frames), [1.0], signal - start, axis=1) + start
+    left_s = float(size[0]) - (frames - 1) / 2 / scene.rate_hz
+    return _late(passed, scene, np.full(scene.session_s.shape, left_s))
+
+
 def _late(signal: np.ndarray, scene: Scene, delay_s: np.ndarray) -> np.ndarray:
     return np.stack(
         [
@@ -68,4 +83,4 @@ def _late(signal: np.ndarray, scene: Scene, delay_s: np.ndarray) -> np.ndarray:
     )
 
 
-FORMS = (transport, buffered, linear_phase)
+FORMS = (transport, buffered, linear_phase, common_average)
