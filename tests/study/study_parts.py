@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from blind_glove import BlindGlove
-from diagnosis_answer import diagnosis_answer
 from delay_gloves import delay_figures, delay_gloves
+from diagnosis_answer import diagnosis_answer
 from glove_choices import clean, effect_names, pair, undecided, unknown, unknown_names, with_cause
 from glove_jobs import Job, Row
 from naming_figures import (

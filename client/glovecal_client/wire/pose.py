@@ -60,9 +60,10 @@ class Pose:
     """Sequence number of the source frame."""
     run_id: int
     monotonic_ns: int
-    """Monotonic time of the source frame on the capture computer."""
+    """Time of the hand by the capture computer's monotonic clock: that of the source frame less the glove's
+    known latency (``pose/meta``: ``glove_latency_s``)."""
     wall_ns: int
-    """Wall time of the source frame on the capture computer."""
+    """The same by its wall clock."""
     degrees: np.ndarray = field(default_factory=_no_values)
     """Rotations in degrees, float32, shape (R,), in the order given by ``pose/meta``."""
     deviations: np.ndarray = field(default_factory=_no_values)
@@ -76,7 +77,7 @@ class Pose:
     skipped: int = 0
     """Frames of this run that the service has skipped so far."""
     age_us: int = 0
-    """Microseconds from the service's receipt of the frame to publication."""
+    """Microseconds from the service's receipt of the frame to publication, plus the glove's known latency."""
 
     @property
     def words(self) -> tuple[str, ...]:

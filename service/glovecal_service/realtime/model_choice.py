@@ -43,7 +43,8 @@ def choose(store: Store, glove: str, meta: Mapping[str, Any] | None, prepared: P
     except NotFound:
         return Serving(sentence=f"glove {glove} has not said yet which layout it has")
     subject, layout = record.subject, record.layout
-    serving = Serving(subject, layout, wearing=record.wearing, run_id=str((meta or {}).get("run_id") or ""))
+    run_id = str((meta or {}).get("run_id") or "")
+    serving = Serving(subject, layout, wearing=record.wearing, run_id=run_id, latency=record.known_latency)
     if layout is None:
         return replace(serving, sentence=f"glove {glove} has not said yet which layout it has")
     if subject is None:

@@ -10,6 +10,7 @@ from threading import Event
 from sqlalchemy.exc import SQLAlchemyError
 
 from glovecal_models.errors import BadInput, GlovecalError
+from glovecal_models.takes.known_latency import KnownLatency
 from glovecal_service.realtime.glove_lane import GloveLane
 from glovecal_service.realtime.glove_metas import GloveMetas
 from glovecal_service.realtime.model_choice import choose
@@ -135,7 +136,7 @@ class ModelWatcher:
             raise
         except (GlovecalError, ArithmeticError, ValueError, MemoryError) as error:
             serving = self._keep(glove, str(error))
-        self._worn.put(glove, WornGlove.of(self._metas.of(glove), serving.wearing))
+        self._worn.put(glove, WornGlove.of(self._metas.of(glove), serving.wearing, serving.latency))
         self._serve(glove, serving)
         self._gloves.add(glove)
         self._to_choose.discard(glove)
@@ -144,8 +145,9 @@ class ModelWatcher:
         model = self._models.of(glove)
         known = self._pose_metas.documents().get(glove, {})
         sentence = f"the model stays: {problem}"
-        wearing, run_id = known.get("wearing"), known.get("run_id", "")
-        return Serving(known.get("subject"), known.get("layout"), model, sentence, wearing, run_id)
+        wearing, run_id, late_s = known.get("wearing"), known.get("run_id", ""), known.get("glove_latency_s")
+        latency = None if late_s is None else KnownLatency(late_s, known["glove_latency_sd_s"])
+        return Serving(known.get("subject"), known.get("layout"), model, sentence, wearing, run_id, latency)
 
     def _serve(self, glove: str, serving: Serving) -> None:
         """Say first what the poses will mean, then let the next frame have it."""

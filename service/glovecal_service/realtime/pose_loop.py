@@ -171,20 +171,22 @@ class PoseLoop:
         ):
             lane, frame, received_ns = item
             flags = _simulated(frame) | _POSE_FLAGS[any_flag & 3] | effect_flag
+            late_ns = self._worn.of(lane.glove).latency_ns
             message = encode_around(
-                of_frame, frame.sequence, frame.run_id, frame.monotonic_ns, frame.wall_ns,
-                model.name_in_pose, flags, lane.skipped_in_run, _age_us(received_ns),
+                of_frame, frame.sequence, frame.run_id, frame.monotonic_ns - late_ns, frame.wall_ns - late_ns,
+                model.name_in_pose, flags, lane.skipped_in_run, _age_us(received_ns - late_ns),
             )  # fmt: skip
             self._publish(lane.glove, message)
             lane.note_pose(message, received_ns, model.model_id)
 
     def _serve_uncalibrated(self, lane: GloveLane) -> None:
         lane.effects = None
+        late_ns = self._worn.of(lane.glove).latency_ns
         for frame, received_ns in self._open(lane, len(lane)):
             flags = int(PoseFlag.UNCALIBRATED) | _simulated(frame)
             pose = Pose(
-                frame.sequence, frame.run_id, frame.monotonic_ns, frame.wall_ns,
-                flags=flags, skipped=lane.skipped_in_run, age_us=_age_us(received_ns),
+                frame.sequence, frame.run_id, frame.monotonic_ns - late_ns, frame.wall_ns - late_ns,
+                flags=flags, skipped=lane.skipped_in_run, age_us=_age_us(received_ns - late_ns),
             )  # fmt: skip
             message = encode_pose(pose)
             self._publish(lane.glove, message)
@@ -217,7 +219,8 @@ class PoseLoop:
         if now - lane.stale_published_ns < STALE_AGAIN_NS:
             return
         lane.stale_published_ns = now
-        pose, age_us = decode_pose(lane.last_pose), _age_us(lane.last_pose_received_ns)
+        late_ns = self._worn.of(lane.glove).latency_ns
+        pose, age_us = decode_pose(lane.last_pose), _age_us(lane.last_pose_received_ns - late_ns)
         flags = pose.flags | int(PoseFlag.STALE)
         stale = replace(pose, flags=flags, age_us=age_us, skipped=lane.skipped_in_run)
         self._publish(lane.glove, encode_pose(stale))
@@ -234,4 +237,4 @@ def _simulated(frame: Frame) -> int:
 
 
 def _age_us(received_ns: int) -> int:
-    return min((time.monotonic_ns() - received_ns) // 1000, 0xFFFFFFFF)
+    return min(max((time.monotonic_ns() - received_ns) // 1000, 0), 0xFFFFFFFF)

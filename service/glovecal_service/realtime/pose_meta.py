@@ -10,6 +10,7 @@ from typing import Any
 import zenoh
 
 from glovecal_client.keys import JSON_ENCODING, GloveKeys, all_gloves
+from glovecal_models.takes.known_latency import KnownLatency
 from glovecal_service.realtime.served_model import ServedModel
 
 
@@ -24,6 +25,8 @@ class Serving:
     wearing: str | None = None
     run_id: str = ""
     """The run of the capture daemon that this was decided for."""
+    latency: KnownLatency | None = None
+    """How late the glove is known to be: the poses' times and ages hold it."""
 
     def document(self, glove: str) -> dict[str, Any]:
         """``rotations`` are in the order of the pose's numbers."""
@@ -36,6 +39,8 @@ class Serving:
             "wearing": self.wearing,
             "layout": self.layout,
             "run_id": self.run_id,
+            "glove_latency_s": None if self.latency is None else self.latency.seconds,
+            "glove_latency_sd_s": None if self.latency is None else self.latency.sd_s,
             "model": None if model is None else model.model_id,
             "method": None if model is None else model.method,
             "model_simulated": None if model is None else model.simulated,

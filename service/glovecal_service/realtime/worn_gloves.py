@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from glovecal_client.wire.frame import Frame
+from glovecal_models.takes.known_latency import KnownLatency
 
 
 @dataclass(frozen=True)
@@ -21,14 +22,19 @@ class WornGlove:
     """"" when nobody said."""
     context: tuple[str, ...] = ()
     """Names of a frame's context values, in order."""
+    latency_ns: int = 0
+    """How long before a frame's time the hand was as it shows; 0 if nobody measured it."""
 
     @classmethod
-    def of(cls, meta: Mapping[str, Any] | None, wearing: str | None) -> WornGlove:
+    def of(
+        cls, meta: Mapping[str, Any] | None, wearing: str | None, latency: KnownLatency | None = None
+    ) -> WornGlove:
         """``meta`` as capture said it, ``wearing`` as the store has it (it knows later assignments too)."""
         meta = meta or {}
         names = meta.get("context")
         context = tuple(map(str, names)) if isinstance(names, list) else ()
-        return cls(str(meta.get("run_id") or ""), wearing or "", context)
+        latency_ns = 0 if latency is None else round(1e9 * latency.seconds)
+        return cls(str(meta.get("run_id") or ""), wearing or "", context, latency_ns)
 
     def wearing_of(self, frame: Frame) -> str:
         """A run of which nothing was said yet is a wearing of its own, without a name."""

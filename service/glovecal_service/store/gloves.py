@@ -10,11 +10,12 @@ from sqlalchemy import Connection, Row, insert, select, update
 
 from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier, subject_name
+from glovecal_models.takes.known_latency import KnownLatency
 from glovecal_service.store import revision, tables
 from glovecal_service.store.clock import now
 from glovecal_service.store.database import Database
 from glovecal_service.store.errors import NotFound
-from glovecal_service.store.records import GloveRecord
+from glovecal_service.store.records import GloveRecord, TakeRecord
 from glovecal_service.store.row_hash import sound_row, sound_rows
 from glovecal_service.store.subjects import require_subject
 from glovecal_service.store.texts import check_text
@@ -81,6 +82,32 @@ class Gloves:
             _change(connection, glove, chosen)
             revision.grow(connection)
             return _record(sound_row(tables.gloves, _require(connection, glove)))
+
+    def set_latency(self, glove: str, latency: Mapping[str, Any] | None) -> GloveRecord:
+        """Keep how late the glove was measured to be, ``latency_s`` and ``sd_s`` in seconds and what else is
+        to be known of it; None forgets it. The glove need not have been seen yet. Raises BadInput."""
+        check_identifier(glove, "glove")
+        with self._database.write() as connection:
+            if _find(connection, glove) is None:
+                connection.execute(insert(tables.gloves).values(**_unseen(glove, now())))
+            _change(connection, glove, {"latency": None if latency is None else dict(latency)})
+            revision.grow(connection)
+            return _record(sound_row(tables.gloves, _require(connection, glove)))
+
+
+def latency_of_take(connection: Connection, take: TakeRecord) -> KnownLatency | None:
+    """Of the glove that the take was recorded with; of a file that of its subject's only such glove."""
+    table = tables.gloves
+    recording = select(tables.recordings.c.glove).where(tables.recordings.c.id == take.recording)
+    glove = connection.execute(recording).scalar() if take.recording else None
+    if glove is None:
+        mine = (table.c.subject == take.subject) & (table.c.layout == take.layout)
+    else:
+        mine = table.c.name == glove
+    rows = connection.execute(select(table).where(mine)).all()
+    found = [_record(sound_row(table, row)).known_latency for row in rows]
+    known = [item for item in found if item is not None]
+    return known[0] if len(known) == 1 else None
 
 
 def _said(glove: str, meta: Mapping[str, Any]) -> dict[str, Any]:

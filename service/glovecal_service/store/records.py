@@ -10,6 +10,7 @@ from typing import Any, Literal
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import Handedness, Skeleton, hand_skeleton
 from glovecal_models.sampling.sampled_takes import is_labelled
+from glovecal_models.takes.known_latency import KnownLatency
 
 RecordingState = Literal["requested", "recording", "stopping", "repairing", "done", "failed"]
 """``repairing``: it is over and its take can be used, but frames may still come from the capture log."""
@@ -62,6 +63,14 @@ class GloveRecord:
     last_seen_at: datetime
     assigned_at: datetime | None = None
     """When a user last chose the wearer; None if only the capture daemon said who it is."""
+    latency: dict[str, Any] | None = None
+    """How late the glove was measured to be: ``latency_s``, ``sd_s``, ``taps`` ...; None if nobody did."""
+
+    @property
+    def known_latency(self) -> KnownLatency | None:
+        if self.latency is None:
+            return None
+        return KnownLatency(float(self.latency["latency_s"]), float(self.latency["sd_s"]))
 
 
 @dataclass(frozen=True)

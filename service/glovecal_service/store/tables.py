@@ -68,6 +68,7 @@ gloves = Table(
     Column("last_seen_at", UtcTime, nullable=False),
     Column("assigned_at", UtcTime),
     Column("assigned_run_id", String(32)),
+    Column("latency", Json),
 )
 
 takes = Table(

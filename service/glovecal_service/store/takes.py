@@ -20,6 +20,7 @@ from glovecal_service.store.artifacts import Artifacts, check_sha256
 from glovecal_service.store.clock import new_id, now
 from glovecal_service.store.database import Database
 from glovecal_service.store.errors import Conflict, NotFound
+from glovecal_service.store.gloves import latency_of_take
 from glovecal_service.store.records import TakeRecord
 from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
 from glovecal_service.store.subjects import of_subject, require_subject
@@ -114,8 +115,11 @@ class Takes:
             return sound_rows(connection, tables.takes, statement, _record, wanted)
 
     def load(self, id: str) -> Take:
-        """The take's arrays, verified. Raises NotFound, DamagedArtifact."""
-        return load_take(self._artifacts.get(self.get(id).artifact))
+        """The take's arrays, verified, with what is known of its glove. Raises NotFound, DamagedArtifact."""
+        record = self.get(id)
+        with self._database.read() as connection:
+            latency = latency_of_take(connection, record)
+        return dataclasses.replace(load_take(self._artifacts.get(record.artifact)), glove_latency=latency)
 
     def attach_reference(
         self,

@@ -57,8 +57,8 @@ class SignificanceLimits:
         3.0,
         "standard errors",
         "A form of delay (a mere delay, one or two poles, moving average, symmetric window) that leaves so"
-        " much more error than the best is ruled out; delays that differ between joints by half as much again are"
-        " a lag.",
+        " much more error than the best is ruled out. Delays that differ between joints by half as much again"
+        " are a lag.",
         "Simulated gloves with 12 to 100 ms, seeds 1 to 3 (2026-11-22).",
     )
     per_take_offset_share: float = limit(

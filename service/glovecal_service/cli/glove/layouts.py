@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -42,17 +42,27 @@ def list_gloves(as_json: AsJson = False) -> None:
     )
     out.print()
     print_table(
-        [{**item, "last_seen_at": moment(item["last_seen_at"])} for item in document["seen"]],
+        [
+            {**item, "last_seen_at": moment(item["last_seen_at"]), "latency": _latency(item["latency"])}
+            for item in document["seen"]
+        ],
         {
             "name": "glove",
             "layout": "layout",
             "subject": "worn by",
             "wearing": "wearing",
             "simulated": "simulated",
+            "latency": "latency (ms)",
             "last_seen_at": "last seen",
         },
         empty="No glove seen yet. Start one: glovecal capture --device cyberglove:PORT --glove NAME",
     )
+
+
+def _latency(measured: dict[str, Any] | None) -> str:
+    if measured is None:
+        return ""
+    return f"{1000 * measured['latency_s']:.0f} ± {1000 * measured['sd_s']:.1f}"
 
 
 @app.command("show")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from glovecal_client.errors import ServiceError
-from glovecal_service.cli.take import clocks, examination, holds, table_import
+from glovecal_service.cli.take import clocks, examination, holds, latency, table_import
 from glovecal_service.cli.take.rows import find_take, find_takes, print_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, OnlySubject, Take, identifier
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 app = typer.Typer(help="Takes: recordings with or without reference angles.", no_args_is_help=True)
 app.command("import")(table_import.import_takes)
 app.command("clocks")(clocks.clocks)
+app.command("latency")(latency.latency)
 app.command("examine")(examination.examine)
 app.command("holds")(holds.holds)
 

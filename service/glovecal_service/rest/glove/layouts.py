@@ -13,6 +13,7 @@ from starlette.concurrency import run_in_threadpool
 
 from glovecal_models.errors import BadLayout
 from glovecal_models.layout import Layout
+from glovecal_models.takes.tap_latency import FEWEST_TAPS
 from glovecal_service.rest.http.answers import change_problems, problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
 from glovecal_service.rest.http.problem import Problem
@@ -26,6 +27,7 @@ from glovecal_service.rest.http.request_types import (
     Title,
     WearingName,
 )
+from glovecal_service.store.clock import now
 from glovecal_service.store.errors import NotFound
 from glovecal_service.store.records import GloveRecord, LayoutRecord
 
@@ -65,6 +67,20 @@ class LayoutView(BaseModel):
     created_at: datetime | None
 
 
+class Latency(StrictBody):
+    """What ``glovecal take latency`` measured."""
+
+    latency_s: Annotated[FiniteFloat, Field(ge=-0.1, le=1.0)]
+    sd_s: Annotated[FiniteFloat, Field(ge=0, le=0.1, description="Standard deviation of `latency_s`.")]
+    taps: Annotated[int, Field(ge=FEWEST_TAPS, le=100_000)]
+    used: Annotated[int, Field(ge=FEWEST_TAPS, le=100_000, description="Taps that were alike.")]
+    key_latency_s: Annotated[FiniteFloat, Field(ge=0, le=0.2, description="Taken for the key's own.")] = 0.0
+
+
+class LatencyView(Latency):
+    measured_at: datetime
+
+
 class GloveView(BaseModel):
     name: str
     layout: str | None
@@ -76,6 +92,7 @@ class GloveView(BaseModel):
     first_seen_at: datetime
     last_seen_at: datetime
     assigned_at: datetime | None
+    latency: LatencyView | None = Field(None, description="How late it is, as taps on a key showed.")
 
 
 class Gloves(BaseModel):
@@ -134,6 +151,28 @@ async def put_layout(layout: NameInPath, request: Request, store: StoreNeeded) -
 def set_wearer(glove: NameInPath, body: Wearer, store: StoreNeeded) -> GloveRecord:
     """The live stream is predicted by that subject's active model from then on."""
     return store.gloves.assign(glove, body.subject, body.wearing)
+
+
+@router.put(
+    "/{glove}/latency",
+    response_model=GloveView,
+    summary="Keep how late a glove is",
+    responses=change_problems(),
+)
+def set_latency(glove: NameInPath, body: Latency, store: StoreNeeded) -> GloveRecord:
+    """It is taken off the time of live poses and added to their age; a diagnosis tells clocks from it."""
+    return store.gloves.set_latency(glove, body.model_dump() | {"measured_at": now().isoformat()})
+
+
+@router.delete(
+    "/{glove}/latency",
+    response_model=GloveView,
+    summary="Forget how late a glove is",
+    responses=change_problems(),
+)
+def forget_latency(glove: NameInPath, store: StoreNeeded) -> GloveRecord:
+    store.gloves.get(glove)
+    return store.gloves.set_latency(glove, None)
 
 
 def _view(record: LayoutRecord) -> LayoutView:
