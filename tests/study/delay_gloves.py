@@ -64,7 +64,7 @@ def delay_figures(rows: Sequence[Row]) -> list[StudyFigure]:
 
 def _glove(kind: str, number: int) -> BlindGlove:
     cause, form, _ = KINDS[kind]
-    label = ("delays", kind)
+    label = ("delays of nine kinds", kind)
     size = dealt(SIZES, number, *label, "size")
     return BlindGlove(
         part="delays",

@@ -21,7 +21,8 @@ FEWEST_TAPS = 20
 STEP_S = 0.001
 BEFORE_S, AFTER_S = 0.3, 0.7
 """Of a key's time: what is looked at, and so the latencies that can be found."""
-LATEST_S = 0.5
+EARLIEST_S, LATEST_S = -0.1, 0.4
+"""Of the stop, from the key's time: a neighbouring tap is further away."""
 APART_S = 0.4
 """Taps closer to another one are left out."""
 STROKE_S = 0.15
@@ -90,7 +91,7 @@ def tap_latency(
     interval_s = float(np.median(np.diff(time_s)))
     smoothing = max(SMOOTHING_S, 0.5 * interval_s) / STEP_S
     speed = gaussian_filter1d(moved @ weights, smoothing, axis=1, order=1)
-    speed = speed if _strike_rises(speed) else -speed
+    speed = speed if _strike_rises(speed, grid) else -speed
     late, fits = _aligned(speed, grid)
     used = late[fits]
     if len(used) < FEWEST_TAPS:
@@ -142,9 +143,9 @@ def _weights(moved: np.ndarray) -> np.ndarray:
     return directions[0] / quiet
 
 
-def _strike_rises(speed: np.ndarray) -> bool:
+def _strike_rises(speed: np.ndarray, grid: np.ndarray) -> bool:
     """Whether the fastest stroke of the mean tap is upwards. Raises BadInput where both are as fast."""
-    mean = np.median(speed, axis=0)
+    mean = np.median(speed, axis=0)[(grid >= EARLIEST_S) & (grid <= LATEST_S)]
     up, down = float(mean.max()), float(-mean.min())
     if max(up, down) < LEAST_CONTRAST * min(up, down):
         raise BadInput(
@@ -175,7 +176,8 @@ def _aligned(speed: np.ndarray, grid: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 def _stop(template: np.ndarray, grid: np.ndarray) -> float:
     """Where the speed has fallen to half its peak, after the peak. Raises BadInput for none in reach."""
-    peak = int(np.argmax(template))
+    within = (grid >= EARLIEST_S) & (grid <= LATEST_S)
+    peak = int(np.argmax(np.where(within, template, -np.inf)))
     below = np.flatnonzero(template[peak:] < 0.5 * template[peak])
     if not len(below) or grid[peak + below[0]] > LATEST_S:
         raise BadInput(f"no stop of the finger is found within {LATEST_S} s after the key was pressed")
@@ -195,5 +197,8 @@ def _fitted(
     windows -= windows.mean(axis=1, keepdims=True)
     size = np.linalg.norm(windows, axis=1) * np.linalg.norm(shape)
     likeness = windows @ shape / np.maximum(size, 1e-12)
-    best = int(np.argmax(likeness))
-    return float(tried[best]), float(likeness[best])
+    best = int(np.argmax(likeness[1:-1])) + 1
+    before, here, after = (float(value) for value in likeness[best - 1 : best + 2])
+    bend = before - 2 * here + after
+    between = float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend < 0 else 0.0
+    return float(tried[best]) + STEP_S * between, here

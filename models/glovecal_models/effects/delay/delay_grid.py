@@ -27,6 +27,7 @@ FIRST_POLE_SHARE = 0.65
 """Of the delay of two poles."""
 WINDOW_SHARE = 0.6
 """Length of a delayed window, of that of a moving average as late: a raised cosine has 0.63."""
+BEND_S = 0.05
 FAST_SHARE = 1.0
 """Per second: a joint is moved fast when its speed reaches so many of its own standard deviations."""
 
@@ -60,6 +61,8 @@ class DelayErrors:
     """(B,), without any delay."""
     take: np.ndarray
     """(B,), the take each block lies in."""
+    fast: np.ndarray
+    """(B,), degrees squared: how much the angle bends within ``BEND_S``, where filters show."""
 
     @property
     def whole(self) -> float:
@@ -148,6 +151,7 @@ def _joint(problem: Problem, joint: int, form: np.ndarray, delay: np.ndarray) ->
     )
     own = np.concatenate([take.own[rows, joint] for take, rows in used])
     moved *= _slope(base, products.whole, own)[:, None]
+    bend = _bend(moved, form, delay)
     left = target - orthogonal @ (orthogonal.T @ target)
     moved -= orthogonal @ (orthogonal.T @ moved)
     np.subtract(left[:, None], moved, out=moved)
@@ -160,7 +164,14 @@ def _joint(problem: Problem, joint: int, form: np.ndarray, delay: np.ndarray) ->
         np.add.reduceat(moved * moved, starts, axis=0),
         np.add.reduceat(left * left, starts),
         np.array(problem.unit_take)[np.searchsorted(ends, starts, side="right")],
+        np.add.reduceat(bend * bend, starts),
     )
+
+
+def _bend(moved: np.ndarray, form: np.ndarray, delay: np.ndarray) -> np.ndarray:
+    """(rows,): the angle ``BEND_S`` before and after, less twice itself."""
+    either = (form == DelayForm.PURE) & (np.abs(np.abs(delay) - BEND_S) < 0.5 * STEP_S)
+    return moved[:, either].sum(axis=1)
 
 
 def _slope(base: np.ndarray, coefficients: np.ndarray, own: np.ndarray) -> np.ndarray:

@@ -3,8 +3,8 @@
 A reading that comes before the angle can only come from the clocks, and so can a delay that differs from take
 to take. Joints that differ are a mark of a lag: a transport and a clock delay all alike. Otherwise the form
 decides, by what it leaves of the error: filters flatten fast motion, a mere delay does not. Clocks and a
-transport are the same in every take; only a latency that was measured tells them apart. Forms are judged on
-strongly smoothed signals, on which a low pass gains nothing by removing noise.
+transport are the same in every take; only a latency that was measured tells them apart. Forms are judged by
+what they gain more where motion is fast: a low pass gains everywhere by taking noise from the reference.
 """
 
 from __future__ import annotations
@@ -20,13 +20,15 @@ from glovecal_models.effects.base.problem import Problem
 from glovecal_models.effects.delay.delay_grid import DelayErrors, DelayForm, delay_errors
 from glovecal_models.takes.known_latency import KnownLatency
 
-SMOOTHING, SHAPE_SMOOTHING = 13, 25
-"""Even times. With 13 a low pass still gains by taking noise from the reference: 4 standard errors."""
+SMOOTHING = 13
+"""Even times."""
 
 LAG, CLOCK, LATENCY = "lag", "clock_offset", "glove_latency"
 APART_TIMES = 1.5
 """Delays of one size for all joints reach 2.3 standard errors (24 simulated gloves), lags of several sizes
 mostly 6 to 17."""
+STILL_SHARE = 0.3
+"""Of the mean motion: blocks with less count alike."""
 KEYS_LATE_S = 0.015
 """Keyboards report a key 5 to 20 ms after it was hit: so much a measured latency may be wrong."""
 ACCOUNTS_FOR = {
@@ -113,7 +115,7 @@ def first_delay(problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]
     """The delay to be named first, and all that remain possible; ``problem`` by the rows smoothed over."""
     usual = problem(SMOOTHING)
     grids = delay_errors(usual)
-    possible = possible_delays(grids, delay_errors(problem(SHAPE_SMOOTHING)), usual.limits)
+    possible = possible_delays(grids, usual.limits)
     latency = usual.signals[0].glove_latency
     if latency is not None and {CLOCK, LATENCY} <= set(possible):
         possible = _told_by_latency(possible, common_delay(grids), latency, usual.limits.delay_clear_se)
@@ -121,32 +123,61 @@ def first_delay(problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]
 
 
 def possible_delays(
-    grids: Sequence[DelayErrors],
-    strongly_smoothed: Sequence[DelayErrors],
-    limits: SignificanceLimits = SIGNIFICANCE_LIMITS,
+    grids: Sequence[DelayErrors], limits: SignificanceLimits = SIGNIFICANCE_LIMITS
 ) -> tuple[str, ...]:
-    """The effects that these delays may come from, the likeliest first.
-
-    ``grids`` are those of ``SMOOTHING``, the others of ``SHAPE_SMOOTHING``.
-    """
+    """The effects that these delays may come from, the likeliest first."""
     clear = limits.delay_clear_se
     clock = clock_choice(grids, limits)
     if np.median(clock.offset_s) < 0:
         return (CLOCK,)
-    together = {form: _together(strongly_smoothed, form) for form in DelayForm}
-    best = min(together, key=lambda form: float(together[form].sum()))
+    together = {form: _together(grids, form) for form in DelayForm}
     if clock.is_per_take:
-        each_take = _over_joints(strongly_smoothed, clock.errors(strongly_smoothed)[0])
-        if _score(together[best], each_take) > clear:
+        each_take = _over_joints(grids, clock.errors(grids)[0])
+        if min(_score(errors, each_take) for errors in together.values()) > clear:
             return (CLOCK,)
-    apart = min((_apart(strongly_smoothed, form) for form in DelayForm), key=np.sum)
-    if _score(together[best], apart) > APART_TIMES * clear:
+    if _score(together[DelayForm.PURE], _apart(grids, DelayForm.PURE)) > APART_TIMES * clear:
         return (LAG,)
-    kept = [form for form in DelayForm if _score(together[form], together[best]) <= clear]
-    kept.sort(key=lambda form: float(together[form].sum()))
+    kept = forms_kept(grids, together, clear)
     if DelayForm.PURE in kept and DelayForm.DELAYED_WINDOW in kept:
         kept.remove(DelayForm.DELAYED_WINDOW)  # hardly told from a mere delay
     return tuple(dict.fromkeys(name for form in kept for name in ACCOUNTS_FOR[form]))
+
+
+def forms_kept(
+    grids: Sequence[DelayErrors], together: dict[DelayForm, np.ndarray], clear_se: float
+) -> list[DelayForm]:
+    """Forms that are not ruled out, the best first, from their errors (B,).
+
+    A filter also takes noise from the reference, in every block alike: only what it gains more where motion
+    is fast is held for it.
+    """
+    fast = _over_joints(grids, [grid.fast for grid in grids])
+    gain = {form: _along(together[DelayForm.PURE] - together[form], fast)[0] for form in DelayForm}
+    order = sorted(DelayForm, key=lambda form: -gain[form])
+    best = together[order[0]]
+    kept = []
+    for form in order:
+        slope, error = _along(together[form] - best, fast)
+        if slope <= clear_se * error:
+            kept.append(form)
+    return kept
+
+
+def _along(gain: np.ndarray, fast: np.ndarray) -> tuple[float, float]:
+    """Slope of the straight line of ``gain`` (B,) over ``fast`` (B,), and its standard error.
+
+    Scatter grows with motion, so that slow blocks count more; the error holds for any scatter.
+    """
+    x = fast / max(float(fast.mean()), 1e-12)
+    weight = 1.0 / (x + STILL_SHARE) ** 2
+    x = x - np.average(x, weights=weight)
+    square = float(weight @ (x * x))
+    if len(x) < 3 or square <= 0:
+        return 0.0, np.inf
+    slope = float((weight * x) @ gain) / square
+    left = gain - np.average(gain, weights=weight) - slope * x
+    left = left / np.maximum(1.0 - weight / weight.sum() - weight * x * x / square, 1e-3)
+    return slope, float(np.sqrt(np.sum((weight * x * left) ** 2))) / square
 
 
 @dataclass(frozen=True)

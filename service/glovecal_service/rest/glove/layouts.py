@@ -78,7 +78,7 @@ class Latency(StrictBody):
 
 
 class LatencyView(Latency):
-    measured_at: datetime
+    measured_at: str = Field(description="ISO 8601.")
 
 
 class GloveView(BaseModel):
