@@ -54,6 +54,12 @@ class ClockOffset:
     """The least share with the sensors played backwards: what chance gives."""
     sentence: str
 
+    @property
+    def is_unknown(self) -> bool:
+        """Whether the reference moves and yet its clock was not found."""
+        moves = self.unexplained_reversed < 1.0
+        return self.verdict == "range too small" or (self.verdict == "not identifiable" and moves)
+
 
 @dataclass(frozen=True)
 class Grid:

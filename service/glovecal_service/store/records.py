@@ -16,6 +16,9 @@ RecordingState = Literal["requested", "recording", "stopping", "repairing", "don
 """``repairing``: it is over and its take can be used, but frames may still come from the capture log."""
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 
+CLOCK_UNKNOWN = "clock_unknown"
+"""Fact of a take: a repair of clocks did not find that of its reference."""
+
 FINISHED_JOB_STATES: tuple[JobState, ...] = ("done", "failed", "cancelled")
 OPEN_RECORDING_STATES: tuple[RecordingState, ...] = ("requested", "recording", "stopping")
 
@@ -124,6 +127,16 @@ class TakeRecord:
         )
 
     @property
+    def unaligned_sentence(self) -> str:
+        """That its reference was not repaired although others were; "" where there is nothing to say."""
+        if not self.facts.get(CLOCK_UNKNOWN):
+            return ""
+        return (
+            f"Take {self.name}: the clock of its reference was not found and not repaired, unlike others'; it"
+            " is used as it is. Leave it out, or measure again."
+        )
+
+    @property
     def sampling(self) -> dict[str, Any] | None:
         """What a guided sampling asked for in this take; None when it is of none."""
         return (self.accounting or {}).get("sampling")
@@ -136,8 +149,9 @@ class TakeRecord:
 
 
 def incomplete_sentences(takes: Iterable[TakeRecord]) -> list[str]:
-    """One for each take that is being repaired."""
-    return [take.incomplete_sentence for take in takes if take.incomplete_sentence]
+    """What is to be known of takes that are incomplete, or whose reference stayed unrepaired."""
+    each = [sentence for take in takes for sentence in (take.incomplete_sentence, take.unaligned_sentence)]
+    return [sentence for sentence in each if sentence]
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from glovecal_service.store.clock import new_id, now
 from glovecal_service.store.database import Database
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.gloves import latency_of_take
-from glovecal_service.store.records import TakeRecord
+from glovecal_service.store.records import CLOCK_UNKNOWN, TakeRecord
 from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
 from glovecal_service.store.subjects import of_subject, require_subject
 from glovecal_service.store.take_file import dump_take, frames_hash, load_take
@@ -145,7 +145,8 @@ class Takes:
             reference=reference,
             poses=take.poses if poses is None else poses_at_frames(take.time_s, time_s, poses),
         )
-        return self._replace(earlier, take, {CLOCK_OFFSET: 0.0} if CLOCK_OFFSET in earlier.facts else {})
+        stale = {CLOCK_OFFSET: 0.0, CLOCK_UNKNOWN: False}
+        return self._replace(earlier, take, {name: stale[name] for name in stale if name in earlier.facts})
 
     def shift_reference(self, id: str, seconds: float) -> TakeRecord:
         """Move a take's reference in time, later by ``seconds``; ``facts`` keep the sum of all shifts.
@@ -159,6 +160,18 @@ class Takes:
         take = aligned(take, -seconds)
         total = earlier.facts.get(CLOCK_OFFSET, 0.0) - seconds
         return self._replace(earlier, take, {CLOCK_OFFSET: round(total, 9)})
+
+    def note_clock(self, id: str, *, unknown: bool) -> TakeRecord:
+        """Keep whether a repair of clocks did not find that of this take's reference. Raises NotFound."""
+        earlier = self.get(id)
+        if bool(earlier.facts.get(CLOCK_UNKNOWN)) == unknown:
+            return earlier
+        same = (tables.takes.c.id == id) & (tables.takes.c.artifact == earlier.artifact)
+        with self._database.write() as connection:
+            facts = {**earlier.facts, CLOCK_UNKNOWN: unknown}
+            if not change_rows(connection, tables.takes, same, {"facts": facts}):
+                raise Conflict(f"take {id} was changed or removed meanwhile; look at it again")
+            return _require(connection, id)
 
     def repair(self, id: str, frames: Take, accounting: Mapping[str, Any]) -> TakeRecord:
         """Give a recorded take the frames that were fetched later; its reference and pose names stay.

@@ -161,8 +161,8 @@ class ClockOffsetEffect(SignatureEffect):
         if not offsets:
             return None
         common = float(np.median(list(offsets.values())))
-        each = {item.take: _offset_of(item, common) for item in found if not _is_unknown(item)}
-        unknown = [item.take for item in found if _is_unknown(item)]
+        each = {item.take: _offset_of(item, common) for item in found if not item.is_unknown}
+        unknown = [item.take for item in found if item.is_unknown]
         settings: Settings = {"offset_s": each, "common_s": common, "per_take": True}
         if unknown:
             settings["left_out"] = unknown
@@ -234,12 +234,6 @@ def offsets_sentence(offsets_s: Sequence[float] | np.ndarray) -> str:
         f"Offset of the reference clock: {low:+.3f} to {high:+.3f} s, median {middle:+.3f} s, each of"
         f" {len(offsets)} takes its own."
     )
-
-
-def _is_unknown(scan: ClockOffset) -> bool:
-    """Whether the reference moves and yet its clock was not found."""
-    moves = scan.unexplained_reversed < 1.0
-    return scan.verdict == "range too small" or (scan.verdict == "not identifiable" and moves)
 
 
 def _offset_of(scan: ClockOffset, common_s: float) -> float:

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
 
 
+NOT_FOUND = ("not identifiable", "range too small")
+
+
 def clocks(
     take: Annotated[
         list[str] | None, typer.Argument(help="Takes: names or ids. Default: all with a reference.")
@@ -57,6 +60,13 @@ def _print(answer: list[dict[str, Any]], repair: bool) -> None:
     off = sum(item["verdict"] == "offset" for item in answer)
     if repair:
         out.print(f"Repaired {off} of {len(answer)} references; --undo moves them back.")
-        err.print("Models trained before keep what they learned: train again.")
+        unknown = [item["take"] for item in answer if item["verdict"] in NOT_FOUND]
+        if off and unknown:
+            err.print(
+                f"Not repaired, the clock was not found: {', '.join(unknown)}. Leave them out of training, or"
+                " measure again.",
+                style="yellow",
+            )
+        err.print("Existing models are unchanged; retrain to use the repair.")
     elif off:
         out.print(f"{off} of {len(answer)} references are off; --repair moves them.")

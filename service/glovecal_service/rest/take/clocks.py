@@ -46,14 +46,17 @@ class ClockView(BaseModel):
     "", response_model=list[ClockView], summary="Examine reference clocks", responses=change_problems(409)
 )
 def examine_clocks(body: ClocksRequest, store: StoreNeeded) -> list[dict[str, Any]]:
-    """Takes of one wearing are judged together. A repair keeps the take's id, and can be undone."""
+    """Takes of one wearing are judged together. A repair keeps the take's id, and can be undone. A reference
+    whose clock is not found stays as it is, and every result that uses it says so."""
     wanted = list(dict.fromkeys(body.takes))
     found = clock_offsets([store.takes.load(id) for id in wanted])
-    answers = []
+    answers, any_off = [], any(clock.verdict == "offset" for clock in found)
     for id, clock in zip(wanted, found, strict=True):
         repaired = body.repair and clock.verdict == "offset"
         if repaired:
             store.takes.shift_reference(id, -clock.offset_s)
+        if body.repair:
+            store.takes.note_clock(id, unknown=any_off and clock.is_unknown)
         answers.append(plain(asdict(clock)) | {"id": id, "repaired": repaired})
     return answers
 
@@ -63,6 +66,7 @@ def undo_repairs(body: Wanted, store: StoreNeeded) -> list[str]:
     """Move references back to where they were; the ids of takes that changed."""
     changed = []
     for id in dict.fromkeys(body.takes):
+        store.takes.note_clock(id, unknown=False)
         offset = store.takes.get(id).facts.get(CLOCK_OFFSET, 0.0)
         if offset:
             store.takes.shift_reference(id, offset)
