@@ -127,12 +127,18 @@ def test_taps_on_a_key_measure_the_glove_and_live_poses_say_so(settings, session
     late_ns = round(1e9 * measured["latency_s"])
     frames: dict[int, Frame] = {}
     poses: list[Pose] = []
+
+    def hear_frame(sample: zenoh.Sample) -> None:
+        frame = decode_frame(sample.payload.to_bytes())
+        frames[frame.sequence] = frame
+
+    def hear_pose(sample: zenoh.Sample) -> None:
+        poses.append(decode_pose(sample.payload.to_bytes()))
+
     hear = [
-        session.declare_subscriber(keys.raw, zenoh.handlers.Callback(
-            lambda sample: _keep(frames, decode_frame(sample.payload.to_bytes())), indirect=False)),
-        session.declare_subscriber(keys.pose, zenoh.handlers.Callback(
-            lambda sample: poses.append(decode_pose(sample.payload.to_bytes())), indirect=False)),
-    ]  # fmt: skip
+        session.declare_subscriber(key, zenoh.handlers.Callback(call, indirect=False))
+        for key, call in ((keys.raw, hear_frame), (keys.pose, hear_pose))
+    ]
     pairs = eventually(
         lambda: [(pose, frames[pose.sequence]) for pose in list(poses) if pose.sequence in frames][5:],
         "poses",
@@ -143,10 +149,6 @@ def test_taps_on_a_key_measure_the_glove_and_live_poses_say_so(settings, session
         assert pose.monotonic_ns == frame.monotonic_ns - late_ns
         assert pose.wall_ns == frame.wall_ns - late_ns
         assert pose.age_us >= late_ns // 1000
-
-
-def _keep(frames: dict[int, Frame], frame: Frame) -> None:
-    frames[frame.sequence] = frame
 
 
 def _meta(session: zenoh.Session, keys: GloveKeys, *, known: bool = False) -> dict[str, Any] | None:
