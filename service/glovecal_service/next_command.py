@@ -25,6 +25,11 @@ def next_command(model: str, stored: Mapping[str, Any]) -> str:
         return f"glovecal record GLOVE deciding --seconds {following['seconds']}"
     if named:
         return f"glovecal add-effect {short} {named['effect']}"
+    for action in found.get("actions") or ():
+        if action["method"] is not None:
+            return f"glovecal train SUBJECT --method {action['method']}"
+        if action["saves"]:
+            return f"glovecal add-effect {short} {action['effect']} --rotation {action['rotation']}"
     residual = found.get("unexplained_residual") or {}
     if residual.get("is_significant"):
         return f"glovecal where {short} --report where.html"

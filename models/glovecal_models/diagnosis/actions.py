@@ -52,6 +52,12 @@ class Action:
         return self.association.rotation
 
     @property
+    def control_share(self) -> float | None:
+        """Of the error that the control leaves, at most 1."""
+        found = self.rmse_deg
+        return None if found is None or found.before <= 0 else min(found.control / found.before, 1.0)
+
+    @property
     def saves(self) -> bool:
         """Whether the effect beats nothing and its control on held-out takes."""
         found = self.rmse_deg
@@ -62,13 +68,13 @@ def actions_for(
     associations: Sequence[ResidualAssociation],
     design: ForwardDesign,
     layout: Layout,
-    has: Set[str],
+    has: Set[tuple[str, str]],
     *,
     linear: bool,
     seed: int = 0,
 ) -> tuple[Action, ...]:
-    """One for each rotation and effect, those that save most first. ``has``: effects on which more of the
-    same would change nothing; ``linear``: whether the base is a straight line of the measuring sensor."""
+    """One for each rotation and effect, those that save most first. ``has``: effects that are on a rotation
+    already, as pairs; ``linear``: whether the base is a straight line of the measuring sensor."""
     found: list[Action] = []
     done: set[tuple[str, str]] = set()
     for item in associations:
@@ -84,7 +90,7 @@ def _action(
     item: ResidualAssociation,
     design: ForwardDesign,
     layout: Layout,
-    has: Set[str],
+    has: Set[tuple[str, str]],
     linear: bool,
     seed: int,
 ) -> Action:
@@ -93,7 +99,7 @@ def _action(
         return Action(item, None, method=TRAIN_OTHERWISE)
     best = Action(item, None)
     for effect in explaining(item.column, sensor):
-        if effect.name in has:
+        if (effect.name, item.rotation) in has:
             continue
         rmse = formed_rmse(design, effect, design.rotations.index(item.rotation), seed)
         if rmse is None:

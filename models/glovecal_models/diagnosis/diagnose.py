@@ -9,6 +9,7 @@ import numpy as np
 
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.noise_floor import takes_noise
+from glovecal_models.diagnosis.actions import Action, actions_for
 from glovecal_models.diagnosis.candidates import assessed
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.forward_design import ForwardDesign
@@ -95,14 +96,18 @@ def diagnose(
     findings = tuple(asked) if signatures else ()
     naming = beside_levels(naming, takes, findings, by_name)
     progress("testing the residual", 0.95)
+    actions: tuple[Action, ...] = ()
     if problem.is_sparse or are_held_levels(takes):
         residual = UnexplainedResidual(obstacle="single poses")
     else:
-        rest = problem.with_first(naming, by_name, design).design()
+        after = problem.with_first(naming, by_name, design)
+        rest = after.design()
         likely = [item.effect for item in impossible if item.saves_much]
         residual = unexplained_residual(
             rest, problem.even, layout, seed, floors=noise_floors, undecided=likely
         )
+        there = {(item.effect.name, joint) for item in after.known for joint in item.joints}
+        actions = actions_for(residual.associations, rest, layout, there, linear=linear, seed=seed)
     progress("done", 1.0)
     return Diagnosis(
         joints=problem.joints,
@@ -115,6 +120,7 @@ def diagnose(
         findings=findings,
         residual=residual,
         next_take=next_take(naming.confidence_set, by_name) or take_to_decide(impossible, residual),
+        actions=actions,
         effects=by_name,
         limits=limits,
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_models.diagnosis.actions import Action
 from glovecal_models.diagnosis.hold_drift import HoldDrift
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.naming import Naming
@@ -19,7 +20,9 @@ from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Kind
 from glovecal_models.effects.base.signature_effect import Finding
 
-Verdict = Literal["named", "ambiguous"]
+Verdict = Literal["named", "ambiguous", "associated"]
+"""Of an effect: the only one that explains the error, one of several that may, or one that was tried because
+the residual goes along with a recorded column: no cause is claimed."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,8 @@ class Diagnosis:
     """What is known by a signature in the recording."""
     residual: UnexplainedResidual
     next_take: NextTake | None
+    actions: tuple[Action, ...] = ()
+    """What the associations of the residual ask for, what saves most first."""
     effects: Mapping[str, Effect]
     """Those asked for, by name."""
     hold_drift: HoldDrift | None = None

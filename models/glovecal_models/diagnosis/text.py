@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from glovecal_models.diagnosis.actions import Action
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.floor_ratio import FloorRatio
 from glovecal_models.diagnosis.hold_drift import HAND, HoldDrift, PoseDrift, drifting
@@ -135,6 +136,28 @@ def _above_floor(name: str, item: FloorRatio) -> str:
         f"the held-out error of {name} is {item.rmse_deg:.2f} degrees, {item.times:.1f} times its noise floor"
         f" of {item.floor.floor_deg:.2f} (lower 95 % bound {item.lower_times:.1f}; healthy gloves: at most"
         f" {item.limits.healthy_floors:g})"
+    )
+
+
+def action_sentence(action: Action) -> str:
+    """What to do about one association, and what it would save."""
+    item = action.association
+    if action.method is not None:
+        return (
+            f"{item.rotation}: the residual is associated with {item.phrase}, which the layout gives it and a"
+            f" straight line does not use: nonlinearity of the base; train with --method {action.method}."
+        )
+    if action.effect is None or action.rmse_deg is None or not action.saves:
+        return (
+            f"{item.rotation}: the residual is associated with {item.phrase}; no effect of it reduces the"
+            " held-out error more than its control."
+        )
+    rmse = action.rmse_deg
+    unnamed = "" if action.is_physical else " (no cause is claimed)"
+    return (
+        f"{item.rotation}: the residual is associated with {item.phrase}; {action.effect}{unnamed} reduces"
+        f" the held-out error from {rmse.before:.2f} to {rmse.after:.2f} degrees (control:"
+        f" {rmse.control:.2f})."
     )
 
 

@@ -27,9 +27,11 @@ from glovecal_models.ceiling.ceiling import Ceiling
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.noise_floor import rotation_noise
 from glovecal_models.comparison.residuals import residuals
+from glovecal_models.diagnosis.actions import Action
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.known_effect import known_effects
+from glovecal_models.diagnosis.text import action_sentence
 from glovecal_models.effects.base.signature_effect import SignatureEffect
 from glovecal_models.effects.catalogue import catalogue, effect
 from glovecal_models.improvement.add_effect import add_effect
@@ -107,6 +109,8 @@ class _Loop:
         self.limits, self.cancelled, self.report = limits, cancelled, report
         self.steps: list[Step] = []
         self.trials: list[Trial] = []
+        self.followed: set[tuple[str, str]] = set()
+        """Effects and rotations that a residual's association asked for."""
         self.stopped: Stop = "nothing_named"
         self.diagnosis: Diagnosis | None = None
         self.errors = HeldOutErrors({}, {})
@@ -154,9 +158,10 @@ class _Loop:
             tried.add(item.effect)
             if len(tried) > self.limits.most_undone:
                 return False
-        if tried:
-            return self._add_widenings()
-        self.stopped = "nothing_named"
+        if self._add_associated(self.diagnosis):
+            return True
+        if not tried:
+            self.stopped = "nothing_named"
         return self._add_widenings()
 
     def finished(self, *, ceiling: bool) -> Improvement:
@@ -202,6 +207,7 @@ class _Loop:
         diagnosis: Diagnosis | None,
         reasons: tuple[str, ...] = (),
         confidence_set: tuple[str, ...] = (),
+        action: Action | None = None,
     ) -> bool:
         model = self.steps[-1].model
         every = trained_rotations(model)
@@ -218,19 +224,34 @@ class _Loop:
         addition = add_effect(
             model, self.takes, name, rotations=chosen, constants=constants, settings=self.settings,
             before=self.errors.of(chosen), judged=judged, least_gain=least,
-            control_share=share_in(diagnosis, name, chosen), take_hashes=self.hashes,
+            control_share=action.control_share if action else share_in(diagnosis, name, chosen),
+            take_hashes=self.hashes,
             limits=self.limits, cancelled=self.cancelled,
         )  # fmt: skip
         if not addition.added:
-            self.trials.append(Trial(addition, reasons, diagnosis=diagnosis))
+            self.trials.append(Trial(addition, reasons, diagnosis=diagnosis, action=action))
             return False
         self.errors = self.errors.with_those_of(addition.after)
         model, self.errors, removed = without_redundant(
             addition, self.takes, self.errors, self.settings, self.hashes, self.cancelled, self.limits
         )
-        self.trials.append(Trial(addition, reasons, removed, diagnosis))
-        self._step(model, AddedInStep.of(addition, constants, diagnosis, confidence_set), diagnosis)
+        self.trials.append(Trial(addition, reasons, removed, diagnosis, action))
+        added = AddedInStep.of(addition, constants, diagnosis, confidence_set, action)
+        self._step(model, added, diagnosis)
         return True
+
+    def _add_associated(self, diagnosis: Diagnosis) -> bool:
+        """The first effect of a column that the residual goes along with, if it stays."""
+        for action in diagnosis.actions:
+            pair = (action.effect or "", action.rotation)
+            if action.effect is None or not action.saves or pair in self.followed:
+                continue
+            self.followed.add(pair)
+            if self._add(
+                action.effect, [action.rotation], None, diagnosis, (action_sentence(action),), action=action
+            ):
+                return True
+        return False
 
     def _add_widenings(self) -> bool:
         steps = widenings(self.steps[-1].model, self._repaired(), self.diagnosis, self._tried | self._has)
@@ -257,7 +278,11 @@ class _Loop:
 
     @property
     def _tried(self) -> set[str]:
-        return {trial.addition.effect for trial in self.trials if not trial.addition.added}
+        return {
+            trial.addition.effect
+            for trial in self.trials
+            if not trial.addition.added and trial.action is None
+        }
 
     def _repaired(self) -> list[Take]:
         return repaired_takes(self.takes, requested_effects(self.steps[-1].model))
@@ -282,7 +307,7 @@ class _Loop:
         per_rotation, overall = step_errors(model, self.holdout, self.errors)
         control = None
         if diagnosis is not None and added is not None:
-            share = share_in(diagnosis, added.effect, added.where)
+            share = added.control_share or share_in(diagnosis, added.effect, added.where)
             control = None if share is None else self._with_control(added.where, share)
         held_out = self.errors.overall_deg
         self.steps.append(Step(model, added, overall, per_rotation, control, held_out))

@@ -10,6 +10,7 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.usable_sensors import UsableSensors
 from glovecal_models.ceiling.ceiling import Ceiling
 from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_models.diagnosis.actions import Action
 from glovecal_models.diagnosis.diagnosis import Diagnosis, Verdict
 from glovecal_models.diagnosis.next_take import NextTake, next_take
 from glovecal_models.effects.base.facts import Settings
@@ -33,9 +34,15 @@ class AddedInStep:
     claim: ClaimCheck | None = None
     next_take: NextTake | None = None
     """The recording that would tell the confidence set apart."""
+    associated_with: str | None = None
+    """The recorded column that the residual went along with, in words, where that is why it was added."""
+    control_share: float | None = None
+    """Of the error that its control leaves, where it was added for an association."""
 
     @property
     def verdict(self) -> Verdict:
+        if self.associated_with is not None:
+            return "associated"
         return "named" if len(self.confidence_set) < 2 else "ambiguous"
 
     @classmethod
@@ -45,6 +52,7 @@ class AddedInStep:
         constants: Settings | None,
         diagnosis: Diagnosis | None,
         confidence_set: tuple[str, ...] = (),
+        action: Action | None = None,
     ) -> AddedInStep:
         """``constants``: with which it was added; ``diagnosis``: by which it was chosen, else with
         ``confidence_set`` by its signature."""
@@ -57,6 +65,9 @@ class AddedInStep:
         following = next_take(rivals, catalogue()) if diagnosis is None else diagnosis.next_take
         following = following if len(rivals) > 1 else None
         where = tuple((constants or {}).get("where", addition.rotations))
+        if action is not None:
+            phrase = action.association.phrase
+            return cls(name, where, (name,), parameters, None, None, phrase, action.control_share)
         return cls(name, where, rivals, parameters, addition.claim, following)
 
 
@@ -91,6 +102,8 @@ class Trial:
     """Earlier effects that it made redundant."""
     diagnosis: Diagnosis | None = None
     """By which it was chosen; None: by its signature."""
+    action: Action | None = None
+    """The association for which it was tried."""
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,11 @@ from typing import Any
 from pydantic import Field
 
 from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_models.diagnosis.actions import Action
 from glovecal_models.diagnosis.diagnosis import Diagnosis, Verdict
 from glovecal_models.diagnosis.floor_ratio import FloorRatio
 from glovecal_models.diagnosis.text import (
+    action_sentence,
     candidate_sentence,
     diagnosis_sentences,
     named_sentence,
@@ -144,6 +146,37 @@ class AssociationView(View):
     p_value: float | None = Field(description="Corrected for all columns and rotations tested.")
 
 
+class ActionView(View):
+    """What an association of the residual asks for."""
+
+    rotation: str
+    column: str = Field(description="As in `where`.")
+    effect: str | None = Field(description="To be added on the rotation; null where `method` is asked for.")
+    is_physical: bool = Field(description="False: the effect only names a column, no cause is claimed.")
+    method: str | None = Field(description="To be trained with: the layout gives the rotation the column.")
+    rmse_before_deg: float | None = Field(description="Of the rotation's sensor, on takes held out whole.")
+    rmse_after_deg: float | None = Field(description="With the effect, in the form that the takes ask for.")
+    rmse_control_deg: float | None = Field(description="With its control, of the same form and freedom.")
+    saves: bool = Field(description="Whether the effect beats its control.")
+    sentence: str
+
+    @classmethod
+    def of(cls, item: Action) -> ActionView:
+        found = item.rmse_deg
+        return cls(
+            rotation=item.rotation,
+            column=item.association.column,
+            effect=item.effect,
+            is_physical=item.is_physical,
+            method=item.method,
+            rmse_before_deg=None if found is None else found.before,
+            rmse_after_deg=None if found is None else found.after,
+            rmse_control_deg=None if found is None else found.control,
+            saves=item.saves,
+            sentence=action_sentence(item),
+        )
+
+
 class FloorRatioView(View):
     """An error that is left, beside its noise floor."""
 
@@ -202,6 +235,7 @@ class DiagnosisView(View):
     hold_drift: HoldDriftView | None = None
     unexplained_residual: UnexplainedResidualView | None
     next_take: NextTakeView | None
+    actions: list[ActionView] = Field([], description="One for each association, what saves most first.")
     sentences: list[str] = Field(description="What to know, the most important first.")
 
     @classmethod
@@ -222,6 +256,7 @@ class DiagnosisView(View):
             hold_drift=None if held is None else HoldDriftView.of(held),
             unexplained_residual=UnexplainedResidualView.of(diagnosis.residual),
             next_take=NextTakeView.of(diagnosis.next_take),
+            actions=[ActionView.of(item) for item in diagnosis.actions],
             sentences=diagnosis_sentences(diagnosis),
         )
 

@@ -109,6 +109,9 @@ def print_diagnosis(found: Mapping[str, Any]) -> None:
         out.print(f"\n{residual['sentence']}")
     if residual.get("associations"):
         print_table(residual["associations"], ASSOCIATIONS, empty="")
+    _print_sentences(
+        "What these associations ask for:", [item["sentence"] for item in found.get("actions") or ()]
+    )
     if following:
         rivals = " and ".join(following.get("separates") or ())
         out.print(f"\nTo separate {rivals}, record {following['seconds']} s: {following['what']}")
