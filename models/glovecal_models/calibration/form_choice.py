@@ -19,9 +19,9 @@ from glovecal_models.effects.base.learned_form import MOST_INPUTS, OWN, FormTerm
 
 EVERY = 3
 """Of the fitted rows: a form is chosen on a third of them."""
-ALONE = (0.25, 0.7)
+ALONE = (0.12, 0.3, 0.8)
 """Lengthscales of functions of one input, in half ranges."""
-TOGETHER = (0.6, 1.2)
+TOGETHER = (0.35, 0.8)
 """Of functions of two."""
 SD_DEG = (2.0, 6.0)
 LEAST_GAIN_NATS = 3.0
@@ -61,7 +61,8 @@ def chosen_form(lanes: Sequence[FormRows]) -> tuple[FormTerm, ...]:
         return _chosen(problems, _of_own())
     if len(others) > MOST_SCREENED:
         others = _screened(problems, others)
-    return _chosen(problems, [term for name in others for term in _of_one(name)])
+    smooth = [FormTerm(pair, TOGETHER[-1], sd) for pair in combinations(sorted(others), 2) for sd in SD_DEG]
+    return _chosen(problems, [*(term for name in others for term in _of_one(name)), *smooth])
 
 
 def _of_own() -> list[FormTerm]:
@@ -107,8 +108,9 @@ def _chosen(lanes: Sequence[_Lane], candidates: Sequence[FormTerm]) -> tuple[For
         left += [
             item
             for pair in combinations(sorted(inputs), 2)
-            if not any(set(pair) == set(other.inputs) for other in (*chosen, *left))
+            if not any(set(pair) == set(other.inputs) for other in chosen)
             for item in _of_pair(pair)
+            if item not in left
         ]
         if len(inputs) >= MOST_INPUTS:
             left = [item for item in left if set(item.inputs) - {OWN} <= inputs]
