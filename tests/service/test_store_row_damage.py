@@ -234,6 +234,7 @@ def _as_before_hashes(store: Store) -> None:
                 written = json.dumps([name, values], sort_keys=True, separators=(",", ":"))
                 digest = hashlib.sha256(written.encode("ascii")).hexdigest()
                 connection.execute(update(table).where(table.c.id == row.id).values(row_sha256=digest))
+        connection.execute(text("ALTER TABLE gloves DROP COLUMN latency"))  # of 0006
         connection.execute(text("UPDATE alembic_version SET version_num = '0004'"))
 
 

@@ -19,7 +19,7 @@ from glovecal_models.errors import BadInput
 
 FORM = "form"
 """Where settings keep the learned form; without one the effect's own columns are all."""
-FRAMES_AT_ONCE = 2048
+FORM_FRAMES_AT_ONCE = 2048
 
 
 class Contribution(NamedTuple):
@@ -109,8 +109,8 @@ class AddedEffect:
         inputs = form_values(effect, take, plain, self.settings) if self.form else {}
         degrees = np.empty(plain.shape[:2])
         variance = None if factor is None else np.empty(plain.shape[:2])
-        for first in range(0, len(take), FRAMES_AT_ONCE):
-            rows = slice(first, first + FRAMES_AT_ONCE)
+        for first in range(0, len(take), FORM_FRAMES_AT_ONCE):
+            rows = slice(first, first + FORM_FRAMES_AT_ONCE)
             columns = plain[rows]
             if self.form is not None:
                 learned = self.form.columns({name: values[rows] for name, values in inputs.items()})

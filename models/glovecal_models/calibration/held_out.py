@@ -169,7 +169,7 @@ class WeightPosterior:
     mean: np.ndarray
     """(C,)."""
     covariance: np.ndarray
-    """(C, C), the base's free weights integrated out."""
+    """(C, C) beside the base as it is: its own uncertainty is the regressor's to tell."""
 
     def part(self, some: slice) -> WeightPosterior:
         """Of some of the columns."""
@@ -199,16 +199,16 @@ def weight_posterior(
         held = gram + np.diag(ridge)
         beta = _solved(held, right)
         left = square + float(beta @ gram @ beta - 2 * beta @ right)
-    scale = np.sqrt(np.diagonal(held))
-    inverse = np.linalg.inv(held / (scale[:, None] * scale)) / (scale[:, None] * scale)
+    own, pull = held[size:, size:], ridge[size:]
+    scale = np.sqrt(np.diagonal(own))
+    inverse = np.linalg.inv(own / (scale[:, None] * scale)) / (scale[:, None] * scale)
     error = [rows.target - part @ beta for part, rows in zip(both, units, strict=True)]
     # What is held against chance is held against ``ALIKE_ROWS``; what is left unknown is as it is: the noise
     # of the rows that count as independent, and the prior's share of what the ridge pulls towards zero.
     alike = min(1 / _effective_ratio(error), ALIKE_ROWS)
-    pulled = inverse * np.where(base, 0.0, ridge)
-    noise = alike * variance * inverse @ gram @ inverse
-    covariance = noise + ALIKE_ROWS * variance * pulled @ inverse
-    return WeightPosterior(beta[size:], covariance[size:, size:])
+    noise = alike * variance * inverse @ gram[size:, size:] @ inverse
+    covariance = noise + ALIKE_ROWS * variance * (inverse * pull) @ inverse
+    return WeightPosterior(beta[size:], covariance)
 
 
 def _effective_ratio(error: Sequence[np.ndarray]) -> float:

@@ -20,7 +20,7 @@ from scipy.stats import t as student_t
 
 from glovecal_models.effects.base.wearing_effect import PRIOR_DEG, PRIOR_WEARINGS
 
-LEVEL = 0.95
+INTERVAL_LEVEL = 0.95
 """Of the interval of the error."""
 MUCH_WORSE = 1.5
 """Times the error in wearings seen: from here on the difference is of the wearing, not of chance in takes."""
@@ -132,7 +132,7 @@ def unseen_wearing(
         total = within + variance * (1 + 1 / len(names)) * quantile**2
         added[name] = max(total - noise[name], 0.0)
     rmse = _rmse(left_out)
-    low, high = (chi2.ppf(p, freedom) for p in ((1 - LEVEL) / 2, (1 + LEVEL) / 2))
+    low, high = (chi2.ppf(p, freedom) for p in ((1 - INTERVAL_LEVEL) / 2, (1 + INTERVAL_LEVEL) / 2))
     return UnseenWearing(
         names,
         rmse,

@@ -20,7 +20,7 @@ LEARNING_RATE = 0.1
 LEAVES = 12
 ROWS_IN_A_LEAF = 36
 """Six seconds: neighbouring rows say nearly the same."""
-BINS = 63
+TREE_BINS = 63
 COLUMNS_TRIED = 0.4
 FOLDS = 4
 
@@ -85,7 +85,7 @@ class _Box:
         self._weights = np.linalg.solve(gram, x.T @ (target - self._level))
         self._trees = HistGradientBoostingRegressor(
             max_iter=TREES, learning_rate=LEARNING_RATE, max_leaf_nodes=LEAVES,
-            min_samples_leaf=ROWS_IN_A_LEAF, max_bins=BINS, max_features=COLUMNS_TRIED,
+            min_samples_leaf=ROWS_IN_A_LEAF, max_bins=TREE_BINS, max_features=COLUMNS_TRIED,
             early_stopping=False,  # pyright: ignore[reportArgumentType]
             random_state=seed,
         )  # fmt: skip

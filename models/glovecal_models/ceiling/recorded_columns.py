@@ -18,7 +18,7 @@ from scipy.signal import lfilter
 
 from glovecal_models.takes.take import Take
 
-GRID_HZ = 30.0
+CEILING_HZ = 30.0
 ROW_EVERY = 5
 """Grid points; the kernel makes those between say the same."""
 MOST_ROWS = 6000
@@ -84,8 +84,8 @@ def smoothed_error(time_s: np.ndarray, take: Take, error: np.ndarray) -> np.ndar
         return np.full(len(time_s), np.nan)
     near = np.interp(time_s, take.time_s, known.astype(float)) > 0.99
     values = np.where(near, np.interp(time_s, take.time_s[known], error[known]), 0.0)
-    weight = gaussian_filter1d(near.astype(float), KERNEL_S * GRID_HZ, mode="constant")
-    total = gaussian_filter1d(values, KERNEL_S * GRID_HZ, mode="constant")
+    weight = gaussian_filter1d(near.astype(float), KERNEL_S * CEILING_HZ, mode="constant")
+    total = gaussian_filter1d(values, KERNEL_S * CEILING_HZ, mode="constant")
     return np.where(near, total / np.maximum(weight, 1e-9), np.nan)
 
 
@@ -123,7 +123,7 @@ def _shares_clock(takes: Sequence[Take]) -> bool:
 
 
 def _grid(take: Take) -> np.ndarray:
-    return take.time_s[0] + np.arange(int(take.duration_s * GRID_HZ) + 1) / GRID_HZ
+    return take.time_s[0] + np.arange(int(take.duration_s * CEILING_HZ) + 1) / CEILING_HZ
 
 
 def _at(time: np.ndarray, frames: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -131,7 +131,7 @@ def _at(time: np.ndarray, frames: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def _smoothed(values: np.ndarray) -> np.ndarray:
-    return gaussian_filter1d(values, KERNEL_S * GRID_HZ, axis=0, mode="nearest")
+    return gaussian_filter1d(values, KERNEL_S * CEILING_HZ, axis=0, mode="nearest")
 
 
 def _context(take: Take, time: np.ndarray, names: Sequence[str]) -> np.ndarray:
@@ -160,20 +160,20 @@ def _history(smooth: np.ndarray, own: Sequence[int]) -> np.ndarray:
 
 
 def _before(x: np.ndarray, lag_s: float) -> np.ndarray:
-    steps = round(lag_s * GRID_HZ)
+    steps = round(lag_s * CEILING_HZ)
     return np.concatenate([np.full(min(steps, len(x)), np.nan), x[: max(len(x) - steps, 0)]])
 
 
 def _average(x: np.ndarray, tau_s: float) -> np.ndarray:
     """Exponential, of what was seen so far."""
-    keep = np.exp(-1.0 / (tau_s * GRID_HZ))
+    keep = np.exp(-1.0 / (tau_s * CEILING_HZ))
     total, weight = (lfilter([1.0], [1.0, -keep], values) for values in (x, np.ones(len(x))))
     return np.asarray(total) / np.asarray(weight)
 
 
 def _largest(x: np.ndarray, window_s: float) -> np.ndarray:
     """Of the last ``window_s``; by doubling, so that long windows cost little."""
-    width, result = round(window_s * GRID_HZ), x.copy()
+    width, result = round(window_s * CEILING_HZ), x.copy()
     done = 1
     while done < width:
         step = min(done, width - done)

@@ -31,9 +31,9 @@ from glovecal_models.takes.take import Take
 
 ROWS_AT_MOST = 4000
 REGIONS = 6
-FEWEST_TAKES = 2
+FEWEST_TAKES_OF_A_HALF = 2
 """In a half; one take alone rarely covers the postures of the others."""
-FEWEST_ROWS = 30
+FEWEST_ROWS_OF_A_REGION = 30
 """In a region; fewer say nothing."""
 
 
@@ -87,7 +87,7 @@ def cross_validation_difference(
     owners = wearings if are_wearings else [f"{take.name} ({at + 1})" for at, take in enumerate(takes)]
     names = list(dict.fromkeys(owners))
     halves = (tuple(names[0::2]), tuple(names[1::2]))
-    if any(sum(owner in half for owner in owners) < FEWEST_TAKES for half in halves):
+    if any(sum(owner in half for owner in owners) < FEWEST_TAKES_OF_A_HALF for half in halves):
         return None
     settings, rotations = left_out_settings(settings_of(model, settings)), trained_rotations(model)
     try:
@@ -146,7 +146,7 @@ def _regions(
         edges = np.linspace(low_end, high_end, REGIONS + 1)
         for low, high in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
             rows = (angle >= low) & (angle <= high)
-            if rows.sum() >= FEWEST_ROWS:
+            if rows.sum() >= FEWEST_ROWS_OF_A_REGION:
                 difference = float(np.sqrt(np.mean((a[rows] - b[rows]) ** 2)))
                 sd = float(np.sqrt(np.mean(claimed[rows])))
                 found.append(RegionDifference(name, low, high, difference, sd, limits))

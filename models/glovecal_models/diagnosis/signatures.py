@@ -20,7 +20,7 @@ from glovecal_models.effects.base.signature_effect import Finding, SignatureEffe
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
-FEWEST_ROWS = 50
+FEWEST_MEASURED = 50
 """Measured frames of a joint; fewer tell no curve."""
 
 
@@ -126,7 +126,7 @@ def static_errors(
         rows = [np.flatnonzero(np.isfinite(part)) for part in y]
         every = np.concatenate(x)
         measured = np.concatenate([part[index] for part, index in zip(x, rows, strict=True)])
-        if len(measured) < FEWEST_ROWS or np.ptp(measured) == 0:
+        if len(measured) < FEWEST_MEASURED or np.ptp(measured) == 0:
             continue
         low, span = float(every.min()), max(float(np.ptp(every)), 1e-9)
         curves = [np.polynomial.legendre.legvander(2 * (part - low) / span - 1, 7) for part in x]

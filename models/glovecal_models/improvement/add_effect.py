@@ -103,7 +103,8 @@ def add_effect(
         )
     if control_share is not None:
         undone = replace(undone, control_rmse_deg=control_share * total_rmse_deg(before, chosen))
-    if undone.is_beaten_by_control:
+    # Who asks for an effect whatever it does (a negative least gain) gets it.
+    if undone.is_beaten_by_control and least_gain >= 0:
         return undone
     if report:
         report(f"learning {name} from all takes", 0.85)

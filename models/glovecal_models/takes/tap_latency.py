@@ -18,8 +18,8 @@ from glovecal_models.errors import BadInput
 from glovecal_models.takes.known_latency import KnownLatency
 
 FEWEST_TAPS = 20
-STEP_S = 0.001
-BEFORE_S, AFTER_S = 0.3, 0.7
+TAP_STEP_S = 0.001
+BEFORE_TAP_S, AFTER_TAP_S = 0.3, 0.7
 """Of a key's time: what is looked at, and so the latencies that can be found."""
 EARLIEST_S, LATEST_S = -0.1, 0.4
 """Of the stop, from the key's time: a neighbouring tap is further away."""
@@ -85,11 +85,11 @@ def tap_latency(
             f"{len(keys)} of {len(key_s)} taps have frames around them and are {APART_S} s from the next one;"
             f" {FEWEST_TAPS} are needed"
         )
-    grid = np.arange(-BEFORE_S, AFTER_S, STEP_S)
+    grid = np.arange(-BEFORE_TAP_S, AFTER_TAP_S, TAP_STEP_S)
     moved = np.stack([_around(time_s, readings, key + grid) for key in keys])
     weights = _weights(moved)
     interval_s = float(np.median(np.diff(time_s)))
-    smoothing = max(SMOOTHING_S, 0.5 * interval_s) / STEP_S
+    smoothing = max(SMOOTHING_S, 0.5 * interval_s) / TAP_STEP_S
     speed = gaussian_filter1d(moved @ weights, smoothing, axis=1, order=1)
     speed = speed if _strike_rises(speed, grid) else -speed
     late, fits = _aligned(speed, grid)
@@ -115,7 +115,7 @@ def _usable(keys: np.ndarray, time_s: np.ndarray) -> np.ndarray:
     """Presses with frames all around them, and no other press near."""
     if len(time_s) < 2:
         return keys[:0]
-    inside = (keys - BEFORE_S >= time_s[0]) & (keys + AFTER_S <= time_s[-1])
+    inside = (keys - BEFORE_TAP_S >= time_s[0]) & (keys + AFTER_TAP_S <= time_s[-1])
     gap = np.diff(keys, prepend=-np.inf, append=np.inf)
     return keys[inside & (gap[:-1] >= APART_S) & (gap[1:] >= APART_S)]
 
@@ -167,7 +167,7 @@ def _aligned(speed: np.ndarray, grid: np.ndarray) -> tuple[np.ndarray, np.ndarra
         shift, correlation = (np.array(part) for part in zip(*fitted, strict=True))
         shift -= np.median(shift[fits])
         off = np.abs(shift - np.median(shift[fits]))
-        spread = max(1.4826 * float(np.median(off[fits])), STEP_S)
+        spread = max(1.4826 * float(np.median(off[fits])), TAP_STEP_S)
         fits = (correlation >= LEAST_CORRELATION) & (off <= MOST_DEVIATIONS * spread)
         if fits.sum() < 3:
             break
@@ -183,7 +183,7 @@ def _stop(template: np.ndarray, grid: np.ndarray) -> float:
         raise BadInput(f"no stop of the finger is found within {LATEST_S} s after the key was pressed")
     at = peak + int(below[0])
     high, low = float(template[at - 1]), float(template[at])
-    return float(grid[at - 1] + STEP_S * (high - 0.5 * template[peak]) / (high - low))
+    return float(grid[at - 1] + TAP_STEP_S * (high - 0.5 * template[peak]) / (high - low))
 
 
 def _fitted(
@@ -192,7 +192,7 @@ def _fitted(
     """The shift (s) at which a tap is most like the template around its stop, and their correlation."""
     part = np.flatnonzero(np.abs(grid - stop) <= STROKE_S)
     shape = template[part] - template[part].mean()
-    tried = near + np.arange(-ALIGNED_WITHIN_S, ALIGNED_WITHIN_S + STEP_S / 2, STEP_S)
+    tried = near + np.arange(-ALIGNED_WITHIN_S, ALIGNED_WITHIN_S + TAP_STEP_S / 2, TAP_STEP_S)
     windows = np.interp(grid[part] + tried[:, None], grid, row)
     windows -= windows.mean(axis=1, keepdims=True)
     size = np.linalg.norm(windows, axis=1) * np.linalg.norm(shape)
@@ -201,4 +201,4 @@ def _fitted(
     before, here, after = (float(value) for value in likeness[best - 1 : best + 2])
     bend = before - 2 * here + after
     between = float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend < 0 else 0.0
-    return float(tried[best]) + STEP_S * between, here
+    return float(tried[best]) + TAP_STEP_S * between, here

@@ -27,7 +27,7 @@ LAG, CLOCK, LATENCY = "lag", "clock_offset", "glove_latency"
 APART_TIMES = 1.5
 """Delays of one size for all joints reach 2.3 standard errors (24 simulated gloves), lags of several sizes
 mostly 6 to 17."""
-STILL_SHARE = 0.3
+SLOW_MOTION_SHARE = 0.3
 """Of the mean motion: blocks with less count alike."""
 KEYS_LATE_S = 0.015
 """Keyboards report a key 5 to 20 ms after it was hit: so much a measured latency may be wrong."""
@@ -169,7 +169,7 @@ def _along(gain: np.ndarray, fast: np.ndarray) -> tuple[float, float]:
     Scatter grows with motion, so that slow blocks count more; the error holds for any scatter.
     """
     x = fast / max(float(fast.mean()), 1e-12)
-    weight = 1.0 / (x + STILL_SHARE) ** 2
+    weight = 1.0 / (x + SLOW_MOTION_SHARE) ** 2
     x = x - np.average(x, weights=weight)
     square = float(weight @ (x * x))
     if len(x) < 3 or square <= 0:

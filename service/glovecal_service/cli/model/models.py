@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -17,6 +18,8 @@ from glovecal_service.cli.terminal.writing import Overwrite, require_place, writ
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
 
+LINE = 79
+"""Characters of a sentence's line."""
 app = typer.Typer(help="Calibration models: versions, activation, export.", no_args_is_help=True)
 
 
@@ -38,7 +41,7 @@ def list_models(subject: OnlySubject = None, layout: OnlyLayout = None, as_json:
         "subject": "subject",
         "layout": "layout",
         "method": "method",
-        "rmse_unseen_wearing_deg": "next wearing (°)",
+        "rmse_unseen_wearing_deg": "unseen (°)",
         "held_out_rmse_deg": "error (°)",
         "active": "active",
         "created_at": "trained",
@@ -60,7 +63,7 @@ def show(model: Model, as_json: AsJson = False) -> None:
         return
     print_facts(_facts(document, lineage))
     for sentence in (document["unseen_wearing"] or {}).get("sentences", ()):
-        out.print(sentence)
+        out.print(fill(sentence, LINE))
     out.print()
     columns = {
         "rotation": "rotation",
@@ -97,7 +100,7 @@ def _facts(document: dict[str, Any], lineage: list[dict[str, Any]]) -> dict[str,
         "layout": document["layout"],
         "method": document["method"],
         "active": document["active"],
-        "next wearing (°)": (document["unseen_wearing"] or {}).get("rmse_unseen_wearing_deg"),
+        "unseen (°)": (document["unseen_wearing"] or {}).get("rmse_unseen_wearing_deg"),
         "error (°)": document["held_out_rmse_deg"],
         "estimated on": document["error_estimate"].get("how"),
         "trained on": [take["name"] for take in document["facts"].get("takes", [])],

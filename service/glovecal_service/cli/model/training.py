@@ -92,8 +92,6 @@ def _say_job(job: dict[str, Any], as_json: bool) -> None:
 def _say_model(result: dict[str, Any], document: dict[str, Any]) -> None:
     for sentence in result.get("sentences", []):
         err.print(sentence)
-    for sentence in (document["unseen_wearing"] or {}).get("sentences", ()):
-        out.print(sentence)
     error = result.get("held_out_rmse_deg")
     how = str(document["error_estimate"].get("how"))
     told = f"held-out error {error:.2f} degrees" if error is not None else "no cross-validation"
@@ -105,6 +103,8 @@ def _say_model(result: dict[str, Any], document: dict[str, Any]) -> None:
     out.print(
         f"Model {document['id'][:12]} ({document['method']}) for {document['subject']}, {told}. {active}"
     )
+    for sentence in (document["unseen_wearing"] or {}).get("sentences", ()):
+        out.print(sentence)
 
 
 def _choose(
