@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from glovecal._additions import Addition, add_effect, remove_effect
 from glovecal._comparison import Comparison, compare
+from glovecal._detectability import Detectable, detectable
 from glovecal._diagnosis import Diagnosis, diagnose
 from glovecal._effects import Catalogue, effects, register_effect
 from glovecal._explanation import Explanation, explain
@@ -49,6 +50,7 @@ __all__ = [
     "Catalogue",
     "Comparison",
     "ContextEffect",
+    "Detectable",
     "Diagnosis",
     "Effect",
     "Explanation",
@@ -71,6 +73,7 @@ __all__ = [
     "WhereItFails",
     "add_effect",
     "compare",
+    "detectable",
     "diagnose",
     "effects",
     "explain",

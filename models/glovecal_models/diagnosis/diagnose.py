@@ -47,6 +47,7 @@ def diagnose(
     known: Sequence[KnownEffect] = (),
     effects: Sequence[Effect] | None = None,
     signatures: bool = True,
+    judge_residual: bool = True,
     noise_floors: Mapping[str, NoiseFloor] | None = None,
     seed: int = 0,
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
@@ -55,6 +56,7 @@ def diagnose(
 ) -> Diagnosis:
     """``known``: effects the model has already; they are part of the base. ``limits`` decide the verdicts.
 
+    Without ``signatures`` and ``judge_residual`` only the naming is worked out, in less time.
     ``noise_floors``: of these takes, where they were measured before; None: they are measured.
 
     Raises BadInput, Cancelled.
@@ -97,7 +99,9 @@ def diagnose(
     naming = beside_levels(naming, takes, findings, by_name)
     progress("testing the residual", 0.95)
     actions: tuple[Action, ...] = ()
-    if problem.is_sparse or are_held_levels(takes):
+    if not judge_residual:
+        residual = UnexplainedResidual()
+    elif problem.is_sparse or are_held_levels(takes):
         residual = UnexplainedResidual(obstacle="single poses")
     else:
         after = problem.with_first(naming, by_name, design)

@@ -67,8 +67,12 @@ def forward(
     linear: bool,
     known: Sequence[KnownEffect] = (),
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
+    every: int = EVERY,
 ) -> ForwardDesign:
-    """Own sensor, scaled to degrees, from the measured angles; ``known`` effects belong to the base."""
+    """Own sensor, scaled to degrees, from the measured angles; ``known`` effects belong to the base.
+
+    One measured row in ``every`` is fitted.
+    """
     names = list(rotations)
     sensor = [_own_sensor(takes, layout, rotation, column) for column, rotation in enumerate(rotations)]
     filled = [
@@ -105,7 +109,7 @@ def forward(
         index = [
             rows[(rows >= piece.start) & (rows < piece.stop)]
             for take, parts in zip(takes, cut, strict=True)
-            for rows in [np.flatnonzero(np.isfinite(take.reference[:, column]))[::EVERY]]
+            for rows in [np.flatnonzero(np.isfinite(take.reference[:, column]))[::every]]
             for piece in parts
         ]
         without = [_without(take, frozenset({rotation, *neighbours, *item.sensors})) for take in signals]

@@ -23,6 +23,19 @@ class DiagnosisLimits(SignificanceLimits):
         "Not tuned; chosen with the first version of the diagnosis (2026-11-21).",
     )
 
+    confused_correlation: float = limit(
+        0.9,
+        "correlation",
+        "Two effects whose contributions to a session are so alike are listed as hard to tell apart.",
+        "Not tuned: then less than a fifth of the square of one is its own.",
+    )
+    confused_condition: float = limit(
+        30.0,
+        "condition number",
+        "Above it the effects of a session cannot all be separated.",
+        "Belsley, Kuh & Welsch 1980: 30 and more is a strong dependence.",
+    )
+
     alike_context_share: float = limit(
         0.02,
         "share of the column's range",

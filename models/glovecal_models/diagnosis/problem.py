@@ -70,11 +70,15 @@ class DiagnosisProblem:
         """Whether the frames are single poses."""
         return all(take.is_sparse for take in self.even)
 
-    def design(self, smoothing: int = SMOOTHING) -> ForwardDesign:
-        """Readings from angles, on signals smoothed over so many rows."""
+    def design(self, smoothing: int = SMOOTHING, every: int = EVERY) -> ForwardDesign:
+        """Readings from angles, on signals smoothed over so many rows; one row in ``every`` is fitted."""
         even = [smoothed(take, smoothing) for take in self.even]
         return forward(
-            even, self.layout, self.joints, linear=self.linear, known=self.known, limits=self.limits
+            *(even, self.layout, self.joints),
+            linear=self.linear,
+            known=self.known,
+            limits=self.limits,
+            every=every,
         )
 
     def beside(self, *effects: KnownEffect) -> DiagnosisProblem:

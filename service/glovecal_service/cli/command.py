@@ -16,7 +16,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from glovecal_service.cli import demo, serve
-from glovecal_service.cli.effect import catalogue, changes, diagnosis, improvement
+from glovecal_service.cli.effect import catalogue, changes, detectability, diagnosis, improvement
 from glovecal_service.cli.glove import capture, find_port, layouts, recordings, watch
 from glovecal_service.cli.job import jobs
 from glovecal_service.cli.model import ceiling, comparison, explain, models, quick_check, training, where
@@ -53,6 +53,7 @@ app.command("where")(where.where)
 app.command("explain")(explain.explain)
 app.command("ceiling")(ceiling.ceiling)
 app.command("diagnose")(diagnosis.diagnose)
+app.command("detectable")(detectability.detectable)
 app.command("add-effect")(changes.add_effect)
 app.command("remove-effect")(changes.remove_effect)
 app.command("improve", cls=improvement.SeveralFiles)(improvement.improve)

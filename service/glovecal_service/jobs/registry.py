@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from glovecal_service.jobs.add_effect import AddEffectJob
 from glovecal_service.jobs.ceiling import CeilingJob
+from glovecal_service.jobs.detectability import DetectabilityJob
 from glovecal_service.jobs.diagnose import DiagnoseJob
 from glovecal_service.jobs.improve import ImproveJob
 from glovecal_service.jobs.job_kind import JobKind
@@ -13,6 +14,7 @@ from glovecal_service.jobs.train import TrainJob
 KINDS: dict[str, JobKind] = {
     "train": TrainJob(),
     "diagnose": DiagnoseJob(),
+    "detectability": DetectabilityJob(),
     "ceiling": CeilingJob(),
     "add_effect": AddEffectJob(),
     "remove_effect": RemoveEffectJob(),

@@ -11,7 +11,7 @@ from starlette.concurrency import run_in_threadpool
 
 from glovecal_models.threads import pin_blas_to_one_thread
 from glovecal_service.jobs.dispatcher import Dispatcher
-from glovecal_service.rest.effect import catalogue, changes, diagnosis, improvement
+from glovecal_service.rest.effect import catalogue, changes, detectability, diagnosis, improvement
 from glovecal_service.rest.glove import layouts, recordings
 from glovecal_service.rest.http import front, health
 from glovecal_service.rest.http.answers import install_openapi
@@ -46,7 +46,7 @@ ROUTERS = (
     *(subjects, layouts, recordings, samplings),
     *(clocks, holds, examination, table_import, takes, reference, uploads),
     *(training, models, predictions, comparison, where, ceiling, diagnosis, changes, catalogue, improvement),
-    *(explanation, quick_check, next_steps),
+    *(detectability, explanation, quick_check, next_steps),
     *(jobs, health),
 )
 

@@ -9,11 +9,13 @@ from pydantic import ValidationError
 
 from glovecal_service.views.addition import AdditionResult
 from glovecal_service.views.ceiling import CeilingResult
+from glovecal_service.views.detectability import DetectabilityResult
 from glovecal_service.views.diagnosis import DiagnosisResult
 from glovecal_service.views.improvement import ImprovementView
 from glovecal_service.views.view import View
 
 VIEW_OF: Mapping[str, type[View]] = {
+    "detectability": DetectabilityResult,
     "diagnose": DiagnosisResult,
     "ceiling": CeilingResult,
     "improve": ImprovementView,

@@ -126,6 +126,11 @@ class Effect(EffectFacts, ABC):
         """How large each of the C weights may be expected to be, as a standard deviation."""
         return np.ones(len(self.weight_names(settings)))
 
+    def forward_weights(self, settings: Settings, generator: np.random.Generator) -> np.ndarray:
+        """(C,) weights with which it may distort a sensor, as its columns of the measured angle; of any size:
+        whoever puts the effect into a session scales them."""
+        return self.prior_sd(settings) * generator.standard_normal(len(self.prior_sd(settings)))
+
     def is_of_training(self, settings: Settings) -> bool:
         """Whether training takes taught it something: they are asked again when a model is learned anew."""
         return True

@@ -44,6 +44,11 @@ class HistoryEffect(Effect):
                 result[block] = self.run(state, elapsed[block], take.own[block], settings, shape)
         return result
 
+    def forward_weights(self, settings: Settings, generator: np.random.Generator) -> np.ndarray:
+        """All of one sign: parts of one memory do not undo each other."""
+        sign = generator.choice([-1.0, 1.0])
+        return sign * np.abs(super().forward_weights(settings, generator))
+
     def stream(self, settings: Settings, shape: np.ndarray) -> Stream:
         return _HistoryStream(self, settings, shape)
 

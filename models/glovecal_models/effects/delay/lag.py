@@ -95,6 +95,10 @@ class Lag(ArrayStateEffect):
     def prior_sd(self, settings: Settings) -> np.ndarray:
         return np.full(len(MULTIPLES), PRIOR)
 
+    def forward_weights(self, settings: Settings, generator: np.random.Generator) -> np.ndarray:
+        """The low pass of tau alone."""
+        return np.where(MULTIPLES == 1.0, -1.0, 0.0)
+
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         return tuple(f"lead_{multiple:g}_tau_deg_per_deg" for multiple in MULTIPLES)
 

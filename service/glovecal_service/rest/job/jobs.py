@@ -26,7 +26,7 @@ router = APIRouter(prefix="/jobs", tags=["jobs"])
 
 LOOK_EVERY_S = 0.25
 MOST_UNFINISHED_JOBS = 100
-WITH_PAGES = ("diagnose", "improve")
+WITH_PAGES = ("diagnose", "detectability", "improve")
 LONGEST_STREAM_S = 3600.0
 """After this the stream ends without ``done``; listeners connect again with ``Last-Event-ID``."""
 
@@ -136,7 +136,7 @@ def new_job(
 @router.get(
     "/{id}/report",
     response_class=Response,
-    summary="What a diagnosis or an improvement found, as a page",
+    summary="What a diagnosis, an improvement or trials of effects found, as a page",
     responses=problems(409)
     | {
         200: {
@@ -149,9 +149,8 @@ def report_on_job(id: IdInPath, store: StoreNeeded) -> Response:
     """Each picture has a sentence that says what it shows. 409 until the job is done, and for other kinds."""
     job = store.jobs.get(id)
     if job.kind not in WITH_PAGES:
-        raise Conflict(
-            f"job {id} is of kind {job.kind!r}; there are pages of {' and '.join(WITH_PAGES)} jobs"
-        )
+        kinds = f"{', '.join(WITH_PAGES[:-1])} and {WITH_PAGES[-1]}"
+        raise Conflict(f"job {id} is of kind {job.kind!r}; there are pages of {kinds} jobs")
     result = current_result(job.kind, job.result)
     if result is None:
         raise Conflict(f"job {id} is {job.state}; it has a page once it is done")
@@ -162,6 +161,11 @@ def report_on_job(id: IdInPath, store: StoreNeeded) -> Response:
 
         caption = caption_of(store, str(result.get("model", "")))
         page = diagnosis_page(result, caption, job.payload.get("declarations") or ())
+    elif job.kind == "detectability":
+        from glovecal_service.report.detectability_page import detectability_page
+
+        of = result.get("model")
+        page = detectability_page(result, None if of is None else caption_of(store, str(of)))
     else:
         from glovecal_service.report.improvement_page import improvement_page
 

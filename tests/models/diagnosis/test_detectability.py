@@ -1,0 +1,166 @@
+"""Laws of trials with effects put into one's own session; the session is simulated."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from glovecal_models.diagnosis.detectability.confusability import confusability
+from glovecal_models.diagnosis.detectability.detection import (
+    Control,
+    Detectability,
+    Outcome,
+    SizeTried,
+    Trial,
+    detectability,
+    trial,
+)
+from glovecal_models.diagnosis.detectability.injection import injected, injected_takes, why_not_injected
+from glovecal_models.diagnosis.detectability.surrogate_session import SurrogateSession
+from glovecal_models.diagnosis.detectability.text import confusability_sentences, detectability_sentence
+from glovecal_models.diagnosis.problem import DiagnosisProblem
+from glovecal_models.diagnosis.resampled import SMOOTHING
+from glovecal_models.effects.catalogue import catalogue, declared_effect, effect, known_by_name
+from glovecal_models.errors import BadInput
+from glovecal_models.layout import Layout
+from glovecal_models.simulation.causes.form import Cause
+from glovecal_models.simulation.session import record_session
+from glovecal_models.simulation.session_plan import SessionPlan
+
+SENSORS = ("I_MCP", "I_PIP")
+LAYOUT = Layout.from_columns("two", SENSORS, SENSORS)
+PLAN = SessionPlan(seed=7, sensors=SENSORS, wearings=3, takes_per_wearing=3, take_s=15.0)
+
+
+@pytest.fixture(scope="module")
+def session() -> SurrogateSession:
+    return SurrogateSession.of(record_session(PLAN).takes, LAYOUT)
+
+
+def errors(session: SurrogateSession, takes, smoothing: int = 1) -> list[float]:
+    """RMS of what the static map leaves on every measured row, degrees."""
+    design = DiagnosisProblem.of(takes, LAYOUT, False, ()).design(smoothing, 1)
+    left = [
+        np.concatenate([unit.target - products.fitted(unit.base) for unit in products.units])
+        for products in design.products
+    ]
+    return [float(np.sqrt(np.mean(part**2))) for part in left]
+
+
+def test_without_noise_and_effect_readings_are_perfect(session):
+    assert max(errors(session, session.takes({}), SMOOTHING)) < 0.05
+    assert min(errors(session, session.recorded, SMOOTHING)) > 0.25
+
+
+def test_with_its_own_noise_the_session_is_the_recorded_one(session):
+    same = session.takes({}, session.residual)
+    for take, recorded in zip(same, session.recorded, strict=True):
+        np.testing.assert_allclose(take.readings, recorded.readings, atol=1e-9)
+
+
+def test_noise_of_other_moments_is_as_large(session):
+    takes = injected_takes(session, None, np.random.default_rng(3))
+    assert errors(session, takes) == pytest.approx(errors(session, session.recorded), rel=0.1)
+    other = injected_takes(session, None, np.random.default_rng(4))
+    assert not np.array_equal(takes[0].readings, other[0].readings)
+
+
+@pytest.mark.parametrize(
+    "name", ["hysteresis", "creep", "lag", "temperature", "cross_coupling", "clock_offset"]
+)
+def test_an_effect_is_put_in_at_the_size_asked_for(session, name):
+    takes = session.takes(
+        *(item.added, None, item.delays_s)
+        if (item := injected(session, effect(name), ["I_PIP"], 2.0, np.random.default_rng(5)))
+        else ({},)
+    )
+    assert errors(session, takes)[1] == pytest.approx(2.0, rel=0.25)
+    if name != "clock_offset":
+        assert errors(session, takes, SMOOTHING)[0] < 0.05
+
+
+def test_a_large_effect_is_named_and_nothing_is_not(session):
+    found = trial(session, effect("hysteresis"), ["I_PIP"], 4.0)
+    assert found == Trial("named", ("hysteresis",))
+    assert trial(session, effect("hysteresis"), ["I_PIP"], 4.0) == found, "the same seed, the same trial"
+    nothing = trial(session, None, (), 0.0)
+    assert nothing is not None
+    assert nothing.named == ()
+
+
+def test_an_effect_hidden_in_the_residuals_is_not_carried_along():
+    """A hysteresis of 3 degrees in the recording: the trial with nothing put in does not find it."""
+    takes = record_session(PLAN, [Cause("hysteresis", strength_deg=3.0)]).takes
+    nothing = trial(SurrogateSession.of(takes, LAYOUT), None, (), 0.0)
+    assert nothing is not None
+    assert nothing.named == ()
+
+
+def test_an_effect_of_ones_own_is_put_in_and_found(session):
+    own = declared_effect("name = bent_hinge; columns = own * own; unit = deg")
+    with known_by_name([own]):
+        assert why_not_injected(session, own) is None
+        assert injected(session, own, ["I_PIP"], 1.0, np.random.default_rng(0)) is None, (
+            "the static map has it"
+        )
+    own = declared_effect("name = ripple; columns = sin(10 * own); unit = deg")
+    with known_by_name([own]):
+        found = trial(session, own, SENSORS, 4.0)
+    assert found is not None
+    assert found.outcome == "named", found.named
+
+
+def test_what_cannot_be_put_in_says_why(session):
+    why = {name: why_not_injected(session, item) for name, item in catalogue().items()}
+    assert why["hysteresis"] is None
+    assert why["clock_offset"] is None
+    assert "signature" in str(why["saturation"])
+    assert why["contact_pressure"] == "no context column c.contact_n was recorded"
+    assert "absence" in str(why["no_effect"])
+    found = detectability(session, effect("saturation"))
+    assert found.sizes == ()
+    assert "cannot be tried" in detectability_sentence(found)
+    with pytest.raises(BadInput, match="no take measured 'R_PIP'"):
+        detectability(session, effect("hysteresis"), ["R_PIP"])
+
+
+def test_alike_effects_are_listed_and_an_effect_is_most_like_itself(session):
+    found = confusability(session.problem, [effect("creep"), effect("creep")])
+    assert found.pairs == () or found.pairs[0].correlation == pytest.approx(1.0)
+    found = confusability(session.problem)
+    pair = found.pairs[0]
+    assert set(pair.effects) == {"clock_offset", "glove_latency"}
+    assert pair.correlation == pytest.approx(1.0)
+    assert pair.is_confused
+    assert pair.next_take is not None
+    assert all(0 <= pair.correlation <= 1 + 1e-9 for pair in found.pairs)
+    assert found.condition["I_PIP"] == float("inf")
+    assert 1 < found.condition_of_others["I_PIP"] < 1e6
+    assert "clock_offset and glove_latency" in confusability_sentences(found)[0]
+
+
+def tried(size_deg: float, *outcomes: Outcome) -> SizeTried:
+    return SizeTried(size_deg, tuple(Trial(item, ("creep",)) for item in outcomes))
+
+
+def test_sizes_are_interpolated_over_monotone_shares():
+    found = Detectability(
+        "hysteresis",
+        ("I_PIP",),
+        (
+            tried(1.0, "not found", "not found"),
+            tried(2.0, "named", "not found"),
+            tried(4.0, "named", "named"),
+        ),
+    )
+    assert found.size_deg(0.5, "named") == pytest.approx(2.0)
+    assert found.size_deg(0.75, "named") == pytest.approx(2.0 * 2**0.5)
+    assert detectability_sentence(found) == (
+        "hysteresis on I_PIP: 4 degrees would have been named (2 of 2 trials), 1 degree would not"
+        " (0 of 2 trials)."
+    )
+    wavy = Detectability("lag", (), (tried(1.0, "named"), tried(2.0, "not found"), tried(4.0, "named")))
+    assert wavy.size_deg(0.5, "named") == 1.0
+    assert wavy.size_deg(0.8, "named") == pytest.approx(2.0 * 2**0.6)
+    assert Detectability("lag", (), (tried(1.0, "mistaken"),)).size_deg(0.5, "named") is None
+    assert Control((Trial("mistaken", ("creep", "lag")), Trial("not found", ()))).named == {"creep": 1}
