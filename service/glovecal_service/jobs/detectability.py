@@ -134,12 +134,10 @@ def _tried(
     session: Any, work: DetectabilityWork, cancelled: Callable[[], bool], report: Report
 ) -> dict[str, Any]:
     from glovecal_models.diagnosis.detectability.detection import trial
-    from glovecal_models.diagnosis.detectability.injection import why_not_injected
+    from glovecal_models.diagnosis.detectability.injection import where_injected, why_not_injected
 
     put_in: Effect | None = None if work.effect is None else effect(work.effect)
-    where = tuple(session.sensors) if work.rotations is None else work.rotations
-    for rotation in where:
-        session.joint(rotation)
+    where = where_injected(session, put_in, work.rotations)
     why = None if put_in is None else why_not_injected(session, put_in)
     found = []
     for number in range(work.trials if why is None else 0):
@@ -205,7 +203,9 @@ def _result(
         found = Detectability(
             name, tuple(facts[0]["rotations"]), () if why is not None else tuple(tried), why
         )  # fmt: skip
-        views.append(EffectDetectabilityView.of(found))
+        view = EffectDetectabilityView.of(found)
+        if view not in views:  # a delay is on all rotations, whichever was asked for
+            views.append(view)
     views.sort(key=lambda item: item.why_not is not None)
     of_control = DetectabilityControlView.of(control)
     said = [item.sentence for item in views]

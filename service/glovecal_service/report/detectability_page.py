@@ -21,6 +21,7 @@ from glovecal_service.report.html import (
     paragraph,
     table,
 )
+from glovecal_service.views.detectability import size_text
 
 OUTCOMES = {
     "named": ("named alone", MODEL),
@@ -50,7 +51,7 @@ def detectability_page(found: Mapping[str, Any], caption: Caption | None = None)
     sizes = [
         (
             item["effect"], ", ".join(item["rotations"]),
-            *(degrees(item[name]) for name in ("named_50_deg", "named_80_deg", "found_50_deg")),
+            *(size_text(item, item[name]) for name in ("named_50_deg", "named_80_deg", "found_50_deg")),
         )
         for item in shown
     ]  # fmt: skip
@@ -68,7 +69,7 @@ def detectability_page(found: Mapping[str, Any], caption: Caption | None = None)
     ]
     said = [item["sentence"] for item in shown] or ["No effect can be put into these takes."]
     summary = [Fact("Verdict", said[0]), *(Fact("", sentence) for sentence in said[1:])]
-    summary += [Fact("Control", found["control"]["sentence"])]
+    summary += [Fact("", found["control"]["sentence"])]
     summary += [Fact("Alike", sentence) for sentence in alike["sentences"][-1:]]
     of = found["subject"] if caption is None else caption.title
     simulated = ", a simulated glove" if found.get("simulated") else ""
@@ -87,14 +88,14 @@ def outcomes_by_size(effects: Sequence[Mapping[str, Any]], trials: int) -> tuple
                 left = column - 0.46
                 for name, (_, colour) in OUTCOMES.items():
                     width = 0.92 * size[name] / max(size["trials"], 1)
-                    axes.barh(row, width, left=left, height=0.8, color=colour)
+                    axes.barh(row, width, left=left, height=0.5, color=colour)
                     left += width
                 said = f"{size['named']}/{size['trials']}" if size["trials"] else "-"
-                axes.text(column, row + 0.47, said, ha="center", va="bottom", fontsize=9)
+                axes.text(column, row + 0.26, said, ha="center", va="bottom", fontsize=9)
         for label, colour in OUTCOMES.values():
             axes.barh([0], [0], color=colour, label=label)
         axes.set_xlim(-0.5, len(sizes) - 0.5)
-        axes.set_ylim(-0.6, len(rows) - 0.2)
+        axes.set_ylim(-0.6, len(rows) - 0.3)
         axes.set_xticks(range(len(sizes)), [f"{size:g}" for size in sizes])
         axes.set_yticks(range(len(rows)), [_row_name(item) for item in rows])
         axes.set_xlabel("size of the effect, degrees RMS beyond any static map")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from pydantic import Field
 
 from glovecal_models.diagnosis.detectability.confusability import Confusability
@@ -135,3 +138,11 @@ class DetectabilityResult(View):
     control: DetectabilityControlView
     confusability: ConfusabilityView
     sentences: list[str] = Field(description="What to know, the most important first.")
+
+
+def size_text(item: Mapping[str, Any], size_deg: float | None) -> str:
+    """A size of an effect's document: the smallest that was tried may be smaller, one not reached is larger."""
+    tried = [size["size_deg"] for size in item["sizes"] if size["trials"]]
+    if size_deg is None:
+        return f"> {tried[-1]:g}" if tried else "-"
+    return f"<= {size_deg:g}" if size_deg == tried[0] else f"{size_deg:.2g}"

@@ -249,6 +249,22 @@ def test_a_job_cancelled_in_the_middle_leaves_nothing(walk: Walk) -> None:
         walk.client.download(f"/jobs/{trained}/report")
 
 
+def test_what_takes_could_have_shown_stops_when_it_is_asked_to(walk: Walk) -> None:
+    body = {"effects": [CAUSE], "rotations": ["I_PIP"], "sizes_deg": [4.0], "trials": 20}
+    job = walk.client.post(f"/models/{walk.model}/detectability", body)["id"]
+    until = time.monotonic() + 300
+    while not walk.client.get(f"/jobs/{job}")["fraction"]:
+        assert time.monotonic() < until
+        time.sleep(0.02)
+    walk.client.post(f"/jobs/{job}/cancel")
+    with pytest.raises(ServiceError, match="cancelled"):
+        walk.client.wait_for_job(job, poll_s=0.02, patience_s=300)
+    with pytest.raises(Refused, match="no rotation 'GLUE' in this layout"):
+        walk.client.post(f"/models/{walk.model}/detectability", {"rotations": ["GLUE"]})
+    with pytest.raises(Refused, match="no effect 'glue'"):
+        walk.client.post(f"/models/{walk.model}/detectability", {"effects": ["glue"]})
+
+
 def test_improve_walks_the_loop_and_keeps_every_step(walk: Walk) -> None:
     names = [take["name"] for take in walk.takes]
     body = {"subject": "anna", "layout": walk.layout, "takes": names, "method": "linear", "max_steps": 1}

@@ -9,7 +9,12 @@ from typing import Literal
 
 import numpy as np
 
-from glovecal_models.diagnosis.detectability.injection import injected, injected_takes, why_not_injected
+from glovecal_models.diagnosis.detectability.injection import (
+    injected,
+    injected_takes,
+    where_injected,
+    why_not_injected,
+)
 from glovecal_models.diagnosis.detectability.surrogate_session import SurrogateSession
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
@@ -152,9 +157,7 @@ def detectability(
 
     Raises BadInput, Cancelled.
     """
-    where = tuple(session.sensors) if rotations is None else tuple(rotations)
-    for rotation in where:
-        session.joint(rotation)
+    where = where_injected(session, effect, rotations)
     why = why_not_injected(session, effect)
     if why is not None:
         return Detectability(effect.name, where, why_not=why)

@@ -68,6 +68,19 @@ def why_not_injected(session: SurrogateSession, effect: Effect) -> str | None:
     return why
 
 
+def where_injected(
+    session: SurrogateSession, effect: Effect | None, rotations: Sequence[str] | None
+) -> tuple[str, ...]:
+    """The rotations that are changed at once; None: all. A delay is always on all that were measured.
+
+    Raises BadInput for a rotation that cannot be rewritten.
+    """
+    where = tuple(session.sensors) if rotations is None else tuple(rotations)
+    for rotation in where:
+        session.joint(rotation)
+    return session.rotations if effect is not None and is_delay(effect) else where
+
+
 def injected(
     session: SurrogateSession,
     effect: Effect,
@@ -77,8 +90,8 @@ def injected(
 ) -> Injected | None:
     """The effect on each of ``rotations``, by itself ``size_deg`` on each of them.
 
-    A delay is on all rotations whatever ``rotations`` says, and of that size over all of them together. None
-    where these takes cannot hold so much of it. Raises BadInput for a rotation that cannot be rewritten.
+    A delay is of that size over all rotations together. None where these takes cannot hold so much of it.
+    Raises BadInput for a rotation that cannot be rewritten.
     """
     if is_delay(effect):
         return _delayed(session, effect, size_deg, generator)

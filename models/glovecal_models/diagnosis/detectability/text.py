@@ -26,7 +26,10 @@ def detectability_sentence(found: Detectability) -> str:
         return f"{found.effect} cannot be tried in these takes: {found.why_not}."
     tried = [item for item in found.sizes if item.trials]
     if not tried:
-        return f"These takes cannot hold {found.effect} of any size that was asked for."
+        return (
+            f"{found.effect} on {where} shows at no size: the static map takes it up, or it is a delay too"
+            " large to be compared."
+        )
     start = f"{found.effect} on {where}"
     named = _from_where(tried, "named")
     if named is not None:

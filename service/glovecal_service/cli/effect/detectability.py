@@ -21,6 +21,7 @@ from glovecal_service.cli.terminal.writing import (
     require_place,
     write_report,
 )
+from glovecal_service.views.detectability import size_text
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
@@ -155,19 +156,11 @@ def _row(item: Mapping[str, Any]) -> dict[str, Any]:
     row = {
         "effect": item["effect"],
         "where": ", ".join(item["rotations"]),
-        "named_50_deg": _reached(item, item["named_50_deg"]),
-        "named_80_deg": _reached(item, item["named_80_deg"]),
+        "named_50_deg": size_text(item, item["named_50_deg"]),
+        "named_80_deg": size_text(item, item["named_80_deg"]),
     }
     for size in item["sizes"]:
         also = f"+{size['ambiguous']}" if size["ambiguous"] else ""
         cell = f"{size['named']}{also} of {size['trials']}" if size["trials"] else "-"
         row[f"{size['size_deg']:g}°"] = cell
     return row
-
-
-def _reached(item: Mapping[str, Any], size_deg: float | None) -> str:
-    """A size that is the smallest that was tried may be smaller, one that none reached is larger."""
-    tried = [size["size_deg"] for size in item["sizes"] if size["trials"]]
-    if size_deg is None:
-        return f"> {tried[-1]:g}" if tried else "-"
-    return f"<= {size_deg:g}" if size_deg == tried[0] else f"{size_deg:.2g}"
