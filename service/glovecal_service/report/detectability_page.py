@@ -72,7 +72,7 @@ def detectability_page(found: Mapping[str, Any], caption: Caption | None = None)
     summary += [Fact("", found["control"]["sentence"])]
     summary += [Fact("Alike", sentence) for sentence in alike["sentences"][-1:]]
     of = found["subject"] if caption is None else caption.title
-    simulated = ", a simulated glove" if found.get("simulated") else ""
+    simulated = " (simulated glove)" if found.get("simulated") else ""
     takes = counted(len(found["takes"]), "take")
     return page(f"What {takes} of {of}{simulated} could have shown", summary, sections)
 

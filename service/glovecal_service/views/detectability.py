@@ -141,7 +141,7 @@ class DetectabilityResult(View):
 
 
 def size_text(item: Mapping[str, Any], size_deg: float | None) -> str:
-    """A size of an effect's document: the smallest that was tried may be smaller, one not reached is larger."""
+    """A size of an effect's document: the smallest tried may be smaller, one not reached is larger."""
     tried = [size["size_deg"] for size in item["sizes"] if size["trials"]]
     if size_deg is None:
         return f"> {tried[-1]:g}" if tried else "-"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -120,6 +122,11 @@ def test_what_cannot_be_put_in_says_why(session):
     found = detectability(session, effect("saturation"))
     assert found.sizes == ()
     assert "cannot be tried" in detectability_sentence(found)
+    shared = Layout.from_columns("shared", SENSORS, ("BEND", "SPREAD"))
+    renamed = [replace(take, rotations=("BEND", "SPREAD")) for take in session.recorded]
+    without = SurrogateSession.of(renamed, shared)
+    assert why_not_injected(without, effect("hysteresis")) == "no rotation has a working sensor of its own"
+    assert detectability(without, effect("hysteresis")).sizes == ()
     with pytest.raises(BadInput, match="no take measured 'R_PIP'"):
         detectability(session, effect("hysteresis"), ["R_PIP"])
 

@@ -51,7 +51,7 @@ def test_a_subject_before_any_model(session: tuple[Run, Path]) -> None:
     assert "Control: with nothing put in nothing is named in 1 of 1 trials." in answer.out
     assert "clock_offset and glove_latency (correlation 1.00 on" in answer.out
     shown = page.read_text(encoding="utf-8")
-    assert "What 6 takes of anna, a simulated glove could have shown" in shown
+    assert "What 6 takes of anna (simulated glove) could have shown" in shown
     assert shown.count("<figure") == shown.count("<svg") == 1
     found = run(*asked, "--json").json
     [item] = found["effects"]

@@ -56,6 +56,8 @@ def why_not_injected(session: SurrogateSession, effect: Effect) -> str | None:
         return "the model has it, or an effect like it, already"
     if not effect.has_columns and not is_delay(effect):
         return "it is found by its signature in a recording, not by what it explains of the error"
+    if not session.sensors and not is_delay(effect):
+        return "no rotation has a working sensor of its own"
     if effect.stage != "compared":
         return "a diagnosis does not compare it with others"
     if session.problem.is_sparse and effect.needs_movement:
