@@ -102,7 +102,7 @@ def test_a_refusal_is_passed_on_and_a_mistake_is_called_one(dispatched, ledger):
     assert "in count\n" in broken.traceback, "the calls inside the worker process"
     assert broken.traceback.rstrip().endswith("ZeroDivisionError: a mistake in the program")
     unknown = wait_for_job(store, store.jobs.create("knit", {}).id)
-    kinds = "add_effect, ceiling, count, diagnose, improve, remove_effect, train"
+    kinds = "add_effect, ceiling, count, detectability, diagnose, improve, remove_effect, train"
     assert unknown.error == f"no job of kind 'knit'; there are {kinds}"
 
 
