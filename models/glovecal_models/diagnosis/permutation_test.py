@@ -7,7 +7,7 @@ take (or its wearing) is given to another one, and the same columns are fitted; 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from glovecal_models.comparison.wearings import partition_of, permuted_sessions
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.effects.base.control import motions_of, with_context
 from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
 from glovecal_models.effects.base.signals import Signals
 
@@ -30,27 +31,84 @@ def session_p_value(design: ForwardDesign, effect: Effect, generator: np.random.
     """
     joints = range(len(design.rotations))
     permutations = _permutations(design, effect, generator)
-    settings = effect.fit_constants(design.signals)
-    grid = effect.grid(design.signals, settings)
     rows = [_thinned(take.time_s) for take in design.signals]
     thin = [_some(take, some) for take, some in zip(design.signals, rows, strict=True)]
-    bases, targets = zip(*(_projected(design, joint, rows) for joint in joints), strict=True)
-    prior = effect.prior_sd(settings)
-
-    def explained(takes: Sequence[Signals]) -> np.ndarray:
-        each = [np.concatenate([effect.columns(take, settings, shape) for take in takes]) for shape in grid]
-        return np.array(
-            [
-                max(_explained(columns[used, joint], base, target, prior) for columns in each)
-                for base, (target, used), joint in zip(bases, targets, joints, strict=True)
-            ]
-        )
-
-    every = np.array(
-        [explained(thin), *(explained(_permuted(thin, order, effect)) for order in permutations)]
-    )
+    settings, left = effect.fit_constants(design.signals), [_projected(design, joint, rows) for joint in joints]
+    given = _Given(effect, settings, effect.grid(design.signals, settings), thin, left)
+    own = _own_givers(thin, effect)
+    every = np.array([given.explained(order) for order in (own, *permutations)])
     shares = np.minimum(_shares_as_large(every.sum(axis=1)), _shares_as_large(every.max(axis=1)))
     return float(np.mean(shares <= shares[0] * (1 + 1e-9)))
+
+
+@dataclass(frozen=True)
+class _Products:
+    """Sums over the rows of one take, for each joint J and shape G."""
+
+    columns: np.ndarray
+    """(J, G, C, C), columns with columns."""
+    base: np.ndarray
+    """(J, G, P, C), with an orthonormal base."""
+    target: np.ndarray
+    """(J, G, C), with what the base leaves of the target."""
+
+
+class _Given:
+    """What columns explain when takes are given the context, or the wearing, of others.
+
+    A permutation is a sum over its takes: what a take contributes with each giver is worked out once.
+    """
+
+    def __init__(
+        self,
+        effect: Effect,
+        settings: Settings,
+        grid: np.ndarray,
+        takes: Sequence[Signals],
+        joints: Sequence[_Projected],
+    ) -> None:
+        self._effect, self._settings, self._grid = effect, settings, grid
+        self._takes, self._joints = takes, joints
+        self._size = max(joint.base.shape[1] for joint in joints)
+        self._square = np.array([float(joint.target @ joint.target) for joint in joints])
+        count = np.array([len(joint.target) for joint in joints])
+        self._held = (self._square / count)[:, None] / effect.prior_sd(settings) ** 2 * 4.0
+        self._kept: dict[tuple[int, int], _Products] = {}
+
+    def explained(self, givers: np.ndarray) -> np.ndarray:
+        """(J,) share of the target's square that columns explain beside the base, weights shrunk by their
+        prior; ``givers``: for each take a number as ``_permutations`` has them."""
+        parts = [self._of(take, int(giver)) for take, giver in enumerate(givers)]
+        base = np.sum([part.base for part in parts], axis=0)
+        gram = np.sum([part.columns for part in parts], axis=0) - base.swapaxes(-1, -2) @ base
+        right = np.sum([part.target for part in parts], axis=0)
+        gram = gram + self._held[:, None, :, None] * np.eye(gram.shape[-1])
+        moves = self._square > 0
+        found = np.zeros(len(self._square))
+        beta = np.linalg.solve(gram[moves], right[moves][..., None])[..., 0]
+        shares = np.einsum("jgc,jgc->jg", right[moves], beta) / self._square[moves, None]
+        found[moves] = shares.max(axis=1)
+        return found
+
+    def _of(self, take: int, giver: int) -> _Products:
+        if (take, giver) not in self._kept:
+            self._kept[take, giver] = self._products(take, _given(self._takes, take, giver, self._effect))
+        return self._kept[take, giver]
+
+    def _products(self, number: int, take: Signals) -> _Products:
+        found = [self._effect.columns(take, self._settings, shape) for shape in self._grid]
+        every = np.stack(found, axis=1)
+        joints, (_, shapes, lanes, added) = self._joints, every.shape
+        columns = np.zeros((lanes, shapes, added, added))
+        base = np.zeros((lanes, shapes, self._size, added))
+        target = np.zeros((lanes, shapes, added))
+        for lane, joint in enumerate(joints):
+            rows, part = joint.rows_of(number)
+            mine = every[rows, :, lane].transpose(1, 0, 2)
+            columns[lane] = mine.swapaxes(-1, -2) @ mine
+            base[lane, :, : joint.base.shape[1]] = joint.base[part].T @ mine
+            target[lane] = joint.target[part] @ mine
+        return _Products(columns, base, target)
 
 
 def _shares_as_large(values: np.ndarray) -> np.ndarray:
@@ -98,11 +156,20 @@ def _within_motions(
     return list(found.values())[:PERMUTATIONS]
 
 
-def _permuted(takes: Sequence[Signals], order: np.ndarray, effect: Effect) -> list[Signals]:
+def _own_givers(takes: Sequence[Signals], effect: Effect) -> np.ndarray:
+    """Every take as it was recorded."""
+    if effect.control != "permuted wearings":
+        return np.arange(len(takes))
+    names = list(dict.fromkeys(take.wearing for take in takes))
+    return np.array([names.index(take.wearing) for take in takes])
+
+
+def _given(takes: Sequence[Signals], take: int, giver: int, effect: Effect) -> Signals:
+    """A take with the wearing of that number, or the context of the take of that number."""
     if effect.control == "permuted wearings":
-        names = list(dict.fromkeys(take.wearing for take in takes))
-        return [replace(take, wearing=names[int(to)]) for take, to in zip(takes, order, strict=True)]
-    return [with_context(take, takes[int(to)]) for take, to in zip(takes, order, strict=True)]
+        names = list(dict.fromkeys(each.wearing for each in takes))
+        return replace(takes[take], wearing=names[giver])
+    return takes[take] if take == giver else with_context(takes[take], takes[giver])
 
 
 def _thinned(time_s: np.ndarray) -> np.ndarray:
@@ -122,12 +189,27 @@ def _some(take: Signals, rows: np.ndarray) -> Signals:
     )
 
 
-def _projected(
-    design: ForwardDesign, joint: int, rows: Sequence[np.ndarray]
-) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
-    """An orthonormal base, what it leaves of the target, and which of the thinned rows were measured."""
-    starts = np.cumsum([0, *(len(some) for some in rows)])
-    base, target, used = [], [], []
+@dataclass(frozen=True)
+class _Projected:
+    """The thinned rows of one joint that were measured."""
+
+    base: np.ndarray
+    """(N, P), orthonormal."""
+    target: np.ndarray
+    """(N,), degrees: what the base leaves of it."""
+    take: np.ndarray
+    """(N,), number of the take."""
+    row: np.ndarray
+    """(N,), among the take's thinned rows."""
+
+    def rows_of(self, take: int) -> tuple[np.ndarray, np.ndarray]:
+        """Of a take: which of its thinned rows, and where they stand here."""
+        part = np.flatnonzero(self.take == take)
+        return self.row[part], part
+
+
+def _projected(design: ForwardDesign, joint: int, rows: Sequence[np.ndarray]) -> _Projected:
+    base, target, owner, row = [], [], [], []
     for unit, (take, fitted) in zip(design.products[joint].units, design.units(joint), strict=True):
         if not len(fitted):
             continue
@@ -136,18 +218,9 @@ def _projected(
         near = np.abs(fitted[at] - some) <= 2
         base.append(unit.base[at[near]])
         target.append(unit.target[at[near]])
-        used.append(starts[take] + np.flatnonzero(near))
+        row.append(np.flatnonzero(near))
+        owner.append(np.full(len(row[-1]), take))
     orthogonal, _ = np.linalg.qr(np.concatenate(base))
     values = np.concatenate(target)
-    return orthogonal, (values - orthogonal @ (orthogonal.T @ values), np.concatenate(used))
-
-
-def _explained(columns: np.ndarray, base: np.ndarray, target: np.ndarray, prior: np.ndarray) -> float:
-    """Share of the target's square that columns explain beside the base, weights shrunk by their prior."""
-    left = columns - base @ (base.T @ columns)
-    square = float(target @ target)
-    if square <= 0:
-        return 0.0
-    gram = left.T @ left + np.diag(square / len(target) / prior**2 * 4.0)
-    right = left.T @ target
-    return float(right @ np.linalg.solve(gram, right)) / square
+    left = values - orthogonal @ (orthogonal.T @ values)
+    return _Projected(orthogonal, left, np.concatenate(owner), np.concatenate(row))
