@@ -17,7 +17,8 @@ import numpy as np
 from glovecal_models.calibration.added_effect import FORM, AddedEffect, form_values
 from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.effect_shape import EffectGroup, best_shape
-from glovecal_models.calibration.fit_task import FitResult, run_task
+from glovecal_models.calibration.fit_memory import KNOWN_FITS
+from glovecal_models.calibration.fit_task import FitResult
 from glovecal_models.calibration.form_choice import EVERY as FORM_EVERY
 from glovecal_models.calibration.form_choice import FormRows, chosen_form
 from glovecal_models.calibration.held_out import BaseFeatures, Rows, WeightPosterior, weight_posterior
@@ -107,7 +108,7 @@ def _trained(
         np.concatenate([np.full(int(rows.sum()), i) for i, rows in enumerate(known)]),
         np.concatenate([part[rows] for part, rows in zip(poses, known, strict=True)]),
     )
-    return run_task(task_for(correspondence, samples, None, settings), cancelled=cancelled)
+    return KNOWN_FITS.fit(task_for(correspondence, samples, None, settings), cancelled=cancelled)
 
 
 def own_signals(
@@ -115,11 +116,19 @@ def own_signals(
 ) -> tuple[list[np.ndarray], float]:
     """For each take (N,), the base's prediction; and what it would be at a raw reading of zero."""
     inputs = takes.inputs(correspondence)
-    own = [regressor.predict(part).mean for part in inputs]
+    own = [_predicted(regressor, part) for part in inputs]
     x, y = np.concatenate([part[:, 0] for part in inputs]), np.concatenate(own)
     variance = float(np.var(x))
     slope = float(np.mean((x - x.mean()) * (y - y.mean()))) / variance if variance > 0 else 0.0
     return own, float(y.mean() - slope * x.mean())
+
+
+def _predicted(regressor: Regressor, inputs: np.ndarray) -> np.ndarray:
+    """(N,), degrees; a single sensor's counts come again and again, and each is predicted once."""
+    if inputs.shape[1] > 1:
+        return regressor.mean(inputs)
+    different, which = np.unique(inputs[:, 0], return_inverse=True)
+    return regressor.mean(different[:, None])[which]
 
 
 def _fitted_effects(

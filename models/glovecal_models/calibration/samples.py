@@ -24,6 +24,8 @@ KEY_POSES = ("flat", "spread", "fist", "overbend")
 LEAST_SHARE_OF_RANGE = 0.25
 """Key poses must span this share of a rotation's recorded range to carry its line."""
 DEFAULT_SAMPLES = 2000
+MOST_COUNTED = 2**22
+"""Cells of a grid up to which the occupied ones are counted in a table, without sorting."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +101,7 @@ def representative_index(samples: Samples, count: int = DEFAULT_SAMPLES, *, seed
     cells = _cells(samples, count)
     order = np.random.default_rng(seed).permutation(len(samples))
     turn = _turn_within(cells[order])
-    first = order[np.argsort(turn, kind="stable")][:count]
+    first = order[np.argsort(_short(turn), kind="stable")][:count]
     return np.sort(first)
 
 
@@ -125,12 +127,22 @@ def _numbered(take: np.ndarray, grid: np.ndarray, divisions: int) -> np.ndarray:
     key = take.astype(np.int64)
     for column in columns.T:
         key = key * divisions + column
-    return np.unique(key, return_inverse=True)[1].ravel()
+    span = int(key.max()) + 1
+    if span > MOST_COUNTED:
+        return np.unique(key, return_inverse=True)[1].ravel()
+    occupied = np.zeros(span, dtype=np.int32)
+    occupied[key] = 1
+    return (np.cumsum(occupied) - 1)[key]
+
+
+def _short(numbers: np.ndarray) -> np.ndarray:
+    """Numbers from 0 in two bytes where they have room: those are sorted by their digits."""
+    return numbers.astype(np.uint16) if numbers.max(initial=0) < 2**16 else numbers
 
 
 def _turn_within(cells: np.ndarray) -> np.ndarray:
     """For each sample, how many samples of its cell come before it."""
-    by_cell = np.argsort(cells, kind="stable")
+    by_cell = np.argsort(_short(cells), kind="stable")
     sorted_cells = cells[by_cell]
     starts = np.flatnonzero(np.r_[True, sorted_cells[1:] != sorted_cells[:-1]])
     lengths = np.diff(np.r_[starts, len(cells)])

@@ -50,6 +50,10 @@ class LinearRegressor:
         spread = x @ self.variance_root[:-1] + self.variance_root[-1]
         return Prediction(x @ self.slope + self.intercept, np.einsum("nr,nr->n", spread, spread))
 
+    def mean(self, inputs: np.ndarray) -> np.ndarray:
+        """Of ``predict``, (N,)."""
+        return self.predict(inputs).mean
+
     def arrays(self) -> dict[str, np.ndarray]:
         return {name: np.ascontiguousarray(getattr(self, name), dtype=float) for name in _ARRAYS}
 

@@ -63,21 +63,33 @@ class ProcessRegressor:
 
     def predict(self, inputs: np.ndarray) -> Prediction:
         """Mean and variance (without noise) at raw inputs (N, D); raises BadInput on a wrong shape."""
+        inputs = self._checked(inputs)
+        mean, variance = np.empty(len(inputs)), np.empty(len(inputs))
+        for rows in _blocks(len(inputs)):
+            x, to_nodes, mean[rows] = self._mean_of_block(inputs[rows])
+            explained = to_nodes @ self.variance_root
+            known = np.einsum("nr,nr->n", explained, explained)
+            variance[rows] = np.maximum(self.covariance.diagonal(self.theta, x) - known, 0.0)
+        return Prediction(mean, variance)
+
+    def mean(self, inputs: np.ndarray) -> np.ndarray:
+        """Of ``predict``, (N,). Raises BadInput."""
+        inputs = self._checked(inputs)
+        return np.concatenate(
+            [np.empty(0), *(self._mean_of_block(inputs[rows])[2] for rows in _blocks(len(inputs)))]
+        )
+
+    def _checked(self, inputs: np.ndarray) -> np.ndarray:
         inputs = np.asarray(inputs, dtype=float)
         if inputs.ndim != 2 or inputs.shape[1] != len(self.input_shift):
             raise BadInput(f"readings have shape {inputs.shape}, expected (N, {len(self.input_shift)})")
-        mean, variance = np.empty(len(inputs)), np.empty(len(inputs))
-        for start in range(0, len(inputs), _ROWS_AT_ONCE):
-            rows = slice(start, start + _ROWS_AT_ONCE)
-            mean[rows], variance[rows] = self._predict_block(inputs[rows])
-        return Prediction(mean, variance)
+        return inputs
 
-    def _predict_block(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _mean_of_block(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Inputs in working units (N, D), their covariance with the nodes (N, M), the mean (N,)."""
         x = (inputs - self.input_shift) / self.input_scale
         to_nodes = self.covariance(self.theta, x, self.nodes)
-        explained = to_nodes @ self.variance_root
-        variance = self.covariance.diagonal(self.theta, x) - np.einsum("nr,nr->n", explained, explained)
-        return x @ self.slope + self.intercept + to_nodes @ self.weights, np.maximum(variance, 0.0)
+        return x, to_nodes, x @ self.slope + self.intercept + to_nodes @ self.weights
 
     def arrays(self) -> dict[str, np.ndarray]:
         return {name: np.ascontiguousarray(getattr(self, name), dtype=float) for name in _SHAPES}
@@ -119,6 +131,10 @@ class ProcessRegressor:
             evidence=dict(evidence),
             **checked,
         )
+
+
+def _blocks(count: int) -> list[slice]:
+    return [slice(start, start + _ROWS_AT_ONCE) for start in range(0, count, _ROWS_AT_ONCE)]
 
 
 _SHAPES: dict[str, tuple[str, ...]] = {

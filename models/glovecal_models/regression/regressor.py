@@ -44,6 +44,10 @@ class Regressor(Protocol):
         """Mean and variance at ``inputs`` of shape (N, D)."""
         ...
 
+    def mean(self, inputs: np.ndarray) -> np.ndarray:
+        """The mean of ``predict`` alone, (N,): the variance is the dearer part."""
+        ...
+
     def arrays(self) -> dict[str, np.ndarray]:
         """Everything numerical, for the artifact. Float64, finite."""
         ...
@@ -91,6 +95,9 @@ class RuleRegressor:
         """Mean and (zero) variance from rotations in degrees, shape (N, len(rotations))."""
         inputs = np.asarray(inputs, dtype=float)
         return Prediction(inputs @ self.weights, np.zeros(len(inputs)))
+
+    def mean(self, inputs: np.ndarray) -> np.ndarray:
+        return self.predict(inputs).mean
 
     def arrays(self) -> dict[str, np.ndarray]:
         return {"weights": np.asarray(self.weights, dtype=np.float64)}
