@@ -10,6 +10,7 @@ Frames are taken as evenly spaced; blocks do not cross gaps.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,11 +60,12 @@ def error_spectrum(
         return None
     shares = np.array([(np.mean(block.slow**2), np.mean(block.error**2)) for block in blocks])
     slow, low, high = _share(shares, generator)
-    squares = np.array([_plateau(block.error) for block in blocks])
-    jitter = float(np.sqrt(np.mean([_plateau(block.predicted) for block in blocks])))
+    errors, predicted = (_periodograms([getattr(b, name) for b in blocks]) for name in ("error", "predicted"))
+    squares = np.array([_plateau(heights) for heights in errors])
+    jitter = float(np.sqrt(np.mean([_plateau(heights) for heights in predicted])))
     floor = pooled(squares, np.ones(len(squares)), jitter, "spectrum", generator)
     count = min(len(block.error) // 2 for block in blocks)
-    densities = [2.0 / block.rate_hz * _periodogram(block.error)[1 : count + 1] for block in blocks]
+    densities = [2.0 / b.rate_hz * heights[1 : count + 1] for b, heights in zip(blocks, errors, strict=True)]
     return ErrorSpectrum(
         frequency_hz=np.arange(1, count + 1) / BLOCK_S,
         density=np.mean(densities, axis=0),
@@ -120,19 +122,26 @@ def _share(shares: np.ndarray, generator: np.random.Generator) -> tuple[float, f
     return float(slow / every), float(low), float(high)
 
 
-def _periodogram(values: np.ndarray) -> np.ndarray:
+def _periodograms(blocks: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Of white noise its variance, at every frequency; tapered, so that what is slow stays slow."""
-    taper = np.hanning(len(values))
-    return np.abs(np.fft.rfft(_detrended(values) * taper)) ** 2 / float(taper @ taper)
+    found: dict[int, np.ndarray] = {}
+    lengths = [len(block) for block in blocks]
+    for length in set(lengths):
+        taper = np.hanning(length)
+        alike = _detrended(np.array([block for block in blocks if len(block) == length]))
+        of_length = iter(np.abs(np.fft.rfft(alike * taper, axis=1)) ** 2 / float(taper @ taper))
+        found |= {number: next(of_length) for number, other in enumerate(lengths) if other == length}
+    return [found[number] for number in range(len(blocks))]
 
 
 def _detrended(values: np.ndarray) -> np.ndarray:
-    """Without their least-squares line."""
-    time = np.arange(len(values)) - (len(values) - 1) / 2
-    return values - values.mean() - (time @ values) / (time @ time) * time
+    """Rows (B, N) without their least-squares lines."""
+    time = np.arange(values.shape[1]) - (values.shape[1] - 1) / 2
+    slope = values @ time / (time @ time)
+    return values - values.mean(axis=1, keepdims=True) - slope[:, None] * time
 
 
-def _plateau(values: np.ndarray) -> float:
+def _plateau(heights: np.ndarray) -> float:
     """Variance of the white noise that the upper half of the frequencies shows, by their median."""
-    heights = _periodogram(values)[len(values) // 4 : len(values) // 2]
-    return float(np.median(heights)) / np.log(2.0)
+    half = len(heights) - 1
+    return float(np.median(heights[half // 2 : half])) / np.log(2.0)

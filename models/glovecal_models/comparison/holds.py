@@ -11,9 +11,11 @@ independent and have the variance of one repeat; their squares add up to the spr
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -57,9 +59,9 @@ def holds(item: TakeResiduals, column: int, limits: ComparisonLimits = COMPARISO
     predicted, readings = item.predicted[frames, column], item.take.readings[frames]
     spread = readings.std(axis=0) if len(readings) else np.zeros(0)
     found = []
-    start = 0
+    start, track = 0, _Track(time.tolist(), np.concatenate([[0.0], np.cumsum(angle)]).tolist())
     while start < len(time):
-        end = _end_of_hold(time, angle, start, limits.still_deg_per_s)
+        end = track.end_of_hold(start, limits.still_deg_per_s)
         if time[end - 1] - time[start] >= limits.shortest_hold_s:
             settled = int(np.searchsorted(time, time[start] + limits.settled_s))
             if end - settled >= limits.fewest_hold_frames:
@@ -79,21 +81,30 @@ def _is_still(readings: np.ndarray, allowed: np.ndarray) -> bool:
     return bool((moved <= allowed).all())
 
 
-def _end_of_hold(time: np.ndarray, angle: np.ndarray, start: int, still_deg_per_s: float) -> int:
-    """One past the last frame up to which the angle stays on a slope too small for motion.
+class _Track(NamedTuple):
+    """Plain numbers, because holds are looked for frame by frame."""
 
-    Judged on means of neighbouring frames, so that the reference's own noise is not taken for motion.
-    """
-    step = max(1, int(np.searchsorted(time, time[start] + 0.1)) - start)
-    end = min(start + step, len(time))
-    before = angle[start:end].mean()
-    while end < len(time):
-        following = min(end + step, len(time))
-        after = angle[end:following].mean()
-        if abs(after - before) > still_deg_per_s * 0.1 or time[following - 1] - time[end - 1] > 0.5:
-            break
-        end, before = following, after
-    return end
+    time_s: list[float]
+    """Of N frames."""
+    sums: list[float]
+    """Of the angles of the first 0 to N frames, degrees."""
+
+    def end_of_hold(self, start: int, still_deg_per_s: float) -> int:
+        """One past the last frame up to which the angle stays on a slope too small for motion.
+
+        Judged on means of neighbouring frames, so that the reference's own noise is not taken for motion.
+        """
+        time, sums = self
+        step = max(1, bisect_left(time, time[start] + 0.1) - start)
+        end = min(start + step, len(time))
+        before = (sums[end] - sums[start]) / (end - start)
+        while end < len(time):
+            following = min(end + step, len(time))
+            after = (sums[following] - sums[end]) / (following - end)
+            if abs(after - before) > still_deg_per_s * 0.1 or time[following - 1] - time[end - 1] > 0.5:
+                break
+            end, before = following, after
+        return end
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ of the model at hand. ``floor_doubts`` says when a floor is not reliable.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -88,27 +88,50 @@ def _estimates(
     limits: ComparisonLimits,
 ) -> tuple[NoiseFloor, ...]:
     """Every estimate that the takes allow, the best first. ``found``: of the plain map."""
+    return tuple(_each_estimate(found, rotation, doubts, generator, limits))
+
+
+def _each_estimate(
+    found: Residuals,
+    rotation: str,
+    doubts: Sequence[str],
+    generator: np.random.Generator,
+    limits: ComparisonLimits,
+) -> Iterator[NoiseFloor]:
+    """As ``_estimates``; one after the other, for whoever wants only the best."""
     column = found.column(rotation)
     held = [holds(item, column, limits) for item in found.takes]
     every = [hold for of_take in held for hold in of_take]
     still = [hold for hold in every if hold.hand_is_still]
-    spectrum = error_spectrum(found, rotation, generator, limits)
-    estimates = (
-        _from_holds(still, "still hand", generator, limits),
-        _from_holds(every, "still joint", generator, limits),
-        from_repeated_poses(found.takes, column, held, generator, limits),
-        spectrum.plateau if spectrum is not None else None,
-        _from_differences(found, column, generator, limits),
+    slow, wandering, is_first = slow_sampling(found.takes, limits), (), True
+    ways: tuple[Callable[[], NoiseFloor | None], ...] = (
+        lambda: _from_holds(still, "still hand", generator, limits),
+        lambda: _from_holds(every, "still joint", generator, limits),
+        lambda: from_repeated_poses(found.takes, column, held, generator, limits),
+        lambda: _of_plateau(error_spectrum(found, rotation, generator, limits)),
+        lambda: _from_differences(found, column, generator, limits),
+        lambda: _of_single_poses(found, column, generator, limits) if is_first else None,
     )
-    some = tuple(one for one in estimates if one is not None)
-    if not some and not any(_has_neighbours(item.take.time_s, limits) for item in found.takes):
-        single = from_near_readings(found.takes, column, generator, limits)
-        some = () if single is None else (single,)
-    wandering = hold_doubts(still, some[0].floor_deg, limits) if some else ()
-    slow = slow_sampling(found.takes, limits)
-    return tuple(
-        replace(one, reasons=(*doubts, *_of_estimate(one, slow, limits), *wandering)) for one in some
-    )
+    for way in ways:
+        one = way()
+        if one is None:
+            continue
+        if is_first:
+            wandering, is_first = hold_doubts(still, one.floor_deg, limits), False
+        yield replace(one, reasons=(*doubts, *_of_estimate(one, slow, limits), *wandering))
+
+
+def _of_plateau(spectrum: ErrorSpectrum | None) -> NoiseFloor | None:
+    return None if spectrum is None else spectrum.plateau
+
+
+def _of_single_poses(
+    found: Residuals, column: int, generator: np.random.Generator, limits: ComparisonLimits
+) -> NoiseFloor | None:
+    """None where frames have neighbours, which tell more."""
+    if any(_has_neighbours(item.take.time_s, limits) for item in found.takes):
+        return None
+    return from_near_readings(found.takes, column, generator, limits)
 
 
 def _of_estimate(floor: NoiseFloor, slow: Sequence[str], limits: ComparisonLimits) -> tuple[str, ...]:
@@ -191,8 +214,21 @@ def takes_noise(
     takes: Sequence[Take], rotations: Sequence[str], limits: ComparisonLimits = COMPARISON_LIMITS
 ) -> dict[str, NoiseFloor]:
     """The floor of each rotation of which it is known: as ``rotation_noise`` has it, without a model."""
-    noise = rotation_noise(plain_residuals(takes, rotations), limits=limits)
-    return {name: item.floor for name, item in noise.items() if item.floor is not None}
+    return _best_floors(plain_residuals(takes, rotations), limits)
+
+
+def noise_floors(found: Residuals, limits: ComparisonLimits = COMPARISON_LIMITS) -> dict[str, NoiseFloor]:
+    """The floor of each rotation of which it is known: as ``rotation_noise`` has it, without the rest."""
+    return _best_floors(_of_plain_map(found), limits)
+
+
+def _best_floors(plain: Residuals, limits: ComparisonLimits) -> dict[str, NoiseFloor]:
+    doubts, floors = clock_doubts(plain.takes, limits), {}
+    for rotation in plain.measured_rotations:
+        best = next(_each_estimate(plain, rotation, doubts, _generator(rotation), limits), None)
+        if best is not None:
+            floors[rotation] = best
+    return floors
 
 
 def _generator(rotation: str) -> np.random.Generator:

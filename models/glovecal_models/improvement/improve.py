@@ -25,7 +25,7 @@ from glovecal_models.calibration.usable_sensors import usable_sensors
 from glovecal_models.ceiling.black_box_ceiling import black_box_ceiling
 from glovecal_models.ceiling.ceiling import Ceiling
 from glovecal_models.comparison.floor_estimate import NoiseFloor
-from glovecal_models.comparison.noise_floor import rotation_noise
+from glovecal_models.comparison.noise_floor import noise_floors
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.actions import Action
 from glovecal_models.diagnosis.diagnose import diagnose
@@ -190,10 +190,7 @@ class _Loop:
         Those of the takes as they came would hold what has been repaired.
         """
         last = self.steps[-1]
-        noise = rotation_noise(
-            residuals(last.model, self.holdout or self.takes), limits=self.limits.comparison
-        )
-        known = {name: item.floor for name, item in noise.items() if item.floor is not None}
+        known = noise_floors(residuals(last.model, self.holdout or self.takes), self.limits.comparison)
         return {
             name: floor.beside(last.per_rotation[name]) if name in last.per_rotation else floor
             for name, floor in known.items()

@@ -9,7 +9,7 @@ slope. All cells are compared at once by projecting them off the base.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -23,6 +23,7 @@ from glovecal_models.effects.base.signals import Signals
 STEP_S = 0.005
 FILTER_STEP_S = 0.01
 LARGEST_DELAY_S = 0.2
+EVEN_S = 1e-6
 FIRST_POLE_SHARE = 0.65
 """Of the delay of two poles."""
 WINDOW_SHARE = 0.6
@@ -146,22 +147,21 @@ def _joint(problem: Problem, joint: int, form: np.ndarray, delay: np.ndarray) ->
     orthogonal, _ = np.linalg.qr(base)
     target = np.concatenate([unit.target for unit in products.units])
     used = [(problem.signals[take], rows) for take, rows in problem.units(joint)]
-    moved = np.concatenate(
-        [_moved(take.time_s, take.own[:, joint], rows, form, delay) for take, rows in used]
-    )
+    moved = _moved([_Track.of(take.time_s, take.own[:, joint], rows) for take, rows in used], form, delay)
     own = np.concatenate([take.own[rows, joint] for take, rows in used])
-    moved *= _slope(base, products.whole, own)[:, None]
+    moved *= _slope(base, products.whole, own)
     bend = _bend(moved, form, delay)
     left = target - orthogonal @ (orthogonal.T @ target)
-    moved -= orthogonal @ (orthogonal.T @ moved)
-    np.subtract(left[:, None], moved, out=moved)
+    moved -= (moved @ orthogonal) @ orthogonal.T
+    np.subtract(left, moved, out=moved)
+    np.square(moved, out=moved)
     lengths = [len(rows) for _, rows in used]
     starts = block_starts(lengths)
     ends = np.cumsum(lengths)
     return DelayErrors(
         form,
         delay,
-        np.add.reduceat(moved * moved, starts, axis=0),
+        np.add.reduceat(moved, starts, axis=1).T,
         np.add.reduceat(left * left, starts),
         np.array(problem.unit_take)[np.searchsorted(ends, starts, side="right")],
         np.add.reduceat(bend * bend, starts),
@@ -171,7 +171,7 @@ def _joint(problem: Problem, joint: int, form: np.ndarray, delay: np.ndarray) ->
 def _bend(moved: np.ndarray, form: np.ndarray, delay: np.ndarray) -> np.ndarray:
     """(rows,): the angle ``BEND_S`` before and after, less twice itself."""
     either = (form == DelayForm.PURE) & (np.abs(np.abs(delay) - BEND_S) < 0.5 * STEP_S)
-    return moved[:, either].sum(axis=1)
+    return moved[either].sum(axis=0)
 
 
 def _slope(base: np.ndarray, coefficients: np.ndarray, own: np.ndarray) -> np.ndarray:
@@ -183,56 +183,98 @@ def _slope(base: np.ndarray, coefficients: np.ndarray, own: np.ndarray) -> np.nd
     return slope / max(float(own.std()), 1e-9)
 
 
-def _moved(
-    time: np.ndarray, own: np.ndarray, rows: np.ndarray, form: np.ndarray, delay: np.ndarray
-) -> np.ndarray:
-    """(rows, K): the angle after each form of delay, minus the angle itself."""
-    if len(time) < 2:
-        return np.zeros((len(rows), len(form)))
-    factor = max(1, round(float(np.median(np.diff(time))) / STEP_S))
-    fine_time = time[0] + STEP_S * np.arange((len(time) - 1) * factor + 1)
-    fine = np.interp(fine_time, time, own)
-    at = np.clip(np.searchsorted(fine_time, time[rows] - 1e-6), 0, len(fine) - 1)
-    result = np.empty((len(rows), len(form)))
-    pure = form == DelayForm.PURE
-    shifts = np.round(delay[pure] / STEP_S).astype(int)
-    result[:, pure] = fine[np.clip(at[:, None] - shifts, 0, len(fine) - 1)]
-    for cell in np.flatnonzero(~pure):
-        late, kind = float(delay[cell]), DelayForm(form[cell])
-        passed = _filtered(fine, kind, late) if late >= 0 else _filtered(fine[::-1], kind, -late)[::-1]
-        result[:, cell] = passed[at]
-    result -= own[rows, None]
+@dataclass(frozen=True)
+class _Track:
+    """The angle of one take on times ``STEP_S`` apart, straight lines between its rows."""
+
+    fine: np.ndarray
+    """(F,), degrees."""
+    every: int
+    """Of the fine times: between these the angle is a straight line."""
+    at: np.ndarray
+    """(N,) places of the fitted rows among the fine times."""
+
+    @classmethod
+    def of(cls, time: np.ndarray, own: np.ndarray, rows: np.ndarray) -> _Track:
+        if len(time) < 2:
+            return cls(own.astype(float), 1, rows)
+        factor = max(1, round(float(np.median(np.diff(time))) / STEP_S))
+        fine_time = time[0] + STEP_S * np.arange((len(time) - 1) * factor + 1)
+        is_even = np.allclose(fine_time[::factor], time, rtol=0.0, atol=EVEN_S)
+        fine = np.interp(fine_time, time, own)
+        at = np.clip(np.searchsorted(fine_time, time[rows] - EVEN_S), 0, len(fine) - 1)
+        return cls(fine, factor if is_even else 1, at)
+
+    @property
+    def backwards(self) -> _Track:
+        return _Track(self.fine[::-1], self.every, len(self.fine) - 1 - self.at)
+
+
+def _moved(tracks: Sequence[_Track], form: np.ndarray, delay: np.ndarray) -> np.ndarray:
+    """(K, rows of all tracks): the angle after each form of delay, minus the angle itself."""
+    own = np.concatenate([track.fine[track.at] for track in tracks])
+    result = np.zeros((len(form), len(own)))
+    pure, late, early = form == DelayForm.PURE, delay > 0, delay < 0
+    shifts = np.round(delay[pure] / STEP_S).astype(int)[:, None]
+    result[pure] = np.concatenate(
+        [track.fine[np.clip(track.at - shifts, 0, len(track.fine) - 1)] for track in tracks], axis=1
+    )
+    _filter(result, tracks, form, np.where(late, delay, 0.0))
+    _filter(result, [track.backwards for track in tracks], form, np.where(early, -delay, 0.0))
+    result[pure | late | early] -= own
     return result
 
 
-def _filtered(signal: np.ndarray, form: DelayForm, late_s: float) -> np.ndarray:
-    """The signal (N,) on the fine times through a filter that is ``late_s`` late in the mean."""
-    if late_s == 0:
-        return signal
-    if form == DelayForm.ONE_POLE:
-        return _low_pass(signal, late_s)
-    if form == DelayForm.TWO_POLES:
-        first = _low_pass(signal, FIRST_POLE_SHARE * late_s)
-        return _low_pass(first, (1 - FIRST_POLE_SHARE) * late_s)
-    length = 2 * late_s * (WINDOW_SHARE if form == DelayForm.DELAYED_WINDOW else 1.0)
-    return _window(signal, late_s - length / 2, late_s + length / 2)
+def _filter(result: np.ndarray, tracks: Sequence[_Track], form: np.ndarray, late_s: np.ndarray) -> None:
+    """Fill the rows of ``result`` (K, rows of all tracks) whose filters are late, by ``late_s`` (K,) in the
+    mean."""
+    low_pass = _low_passes(tracks)
+    for cell in np.flatnonzero((form == DelayForm.ONE_POLE) & (late_s > 0)):
+        result[cell] = low_pass(late_s[cell])
+    for cell in np.flatnonzero((form == DelayForm.TWO_POLES) & (late_s > 0)):
+        # Two first-order filters in a row, in partial fractions.
+        first, second = FIRST_POLE_SHARE * late_s[cell], (1 - FIRST_POLE_SHARE) * late_s[cell]
+        result[cell] = (first * low_pass(first) - second * low_pass(second)) / (first - second)
+    is_window = np.isin(form, (DelayForm.MOVING_AVERAGE, DelayForm.DELAYED_WINDOW)) & (late_s > 0)
+    length = 2 * late_s * np.where(form == DelayForm.DELAYED_WINDOW, WINDOW_SHARE, 1.0)
+    from_s, to_s = (late_s - length / 2)[is_window], (late_s + length / 2)[is_window]
+    result[is_window] = np.concatenate([_windows(track, from_s, to_s) for track in tracks], axis=1)
 
 
-def _low_pass(signal: np.ndarray, tau: float) -> np.ndarray:
-    """First order, exact for straight lines between the samples; starts at rest."""
-    h = STEP_S / tau
-    e = np.exp(-h)
-    gain = (1 - e) / h
-    return lfilter([1 - gain, gain - e], [1, -e], signal - signal[0]) + signal[0]
+def _low_passes(tracks: Sequence[_Track]) -> Callable[[float], np.ndarray]:
+    """The first-order filter of all tracks by its time constant: exact for straight lines between samples,
+    and at rest before the first."""
+    every = tracks[0].every if len({track.every for track in tracks}) == 1 else 1
+    coarse = [track.fine[::every] for track in tracks]
+    # Side by side, filled up behind their ends, where nothing is read.
+    together = np.zeros((len(coarse), max(map(len, coarse))))
+    for signal, part in zip(together, coarse, strict=True):
+        signal[: len(part)] = part - part[:1]
+    start = np.concatenate([np.full(len(track.at), track.fine[:1].sum()) for track in tracks])
+    signal = np.repeat(np.arange(len(tracks)), [len(track.at) for track in tracks])
+    row = np.concatenate([track.at // every for track in tracks])
+
+    def low_pass(tau: float) -> np.ndarray:
+        h = every * STEP_S / tau
+        e = np.exp(-h)
+        gain = (1 - e) / h
+        return lfilter([1 - gain, gain - e], [1, -e], together)[signal, row] + start
+
+    return low_pass
 
 
-def _window(signal: np.ndarray, from_s: float, to_s: float) -> np.ndarray:
-    """The mean of what was between ``from_s`` and ``to_s`` ago."""
-    rows = np.arange(len(signal), dtype=float)
+def _windows(track: _Track, from_s: np.ndarray, to_s: np.ndarray) -> np.ndarray:
+    """(K, N): the means of what was between ``from_s`` and ``to_s`` (K,) ago."""
+    signal = track.fine
+    if len(signal) < 2:
+        return np.repeat(signal[track.at][None], len(from_s), axis=0)
     sums = np.concatenate([[0.0], np.cumsum(0.5 * (signal[1:] + signal[:-1]))])
 
-    def sum_until(ago_s: float) -> np.ndarray:
-        at = rows - ago_s / STEP_S
-        return np.interp(at, rows, sums) + signal[0] * np.minimum(at, 0.0)
+    def sum_until(ago_s: np.ndarray) -> np.ndarray:
+        at = track.at - ago_s[:, None] / STEP_S
+        inside = np.clip(at, 0.0, len(signal) - 1.0)
+        below = np.minimum(inside.astype(int), len(signal) - 2)
+        between = sums[below] + (inside - below) * (sums[below + 1] - sums[below])
+        return between + signal[0] * np.minimum(at, 0.0)
 
-    return (sum_until(from_s) - sum_until(to_s)) / ((to_s - from_s) / STEP_S)
+    return (sum_until(from_s) - sum_until(to_s)) / ((to_s - from_s) / STEP_S)[:, None]
