@@ -16,7 +16,7 @@ import numpy as np
 
 from glovecal_models.calibration.added_effect import FORM, AddedEffect, form_values
 from glovecal_models.calibration.effect_request import EffectRequest
-from glovecal_models.calibration.effect_shape import EffectGroup, best_shape
+from glovecal_models.calibration.effect_shape import REFINEMENTS, EffectGroup, best_shape
 from glovecal_models.calibration.fit_memory import KNOWN_FITS
 from glovecal_models.calibration.fit_task import FitResult
 from glovecal_models.calibration.form_choice import EVERY as FORM_EVERY
@@ -69,7 +69,6 @@ def fit_with_effects(
             results[name] = _trained(takes, columns[name], corrected.get(name), settings, cancelled)
             regressors[name] = restore_regressor(results[name].arrays, results[name].settings)
         if wanted:
-            # While the base still holds a part of the effect, its form cannot be seen.
             is_last = turn == TURNS - 1
             effects = _fitted_effects(takes, columns, regressors, wanted, settings, is_last, cancelled)
             corrected = _explained(takes, columns, regressors, effects)
@@ -137,7 +136,7 @@ def _fitted_effects(
     regressors: Mapping[str, Regressor],
     wanted: Sequence[EffectRequest],
     settings: TrainingSettings,
-    with_forms: bool,
+    is_last: bool,
     cancelled: Cancel | None,
 ) -> tuple[AddedEffect, ...]:
     """Shapes and forms one effect after another, then all weights of a joint together."""
@@ -152,7 +151,8 @@ def _fitted_effects(
     shapes: list[np.ndarray] = []
     for place, group in enumerate(groups):
         stop_if(cancelled, "adding an effect")
-        shape = best_shape(group, rows, bases, extra, priors)
+        # The first turn's shapes only tell the base what to leave out: the grid is fine enough for that.
+        shape = best_shape(group, rows, bases, extra, refinements=REFINEMENTS if is_last else 0)
         shapes.append(shape)
         effect = group.wanted.effect
         found = [effect.columns(take, group.settings, shape) for take in group.signals]
@@ -160,7 +160,7 @@ def _fitted_effects(
         for lane, name in enumerate(group.lanes):
             extra[name].append([part[index, lane] for part, index in zip(found, rows[name], strict=True)])
             priors[name].append(own_prior)
-        if with_forms:
+        if is_last:  # while the base still holds a part of the effect, its form cannot be seen
             form = _learned_form(group, found, rows, bases, extra, priors)
             if form is not None:
                 groups[place] = replace(group, settings=group.settings | {FORM: form.to_document()})

@@ -31,9 +31,10 @@ def best_shape(
     rows: Mapping[str, Sequence[np.ndarray]],
     bases: Mapping[str, list[Rows]],
     extra: Mapping[str, list[list[np.ndarray]]],
-    priors: Mapping[str, list[np.ndarray]],
+    *,
+    refinements: int = REFINEMENTS,
 ) -> np.ndarray:
-    """(L, P): the best of the effect's grid, then of finer ones around it."""
+    """(L, P): the best of the effect's grid, then of ``refinements`` finer ones around it."""
     effect, settings = group.wanted.effect, group.settings
     grid = effect.grid(group.signals, settings)
     if grid.shape[0] == 1 or grid.shape[2] == 0:
@@ -49,7 +50,7 @@ def best_shape(
     }
     prior = effect.prior_sd(settings)
     best = np.zeros((len(group.lanes), grid.shape[2]))
-    for _ in range(1 + REFINEMENTS):
+    for _ in range(1 + refinements):
         shapes, lanes, numbers = grid.shape
         flat = grid.reshape(shapes * lanes, numbers)
         found = [
@@ -57,7 +58,7 @@ def best_shape(
             for take in group.signals
         ]
         for lane, name in enumerate(group.lanes):
-            mine = [part[index][:, :, lane] for part, index in zip(found, rows[name], strict=True)]
+            mine = [part[index, :, lane] for part, index in zip(found, rows[name], strict=True)]
             best[lane] = grid[held_out(products[name], mine, prior).shape, lane]
         grid = _finer(grid, best)
     return best

@@ -122,12 +122,13 @@ def held_out(
     for unit, (rows, extra) in enumerate(zip(products.units, columns, strict=True)):
         joint[unit, :, :size, :size] = products.gram[unit]
         right[unit, :, :size] = products.right[unit]
+        flat = extra.reshape(len(extra), shapes * added)
+        joint[unit, :, size:, :size] = (flat.T @ rows.base).reshape(shapes, added, size)
+        joint[unit, :, :size, size:] = joint[unit, :, size:, :size].swapaxes(1, 2)
+        right[unit, :, size:] = (flat.T @ rows.target).reshape(shapes, added)
         for g in range(shapes):
-            own = extra[:, g, :]
-            joint[unit, g, size:, :size] = own.T @ rows.base
-            joint[unit, g, :size, size:] = joint[unit, g, size:, :size].T
+            own = flat[:, g * added : (g + 1) * added]
             joint[unit, g, size:, size:] = own.T @ own
-            right[unit, g, size:] = own.T @ rows.target
     total, total_right = joint.sum(axis=0), right.sum(axis=0)
     ridge = np.zeros((shapes, size + added, size + added))
     ridge[:, :size, :size] = products.ridge

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from glovecal_models.comparison.holds import Hold
 from glovecal_models.comparison.limits import ComparisonLimits
@@ -20,8 +21,8 @@ FURTHEST_S = 1.5
 SHIFT_S = 0.03
 SHORTEST_S = 4.0
 """Of a take, below which nothing is said of its clocks."""
-MOST_ROWS_S = 30.0
-"""Rows a second; more say nothing new of a shift."""
+ROW_S = SHIFT_S
+"""Between rows; more of them say nothing new of a shift."""
 RIDGE = 1e-3
 FEWEST_WANDERING = 4
 """Holds."""
@@ -59,20 +60,22 @@ def _apart_s(take: Take, measured: np.ndarray, limits: ComparisonLimits) -> floa
     usable = np.flatnonzero(np.isfinite(measured).sum(axis=0) >= 0.8 * len(measured))
     if take.duration_s < SHORTEST_S or not len(usable):
         return None
-    step = 1.0 / MOST_ROWS_S
-    time = np.arange(take.time_s[0] + furthest, take.time_s[-1] - furthest, step)
+    count = int(furthest / SHIFT_S)
+    rows = np.arange(int((take.duration_s - 2 * furthest) / ROW_S))
+    time = take.time_s[0] + furthest + ROW_S * rows
     moving = np.flatnonzero(np.ptp(take.readings, axis=0) > 0)
     if len(time) < 10 * (len(moving) + 1) or not len(moving):
         return None
     read = np.column_stack([np.interp(time, take.time_s, take.readings[:, at]) for at in moving])
     read = (read - read.mean(axis=0)) / np.maximum(read.std(axis=0), 1e-9)
     inverse = np.linalg.inv(read.T @ read + RIDGE * len(time) * np.eye(len(moving)))
-    count = int(furthest / SHIFT_S)
     shifts = SHIFT_S * np.arange(-count, count + 1)
+    every = time[0] + ROW_S * np.arange(-count, len(time) + count)
     left = np.zeros(len(shifts))
     for column in usable:
         known = np.isfinite(measured[:, column])
-        angle = np.array([np.interp(time + by, take.time_s[known], measured[known, column]) for by in shifts])
+        angles = np.interp(every, take.time_s[known], measured[known, column])
+        angle = sliding_window_view(angles, len(time))
         angle = angle - angle.mean(axis=1, keepdims=True)
         square = np.einsum("dn,dn->d", angle, angle)
         crossed = angle @ read

@@ -159,16 +159,17 @@ def _all_joints(
     tiled = tuple(replace(take, own=np.tile(take.own, (1, shapes))) for take in signals)
     flat = grid.reshape(shapes * lanes, numbers)
 
-    def by_shape(columns: np.ndarray) -> np.ndarray:
-        return columns.reshape(len(columns), shapes, lanes, -1)
+    def by_lane(columns: np.ndarray) -> np.ndarray:
+        """(L, N, G, C), in this order in memory, too: rows are taken lane by lane."""
+        return columns.reshape(len(columns), shapes, lanes, -1).transpose(2, 0, 1, 3).copy()
 
-    true = [by_shape(effect.columns(take, settings, flat)) for take in tiled]
-    control = [by_shape(part) for part in control_columns(effect, tiled, settings, flat, generator)]
+    true = [by_lane(effect.columns(take, settings, flat)) for take in tiled]
+    control = [by_lane(part) for part in control_columns(effect, tiled, settings, flat, generator)]
     prior = effect.prior_sd(settings)
     found = []
     for lane, joint in enumerate(joints):
         products = design.products[joint]
-        right = held_out(products, design.rows(joint, [part[:, :, lane] for part in true]), prior)
-        wrong = held_out(products, design.rows(joint, [part[:, :, lane] for part in control]), prior)
+        right = held_out(products, design.rows(joint, [part[lane] for part in true]), prior)
+        wrong = held_out(products, design.rows(joint, [part[lane] for part in control]), prior)
         found.append(Evidence(right, wrong, grid[right.shape, lane], settings))
     return tuple(found)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from glovecal_models.takes.take import Take
 
@@ -145,8 +146,55 @@ def unexplained(grid: Grid, readings: np.ndarray, at: np.ndarray) -> float:
 
 
 def _scan(grid: Grid, readings: np.ndarray) -> np.ndarray:
-    """The unexplained share at each of ``_COARSE``."""
-    return np.array([unexplained(grid, readings, grid.time_s + offset) for offset in _COARSE])
+    """The unexplained share at each of ``_COARSE``, as ``unexplained`` has it: those are whole steps of the
+    grid, so that the reference is read once and sums over windows of it are compared."""
+    rows, furthest = len(grid.time_s), len(_COARSE) // 2
+    every = grid.time_s[0] + np.arange(-furthest, rows + furthest) / GRID_HZ
+    reference = grid.reference(every)
+    is_known = np.isfinite(reference[:, 0])
+    y = (
+        np.where(is_known[:, None], reference - np.nanmean(reference, axis=0), 0.0)
+        if is_known.any()
+        else reference
+    )
+    x = readings - readings.mean(axis=0)
+    x = x / np.maximum(x.std(axis=0), 1e-9)
+    count = _window_sums(is_known[:, None].astype(float), rows)[:, 0]
+    enough = np.flatnonzero(count / rows >= LEAST_OVERLAP * grid.most_overlap)
+    found = np.full(len(_COARSE), np.nan)
+    if not len(enough):
+        return found
+    enough = slice(int(enough[0]), int(enough[-1]) + 1)
+    # What is known of the reference has no gaps, so the rows that see it are a range of them.
+    seen = sliding_window_view(is_known, rows)[enough]
+    first, count = seen.argmax(axis=1), count[enough, None]
+    last, sensors = first + count[:, 0].astype(int), x.shape[1]
+    products = (x[:, :, None] * x[:, None, :]).reshape(rows, sensors**2)
+    sums, of_products = _running(x), _running(products)
+    of_x, of_y = (sums[last] - sums[first]) / count, _window_sums(y, rows)[enough] / count
+    gram = (of_products[last] - of_products[first]).reshape(-1, sensors, sensors)
+    gram -= count[:, :, None] * of_x[:, :, None] * of_x[:, None, :]
+    crossed = sliding_window_view(y, rows, axis=0)[enough] @ x
+    crossed -= count[:, :, None] * of_y[:, :, None] * of_x[:, None, :]
+    whole = (_window_sums(y**2, rows)[enough] - count * of_y**2).sum(axis=1)
+    size = np.maximum(np.sqrt(np.maximum(np.einsum("kss->ks", gram), 0.0) / count), 1e-9)
+    gram /= size[:, :, None] * size[:, None, :]
+    crossed = (crossed / size[:, None, :]).swapaxes(1, 2)
+    gram += RIDGE * count[:, :, None] * np.eye(sensors)
+    explained = (crossed * np.linalg.solve(gram, crossed)).sum(axis=(1, 2))
+    found[enough] = (whole - explained) / np.maximum(whole, 1e-12)
+    return found
+
+
+def _running(values: np.ndarray) -> np.ndarray:
+    """Sums of the first 0 to N rows (N, C)."""
+    return np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
+
+
+def _window_sums(values: np.ndarray, rows: int) -> np.ndarray:
+    """Sums over each run of ``rows`` rows of (N, C)."""
+    sums = _running(values)
+    return sums[rows:] - sums[:-rows]
 
 
 def _least(scan: np.ndarray) -> float:
