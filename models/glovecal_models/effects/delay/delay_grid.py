@@ -258,7 +258,8 @@ def _low_passes(tracks: Sequence[_Track]) -> Callable[[float], np.ndarray]:
         h = every * STEP_S / tau
         e = np.exp(-h)
         gain = (1 - e) / h
-        return lfilter([1 - gain, gain - e], [1, -e], together)[signal, row] + start
+        passed = np.asarray(lfilter([1 - gain, gain - e], [1, -e], together))
+        return passed[signal, row] + start
 
     return low_pass
 
