@@ -33,7 +33,13 @@ def list_models(subject: OnlySubject = None, layout: OnlyLayout = None, as_json:
         print_json(rows)
         return
     shown = [
-        {**row, "short": row["id"][:12], "method": _method(row), "created_at": moment(row["created_at"])}
+        {
+            **row,
+            "short": row["id"][:12],
+            "method": _method(row),
+            "errors": _errors(row),
+            "created_at": moment(row["created_at"]),
+        }
         for row in rows
     ]
     columns = {
@@ -41,12 +47,13 @@ def list_models(subject: OnlySubject = None, layout: OnlyLayout = None, as_json:
         "subject": "subject",
         "layout": "layout",
         "method": "method",
-        "rmse_unseen_wearing_deg": "unseen (°)",
-        "held_out_rmse_deg": "error (°)",
+        "errors": "error (°)",
         "active": "active",
         "created_at": "trained",
     }
     print_table(shown, columns, empty="No models yet. Train one: glovecal train --subject NAME")
+    if any(row["rmse_unseen_wearing_deg"] is not None for row in rows):
+        out.print("Errors: in a wearing not seen / in wearings seen.")
     for row in rows:
         if row["damage"]:
             err.print(f"Damaged and active: {row['damage']}", style="red")
@@ -86,6 +93,12 @@ def show(model: Model, as_json: AsJson = False) -> None:
     if document["effect_details"]:
         out.print()
         print_table(effect_rows(document["effect_details"]), EFFECT_COLUMNS, empty="")
+
+
+def _errors(row: dict[str, Any]) -> str | float | None:
+    """In a wearing not seen, then in those seen, where both are known."""
+    unseen, seen = row["rmse_unseen_wearing_deg"], row["held_out_rmse_deg"]
+    return seen if unseen is None or seen is None else f"{unseen:.2f} / {seen:.2f}"
 
 
 def _method(row: dict[str, Any]) -> str:
