@@ -11,15 +11,21 @@ import typer
 from glovecal_service.cli.model.rows import EFFECT_COLUMNS, KERNEL_COLUMNS, effect_rows, kernel_rows
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Model, OnlyLayout, OnlySubject, Subject
-from glovecal_service.cli.terminal.printing import err, moment, out, print_facts, print_json, print_table
+from glovecal_service.cli.terminal.printing import (
+    LINE,
+    err,
+    moment,
+    out,
+    print_facts,
+    print_json,
+    print_table,
+)
 from glovecal_service.cli.terminal.refusal import Refusal
 from glovecal_service.cli.terminal.writing import Overwrite, require_place, write_whole
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
 
-LINE = 79
-"""Characters of a sentence's line."""
 app = typer.Typer(help="Calibration models: versions, activation, export.", no_args_is_help=True)
 
 
