@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -35,6 +36,10 @@ from glovecal_models.regression.regressor import Regressor
 TURNS = 2
 
 
+SampleWeights = tuple[Mapping[str, float], ...]
+"""What each sample of a rotation counts, for each time that the regressors are trained."""
+
+
 @dataclass(frozen=True)
 class EffectFit:
     """Regressors of some rotations with the effects that correct them."""
@@ -42,6 +47,7 @@ class EffectFit:
     results: Mapping[str, FitResult]
     """For each rotation."""
     effects: tuple[AddedEffect, ...]
+    sample_weights: SampleWeights = ()
 
     def regressor(self, rotation: str) -> Regressor:
         found = self.results[rotation]
@@ -54,29 +60,47 @@ def fit_with_effects(
     wanted: Sequence[EffectRequest],
     settings: TrainingSettings,
     *,
+    sample_weights: SampleWeights = (),
     cancelled: Cancel | None = None,
 ) -> EffectFit:
-    """Train ``rotations`` with those of ``wanted`` that predict something. Raises NotTrainable, Cancelled."""
+    """Train ``rotations`` with those of ``wanted`` that predict something.
+
+    ``sample_weights`` of a fit of the same with more takes: they are not chosen again. Raises NotTrainable,
+    Cancelled.
+    """
     wanted = [item for item in wanted if item.has_columns and set(item.rotations) & set(rotations)]
     columns = {name: correspondence_for(takes, name, settings) for name in rotations}
     corrected: dict[str, list[np.ndarray]] = {}
     results: dict[str, FitResult] = {}
     effects: tuple[AddedEffect, ...] = ()
-    regressors: dict[str, Regressor] = {}
-    for turn in range(TURNS if wanted else 1):
+    weights: list[Mapping[str, float]] = []
+
+    def trained() -> None:
+        known = sample_weights[len(weights)] if sample_weights else {}
+        chosen = replace(settings, sample_weights=tuple(sorted(known.items()))) if known else settings
         for name in rotations:
             stop_if(cancelled, "adding an effect")
-            results[name] = _trained(takes, columns[name], corrected.get(name), settings, cancelled)
-            regressors[name] = restore_regressor(results[name].arrays, results[name].settings)
+            results[name] = _trained(takes, columns[name], corrected.get(name), chosen, cancelled)
+        weights.append(chosen_weights({name: item.settings for name, item in results.items()}))
+
+    for turn in range(TURNS if wanted else 1):
+        trained()
         if wanted:
+            regressors = {
+                name: restore_regressor(item.arrays, item.settings) for name, item in results.items()
+            }
             is_last = turn == TURNS - 1
             effects = _fitted_effects(takes, columns, regressors, wanted, settings, is_last, cancelled)
             corrected = _explained(takes, columns, regressors, effects)
     if wanted:
-        for name in rotations:
-            stop_if(cancelled, "adding an effect")
-            results[name] = _trained(takes, columns[name], corrected.get(name), settings, cancelled)
-    return EffectFit(results, effects)
+        trained()
+    return EffectFit(results, effects, tuple(weights))
+
+
+def chosen_weights(settings: Mapping[str, Mapping[str, Any]]) -> dict[str, float]:
+    """What each sample counted, from the ``settings`` of each rotation's regressor; processes only."""
+    found = {name: item.get("evidence", {}).get("sample_weight") for name, item in settings.items()}
+    return {name: float(weight) for name, weight in found.items() if weight is not None}
 
 
 def correspondence_for(takes: PreparedTakes, rotation: str, settings: TrainingSettings) -> Correspondence:

@@ -10,6 +10,7 @@ import numpy as np
 from glovecal_models.calibration.effect_correction import EffectCorrection
 from glovecal_models.calibration.effect_fit import (
     EffectFit,
+    SampleWeights,
     correspondence_for,
     fit_with_effects,
     own_signals,
@@ -55,10 +56,13 @@ def held_out_errors(
     wanted: Sequence[EffectRequest],
     settings: TrainingSettings,
     *,
+    sample_weights: SampleWeights = (),
     cancelled: Cancel | None = None,
     report: Report | None = None,
 ) -> HeldOutErrors:
     """Leave out whole takes, in ``settings.folds`` folds, at least two. Raises NotTrainable, Cancelled.
+
+    ``sample_weights`` of the fit on all takes, where it is known (``fit_with_effects``).
 
     A single take, and short takes of one motion each, are left out in pieces (``left_out``).
     """
@@ -82,7 +86,9 @@ def held_out_errors(
         kept = parts.some(np.flatnonzero(~held).tolist())
         left = parts.some(np.flatnonzero(held).tolist())
         try:
-            fit = fit_with_effects(kept, rotations, wanted, settings, cancelled=cancelled)
+            fit = fit_with_effects(
+                kept, rotations, wanted, settings, sample_weights=sample_weights, cancelled=cancelled
+            )
         except NotTrainable:
             continue  # what is left of this fold cannot carry a model: it says nothing about the error
         for name, errors in errors_of(fit, left, rotations, settings).items():

@@ -191,7 +191,10 @@ def fit_best_kernel(
     if kept is not None and kept not in CANDIDATE:
         raise BadInput(f"no kernel {kept!r} for {rotation}; there are {', '.join(CANDIDATE)}")
     candidates = (CANDIDATE[kept],) if kept else candidates_of(settings.method)
-    base = fit_weighted(samples, seed=settings.seed, cancelled=cancelled, report=part(report, 0.0, 0.2))
+    base = fit_weighted(
+        samples, weight=dict(settings.sample_weights).get(rotation), seed=settings.seed,
+        cancelled=cancelled, report=part(report, 0.0, 0.2),
+    )  # fmt: skip
     if kept == LMC:
         return base.regressor
     chosen, scores, search = candidates[0], None, {}

@@ -69,17 +69,23 @@ class Weighted:
 def fit_weighted(
     samples: Recorded,
     *,
+    weight: float | None = None,
     seed: int = 0,
     cancelled: Cancel | None = None,
     report: Report | None = None,
 ) -> Weighted:
-    """The LMC-GPR of ``samples``, each counting what serves takes left out best.
+    """The LMC-GPR of ``samples``, each counting ``weight``; None: what serves takes left out best.
 
     The regressor's evidence tells ``effective_sample_ratio``, ``degrees_of_freedom`` and, where weights were
     tried, ``held_out_rmse_deg`` of each. Raises NotTrainable, Cancelled.
     """
     say = report or (lambda sentence, share: None)
     say("searching from several starts", 0.0)
+    if weight is not None:
+        known = LmcSearch.begin(
+            samples.inputs, samples.target, sample_weight=weight, seed=seed, cancelled=cancelled
+        )
+        return Weighted(finish_search(known, cancelled=cancelled), weight)
     search = LmcSearch.begin(samples.inputs, samples.target, seed=seed, cancelled=cancelled)
     whole, need = None, None
     if search.is_expensive:  # a rough process may show the need for a tenth of the cost

@@ -35,6 +35,9 @@ class TrainingSettings:
     """(rotation, candidate kernel) already chosen: when a model is trained again, with an effect for example,
     its kernels stay, so that a change of the error is the effect's."""
 
+    sample_weights: tuple[tuple[str, float], ...] = ()
+    """(rotation, weight of each sample) already chosen: a fold of the same training does not choose again."""
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "kernels", tuple((str(name), str(kernel)) for name, kernel in self.kernels))
         if self.folds < 0 or self.folds == 1:

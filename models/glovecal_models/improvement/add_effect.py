@@ -89,8 +89,14 @@ def add_effect(
         PreparedTakes.of(repaired_takes(takes, has), model.layout), chosen, has, settings,
         cancelled=cancelled, report=part(report, 0.0, 0.4, "measuring what there is"),
     )  # fmt: skip
-    with_it = part(report, 0.4, 0.8, f"with {name}")
-    after = held_out_errors(prepared, chosen, wanted, settings, cancelled=cancelled, report=with_it)
+    if report:
+        report(f"learning {name} from all takes", 0.4)
+    fit = fit_with_effects(prepared, chosen, wanted, settings, cancelled=cancelled)
+    with_it = part(report, 0.5, 0.9, f"with {name}")
+    after = held_out_errors(
+        prepared, chosen, wanted, settings, sample_weights=fit.sample_weights, cancelled=cancelled,
+        report=with_it,
+    )  # fmt: skip
     judged = tuple(judged or chosen)
     undone = Addition(
         name, chosen, False, before, after, model, has, judged=judged, least_gain=least_gain, live=live
@@ -106,9 +112,6 @@ def add_effect(
     # Who asks for an effect whatever it does (a negative least gain) gets it.
     if undone.is_beaten_by_control and least_gain >= 0:
         return undone
-    if report:
-        report(f"learning {name} from all takes", 0.85)
-    fit = fit_with_effects(prepared, chosen, wanted, settings, cancelled=cancelled)
     evidence = _evidence(before, after, chosen, control_share) | dict(live.evidence if live else {})
     effects = [*kept_lanes(model.effects, chosen), *fit.effects, *columnless_effects(wanted, model.effects)]
     effects = [replace(item, evidence=evidence) if item.name == name else item for item in effects]

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from glovecal_models.calibration.effect_fit import SampleWeights, chosen_weights
 from glovecal_models.calibration.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.calibration.left_out_wearings import left_out_wearings
 from glovecal_models.calibration.model import CalibrationModel
@@ -287,14 +288,17 @@ class _Loop:
     def _held_out(self, model: CalibrationModel) -> HeldOutErrors:
         prepared = PreparedTakes.of(self.takes, self.layout)
         return held_out_errors(
-            prepared, trained_rotations(model), [], self.settings, cancelled=self.cancelled
-        )
+            prepared, trained_rotations(model), [], self.settings, sample_weights=_weights_of(model),
+            cancelled=self.cancelled,
+        )  # fmt: skip
 
     def _with_unseen_wearing(self, model: CalibrationModel) -> CalibrationModel:
         """The base with its error in a wearing that it has not seen."""
         prepared = PreparedTakes.of(self.takes, self.layout)
         names = trained_rotations(model)
-        left_out = left_out_wearings(prepared, names, [], self.settings, cancelled=self.cancelled)
+        left_out = left_out_wearings(
+            prepared, names, [], self.settings, sample_weights=_weights_of(model), cancelled=self.cancelled
+        )
         wearings = [take.wearing for take in self.takes]
         return replace(model, unseen_wearing=unseen_wearing(wearings, left_out, noise_of(model.rotations)))
 
@@ -321,3 +325,8 @@ class _Loop:
     def _say(self, text: str, share: float) -> None:
         if self.report:
             self.report(text, min(share, 1.0))
+
+
+def _weights_of(base: CalibrationModel) -> SampleWeights:
+    """Those with which a model without effects was trained."""
+    return (chosen_weights({item.rotation: item.regressor.settings() for item in base.rotations}),)
