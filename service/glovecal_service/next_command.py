@@ -12,13 +12,15 @@ LONG_ENOUGH_S = 60
 """Of movement, to tell an unexplained residual from noise."""
 
 
-def next_command(model: str, stored: Mapping[str, Any]) -> str:
-    """For a diagnosis document of that model, also one that an earlier service stored."""
+def next_command(model: str, stored: Mapping[str, Any], subject: str = "") -> str:
+    """For a diagnosis document of that model of ``subject``, also one that an earlier service stored."""
     found, short = current(stored), model[:SHORT]
     if found.get("reference_problems"):
         return f"glovecal take check {_take_of(found)}"
     named, following = found.get("named"), found.get("next_take")
     if named and named.get("verdict") == "named":
+        if named.get("method"):
+            return _train(subject, named["method"])
         where = "".join(f" --rotation {name}" for name in named.get("where") or ())
         return f"glovecal add-effect {short} {named['effect']}" + where * _is_on_rotations(found)
     if following:
@@ -26,16 +28,28 @@ def next_command(model: str, stored: Mapping[str, Any]) -> str:
     if named:
         return f"glovecal add-effect {short} {named['effect']}"
     for action in found.get("actions") or ():
-        if action["method"] is not None:
-            return f"glovecal train SUBJECT --method {action['method']}"
-        if action["saves"]:
-            return f"glovecal add-effect {short} {action['effect']} --rotation {action['rotation']}"
+        command = action_command(model, action, subject)
+        if command is not None:
+            return command
     residual = found.get("unexplained_residual") or {}
     if residual.get("is_significant"):
         return f"glovecal where {short} --report where.html"
     if residual.get("not_identifiable"):
         return f"glovecal record GLOVE free-motion --seconds {LONG_ENOUGH_S}"
     return f"glovecal model activate {short}"
+
+
+def action_command(model: str, action: Mapping[str, Any], subject: str = "") -> str | None:
+    """Of one action of a diagnosis; None where nothing is known that would help."""
+    if action.get("method"):
+        return _train(subject, action["method"])
+    if not action.get("saves"):
+        return None
+    return f"glovecal add-effect {model[:SHORT]} {action['effect']} --rotation {action['rotation']}"
+
+
+def _train(subject: str, method: str) -> str:
+    return f"glovecal train --subject {subject or 'SUBJECT'} --method {method}"
 
 
 def _take_of(found: Mapping[str, Any]) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from glovecal_models.effects.base.effect import Effect, Stream
 from glovecal_models.effects.base.facts import Settings
+from glovecal_models.effects.base.form_curve import LaneCurves
 from glovecal_models.effects.base.interval_effect import IntervalEffect
 from glovecal_models.effects.base.learned_form import OWN, LearnedForm
 from glovecal_models.effects.base.signals import GloveFrames, Signals
@@ -19,6 +20,8 @@ from glovecal_models.errors import BadInput
 
 FORM = "form"
 """Where settings keep the learned form; without one the effect's own columns are all."""
+CURVES = "curves"
+"""Where the form's document keeps, for each rotation, what it adds over its inputs."""
 FORM_FRAMES_AT_ONCE = 2048
 
 
@@ -73,6 +76,13 @@ class AddedEffect:
         """What was learned of how its inputs act, beyond its own columns. Raises BadInput."""
         return LearnedForm.from_document(self.settings[FORM]) if FORM in self.settings else None
 
+    @cached_property
+    def curves(self) -> dict[str, LaneCurves]:
+        """What it added in training over each input of its learned form, of every rotation on which it has
+        weight; empty without a form, and in models that were stored without. Raises BadInput."""
+        stored = self.settings.get(FORM, {}).get(CURVES, {})
+        return {name: LaneCurves.from_document(stored[name]) for name in self.active if name in stored}
+
     @property
     def own_count(self) -> int:
         """Columns that are not of the learned form."""
@@ -94,10 +104,17 @@ class AddedEffect:
             return {name: effect.described_on(self.settings, name) for name in self.rotations}
         own = self.own_count
         return {
-            name: effect.described(self.settings, shape, weights[:own])
+            name: self._with_curves(name, effect.described(self.settings, shape, weights[:own]))
             for name, shape, weights in zip(self.rotations, self.shape, self.weights, strict=True)
             if name in self.active
         }
+
+    def _with_curves(self, rotation: str, numbers: Mapping[str, float]) -> dict[str, float]:
+        """The shape's numbers, those of the form's curves, then the weights."""
+        if rotation not in self.curves:
+            return dict(numbers)
+        each, first = list(numbers.items()), len(self.effect.parameters)
+        return {**dict(each[:first]), **self.curves[rotation].described(), **dict(each[first:])}
 
     def contribution(self, take: Signals) -> Contribution:
         """To every frame of a take whose lanes are this effect's."""

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.calibration.added_effect import FORM, AddedEffect, form_values
+from glovecal_models.calibration.added_effect import CURVES, FORM, AddedEffect, form_values
 from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.effect_shape import REFINEMENTS, EffectGroup, best_shape
 from glovecal_models.calibration.fit_memory import KNOWN_FITS
@@ -28,6 +28,7 @@ from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.samples import Samples, linear_correspondence
 from glovecal_models.calibration.training_plan import task_for
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.effects.base.form_curve import LaneCurves
 from glovecal_models.effects.base.learned_form import LearnedForm
 from glovecal_models.layout import Correspondence
 from glovecal_models.progress import Cancel, stop_if
@@ -173,6 +174,7 @@ def _fitted_effects(
     extra: dict[str, list[list[np.ndarray]]] = {name: [] for name in touched}
     priors: dict[str, list[np.ndarray]] = {name: [] for name in touched}
     shapes: list[np.ndarray] = []
+    inputs: dict[int, dict[str, dict[str, np.ndarray]]] = {}
     for place, group in enumerate(groups):
         stop_if(cancelled, "adding an effect")
         # The first turn's shapes only tell the base what to leave out: the grid is fine enough for that.
@@ -185,44 +187,50 @@ def _fitted_effects(
             extra[name].append([part[index, lane] for part, index in zip(found, rows[name], strict=True)])
             priors[name].append(own_prior)
         if is_last:  # while the base still holds a part of the effect, its form cannot be seen
-            form = _learned_form(group, found, rows, bases, extra, priors)
+            values = [
+                form_values(effect, take, part, group.settings)
+                for take, part in zip(group.signals, found, strict=True)
+            ]
+            form = _learned_form(group, values, rows, bases, extra, priors)
             if form is not None:
                 groups[place] = replace(group, settings=group.settings | {FORM: form.to_document()})
+                inputs[place] = _form_inputs(group, form, values, rows)
     weights = {name: _weights(bases[name], extra[name], priors[name]) for name in touched}
     used = dict.fromkeys(touched, 0)
     added = []
-    for group, shape in zip(groups, shapes, strict=True):
-        mine = []
+    for place, (group, shape) in enumerate(zip(groups, shapes, strict=True)):
+        mine, curves = [], {}
         for name in group.lanes:
             mine.append(weights[name][used[name]])
+            if place in inputs and any(map(len, rows[name])):
+                degrees = np.concatenate(extra[name][used[name]]) @ mine[-1].mean
+                drawn = LaneCurves.over(inputs[place][name], group.wanted.effect.form_unit, degrees)
+                curves[name] = drawn.to_document()
             used[name] += 1
         zero = np.array([own[name][1] for name in group.lanes])
         mean = np.array([each.mean for each in mine])
         is_told = group.wanted.effect.tells_own_uncertainty
         covariance = None if is_told else np.array([each.covariance for each in mine])
+        settled = group.settings
+        if curves:
+            settled = settled | {FORM: settled[FORM] | {CURVES: curves}}
         added.append(
-            AddedEffect(
-                group.wanted.name, group.lanes, group.settings, shape, mean, zero, covariance=covariance
-            )
+            AddedEffect(group.wanted.name, group.lanes, settled, shape, mean, zero, covariance=covariance)
         )
     return tuple(added)
 
 
 def _learned_form(
     group: EffectGroup,
-    found: Sequence[np.ndarray],
+    values: Sequence[Mapping[str, np.ndarray]],
     rows: Mapping[str, Sequence[np.ndarray]],
     bases: Mapping[str, list[Rows]],
     extra: Mapping[str, list[list[np.ndarray]]],
     priors: Mapping[str, list[np.ndarray]],
 ) -> LearnedForm | None:
-    """What the takes ask for beyond the effect's own columns ``found``, which stand last in ``extra``; the
-    form's columns are joined to those."""
-    effect, lanes = group.wanted.effect, group.lanes
-    values = [
-        form_values(effect, take, part, group.settings)
-        for take, part in zip(group.signals, found, strict=True)
-    ]
+    """What the takes ask for beyond the effect's own columns, which stand last in ``extra``; the form's
+    columns are joined to those. ``values``: for each take the form's possible inputs (N, L)."""
+    lanes = group.lanes
     if not values or not values[0]:
         return None
     problems = []
@@ -257,6 +265,25 @@ def _learned_form(
             extra[name][-1][number] = np.column_stack([extra[name][-1][number], learned[:, 0, :]])
         priors[name][-1] = np.concatenate([priors[name][-1], np.ones(form.count)])
     return form
+
+
+def _form_inputs(
+    group: EffectGroup,
+    form: LearnedForm,
+    values: Sequence[Mapping[str, np.ndarray]],
+    rows: Mapping[str, Sequence[np.ndarray]],
+) -> dict[str, dict[str, np.ndarray]]:
+    """For each lane the fitted rows (N,) of each input that the form uses."""
+    used = dict.fromkeys(key for term in form.terms for key in term.inputs)
+    return {
+        name: {
+            key: np.concatenate(
+                [take[key][index, lane] for take, index in zip(values, rows[name], strict=True)]
+            )
+            for key in used
+        }
+        for lane, name in enumerate(group.lanes)
+    }
 
 
 def _groups(

@@ -126,6 +126,7 @@ def diagnose(
         next_take=next_take(naming.confidence_set, by_name) or take_to_decide(impossible, residual),
         actions=actions,
         effects=by_name,
+        linear=linear,
         limits=limits,
     )
 

@@ -42,6 +42,8 @@ class NamedEffect:
     """Held-out RMSE without it minus with it; None where it was found by its signature."""
     control_saved_deg: float | None = None
     """The same of its control."""
+    method: str | None = None
+    """The training method whose base learns it by itself, where this base is a straight line."""
 
     @property
     def verdict(self) -> Verdict:
@@ -72,6 +74,8 @@ class Diagnosis:
     """Those asked for, by name."""
     hold_drift: HoldDrift | None = None
     """Where the reference only names poses: what the readings do while one is held."""
+    linear: bool = False
+    """Whether the base is a straight line."""
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS
 
     @property
@@ -129,6 +133,7 @@ class Diagnosis:
             {item.joints[i]: item.shape_described(i) for i in item.significant_joints},
             rmse.before - rmse.after,
             rmse.before - rmse.control,
+            self.effects[item.effect].learned_by if self.linear else None,
         )
 
 

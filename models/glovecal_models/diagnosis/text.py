@@ -56,6 +56,9 @@ def ranked_sentence(diagnosis: Diagnosis) -> str:
     )
     named, rivals = diagnosis.effects[item.effect], diagnosis.naming.confidence_set[1:]
     more = named.consequence(item, diagnosis.naming.confidence_set)
+    if diagnosis.linear and named.learned_by is not None:
+        better = f"The base is a straight line; one of --method {named.learned_by} learns this by itself."
+        more = f"{more} {better}".lstrip()
     if rivals:
         return f"{start}; ambiguous with {', '.join(rivals)}. {more}".rstrip()
     return f"{start}; {named.caveat}. {more}".rstrip() if named.caveat else f"{start}. {more}".rstrip()

@@ -24,6 +24,7 @@ class ColumnDependence(InstantEffect):
     """One for each sensor."""
 
     source = "smooth dependence on a recorded reading; no physics is claimed"
+    form_unit: ClassVar[str] = "SD"
     control: ClassVar[Control] = "circularly shifted"
     is_physical: ClassVar[bool] = False
 

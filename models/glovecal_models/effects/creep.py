@@ -33,6 +33,7 @@ class Creep(ArrayStateEffect):
     name = "creep"
     explanation = "After a movement the reading goes on drifting for seconds although the joint is held."
     source = "standard linear solid, relaxations of 1 to 40 s: Springer 10.1007/978-3-030-25261-8_34"
+    form_unit: ClassVar[str] = "deg"
     shown_by: ClassVar = RAMPS
     shows_in: ClassVar = ("direction", "time in take")
     drift_in_holds: ClassVar = "begins anew with each hold"

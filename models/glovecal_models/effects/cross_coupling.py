@@ -26,6 +26,7 @@ class CrossCoupling(InstantEffect):
     name = "cross_coupling"
     explanation = "Moving a neighbouring joint changes what this sensor reads."
     source = "Wang & Neff 2013, section 3.1 and Table 1; Kahlesz, Zachmann, Klein 2004"
+    form_unit: ClassVar[str] = "SD"
     one_joint_at_a_time: ClassVar[bool] = True
     shows_in: ClassVar = ("joint", "sensor")
     shown_by: ClassVar = ONE_FINGER

@@ -29,6 +29,7 @@ class Hysteresis(ArrayStateEffect):
         "The sensor sticks: at the same angle it reads differently on the way up and on the way down."
     )
     source = "Prandtl-Ishlinskii: Kuhnen 2003, European Journal of Control 9(4) 407; size: Mattmann 2008"
+    form_unit: ClassVar[str] = "deg"
     shown_by: ClassVar = RAMPS
     shows_in: ClassVar = ("direction", "speed")
     rivals: ClassVar = (Rival("creep", RAMPS),)

@@ -31,6 +31,7 @@ class Nonlinearity(InstantEffect):
     source = "smooth curve of the joint; bend sensors are curved: Kahlesz, Zachmann, Klein 2004"
     shown_by: ClassVar = RAMPS
     shows_in: ClassVar = ("angle",)
+    learned_by: ClassVar[str | None] = "lmc_gpr"
     control: ClassVar[Control] = "circularly shifted"
 
     def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:

@@ -26,6 +26,7 @@ class PalmArch(InstantEffect):
     name = "palm_arch"
     explanation = "Hollowing the palm pulls at this sensor, most of all at thumb and little finger."
     source = "Krnoul, Kanis, Zelezny, Muller 2016, section 3.3.3, equations 2 to 5"
+    form_unit: ClassVar[str] = "SD"
     one_joint_at_a_time: ClassVar[bool] = True
     shows_in: ClassVar = (f"sensor {PALM}", f"joint {PALM}")
     shown_by: ClassVar = ONE_FINGER

@@ -10,6 +10,7 @@ import numpy as np
 from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.held_out_check import HeldOutErrors
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.effects.base.form_curve import LaneCurves
 from glovecal_models.effects.base.signature_effect import LiveCheck
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 
@@ -68,6 +69,13 @@ class Addition:
     """Of an effect that widens the interval: the claim decides instead of the error."""
     control_rmse_deg: float | None = None
     """Held-out error of the rotations with its control instead; None where there is none."""
+
+    @property
+    def curves(self) -> dict[str, LaneCurves]:
+        """For each rotation what the learned form adds over its inputs; empty where it was undone."""
+        mine = [item for item in self.model.effects if self.added and item.name == self.effect]
+        found = {name: curves for item in mine for name, curves in item.curves.items()}
+        return {name: curves for name, curves in found.items() if name in self.rotations}
 
     @property
     def is_beaten_by_control(self) -> bool:

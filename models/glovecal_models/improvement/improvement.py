@@ -14,6 +14,7 @@ from glovecal_models.diagnosis.actions import Action
 from glovecal_models.diagnosis.diagnosis import Diagnosis, Verdict
 from glovecal_models.diagnosis.next_take import NextTake, next_take
 from glovecal_models.effects.base.facts import Settings
+from glovecal_models.effects.base.form_curve import LaneCurves
 from glovecal_models.effects.base.signature_effect import SignatureEffect
 from glovecal_models.effects.catalogue import catalogue, effect
 from glovecal_models.improvement.addition import Addition, ClaimCheck
@@ -38,6 +39,8 @@ class AddedInStep:
     """The recorded column that the residual went along with, in words, where that is why it was added."""
     control_share: float | None = None
     """Of the error that its control leaves, where it was added for an association."""
+    curves: Mapping[str, LaneCurves] = field(default_factory=dict)
+    """For each rotation what its learned form adds over its inputs."""
 
     @property
     def verdict(self) -> Verdict:
@@ -67,8 +70,10 @@ class AddedInStep:
         where = tuple((constants or {}).get("where", addition.rotations))
         if action is not None:
             phrase = action.association.phrase
-            return cls(name, where, (name,), parameters, None, None, phrase, action.control_share)
-        return cls(name, where, rivals, parameters, addition.claim, following)
+            return cls(
+                name, where, (name,), parameters, None, None, phrase, action.control_share, addition.curves
+            )
+        return cls(name, where, rivals, parameters, addition.claim, following, curves=addition.curves)
 
 
 @dataclass(frozen=True)

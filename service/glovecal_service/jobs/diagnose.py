@@ -22,6 +22,7 @@ from glovecal_service.jobs.task_key import task_key
 from glovecal_service.store import Store
 from glovecal_service.store.records import JobRecord
 from glovecal_service.views.diagnosis import DiagnosisResult, DiagnosisView
+from glovecal_service.views.training import effect_view
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,7 @@ class DiagnoseJob:
         def finish(results: Sequence[TaskResult]) -> dict[str, Any]:
             named = [{"id": take.id, "name": take.name} for take in takes]
             facts = {**results[0].facts, "model": record.id, "takes": named}
+            facts["model_effects"] = [effect_view(item) for item in on.model.effects]
             facts["ceiling"] = known_ceiling(store, record)
             return DiagnosisResult.model_validate(facts).document()
 

@@ -24,7 +24,7 @@ from glovecal_service.report.comparison_pictures import (
     heat_sentence,
     side_by_side,
 )
-from glovecal_service.report.effects import effect_card, parameters_of
+from glovecal_service.report.effects import curves_of, effect_card, parameters_of
 from glovecal_service.report.error_fall import lineage_fall
 from glovecal_service.report.fingertips import fingertips_part
 from glovecal_service.report.html import (
@@ -170,7 +170,7 @@ def _fall(
 
 def _effects(model: CalibrationModel) -> list[Markup]:
     return [
-        effect_card(added.name, parameters_of(added), added.settings.get("declaration"))
+        effect_card(added.name, parameters_of(added), added.settings.get("declaration"), curves_of(added))
         for added in model.effects
     ]
 

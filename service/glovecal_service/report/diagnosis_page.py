@@ -7,7 +7,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from glovecal_service.next_command import next_command
+from glovecal_service.next_command import action_command, next_command
 from glovecal_service.report.caption import Caption
 from glovecal_service.report.diagnosis_pictures import (
     errors_beside_floors,
@@ -35,6 +35,13 @@ RESIDUAL_HEADS = (
     "unexplained residual is associated with", "rotation", "RMS contribution, degrees",
     "p value, all columns counted",
 )  # fmt: skip
+ACTION_HEADS = ("rotation", "associated with", "effect or method", "before", "after", "control", "command")
+ACTIONS = (
+    "Held-out RMSE of the rotation's sensor in degrees: without the effect, with it in the form that the "
+    "takes ask for, with its control of the same form. An effect column:NAME or context:NAME only names what "
+    "the error goes along with; no cause is claimed. A method is named where the layout gives the "
+    "rotation the column and a straight line does not use it: nonlinearity of the base."
+)
 HOLD_HEADS = (
     *("pose", "sensor", "holds", "seconds each", "change, % of span", "same sign in", "time constant, s"),
 )
@@ -66,6 +73,7 @@ def diagnosis_page(
         Section("The effect" if len(explained) == 1 else "The effects that are possible", shown),
         Section("What was tried", [*_candidates(candidates), *effects_explained(tried, own)]),
         Section("What remains unexplained", _unexplained(found.get("unexplained_residual") or {})),
+        Section("What to do about it", _actions(found.get("actions") or (), of)),
     ]
     if held and held["poses"]:
         sections.append(
@@ -74,6 +82,7 @@ def diagnosis_page(
     if rotations and not held:
         sections.append(Section("Error of each rotation", [figure(*errors_beside_floors(rotations))]))
     sections += [
+        Section("Effects of the model", [_effect_card(item) for item in found.get("model_effects") or ()]),
         Section("Not identifiable from these takes", _not_identifiable(found.get("not_identifiable") or ())),
         Section("Details", [_details(found, takes)]),
     ]
@@ -82,8 +91,9 @@ def diagnosis_page(
         *_warned("Found in the recording", [item["sentence"] for item in found.get("findings") or ()]),
         *next_take_note(found.get("next_take")),
     ]
+    summary = _summary(found, of)
     title = f"Missing effects in {of.title} ({counted(len(takes), 'take')})"
-    return page(title, _summary(found), sections, notes=notes)
+    return page(title, summary, sections, notes=notes)
 
 
 def hold_table(held: Mapping[str, Any]) -> Markup:
@@ -107,7 +117,7 @@ def next_take_note(following: Mapping[str, Any] | None) -> list[Markup]:
     return [note("", [f"To tell {rivals} apart record {following['seconds']} s: {following['what']}"])]
 
 
-def _summary(found: Mapping[str, Any]) -> list[Fact]:
+def _summary(found: Mapping[str, Any], of: Caption) -> list[Fact]:
     named, held = found.get("named"), found.get("hold_drift")
     rotations = found.get("rotations") or {}
     if held:
@@ -127,7 +137,8 @@ def _summary(found: Mapping[str, Any]) -> list[Fact]:
         facts += [Fact("Size", f"{error:.2f} degrees{beside}"), Fact("Place", f"largest error at {name}")]
     if found.get("ceiling"):
         facts.append(Fact("Ceiling", found["ceiling"]["sentence"]))
-    return [*facts, Fact("Next", next_command(str(found.get("model", "MODEL")), found), is_command=True)]
+    command = next_command(str(found.get("model", "MODEL")), found, of.subject)
+    return [*facts, Fact("Next", command, is_command=True)]
 
 
 def _held_facts(held: Mapping[str, Any]) -> list[Fact]:
@@ -178,6 +189,10 @@ def _warned(heading: str, sentences: Sequence[str] | None) -> list[Markup]:
     return [note(heading, sentences)] if sentences else []
 
 
+def _effect_card(item: Mapping[str, Any]) -> Markup:
+    return effect_card(item["effect"], item.get("parameters"), item.get("declaration"), item.get("curves"))
+
+
 def _candidates(candidates: Sequence[Mapping[str, Any]]) -> list[Markup]:
     if not candidates:
         return []
@@ -204,6 +219,27 @@ def _unexplained(residual: Mapping[str, Any]) -> list[Markup]:
         for item in residual.get("associations") or ()
     ]
     return [*parts, table(RESIDUAL_HEADS, rows)] if rows else parts
+
+
+def _actions(actions: Sequence[Mapping[str, Any]], of: Caption) -> list[Markup]:
+    """What each association asks for; nothing without any."""
+    rows = [
+        (
+            item["rotation"], item.get("phrase") or item["column"], _to_try(item),
+            *(degrees(item.get(f"rmse_{when}_deg")) for when in ("before", "after", "control")),
+            action_command(of.id or "MODEL", item, of.subject) or "-",
+        )
+        for item in actions
+    ]  # fmt: skip
+    return [table(ACTION_HEADS, rows), paragraph(ACTIONS)] if rows else []
+
+
+def _to_try(action: Mapping[str, Any]) -> str:
+    if action.get("method"):
+        return f"method {action['method']}"
+    if not action.get("saves"):
+        return "-"
+    return str(action["effect"])
 
 
 def _not_identifiable(items: Sequence[Mapping[str, Any]]) -> list[Markup]:

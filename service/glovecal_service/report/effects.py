@@ -28,6 +28,7 @@ from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 from glovecal_service.report.drawing import FLOOR, MEASURED, MODEL, figure_svg, legend_above
+from glovecal_service.report.form_pictures import form_pictures
 from glovecal_service.report.html import effect_part, folded, table
 
 RATE_HZ = 50
@@ -49,14 +50,18 @@ def effect_card(
     name: str,
     parameters: Mapping[str, Any] | None = None,
     declaration: Mapping[str, Any] | None = None,
+    curves: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> Markup:
-    """One effect in a sentence and a picture, with its learned ``parameters`` as documents tell them."""
+    """One effect in a sentence and a picture, with its learned ``parameters`` and the ``curves`` of its
+    learned form as documents tell them."""
     known = _known(name, declaration)
     if known is None:
         explanation, picture = NO_EFFECTS.get(name, "No effect of this name is installed here."), None
     else:
         explanation, picture = known.explanation, _picture_of(known)
-    return effect_part(name, explanation, picture, _learned(known, parameters or {}))
+    return effect_part(
+        name, explanation, picture, [*form_pictures(curves or {}), *_learned(known, parameters or {})]
+    )
 
 
 def effects_explained(names: Iterable[str], declarations: Mapping[str, Mapping[str, Any]]) -> list[Markup]:
@@ -71,6 +76,11 @@ def parameters_of(added: AddedEffect) -> dict[str, Any]:
     if isinstance(known, SignatureEffect) and not isinstance(known, IntervalEffect):
         return dict(known.described_constants(added.settings))
     return dict(added.described())
+
+
+def curves_of(added: AddedEffect) -> dict[str, Any]:
+    """The curves of a model's effect, in the shape of documents."""
+    return {name: item.to_document() for name, item in added.curves.items()}
 
 
 def _known(name: str, declaration: Mapping[str, Any] | None) -> Effect | None:

@@ -92,6 +92,11 @@ def beside(figures: Sequence[Markup]) -> Markup:
     return _part("beside", figures)
 
 
+def multiples(figures: Sequence[Markup]) -> Markup:
+    """Small pictures in their own size, as many in a row as there is room for."""
+    return _part("multiples", figures)
+
+
 def folded(heading: str, parts: Sequence[Markup]) -> Markup:
     """What is opened by a click."""
     return _part("folded", heading, parts)

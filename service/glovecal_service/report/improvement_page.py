@@ -92,7 +92,9 @@ def _next(found: Mapping[str, Any]) -> str:
 
 
 def _card(added: Mapping[str, Any]) -> Markup:
-    return effect_card(added["effect"], added.get("parameters"), added.get("declaration"))
+    return effect_card(
+        added["effect"], added.get("parameters"), added.get("declaration"), added.get("curves")
+    )
 
 
 def falls_of(found: Mapping[str, Any], method: str) -> list[Fall]:
@@ -132,7 +134,7 @@ def _steps(steps: Sequence[Mapping[str, Any]], method: str) -> Markup:
     for step in steps:
         added = step["added"] or {}
         rivals = [name for name in added.get("confidence_set") or () if name != added["effect"]]
-        verdict = added.get("verdict", "-") + (f" (or {', '.join(rivals)})" if rivals else "")
+        verdict = verdict_words(added) + (f" (or {', '.join(rivals)})" if rivals else "")
         control = None if before is None else _with_control(before, step)
         rows.append(
             (
@@ -144,6 +146,15 @@ def _steps(steps: Sequence[Mapping[str, Any]], method: str) -> Markup:
         before = step
     heads = ("step", "where", "verdict", "before", "after", "control")
     return table(heads, rows) + Markup("<p>{}</p>").format(MEASURED_HOW)
+
+
+def verdict_words(added: Mapping[str, Any]) -> str:
+    """Of the effect of a step; no cause is claimed of one that was tried for an association."""
+    verdict = str(added.get("verdict", "-"))
+    if verdict != "associated":
+        return verdict
+    column = added.get("associated_with")
+    return f"associated{f' with {column}' if column else ''}; no cause is claimed"
 
 
 def _models(steps: Sequence[Mapping[str, Any]], method: str) -> Markup:

@@ -9,6 +9,7 @@ from pydantic import Field
 from glovecal_models.improvement.add_interval import claim_evidence
 from glovecal_models.improvement.addition import Addition, ClaimCheck
 from glovecal_models.improvement.text import addition_sentence
+from glovecal_service.views.form_curves import LaneCurvesView, curve_views
 from glovecal_service.views.view import View
 
 
@@ -37,6 +38,9 @@ class AdditionView(View):
     parameters: dict[str, dict[str, Any]] = Field(
         description="Learned numbers of each rotation, units in their names."
     )
+    curves: dict[str, LaneCurvesView] = Field(
+        {}, description="For each rotation what a learned form adds over its inputs."
+    )
     claim: ClaimView | None = Field(None, description="Of an effect that widens the claimed interval.")
 
     @classmethod
@@ -49,6 +53,7 @@ class AdditionView(View):
             before={name: addition.before.rmse_deg(name) for name in addition.rotations},
             after={name: addition.after.rmse_deg(name) for name in addition.rotations},
             parameters=dict(addition.parameters),
+            curves=curve_views(addition.curves),
             claim=ClaimView.of(addition.claim),
         )
 

@@ -25,6 +25,7 @@ from glovecal_service.views.ceiling import CeilingView
 from glovecal_service.views.hold_drift import HoldDriftView
 from glovecal_service.views.next_take import NextTakeView
 from glovecal_service.views.noise_floor import NoiseFloorView
+from glovecal_service.views.training import EffectView
 from glovecal_service.views.view import View
 
 
@@ -53,6 +54,9 @@ class NamedEffectView(View):
     parameters: dict[str, Any] = Field(description="Learned numbers, units in their names.")
     saved_deg: float | None = Field(description="Held-out error saved; null: found by its signature.")
     control_saved_deg: float | None = Field(None, description="The same of its control.")
+    method: str | None = Field(
+        None, description="To be trained with: its base learns the effect by itself, a straight line cannot."
+    )
     sentence: str
 
     @classmethod
@@ -69,6 +73,7 @@ class NamedEffectView(View):
             parameters=dict(named.parameters),
             saved_deg=named.saved_deg,
             control_saved_deg=named.control_saved_deg,
+            method=named.method,
             sentence=named_sentence(diagnosis) or "",
         )
 
@@ -151,6 +156,7 @@ class ActionView(View):
 
     rotation: str
     column: str = Field(description="As in `where`.")
+    phrase: str = Field("", description="The column in words.")
     effect: str | None = Field(description="To be added on the rotation; null where `method` is asked for.")
     is_physical: bool = Field(description="False: the effect only names a column, no cause is claimed.")
     method: str | None = Field(description="To be trained with: the layout gives the rotation the column.")
@@ -166,6 +172,7 @@ class ActionView(View):
         return cls(
             rotation=item.rotation,
             column=item.association.column,
+            phrase=item.association.phrase,
             effect=item.effect,
             is_physical=item.is_physical,
             method=item.method,
@@ -271,4 +278,5 @@ class DiagnosisResult(DiagnosisView):
 
     model: str
     takes: list[TakeNamed] = Field([])
+    model_effects: list[EffectView] = Field([], description="What the model has learned already.")
     ceiling: CeilingView | None = Field(None, description="Of the model; null: not asked for yet.")

@@ -13,6 +13,7 @@ from glovecal_models.improvement.text import improvement_sentences, is_noise
 from glovecal_service.views.addition import AdditionView, ClaimView
 from glovecal_service.views.ceiling import CeilingView
 from glovecal_service.views.diagnosis import UnexplainedResidualView
+from glovecal_service.views.form_curves import LaneCurvesView, curve_views
 from glovecal_service.views.hold_drift import HoldDriftView
 from glovecal_service.views.next_take import NextTakeView
 from glovecal_service.views.noise_floor import NoiseFloorView
@@ -26,6 +27,12 @@ class AddedInStepView(View):
     verdict: Verdict
     confidence_set: list[str] = Field(description="It, and all that the takes could not tell from it.")
     parameters: dict[str, Any] = Field(description="Learned numbers, units in their names.")
+    curves: dict[str, LaneCurvesView] = Field(
+        {}, description="For each rotation what a learned form adds over its inputs."
+    )
+    associated_with: str | None = Field(
+        None, description="The column that the residual went along with, where no cause is claimed."
+    )
     claim: ClaimView | None = None
     next_take: NextTakeView | None = None
 
@@ -39,6 +46,8 @@ class AddedInStepView(View):
             verdict=added.verdict,
             confidence_set=list(added.confidence_set),
             parameters=dict(added.parameters),
+            curves=curve_views(added.curves),
+            associated_with=added.associated_with,
             claim=ClaimView.of(added.claim),
             next_take=NextTakeView.of(added.next_take),
         )

@@ -11,6 +11,7 @@ from glovecal_models.regression.kernel_candidates import CANDIDATE
 from glovecal_models.regression.kernel_scores import choice_of
 from glovecal_models.regression.regressor import Regressor
 from glovecal_service.plain import plain
+from glovecal_service.views.form_curves import LaneCurvesView, curve_views
 from glovecal_service.views.renamed_keys import current_evidence
 
 
@@ -20,6 +21,9 @@ class EffectView(BaseModel):
     rotations: list[str] = Field(description="Rotations that it corrects.")
     parameters: dict[str, dict[str, float | None]] = Field(
         description="For each rotation the learned numbers, their units in their names."
+    )
+    curves: dict[str, LaneCurvesView] = Field(
+        description="For each rotation what a learned form adds over its inputs; empty without one."
     )
     context: list[str] = Field(description="Context columns that it needs.")
     has_memory: bool = Field(description="Whether it depends on earlier frames.")
@@ -38,6 +42,7 @@ def effect_view(added: AddedEffect) -> dict[str, Any]:
         "explanation": effect.explanation,
         "rotations": list(added.active),
         "parameters": plain(added.described()),
+        "curves": {name: item.document() for name, item in curve_views(added.curves).items()},
         "context": list(effect.context),
         "has_memory": effect.has_memory,
         "settling_s": effect.transient_s(added.shape[[name in added.active for name in added.rotations]]),

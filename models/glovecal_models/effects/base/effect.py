@@ -114,6 +114,9 @@ class Effect(EffectFacts, ABC):
         """
         return {}
 
+    form_unit: ClassVar[str] = ""
+    """Of those signals, all alike; "" where they have none, or are context columns of any unit."""
+
     @abstractmethod
     def stream(self, settings: Settings, shape: np.ndarray) -> Stream:
         """The same columns, frame by frame."""

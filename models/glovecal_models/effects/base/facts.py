@@ -108,6 +108,8 @@ class EffectFacts:
     """What an error that it leaves goes along with, as ``glovecal where`` calls it: "angle", "speed",
     "direction", "time in take", "wearing", and "joint" or "sensor" for any other one. Context columns that it
     reads count by themselves."""
+    learned_by: ClassVar[str | None] = None
+    """The training method whose base learns it by itself: asked for where the base is a straight line."""
     is_physical: ClassVar[bool] = True
     """Whether its name says what happens; not where only a recorded column is named."""
     also_explained_by: ClassVar[tuple[str, ...]] = ()

@@ -209,4 +209,7 @@ def _added(added: Mapping[str, Any] | None, method: str) -> str:
         return f"{method} alone"
     rivals = [name for name in added.get("confidence_set") or () if name != added["effect"]]
     doubt = f" (or {', '.join(rivals)})" if rivals else ""
+    if added["verdict"] == "associated":
+        column = added.get("associated_with")
+        doubt = f" (associated{f' with {column}' if column else ''}; no cause is claimed)"
     return f"{added['effect']} on {', '.join(added['where'])}{doubt}"
