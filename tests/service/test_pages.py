@@ -199,6 +199,56 @@ def test_every_effect_is_explained_and_drawn(name: str) -> None:
     assert ("<svg" in card) == (catalogue()[name].kind != "nothing")
 
 
+def curve(name: str, unit: str) -> dict[str, Any]:
+    at = [float(place) for place in range(12)]
+    return {
+        "input": name, "unit": unit, "at": at, "mean_deg": [0.3 * x - 1 for x in at],
+        "low_deg": [0.2 * x - 2 for x in at], "high_deg": [0.4 * x for x in at], "slope_deg_per_unit": 0.3,
+    }  # fmt: skip
+
+
+def test_a_learned_form_is_a_picture_for_each_rotation_and_input(improvement: dict[str, Any]) -> None:
+    added = improvement["steps"][1]["added"]
+    inputs = [curve("M_MCP", "SD"), curve("own", "deg"), curve("humidity_pct", "")]
+    lanes = {f"R{place}": {"lowest_deg": -2.0, "highest_deg": place, "inputs": inputs} for place in range(10)}
+    added["curves"] = lanes
+    page = improvement_page(improvement, "linear", "pia", CAPTION)
+    strict(page)
+    card = page[page.index('<h2 id="effects-added">') : page.index('<h2 id="each-rotation">')]
+    assert card.count("<svg") == 8 * 3
+    assert "2 other rotations, to which less is added, are not shown" in card
+    for label in ("adds to R9, degrees", "M_MCP, SD of training", "angle of R9, degrees", ">humidity_pct<"):
+        assert label in card
+    assert "R9 over M_MCP: +0.3 degrees per SD on average" in card
+    assert "R9: -2.00 to +9.00" in card
+    sizes = [float(size) for size in re.findall(r"font(?:-size)?: ([\d.]+)px", card)]
+    assert sizes
+    assert min(sizes) >= 9
+    assert max(float(width) for width in re.findall(r'<svg[^>]* width="([\d.]+)pt"', card)) < 230
+
+
+def test_associations_have_their_actions_and_claim_no_cause(
+    diagnosis: dict[str, Any], improvement: dict[str, Any]
+) -> None:
+    action = {"rotation": "I_MCP", "column": "sensor M_MCP", "phrase": "sensor M_MCP", "method": None,
+              "effect": "column:M_MCP", "rmse_before_deg": 2.5, "rmse_after_deg": 1.1,
+              "rmse_control_deg": 2.4, "saves": True}  # fmt: skip
+    nothing = {**action, "effect": None, "saves": False, "rotation": "I_PIP"}
+    diagnosis["actions"] = [action, nothing, {**nothing, "method": "lmc_gpr"}]
+    page = diagnosis_page(diagnosis, CAPTION)
+    strict(page)
+    part = page[page.index('<h2 id="what-to-do-about-it">') : page.index('<h2 id="error-of-each-rotation">')]
+    assert f"glovecal add-effect {MODEL_ID[:12]} column:M_MCP --rotation I_MCP" in part
+    assert "glovecal train --subject pia --method lmc_gpr" in part
+    assert "no cause is claimed" in part
+    cells = re.findall(r"<td[^>]*>(.*?)</td>", part)
+    assert cells[:6] == ["I_MCP", "sensor M_MCP", "column:M_MCP", "2.50", "1.10", "2.40"]
+    assert cells[13] == "-"
+    improvement["steps"][1]["added"] |= {"verdict": "associated", "associated_with": "sensor M_MCP"}
+    page = improvement_page(improvement, "linear", "pia", CAPTION)
+    assert "associated with sensor M_MCP; no cause is claimed" in page
+
+
 def test_bars_start_at_zero_and_a_fall_over_decades_is_dots(monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[Figure] = []
     real = svg

@@ -15,3 +15,23 @@ def test_where_nothing_is_unexplained_the_model_is_used():
     residual = {"is_significant": False, "not_identifiable": None}
     found = {"named": None, "next_take": None, "unexplained_residual": residual}
     assert next_command(MODEL, found) == "glovecal model activate 0123456789ab"
+
+
+def test_what_a_straight_line_cannot_learn_is_trained_otherwise_for_its_subject():
+    named = {"effect": "nonlinearity", "kind": "correction", "verdict": "named", "where": ["I_MCP"]}
+    found = {"named": {**named, "method": "lmc_gpr"}, "next_take": None}
+    assert next_command(MODEL, found, "pia") == "glovecal train --subject pia --method lmc_gpr"
+    without = {"named": named, "next_take": None}
+    assert next_command(MODEL, without, "pia").startswith("glovecal add-effect 0123456789ab nonlinearity")
+
+
+def test_an_association_has_its_command():
+    action = {"rotation": "I_MCP", "effect": "column:M_MCP", "method": None, "saves": True}
+    residual = {"is_significant": True, "not_identifiable": None}
+    found = {"named": None, "next_take": None, "actions": [action], "unexplained_residual": residual}
+    expected = "glovecal add-effect 0123456789ab column:M_MCP --rotation I_MCP"
+    assert next_command(MODEL, found, "pia") == expected
+    found["actions"] = [{**action, "saves": False}, {**action, "effect": None, "method": "lmc_gpr"}]
+    assert next_command(MODEL, found, "pia") == "glovecal train --subject pia --method lmc_gpr"
+    found["actions"] = [{**action, "saves": False}]
+    assert next_command(MODEL, found, "pia") == "glovecal where 0123456789ab --report where.html"
