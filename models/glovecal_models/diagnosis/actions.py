@@ -39,11 +39,11 @@ class Action:
 
     association: ResidualAssociation
     effect: str | None
-    """To be added on the association's rotation; None where ``method`` is asked for, or nothing is known."""
+    """To be added on the association's rotation; None where only ``method`` helps, or nothing is known."""
     is_physical: bool = True
     """Whether the effect's name says what happens; else it only names the column."""
     method: str | None = None
-    """To be trained with, where the base could read the column and does not use it."""
+    """To be trained with rather, where the base could read the column and a straight line does not use it."""
     rmse_deg: HeldOutRmse | None = None
     """Of the rotation's sensor, on takes held out whole: without the effect, with it, with its control."""
 
@@ -104,7 +104,8 @@ def _action(
         rmse = formed_rmse(design, effect, design.rotations.index(item.rotation), seed)
         if rmse is None:
             continue
-        tried = Action(item, effect.name, effect.is_physical, None, rmse)
+        method = effect.learned_by if linear else None
+        tried = Action(item, effect.name, effect.is_physical, method, rmse)
         # A column that only has a name comes last: it is taken where no physical effect saves anything.
         if tried.saves and (not best.saves or (effect.is_physical and _saved(tried) > _saved(best))):
             best = tried

@@ -148,7 +148,7 @@ def action_sentence(action: Action) -> str:
     if action.method is not None:
         return (
             f"{item.rotation}: the residual is associated with {item.phrase}, which the layout gives it and a"
-            f" straight line does not use: nonlinearity of the base; train with --method {action.method}."
+            f" straight line cannot use: nonlinearity of the base; train with --method {action.method}."
         )
     if action.effect is None or action.rmse_deg is None or not action.saves:
         return (

@@ -40,7 +40,7 @@ ACTIONS = (
     "Held-out RMSE of the rotation's sensor in degrees: without the effect, with it in the form that the "
     "takes ask for, with its control of the same form. An effect column:NAME or context:NAME only names what "
     "the error goes along with; no cause is claimed. A method is named where the layout gives the "
-    "rotation the column and a straight line does not use it: nonlinearity of the base."
+    "rotation the column and a straight line cannot use it: nonlinearity of the base."
 )
 HOLD_HEADS = (
     *("pose", "sensor", "holds", "seconds each", "change, % of span", "same sign in", "time constant, s"),

@@ -157,9 +157,11 @@ class ActionView(View):
     rotation: str
     column: str = Field(description="As in `where`.")
     phrase: str = Field("", description="The column in words.")
-    effect: str | None = Field(description="To be added on the rotation; null where `method` is asked for.")
+    effect: str | None = Field(description="To be added on the rotation; null where only `method` helps.")
     is_physical: bool = Field(description="False: the effect only names a column, no cause is claimed.")
-    method: str | None = Field(description="To be trained with: the layout gives the rotation the column.")
+    method: str | None = Field(
+        description="To be trained with rather: a straight line cannot use the column."
+    )
     rmse_before_deg: float | None = Field(description="Of the rotation's sensor, on takes held out whole.")
     rmse_after_deg: float | None = Field(description="With the effect, in the form that the takes ask for.")
     rmse_control_deg: float | None = Field(description="With its control, of the same form and freedom.")
