@@ -14,11 +14,11 @@ import numpy as np
 from glovecal_models.effects.base.learned_form import OWN
 from glovecal_models.errors import BadInput
 
-BINS = 12
+CURVE_BINS = 12
 LOW, HIGH = 0.1, 0.9
 """Quantiles: of a bin's frames, and of the input between which the mean slope is taken."""
 DIGITS = 5
-LARGEST_DOCUMENT = 64
+LARGEST_CURVES = 64
 """Inputs of one joint that a stored picture may have."""
 OWN_UNIT = "deg"
 
@@ -45,7 +45,7 @@ class FormCurve:
     @classmethod
     def over(cls, name: str, unit: str, values: np.ndarray, degrees: np.ndarray) -> FormCurve:
         """Of ``values`` (N,) of an input and what the effect adds there, ``degrees`` (N,); N at least 1."""
-        edges = np.unique(np.quantile(values, np.arange(1, BINS) / BINS))
+        edges = np.unique(np.quantile(values, np.arange(1, CURVE_BINS) / CURVE_BINS))
         number = np.searchsorted(edges, values, side="right")
         bins = [number == place for place in range(len(edges) + 1) if np.any(number == place)]
         at = np.array([values[rows].mean() for rows in bins])
@@ -81,7 +81,7 @@ class FormCurve:
         at, mean, low, high = (
             tuple(map(float, document[key])) for key in ("at", "mean_deg", "low_deg", "high_deg")
         )
-        if not 1 <= len(at) <= BINS or {len(mean), len(low), len(high)} != {len(at)}:
+        if not 1 <= len(at) <= CURVE_BINS or {len(mean), len(low), len(high)} != {len(at)}:
             raise ValueError(f"curves of {len(at)}, {len(mean)}, {len(low)} and {len(high)} bins")
         slope = float(document["slope_deg_per_unit"])
         return cls(str(document["input"]), str(document["unit"]), at, mean, low, high, slope)
@@ -126,7 +126,7 @@ class LaneCurves:
     def from_document(cls, document: Mapping[str, Any]) -> LaneCurves:
         """Inverse of ``to_document``. Raises BadInput."""
         try:
-            inputs = document["inputs"][:LARGEST_DOCUMENT]
+            inputs = document["inputs"][:LARGEST_CURVES]
             curves = tuple(FormCurve.from_document(item) for item in inputs)
             return cls(float(document["lowest_deg"]), float(document["highest_deg"]), curves)
         except (KeyError, TypeError, ValueError) as error:

@@ -45,7 +45,6 @@ def per_take(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -
 @form(
     Stage.CLOCK,
     "A time difference that grows over the session (crystals that differ by parts per million).",
-    set_aside=True,
     sizes=SIZES_S,
     shared=True,
 )

@@ -64,7 +64,6 @@ def times_bend(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws)
 @form(
     Stage.MECHANICAL,
     "The first newtons count most, then it levels off (padding pressed flat).",
-    set_aside=True,
     column=contact_column,
 )
 def levels_off(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:

@@ -46,7 +46,6 @@ def logarithm(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) 
 @form(
     Stage.MECHANICAL,
     "Growth with a small power of the time since each bend (Nutting 1921; fractional Kelvin-Voigt).",
-    set_aside=True,
 )
 def power_law(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Every step of bend grows with a small power of the time since it."""

@@ -41,7 +41,6 @@ def bilinear(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -
 @form(
     Stage.MECHANICAL,
     "Neighbours pull only once the cloth's slack is used up (ours).",
-    set_aside=True,
     touches="two",
 )
 def one_sided(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:

@@ -32,7 +32,6 @@ def offset_and_gain(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: D
 @form(
     Stage.WEARING,
     "Each sensor off its joint's axis per wearing, so that the shift changes along the bend.",
-    set_aside=True,
 )
 def posture_dependent(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A sensor that sits off the joint's axis: the shift grows along the bend, in another curve each time."""

@@ -44,7 +44,6 @@ def steps_when_fast(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: D
 @form(
     Stage.WEARING,
     "A shift that always goes one way and settles within minutes of donning (a cuff working down).",
-    set_aside=True,
 )
 def to_one_side(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The cuff works its way down the wrist: fast after donning, ever more slowly, always one way."""

@@ -34,9 +34,7 @@ def absorbed(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -
     return signal + size * draws.signs() * taken_up * (1 + draws.each("gain", -0.5, 0.5) * bent)
 
 
-@form(
-    Stage.ELECTRICAL, "Zero points move only above a humidity (sweat that no longer dries).", set_aside=True
-)
+@form(Stage.ELECTRICAL, "Zero points move only above a humidity (sweat that no longer dries).")
 def sweat(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Nothing until it condenses; beyond that every per cent counts."""
     wet = np.maximum(_damper(scene) - draws.one("above_usual_pct", -2.0, 1.0), 0.0)

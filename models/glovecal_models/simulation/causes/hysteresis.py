@@ -64,7 +64,6 @@ def several_plays(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Dra
 @form(
     Stage.MECHANICAL,
     "Ninety switches with their own closing and opening angles (Preisach 1935).",
-    set_aside=True,
 )
 def relays(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Many small switches, each closing at one angle and opening at a lower one (Preisach)."""

@@ -37,7 +37,6 @@ def two_poles(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) 
 @form(
     Stage.ELECTRICAL,
     "The mean of a window of past readings (firmware of data-acquisition boards).",
-    set_aside=True,
     sizes=SIZES_S,
 )
 def moving_average(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:

@@ -46,7 +46,6 @@ def s_shape(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) ->
 @form(
     Stage.ELECTRICAL,
     "The hyperbola of a growing resistor in a voltage divider (circuit of home-made flex gloves).",
-    set_aside=True,
     judged_by="straight_line",
 )
 def divider(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:

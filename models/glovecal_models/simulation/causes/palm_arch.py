@@ -42,7 +42,6 @@ def cylinder(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -
 @form(
     Stage.MECHANICAL,
     "The product of arch and thumb opposition (Krnoul 2016: for thumb and little finger to touch).",
-    set_aside=True,
     touches="palm",
 )
 def with_opposition(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:

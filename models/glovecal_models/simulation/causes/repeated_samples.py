@@ -41,7 +41,6 @@ def periodic(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -
 @form(
     Stage.TRANSPORT,
     "The stream stands still for a while now and then (radio retransmission).",
-    set_aside=True,
     sizes=(0.02, 3.0),
     shared=True,
 )

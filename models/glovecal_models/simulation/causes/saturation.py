@@ -51,7 +51,6 @@ def soft_tanh(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) 
 @form(
     Stage.COUNTS,
     "Readings begin to change only after some bend (a sensor loose in its pocket; ours).",
-    set_aside=True,
     judged_by="lost_angle",
     sizes=SIZES,
     touches="two",

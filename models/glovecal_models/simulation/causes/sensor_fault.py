@@ -59,7 +59,6 @@ def dropouts(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -
 @form(
     Stage.CONVERTER,
     "From one moment on the sensor answers differently (a cracked film).",
-    set_aside=True,
     touches="one",
 )
 def gain_jump(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:

@@ -40,7 +40,6 @@ def offset_and_gain(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: D
 @form(
     Stage.COUNTS,
     "Raw counts fall with the voltage below the regulator's limit, not above (low-dropout regulator).",
-    set_aside=True,
     sizes=(0.003, 20.0),
     shared=True,
 )

@@ -43,7 +43,6 @@ def quadratic(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) 
 @form(
     Stage.ELECTRICAL,
     "Zero points follow the thermometer one to four minutes later (cloth warms slowly).",
-    set_aside=True,
 )
 def late(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The sensor in the cloth follows the thermometer in the cuff minutes later."""

@@ -38,7 +38,6 @@ def offset_and_gain(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: D
 @form(
     Stage.ELECTRICAL,
     "Zero points move with the logarithm of the time since power-on (no time of its own; ours).",
-    set_aside=True,
 )
 def logarithm(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Zero points move with the logarithm of the time since power-on and never quite end."""
