@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from glovecal_models.effects.base.form_curve import BINS, FormCurve, LaneCurves
+from glovecal_models.effects.base.form_curve import CURVE_BINS, FormCurve, LaneCurves
 from glovecal_models.effects.base.learned_form import OWN
 from glovecal_models.errors import BadInput
 
@@ -25,9 +25,9 @@ def test_a_curve_is_the_mean_in_each_bin_and_its_spread() -> None:
     found, inputs, degrees = curves()
     over, own = found.curves
     assert (over.input, over.unit, own.input, own.unit) == ("I_MCP", "SD", OWN, "deg")
-    assert len(over.at) == BINS
+    assert len(over.at) == CURVE_BINS
     order = np.argsort(inputs["I_MCP"])
-    bins = np.array_split(order, BINS)
+    bins = np.array_split(order, CURVE_BINS)
     np.testing.assert_allclose(over.at, [inputs["I_MCP"][rows].mean() for rows in bins], rtol=1e-3, atol=1e-3)
     np.testing.assert_allclose(over.mean_deg, [degrees[rows].mean() for rows in bins], rtol=1e-3, atol=1e-3)
     assert max(over.mean_deg[:5]) < 0.01
