@@ -14,20 +14,17 @@ from rich.table import Table
 
 WIDTH_OF_A_FILE = 400
 """Columns to use where there is no terminal to fit into: lines stay whole for grep."""
+LINE = 79
+"""Characters of a line of a sentence beside a table."""
 
 
 class Sentences(Console):
     """Standard error. Where nobody reads it any more (``2>&1 | head``), the work goes on in silence."""
 
-
-LINE = 79
-"""Characters of a line of a sentence beside a table."""
-
-
-def on_broken_pipe(self) -> None:
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, sys.stderr.fileno())
-    os.close(nowhere)
+    def on_broken_pipe(self) -> None:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stderr.fileno())
+        os.close(nowhere)
 
 
 out = Console(highlight=False, markup=False, emoji=False, soft_wrap=True)
