@@ -49,7 +49,12 @@ def test_gloves_are_unlike_and_the_same_in_every_run():
     assert {glove.bits for glove in gloves} == {8, 12}
     assert {glove.nuisance for glove in gloves} == {"white", "drift", "posture"}
     assert {len(glove.causes[0].channels or ()) for glove in gloves} == {0, 1}
-    assert {glove.causes[0].form for glove in gloves} == {"bouc_wen", "single_play", "several_plays"}
+    assert {glove.causes[0].form for glove in gloves} == {
+        "bouc_wen",
+        "single_play",
+        "several_plays",
+        "relays",
+    }
 
 
 def test_set_aside_forms_are_used_only_when_asked_for():

@@ -23,7 +23,7 @@ from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.base.signature_effect import SignatureEffect
 from glovecal_models.effects.catalogue import effect, effect_of_declaration
 from glovecal_models.errors import BadInput
-from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES
+from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES, forms
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
@@ -226,7 +226,7 @@ def _ramp_and_hold(known: Effect, number: int) -> Signals:
 
 def _by_simulation(name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, str] | None:
     """A simulated glove with and without the cause, where it does most."""
-    session = record_session(SIMULATED, [Cause(name, strength_deg=6.0)])
+    session = record_session(SIMULATED, [Cause(name, forms(name)[0].name, strength_deg=6.0)])
     take, clean = session.takes[0], session.clean[0]
     label, pair = "reading", (clean.readings, take.readings)
     if np.array_equal(*pair) and take.reference is not None and clean.reference is not None:
