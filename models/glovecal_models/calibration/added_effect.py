@@ -118,7 +118,7 @@ class AddedEffect:
 
     def contribution(self, take: Signals) -> Contribution:
         """To every frame of a take whose lanes are this effect's."""
-        effect, own = self.effect, self.own_count
+        effect = self.effect
         plain = effect.columns(take, self.settings, self.shape)
         factor = self.variance_factor
         if self.form is None and factor is None:
@@ -132,8 +132,7 @@ class AddedEffect:
             if self.form is not None:
                 learned = self.form.columns({name: values[rows] for name, values in inputs.items()})
                 columns = np.concatenate([columns, learned], axis=2)
-            degrees[rows] = np.einsum("nlc,lc->nl", columns[:, :, :own], self.weights[:, :own])
-            degrees[rows] += np.einsum("nlc,lc->nl", columns[:, :, own:], self.weights[:, own:])
+            degrees[rows] = np.einsum("nlc,lc->nl", columns, self.weights)
             if variance is not None and factor is not None:
                 variance[rows] = weight_variance(columns, factor)
         return Contribution(degrees, variance)

@@ -78,9 +78,11 @@ def fit_with_effects(
 
     def trained() -> None:
         known = sample_weights[len(weights)] if sample_weights else {}
-        chosen = replace(settings, sample_weights=tuple(sorted(known.items()))) if known else settings
         for name in rotations:
             stop_if(cancelled, "adding an effect")
+            # Only its own weight: the same fit is known again whatever other rotations are trained beside.
+            own = ((name, known[name]),) if name in known else ()
+            chosen = replace(settings, sample_weights=own)
             results[name] = _trained(takes, columns[name], corrected.get(name), chosen, cancelled)
         weights.append(chosen_weights({name: item.settings for name, item in results.items()}))
 

@@ -53,29 +53,21 @@ def chosen_form(lanes: Sequence[FormRows]) -> tuple[FormTerm, ...]:
 
     Every lane has the same inputs, in units of its own range.
     """
-    problems = [_Lane.of(lane) for lane in lanes if len(lane.target)]
+    problems = [_Lane(lane) for lane in lanes if len(lane.target)]
     if not problems:
         return ()
     others = [name for name in lanes[0].inputs if name != OWN]
     if not others:
-        return _chosen(problems, _of_own())
+        return _chosen(problems, _terms((OWN,), ALONE))
     if len(others) > MOST_SCREENED:
         others = _screened(problems, others)
-    smooth = [FormTerm(pair, TOGETHER[-1], sd) for pair in combinations(sorted(others), 2) for sd in SD_DEG]
-    return _chosen(problems, [*(term for name in others for term in _of_one(name)), *smooth])
+    tried = [term for name in others for term in (*_terms((name,), ALONE), *_terms((name, OWN), TOGETHER))]
+    tried += [term for pair in combinations(sorted(others), 2) for term in _terms(pair, TOGETHER[-1:])]
+    return _chosen(problems, tried)
 
 
-def _of_own() -> list[FormTerm]:
-    return [FormTerm((OWN,), scale, sd) for scale in ALONE for sd in SD_DEG]
-
-
-def _of_one(name: str) -> list[FormTerm]:
-    alone = [FormTerm((name,), scale, sd) for scale in ALONE for sd in SD_DEG]
-    return [*alone, *(FormTerm((name, OWN), scale, sd) for scale in TOGETHER for sd in SD_DEG)]
-
-
-def _of_pair(names: tuple[str, str]) -> list[FormTerm]:
-    return [FormTerm(names, scale, sd) for scale in TOGETHER for sd in SD_DEG]
+def _terms(inputs: tuple[str, ...], lengthscales: Sequence[float]) -> list[FormTerm]:
+    return [FormTerm(inputs, scale, sd) for scale in lengthscales for sd in SD_DEG]
 
 
 def _screened(lanes: Sequence[_Lane], names: Sequence[str]) -> list[str]:
@@ -90,26 +82,23 @@ def _screened(lanes: Sequence[_Lane], names: Sequence[str]) -> list[str]:
 
 def _chosen(lanes: Sequence[_Lane], candidates: Sequence[FormTerm]) -> tuple[FormTerm, ...]:
     chosen: list[FormTerm] = []
-    for lane in lanes:
-        lane.settle(chosen)
-    now = sum(lane.evidence([]) for lane in lanes)
     left = list(candidates)
     while len(chosen) < MOST_TERMS and left:
+        for lane in lanes:
+            lane.settle(chosen)
+        now = sum(lane.evidence(chosen) for lane in lanes)
         tried = [(sum(lane.evidence([*chosen, term]) for lane in lanes), term) for term in left]
         best, term = max(tried, key=lambda pair: pair[0])
         if best - now < LEAST_GAIN_NATS:
             break
         chosen.append(term)
-        for lane in lanes:
-            lane.settle(chosen)
-        now = sum(lane.evidence(chosen) for lane in lanes)
         inputs = {name for item in chosen for name in item.inputs if name != OWN}
         left = [item for item in left if set(item.inputs) != set(term.inputs)]
         left += [
             item
             for pair in combinations(sorted(inputs), 2)
             if not any(set(pair) == set(other.inputs) for other in chosen)
-            for item in _of_pair(pair)
+            for item in _terms(pair, TOGETHER)
             if item not in left
         ]
         if len(inputs) >= MOST_INPUTS:
@@ -120,8 +109,8 @@ def _chosen(lanes: Sequence[_Lane], candidates: Sequence[FormTerm]) -> tuple[For
 class _Lane:
     """Sums of products of one lane, the base's free columns projected out."""
 
-    def __init__(self, rows: FormRows, free: np.ndarray) -> None:
-        self._rows, self._free = rows, free
+    def __init__(self, rows: FormRows) -> None:
+        self._free = np.linalg.qr(rows.free)[0]
         ranges = LearnedForm.over([FormTerm((name,), 1.0, 1.0) for name in rows.inputs], [rows.inputs])
         self._place = {name: ranges.place(name, values) for name, values in rows.inputs.items()}
         self._target = self._without_base(rows.target[:, None])[:, 0]
@@ -130,11 +119,6 @@ class _Lane:
         self._gram: dict[tuple[Key, Key], np.ndarray] = {}
         self._right: dict[Key, np.ndarray] = {}
         self._variance = max(float(self._target @ self._target) / len(self._target), LEAST_VARIANCE_DEG2)
-
-    @classmethod
-    def of(cls, rows: FormRows) -> _Lane:
-        free = np.linalg.qr(rows.free)[0]
-        return cls(rows, free)
 
     def settle(self, terms: Sequence[FormTerm]) -> None:
         """Take what ``terms`` leave as the noise from now on."""

@@ -6,24 +6,20 @@ with the same form, freedom and choice, both on takes held out whole.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Set
-from dataclasses import dataclass, replace
+from collections.abc import Sequence, Set
+from dataclasses import dataclass
 
 import numpy as np
 
-from glovecal_models.calibration.added_effect import form_values
-from glovecal_models.calibration.form_choice import EVERY as FORM_EVERY
-from glovecal_models.calibration.form_choice import FormRows, chosen_form
+from glovecal_models.calibration.folds import folds_over_takes
 from glovecal_models.calibration.held_out import BaseProducts, Rows
+from glovecal_models.diagnosis.form_inputs import FormInputs
 from glovecal_models.diagnosis.forward_design import ForwardDesign
-from glovecal_models.diagnosis.known_effect import one_lane
 from glovecal_models.diagnosis.residual_association import ResidualAssociation
 from glovecal_models.effects.base.assessment import HeldOutRmse
 from glovecal_models.effects.base.control import control_signals
 from glovecal_models.effects.base.effect import Effect
-from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.learned_form import LearnedForm
-from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.catalogue import explaining
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
@@ -127,112 +123,56 @@ def _sensor_of(column: str, layout: Layout) -> str | None:
     return layout.correspondence(name).measuring_sensor
 
 
-@dataclass(frozen=True)
-class _Inputs:
-    """An effect's own columns on one joint, and what its form may be a function of."""
-
-    plain: list[np.ndarray]
-    """For each unit (N, C)."""
-    values: list[Mapping[str, np.ndarray]]
-    """For each unit, each (N, 1)."""
-
-
 def formed_rmse(design: ForwardDesign, effect: Effect, joint: int, seed: int = 0) -> HeldOutRmse | None:
     """Held-out errors of one joint's sensor, degrees; None where these takes cannot show the effect."""
-    signals = [
-        one_lane(
-            replace(take, others={k: v for k, v in take.others.items() if k not in design.known[joint]}),
-            joint,
-        )
-        for take in design.signals
-    ]
-    if effect.not_applicable_reason(signals) is not None:
+    takes = design.of_joint(joint)
+    if effect.not_applicable_reason(takes) is not None:
         return None
-    settings = effect.fit_constants(signals)
-    grid = effect.grid(signals, settings)
+    settings = effect.fit_constants(takes)
+    grid = effect.grid(takes, settings)
     shape = grid[len(grid) // 2]
     try:
-        wrong = control_signals(effect, signals, np.random.default_rng(seed))
+        wrong = control_signals(effect, takes, np.random.default_rng(seed))
     except BadInput:
         return None
     step = -1 if effect.control == "time-reversed" else 1
-    right = _inputs(design, joint, effect, signals, settings, shape, 1)
-    control = _inputs(design, joint, effect, wrong, settings, shape, step)
-    prior = effect.prior_sd(settings)
-    squares, count = np.zeros(3), 0
-    for held in _folds(design):
-        base = _errors(design, joint, held, None, prior)
-        squares += [
-            base,
-            _errors(design, joint, held, right, prior),
-            _errors(design, joint, held, control, prior),
-        ]
-        count += sum(len(design.products[joint].units[unit].target) for unit in held)
-    return HeldOutRmse(*(float(np.sqrt(square / max(count, 1))) for square in squares))
+    right = FormInputs.of(design, joint, effect, takes, settings, shape)
+    control = FormInputs.of(design, joint, effect, wrong, settings, shape, step)
+    count = max(sum(len(unit.target) for unit in design.products[joint].units), 1)
+    before = design.once(f"held-out base {joint}", lambda: _squared(design, joint, None))
+    squares = (before, _squared(design, joint, right), _squared(design, joint, control))
+    return HeldOutRmse(*(float(np.sqrt(square / count)) for square in squares))
 
 
-def _folds(design: ForwardDesign) -> list[list[int]]:
-    """Units held out together: whole takes."""
-    takes = list(dict.fromkeys(design.unit_take))
-    parts = min(FOLDS, len(takes)) if len(takes) > 1 else min(FOLDS, len(design.unit_take))
-    of = takes if len(takes) > 1 else list(range(len(design.unit_take)))
-    number = {item: at % parts for at, item in enumerate(of)}
-    which = [number[take] if len(takes) > 1 else number[unit] for unit, take in enumerate(design.unit_take)]
-    return [[unit for unit, fold in enumerate(which) if fold == at] for at in range(parts)]
+def _squared(design: ForwardDesign, joint: int, inputs: FormInputs | None) -> float:
+    """Sum of squares, degrees squared, on units held out in folds; the form is chosen on the others."""
+    units = design.products[joint].units
+    owner = np.array(design.unit_take)
+    if len(np.unique(owner)) < 2:
+        owner = np.arange(len(units))  # pieces of the only take
+    total = 0.0
+    for fold in folds_over_takes(owner, FOLDS):
+        held, kept = (np.flatnonzero(mask).tolist() for mask in (fold.held_out, ~fold.held_out))
+        if kept:
+            total += _squared_on(design, joint, inputs, kept, held)
+    return total
 
 
-def _inputs(
-    design: ForwardDesign,
-    joint: int,
-    effect: Effect,
-    signals: Sequence[Signals],
-    settings: Settings,
-    shape: np.ndarray,
-    step: int,
-) -> _Inputs:
-    plain = [effect.columns(take, settings, shape) for take in signals]
-    values = [form_values(effect, take, part, settings) for take, part in zip(signals, plain, strict=True)]
-    units = list(design.units(joint))
-    return _Inputs(
-        [plain[take][::step][index, 0] for take, index in units],
-        [{name: each[::step][index] for name, each in values[take].items()} for take, index in units],
-    )
-
-
-def _errors(
-    design: ForwardDesign, joint: int, held: Sequence[int], inputs: _Inputs | None, prior_sd: np.ndarray
+def _squared_on(
+    design: ForwardDesign, joint: int, inputs: FormInputs | None, kept: Sequence[int], held: Sequence[int]
 ) -> float:
-    """Sum of squares, degrees squared, on the units of ``held``; the form is chosen on the others."""
-    products = design.products[joint]
-    units = products.units
-    kept = [unit for unit in range(len(units)) if unit not in held]
-    extra: list[np.ndarray] = [np.empty((len(unit.target), 0)) for unit in units]
-    sd = np.full(units[0].base.shape[1], np.inf)
+    rows, sd = design.products[joint].units, None
     if inputs is not None:
-        extra, sd = inputs.plain, np.concatenate([sd, prior_sd])
-        terms = chosen_form([_form_rows(units, kept, inputs, prior_sd)]) if inputs.values[0] else ()
+        extra, prior = inputs.plain, inputs.prior_sd
+        terms = inputs.terms(design, joint, kept)
         if terms:
             form = LearnedForm.over(terms, [inputs.values[unit] for unit in kept])
             learned = [form.columns(values)[:, 0, :] for values in inputs.values]
             extra = [np.column_stack(pair) for pair in zip(extra, learned, strict=True)]
-            sd = np.concatenate([sd, np.ones(form.count)])
-    rows = [
-        Rows(np.column_stack([unit.base, part]), unit.target) for unit, part in zip(units, extra, strict=True)
-    ]
+            prior = np.concatenate([prior, np.ones(form.count)])
+        sd = np.concatenate([np.full(rows[0].base.shape[1], np.inf), prior])
+        pairs = zip(rows, extra, strict=True)
+        rows = [Rows(np.column_stack([unit.base, part]), unit.target) for unit, part in pairs]
     fitted = BaseProducts([rows[unit] for unit in kept], sd)
     left = [rows[unit].target - fitted.fitted(rows[unit].base) for unit in held]
     return float(sum(part @ part for part in left))
-
-
-def _form_rows(units: Sequence[Rows], kept: Sequence[int], inputs: _Inputs, prior_sd: np.ndarray) -> FormRows:
-    some = slice(None, None, FORM_EVERY)
-    return FormRows(
-        np.concatenate([units[unit].base[some] for unit in kept]),
-        np.concatenate([inputs.plain[unit][some] for unit in kept]),
-        prior_sd,
-        {
-            name: np.concatenate([inputs.values[unit][name][some] for unit in kept])
-            for name in inputs.values[0]
-        },
-        np.concatenate([units[unit].target[some] for unit in kept]),
-    )

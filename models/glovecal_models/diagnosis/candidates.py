@@ -134,15 +134,7 @@ def screen(design: ForwardDesign, effect: Effect, generator: np.random.Generator
 
 
 def _one_joint(design: ForwardDesign, effect: Effect, joint: int, generator: np.random.Generator) -> Evidence:
-    signals = tuple(
-        replace(
-            take,
-            own=take.own[:, [joint]],
-            others={k: v for k, v in take.others.items() if k not in design.known[joint]},
-        )
-        for take in design.signals
-    )
-    return _all_joints(design, effect, signals, generator, joints=(joint,))[0]
+    return _all_joints(design, effect, design.of_joint(joint), generator, joints=(joint,))[0]
 
 
 def _all_joints(

@@ -14,7 +14,7 @@ import numpy as np
 
 from glovecal_models.calibration.folds import are_short, first_measured, pieces
 from glovecal_models.calibration.held_out import BaseFeatures, BaseProducts, Rows
-from glovecal_models.diagnosis.known_effect import KnownEffect
+from glovecal_models.diagnosis.known_effect import KnownEffect, one_lane
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.resampled import ResampledTake
 from glovecal_models.effects.base.signals import Signals
@@ -53,6 +53,10 @@ class ForwardDesign:
     def rows(self, joint: int, columns: Sequence[np.ndarray]) -> list[np.ndarray]:
         """``columns``: for each take (N, ...); the fitted rows of those."""
         return [columns[take][index] for take, index in self.units(joint)]
+
+    def of_joint(self, joint: int) -> tuple[Signals, ...]:
+        """The signals of one joint alone, without those that its base reads already."""
+        return tuple(one_lane(_without(take, self.known[joint]), joint) for take in self.signals)
 
     def units(self, joint: int) -> Iterator[tuple[int, np.ndarray]]:
         """Take and row indices of each unit."""

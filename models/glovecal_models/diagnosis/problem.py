@@ -7,11 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.calibration.added_effect import form_values
-from glovecal_models.calibration.form_choice import EVERY as FORM_EVERY
-from glovecal_models.calibration.form_choice import FormRows, chosen_form
+from glovecal_models.diagnosis.form_inputs import FormInputs
 from glovecal_models.diagnosis.forward_design import EVERY, ForwardDesign, forward
-from glovecal_models.diagnosis.known_effect import KnownEffect, one_lane
+from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.naming import Naming
 from glovecal_models.diagnosis.resampled import (
@@ -110,26 +108,10 @@ def _with_learned_terms(known: KnownEffect, design: ForwardDesign) -> KnownEffec
     terms = []
     for joint, shape in zip(known.joints, known.shapes, strict=True):
         lane = design.rotations.index(joint)
-        without = [
-            replace(take, others={k: v for k, v in take.others.items() if k not in design.known[lane]})
-            for take in design.signals
-        ]
-        single = [one_lane(take, lane) for take in without]
-        settings = known.effect.fit_constants(single)
-        plain = [known.effect.columns(take, settings, shape[None, :]) for take in single]
-        values = [
-            form_values(known.effect, take, part, settings) for take, part in zip(single, plain, strict=True)
-        ]
-        some = [(take, index[::FORM_EVERY]) for take, index in design.units(lane)]
-        units = design.products[lane].units
-        rows = FormRows(
-            np.concatenate([unit.base[::FORM_EVERY] for unit in units]),
-            np.concatenate([plain[take][index, 0] for take, index in some]),
-            known.effect.prior_sd(settings),
-            {name: np.concatenate([values[take][name][index] for take, index in some]) for name in values[0]},
-            np.concatenate([unit.target[::FORM_EVERY] for unit in units]),
-        )
-        terms.append(chosen_form([rows]) if values[0] else ())
+        takes = design.of_joint(lane)
+        settings = known.effect.fit_constants(takes)
+        inputs = FormInputs.of(design, lane, known.effect, takes, settings, shape[None, :])
+        terms.append(inputs.terms(design, lane, range(len(inputs.plain))))
     return replace(known, terms=tuple(terms))
 
 

@@ -308,7 +308,9 @@ class _Loop:
         per_rotation, overall = step_errors(model, self.holdout, self.errors)
         control = None
         if diagnosis is not None and added is not None:
-            share = added.control_share or share_in(diagnosis, added.effect, added.where)
+            share = added.control_share
+            if share is None:
+                share = share_in(diagnosis, added.effect, added.where)
             control = None if share is None else self._with_control(added.where, share)
         held_out = self.errors.overall_deg
         self.steps.append(Step(model, added, overall, per_rotation, control, held_out))

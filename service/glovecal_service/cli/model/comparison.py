@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from textwrap import fill
 from typing import Annotated, Any
 
 import typer
@@ -13,7 +12,7 @@ from glovecal_service.cli.model.held_out_takes import HeldOutTakes, held_out_tak
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.floor_doubts import print_floor_doubts
 from glovecal_service.cli.terminal.options import AsJson, Models
-from glovecal_service.cli.terminal.printing import LINE, err, out, print_json, print_table
+from glovecal_service.cli.terminal.printing import err, out, print_json, print_sentences, print_table
 from glovecal_service.cli.terminal.writing import Overwrite, Report, fetch_report, require_place, write_report
 
 COLUMNS = {
@@ -82,8 +81,7 @@ def _print(
     out.print(f"Against {', '.join(row['name'] for row in takes)}:")
     for name, result in results.items():
         of_model = "" if len(results) == 1 else f"Model {name[:12]}: "
-        for sentence in result["sentences"]:
-            out.print(fill(f"{of_model}{sentence}", LINE))
+        print_sentences(result["sentences"], of_model)
     if len(results) == 1:
         rows = [{**row, "floor": _interval(row["floor"])} for row in _rows(next(iter(results.values())))]
         print_table(rows, COLUMNS, empty="Nothing was measured.")

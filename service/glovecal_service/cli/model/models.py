@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -12,12 +11,12 @@ from glovecal_service.cli.model.rows import EFFECT_COLUMNS, KERNEL_COLUMNS, effe
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Model, OnlyLayout, OnlySubject, Subject
 from glovecal_service.cli.terminal.printing import (
-    LINE,
     err,
     moment,
     out,
     print_facts,
     print_json,
+    print_sentences,
     print_table,
 )
 from glovecal_service.cli.terminal.refusal import Refusal
@@ -75,8 +74,7 @@ def show(model: Model, as_json: AsJson = False) -> None:
         print_json({**document, "lineage": [row["id"] for row in lineage]})
         return
     print_facts(_facts(document, lineage))
-    for sentence in (document["unseen_wearing"] or {}).get("sentences", ()):
-        out.print(fill(sentence, LINE))
+    print_sentences((document["unseen_wearing"] or {}).get("sentences", ()))
     out.print()
     columns = {
         "rotation": "rotation",
@@ -119,7 +117,6 @@ def _facts(document: dict[str, Any], lineage: list[dict[str, Any]]) -> dict[str,
         "layout": document["layout"],
         "method": document["method"],
         "active": document["active"],
-        "unseen (°)": (document["unseen_wearing"] or {}).get("rmse_unseen_wearing_deg"),
         "error (°)": document["held_out_rmse_deg"],
         "estimated on": document["error_estimate"].get("how"),
         "trained on": [take["name"] for take in document["facts"].get("takes", [])],

@@ -9,7 +9,7 @@ import typer
 from glovecal_service.cli.take.rows import find_takes
 from glovecal_service.cli.terminal.connection import connect, is_remote
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, Subject
-from glovecal_service.cli.terminal.printing import err, out, print_json
+from glovecal_service.cli.terminal.printing import err, out, print_json, print_sentences
 from glovecal_service.cli.terminal.refusal import Refusal
 from glovecal_service.cli.terminal.waiting import wait_for_job
 
@@ -103,8 +103,7 @@ def _say_model(result: dict[str, Any], document: dict[str, Any]) -> None:
     out.print(
         f"Model {document['id'][:12]} ({document['method']}) for {document['subject']}, {told}. {active}"
     )
-    for sentence in (document["unseen_wearing"] or {}).get("sentences", ()):
-        out.print(sentence)
+    print_sentences((document["unseen_wearing"] or {}).get("sentences", ()))
 
 
 def _choose(

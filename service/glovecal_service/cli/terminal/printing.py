@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
+from textwrap import fill
 from typing import Any
 
 from rich.console import Console, RenderableType
@@ -70,6 +71,12 @@ def show(picture: RenderableType) -> None:
         wide.print(picture)
     for line in captured.get().splitlines():
         sys.stdout.write(line.rstrip() + "\n")
+
+
+def print_sentences(sentences: Iterable[str], about: str = "") -> None:
+    """Each on lines of its own that are no longer than those of a table; ``about`` begins each."""
+    for sentence in sentences:
+        out.print(fill(f"{about}{sentence}", LINE))
 
 
 def print_facts(document: Mapping[str, Any]) -> None:
