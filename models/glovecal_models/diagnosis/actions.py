@@ -9,22 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence, Set
 from dataclasses import dataclass
 
-import numpy as np
-
-from glovecal_models.calibration.folds import folds_over_takes
-from glovecal_models.calibration.held_out import BaseProducts, Rows
-from glovecal_models.diagnosis.form_inputs import FormInputs
+from glovecal_models.diagnosis.formed_error import formed_rmse
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.residual_association import ResidualAssociation
 from glovecal_models.effects.base.assessment import HeldOutRmse
-from glovecal_models.effects.base.control import control_signals
-from glovecal_models.effects.base.effect import Effect
-from glovecal_models.effects.base.learned_form import LearnedForm
 from glovecal_models.effects.catalogue import explaining
-from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 
-FOLDS = 4
 TRAIN_OTHERWISE = "lmc_gpr"
 """The method that learns curves and products of all the sensors that the layout gives a rotation."""
 
@@ -121,58 +112,3 @@ def _sensor_of(column: str, layout: Layout) -> str | None:
     if column == "angle" or kind != "joint" or name not in layout.rotations:
         return None
     return layout.correspondence(name).measuring_sensor
-
-
-def formed_rmse(design: ForwardDesign, effect: Effect, joint: int, seed: int = 0) -> HeldOutRmse | None:
-    """Held-out errors of one joint's sensor, degrees; None where these takes cannot show the effect."""
-    takes = design.of_joint(joint)
-    if effect.not_applicable_reason(takes) is not None:
-        return None
-    settings = effect.fit_constants(takes)
-    grid = effect.grid(takes, settings)
-    shape = grid[len(grid) // 2]
-    try:
-        wrong = control_signals(effect, takes, np.random.default_rng(seed))
-    except BadInput:
-        return None
-    step = -1 if effect.control == "time-reversed" else 1
-    right = FormInputs.of(design, joint, effect, takes, settings, shape)
-    control = FormInputs.of(design, joint, effect, wrong, settings, shape, step)
-    count = max(sum(len(unit.target) for unit in design.products[joint].units), 1)
-    before = design.once(f"held-out base {joint}", lambda: _squared(design, joint, None))
-    squares = (before, _squared(design, joint, right), _squared(design, joint, control))
-    return HeldOutRmse(*(float(np.sqrt(square / count)) for square in squares))
-
-
-def _squared(design: ForwardDesign, joint: int, inputs: FormInputs | None) -> float:
-    """Sum of squares, degrees squared, on units held out in folds; the form is chosen on the others."""
-    units = design.products[joint].units
-    owner = np.array(design.unit_take)
-    if len(np.unique(owner)) < 2:
-        owner = np.arange(len(units))  # pieces of the only take
-    total = 0.0
-    for fold in folds_over_takes(owner, FOLDS):
-        held, kept = (np.flatnonzero(mask).tolist() for mask in (fold.held_out, ~fold.held_out))
-        if kept:
-            total += _squared_on(design, joint, inputs, kept, held)
-    return total
-
-
-def _squared_on(
-    design: ForwardDesign, joint: int, inputs: FormInputs | None, kept: Sequence[int], held: Sequence[int]
-) -> float:
-    rows, sd = design.products[joint].units, None
-    if inputs is not None:
-        extra, prior = inputs.plain, inputs.prior_sd
-        terms = inputs.terms(design, joint, kept)
-        if terms:
-            form = LearnedForm.over(terms, [inputs.values[unit] for unit in kept])
-            learned = [form.columns(values)[:, 0, :] for values in inputs.values]
-            extra = [np.column_stack(pair) for pair in zip(extra, learned, strict=True)]
-            prior = np.concatenate([prior, np.ones(form.count)])
-        sd = np.concatenate([np.full(rows[0].base.shape[1], np.inf), prior])
-        pairs = zip(rows, extra, strict=True)
-        rows = [Rows(np.column_stack([unit.base, part]), unit.target) for unit, part in pairs]
-    fitted = BaseProducts([rows[unit] for unit in kept], sd)
-    left = [rows[unit].target - fitted.fitted(rows[unit].base) for unit in held]
-    return float(sum(part @ part for part in left))

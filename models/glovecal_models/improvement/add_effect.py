@@ -103,10 +103,12 @@ def add_effect(
     )
     if undone.gain < least_gain:
         return undone
-    if control_share is None and fresh.has_columns:
+    has_form = any(item.name == name and item.curves for item in fit.effects)
+    if fresh.has_columns and (has_form or control_share is None):
         control_share = share_left_by_control(
-            model, repaired_takes(takes, has), effect, chosen, cancelled, limits.diagnosis
-        )
+            model, repaired_takes(takes, has), effect, chosen, known_share=control_share,
+            has_form=has_form, cancelled=cancelled, limits=limits.diagnosis,
+        )  # fmt: skip
     if control_share is not None:
         undone = replace(undone, control_rmse_deg=control_share * total_rmse_deg(before, chosen))
     # Who asks for an effect whatever it does (a negative least gain) gets it.

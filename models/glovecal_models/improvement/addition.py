@@ -78,6 +78,14 @@ class Addition:
         return {name: curves for name, curves in found.items() if name in self.rotations}
 
     @property
+    def control_share(self) -> float | None:
+        """Of the held-out error of the rotations that the control leaves, at most 1."""
+        before = total_rmse_deg(self.before, self.rotations)
+        if self.control_rmse_deg is None or before <= 0:
+            return None
+        return min(self.control_rmse_deg / before, 1.0)
+
+    @property
     def is_beaten_by_control(self) -> bool:
         """Whether the control, which cannot be right, leaves a smaller held-out error than the effect."""
         control = self.control_rmse_deg

@@ -9,6 +9,7 @@ import numpy as np
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.diagnosis.candidates import assessed
 from glovecal_models.diagnosis.diagnosis import Diagnosis
+from glovecal_models.diagnosis.formed_error import formed_control_share
 from glovecal_models.diagnosis.forward_design import forward
 from glovecal_models.diagnosis.known_effect import known_effects
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
@@ -25,11 +26,16 @@ def share_left_by_control(
     takes: Sequence[Take],
     effect: Effect,
     rotations: Sequence[str],
+    *,
+    known_share: float | None = None,
+    has_form: bool = False,
     cancelled: Cancel | None = None,
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
 ) -> float | None:
     """Of the RMSE of ``rotations`` on held-out takes, at most 1; None when the takes cannot judge it.
 
+    ``known_share``: what a diagnosis found for the effect's own columns; ``has_form``: the effect has learned
+    a form, so that its control may learn one too, and counts with it where that leaves less.
     Raises Cancelled.
     """
 
@@ -44,9 +50,12 @@ def share_left_by_control(
     known = [item for item in known_effects(model) if item.effect.name != effect.name]
     linear = model.method in ("raw", "linear")
     direction = forward(even, model.layout, joints, linear=linear, known=known, limits=limits)
-    found, _ = assessed(direction, [effect], np.random.default_rng(0), set(), progress)
-    judged = next((item for item in found if item.effect == effect.name), None)
-    return None if judged is None else control_share(judged, rotations)
+    if known_share is None:
+        found, _ = assessed(direction, [effect], np.random.default_rng(0), set(), progress)
+        judged = next((item for item in found if item.effect == effect.name), None)
+        known_share = None if judged is None else control_share(judged, rotations)
+    formed = formed_control_share(direction, effect, joints) if has_form else None
+    return min((share for share in (known_share, formed) if share is not None), default=None)
 
 
 def share_in(diagnosis: Diagnosis | None, name: str, rotations: Sequence[str]) -> float | None:

@@ -235,7 +235,7 @@ class _Loop:
         )
         self.trials.append(Trial(addition, reasons, removed, diagnosis, action))
         added = AddedInStep.of(addition, constants, diagnosis, confidence_set, action)
-        self._step(model, added, diagnosis)
+        self._step(model, added)
         return True
 
     def _add_associated(self, diagnosis: Diagnosis) -> bool:
@@ -302,16 +302,10 @@ class _Loop:
         wearings = [take.wearing for take in self.takes]
         return replace(model, unseen_wearing=unseen_wearing(wearings, left_out, noise_of(model.rotations)))
 
-    def _step(
-        self, model: CalibrationModel, added: AddedInStep | None, diagnosis: Diagnosis | None = None
-    ) -> None:
+    def _step(self, model: CalibrationModel, added: AddedInStep | None) -> None:
         per_rotation, overall = step_errors(model, self.holdout, self.errors)
-        control = None
-        if diagnosis is not None and added is not None:
-            share = added.control_share
-            if share is None:
-                share = share_in(diagnosis, added.effect, added.where)
-            control = None if share is None else self._with_control(added.where, share)
+        share = None if added is None else added.control_share
+        control = None if added is None or share is None else self._with_control(added.where, share)
         held_out = self.errors.overall_deg
         self.steps.append(Step(model, added, overall, per_rotation, control, held_out))
 

@@ -38,7 +38,7 @@ class AddedInStep:
     associated_with: str | None = None
     """The recorded column that the residual went along with, in words, where that is why it was added."""
     control_share: float | None = None
-    """Of the error that its control leaves, where it was added for an association."""
+    """Of the error of its rotations that its control leaves; None where there is none."""
     curves: Mapping[str, LaneCurves] = field(default_factory=dict)
     """For each rotation what its learned form adds over its inputs."""
 
@@ -71,9 +71,12 @@ class AddedInStep:
         if action is not None:
             phrase = action.association.phrase
             return cls(
-                name, where, (name,), parameters, None, None, phrase, action.control_share, addition.curves
+                name, where, (name,), parameters, None, None, phrase, addition.control_share, addition.curves
             )
-        return cls(name, where, rivals, parameters, addition.claim, following, curves=addition.curves)
+        return cls(
+            name, where, rivals, parameters, addition.claim, following, None, addition.control_share,
+            addition.curves,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)

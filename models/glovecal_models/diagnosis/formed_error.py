@@ -1,0 +1,114 @@
+"""An effect in the form that the takes ask for, and its control: held-out errors of one joint's sensor.
+
+The control has the same basis, the same choice of a form inside each fold, and the same freedom.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from glovecal_models.calibration.folds import folds_over_takes
+from glovecal_models.calibration.held_out import BaseProducts, Rows
+from glovecal_models.diagnosis.form_inputs import FormInputs
+from glovecal_models.diagnosis.forward_design import ForwardDesign
+from glovecal_models.effects.base.assessment import HeldOutRmse
+from glovecal_models.effects.base.control import control_signals
+from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.facts import Settings
+from glovecal_models.effects.base.learned_form import LearnedForm
+from glovecal_models.effects.base.signals import Signals
+from glovecal_models.errors import BadInput
+
+FOLDS = 4
+
+
+def formed_rmse(design: ForwardDesign, effect: Effect, joint: int, seed: int = 0) -> HeldOutRmse | None:
+    """Degrees; None where these takes cannot show the effect, or allow no control."""
+    control = _inputs_of_control(design, effect, joint, seed)
+    if control is None:
+        return None
+    takes = design.of_joint(joint)
+    settings, shape = _settings(effect, takes)
+    right = FormInputs.of(design, joint, effect, takes, settings, shape)
+    squares = (_base(design, joint), _squared(design, joint, right), _squared(design, joint, control))
+    return HeldOutRmse(*(float(np.sqrt(square / _count(design, joint))) for square in squares))
+
+
+def formed_control_share(
+    design: ForwardDesign, effect: Effect, rotations: Sequence[str], seed: int = 0
+) -> float | None:
+    """Of the RMSE over ``rotations`` that the control leaves, at most 1; None as above."""
+    before = after = 0.0
+    for name in rotations:
+        joint = design.rotations.index(name)
+        control = _inputs_of_control(design, effect, joint, seed)
+        if control is None:
+            return None
+        before += _base(design, joint)
+        after += _squared(design, joint, control)
+    return min(float(np.sqrt(after / before)), 1.0) if before > 0 else None
+
+
+def _inputs_of_control(design: ForwardDesign, effect: Effect, joint: int, seed: int) -> FormInputs | None:
+    takes = design.of_joint(joint)
+    if effect.not_applicable_reason(takes) is not None:
+        return None
+    settings, shape = _settings(effect, takes)
+    try:
+        wrong = control_signals(effect, takes, np.random.default_rng(seed))
+    except BadInput:
+        return None
+    step = -1 if effect.control == "time-reversed" else 1
+    return FormInputs.of(design, joint, effect, wrong, settings, shape, step)
+
+
+def _settings(effect: Effect, takes: Sequence[Signals]) -> tuple[Settings, np.ndarray]:
+    """Of the effect, with the middle shape (1, P) of its grid."""
+    settings = effect.fit_constants(takes)
+    grid = effect.grid(takes, settings)
+    return settings, grid[len(grid) // 2]
+
+
+def _count(design: ForwardDesign, joint: int) -> int:
+    return max(sum(len(unit.target) for unit in design.products[joint].units), 1)
+
+
+def _base(design: ForwardDesign, joint: int) -> float:
+    """Without the effect, degrees squared."""
+    return design.once(f"held-out base {joint}", lambda: _squared(design, joint, None))
+
+
+def _squared(design: ForwardDesign, joint: int, inputs: FormInputs | None) -> float:
+    """Sum of squares, degrees squared, on units held out in folds; the form is chosen on the others."""
+    units = design.products[joint].units
+    owner = np.array(design.unit_take)
+    if len(np.unique(owner)) < 2:
+        owner = np.arange(len(units))  # pieces of the only take
+    total = 0.0
+    for fold in folds_over_takes(owner, FOLDS):
+        held, kept = (np.flatnonzero(mask).tolist() for mask in (fold.held_out, ~fold.held_out))
+        if kept:
+            total += _squared_on(design, joint, inputs, kept, held)
+    return total
+
+
+def _squared_on(
+    design: ForwardDesign, joint: int, inputs: FormInputs | None, kept: Sequence[int], held: Sequence[int]
+) -> float:
+    rows, sd = design.products[joint].units, None
+    if inputs is not None:
+        extra, prior = inputs.plain, inputs.prior_sd
+        terms = inputs.terms(design, joint, kept)
+        if terms:
+            form = LearnedForm.over(terms, [inputs.values[unit] for unit in kept])
+            learned = [form.columns(values)[:, 0, :] for values in inputs.values]
+            extra = [np.column_stack(pair) for pair in zip(extra, learned, strict=True)]
+            prior = np.concatenate([prior, np.ones(form.count)])
+        sd = np.concatenate([np.full(rows[0].base.shape[1], np.inf), prior])
+        pairs = zip(rows, extra, strict=True)
+        rows = [Rows(np.column_stack([unit.base, part]), unit.target) for unit, part in pairs]
+    fitted = BaseProducts([rows[unit] for unit in kept], sd)
+    left = [rows[unit].target - fitted.fitted(rows[unit].base) for unit in held]
+    return float(sum(part @ part for part in left))
