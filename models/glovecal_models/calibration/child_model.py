@@ -41,7 +41,7 @@ def child_model(
     fresh = {name: _rotation_model(takes, name, fit, errors, settings) for name in fit.results}
     rotations = tuple(_renewed(item, fresh.get(item.rotation)) for item in parent.rotations)
     left_out = left_out_wearings(
-        takes, tuple(fresh), wanted, settings, sample_weights=fit.sample_weights, cancelled=cancelled
+        takes, tuple(fresh), wanted, settings, optima=fit.optima, cancelled=cancelled
     )
     if parent.unseen_wearing is not None:
         left_out += [item for item in parent.unseen_wearing.left_out if item.rotation not in fresh]

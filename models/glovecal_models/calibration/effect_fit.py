@@ -32,13 +32,14 @@ from glovecal_models.effects.base.form_curve import LaneCurves
 from glovecal_models.effects.base.learned_form import LearnedForm
 from glovecal_models.layout import Correspondence
 from glovecal_models.progress import Cancel, stop_if
+from glovecal_models.regression.lmc_search import LmcOptimum
 from glovecal_models.regression.regressor import Regressor
 
 TURNS = 2
 
 
-SampleWeights = tuple[Mapping[str, float], ...]
-"""What each sample of a rotation counts, for each time that the regressors are trained."""
+Optima = tuple[Mapping[str, LmcOptimum], ...]
+"""What each rotation's training found, for each time that the regressors are trained."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class EffectFit:
     results: Mapping[str, FitResult]
     """For each rotation."""
     effects: tuple[AddedEffect, ...]
-    sample_weights: SampleWeights = ()
+    optima: Optima = ()
 
     def regressor(self, rotation: str) -> Regressor:
         found = self.results[rotation]
@@ -61,30 +62,30 @@ def fit_with_effects(
     wanted: Sequence[EffectRequest],
     settings: TrainingSettings,
     *,
-    sample_weights: SampleWeights = (),
+    optima: Optima = (),
     cancelled: Cancel | None = None,
 ) -> EffectFit:
     """Train ``rotations`` with those of ``wanted`` that predict something.
 
-    ``sample_weights`` of a fit of the same with more takes: they are not chosen again. Raises NotTrainable,
-    Cancelled.
+    ``optima`` of a fit of the same with more takes: sample weights are not chosen again, and searches begin
+    there. Raises NotTrainable, Cancelled.
     """
     wanted = [item for item in wanted if item.has_columns and set(item.rotations) & set(rotations)]
     columns = {name: correspondence_for(takes, name, settings) for name in rotations}
     corrected: dict[str, list[np.ndarray]] = {}
     results: dict[str, FitResult] = {}
     effects: tuple[AddedEffect, ...] = ()
-    weights: list[Mapping[str, float]] = []
+    found: list[Mapping[str, LmcOptimum]] = []
 
     def trained() -> None:
-        known = sample_weights[len(weights)] if sample_weights else {}
+        known = optima[len(found)] if optima else {}
         for name in rotations:
             stop_if(cancelled, "adding an effect")
-            # Only its own weight: the same fit is known again whatever other rotations are trained beside.
+            # Only its own: the same fit is known again whatever other rotations are trained beside.
             own = ((name, known[name]),) if name in known else ()
-            chosen = replace(settings, sample_weights=own)
+            chosen = replace(settings, optima=own)
             results[name] = _trained(takes, columns[name], corrected.get(name), chosen, cancelled)
-        weights.append(chosen_weights({name: item.settings for name, item in results.items()}))
+        found.append(found_optima({name: item.settings for name, item in results.items()}))
 
     for turn in range(TURNS if wanted else 1):
         trained()
@@ -97,13 +98,13 @@ def fit_with_effects(
             corrected = _explained(takes, columns, regressors, effects)
     if wanted:
         trained()
-    return EffectFit(results, effects, tuple(weights))
+    return EffectFit(results, effects, tuple(found))
 
 
-def chosen_weights(settings: Mapping[str, Mapping[str, Any]]) -> dict[str, float]:
-    """What each sample counted, from the ``settings`` of each rotation's regressor; processes only."""
-    found = {name: item.get("evidence", {}).get("sample_weight") for name, item in settings.items()}
-    return {name: float(weight) for name, weight in found.items() if weight is not None}
+def found_optima(settings: Mapping[str, Mapping[str, Any]]) -> dict[str, LmcOptimum]:
+    """From the ``settings`` of each rotation's regressor; processes only."""
+    found = {name: LmcOptimum.of(item.get("evidence", {})) for name, item in settings.items()}
+    return {name: optimum for name, optimum in found.items() if optimum is not None}
 
 
 def correspondence_for(takes: PreparedTakes, rotation: str, settings: TrainingSettings) -> Correspondence:

@@ -96,8 +96,8 @@ def _fit(task: FitTask, cancelled: Cancel | None, report: Report | None) -> Regr
         return fit_best_kernel(
             samples, task.rotation, settings, thorough=thorough, cancelled=cancelled, report=report
         )
-    weight = dict(settings.sample_weights).get(task.rotation)
-    start = fit_weighted(samples, weight=weight, seed=settings.seed, cancelled=cancelled, report=report)
+    known = dict(settings.optima).get(task.rotation)
+    start = fit_weighted(samples, known=known, seed=settings.seed, cancelled=cancelled, report=report)
     if settings.method == "lmc_gpr":
         return start.regressor
     sparse = fit_spgp(

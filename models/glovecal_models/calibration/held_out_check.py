@@ -10,7 +10,7 @@ import numpy as np
 from glovecal_models.calibration.effect_correction import EffectCorrection
 from glovecal_models.calibration.effect_fit import (
     EffectFit,
-    SampleWeights,
+    Optima,
     correspondence_for,
     fit_with_effects,
     own_signals,
@@ -56,13 +56,13 @@ def held_out_errors(
     wanted: Sequence[EffectRequest],
     settings: TrainingSettings,
     *,
-    sample_weights: SampleWeights = (),
+    optima: Optima = (),
     cancelled: Cancel | None = None,
     report: Report | None = None,
 ) -> HeldOutErrors:
     """Leave out whole takes, in ``settings.folds`` folds, at least two. Raises NotTrainable, Cancelled.
 
-    ``sample_weights`` of the fit on all takes, where it is known (``fit_with_effects``).
+    ``optima`` of the fit on all takes, where it is known (``fit_with_effects``).
 
     A single take, and short takes of one motion each, are left out in pieces (``left_out``).
     """
@@ -86,9 +86,7 @@ def held_out_errors(
         kept = parts.some(np.flatnonzero(~held).tolist())
         left = parts.some(np.flatnonzero(held).tolist())
         try:
-            fit = fit_with_effects(
-                kept, rotations, wanted, settings, sample_weights=sample_weights, cancelled=cancelled
-            )
+            fit = fit_with_effects(kept, rotations, wanted, settings, optima=optima, cancelled=cancelled)
         except NotTrainable:
             continue  # what is left of this fold cannot carry a model: it says nothing about the error
         for name, errors in errors_of(fit, left, rotations, settings).items():

@@ -192,7 +192,7 @@ def fit_best_kernel(
         raise BadInput(f"no kernel {kept!r} for {rotation}; there are {', '.join(CANDIDATE)}")
     candidates = (CANDIDATE[kept],) if kept else candidates_of(settings.method)
     base = fit_weighted(
-        samples, weight=dict(settings.sample_weights).get(rotation), seed=settings.seed,
+        samples, known=dict(settings.optima).get(rotation), seed=settings.seed,
         cancelled=cancelled, report=part(report, 0.0, 0.2),
     )  # fmt: skip
     if kept == LMC:

@@ -8,7 +8,7 @@ import numpy as np
 
 from glovecal_models.calibration.effect_fit import (
     EffectFit,
-    SampleWeights,
+    Optima,
     correspondence_for,
     fit_with_effects,
 )
@@ -28,18 +28,16 @@ def left_out_wearings(
     wanted: Sequence[EffectRequest],
     settings: TrainingSettings,
     *,
-    sample_weights: SampleWeights = (),
+    optima: Optima = (),
     cancelled: Cancel | None = None,
 ) -> list[LeftOutWearing]:
-    """Empty with a single wearing. ``sample_weights`` as in ``held_out_errors``. Raises Cancelled."""
+    """Empty with a single wearing. ``optima`` as in ``held_out_errors``. Raises Cancelled."""
     wearings = [take.wearing for take in takes.takes]
     settings, found = left_out_settings(settings), []
     for group in wearing_groups(wearings):
         kept = takes.some([at for at, name in enumerate(wearings) if name not in group])
         try:
-            fit = fit_with_effects(
-                kept, rotations, wanted, settings, sample_weights=sample_weights, cancelled=cancelled
-            )
+            fit = fit_with_effects(kept, rotations, wanted, settings, optima=optima, cancelled=cancelled)
         except NotTrainable:
             continue  # what is left cannot carry a model: it says nothing about the error
         trained = len(set(wearings) - set(group))

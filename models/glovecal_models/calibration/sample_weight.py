@@ -24,7 +24,7 @@ from glovecal_models.calibration.folds import folds_over_takes
 from glovecal_models.errors import NotTrainable
 from glovecal_models.progress import Cancel, Report, part
 from glovecal_models.regression.fast_lmc import finish_search, fit_lmc_gpr
-from glovecal_models.regression.lmc_search import LmcSearch, fit_roughly
+from glovecal_models.regression.lmc_search import LmcOptimum, LmcSearch, fit_roughly
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.regression.training_samples import check_samples
 
@@ -69,23 +69,27 @@ class Weighted:
 def fit_weighted(
     samples: Recorded,
     *,
-    weight: float | None = None,
+    known: LmcOptimum | None = None,
     seed: int = 0,
     cancelled: Cancel | None = None,
     report: Report | None = None,
 ) -> Weighted:
-    """The LMC-GPR of ``samples``, each counting ``weight``; None: what serves takes left out best.
+    """The LMC-GPR of ``samples``, each counting what serves takes left out best.
+
+    ``known``: of a training of more samples of the same takes: their weight is kept, the search begins there.
 
     The regressor's evidence tells ``effective_sample_ratio``, ``degrees_of_freedom`` and, where weights were
     tried, ``held_out_rmse_deg`` of each. Raises NotTrainable, Cancelled.
     """
     say = report or (lambda sentence, share: None)
+    if known is not None:
+        say("searching from a known optimum", 0.0)
+        begun = LmcSearch.begin(
+            samples.inputs, samples.target, sample_weight=known.sample_weight, start=known.parameters,
+            seed=seed, cancelled=cancelled,
+        )  # fmt: skip
+        return Weighted(finish_search(begun, cancelled=cancelled), known.sample_weight)
     say("searching from several starts", 0.0)
-    if weight is not None:
-        known = LmcSearch.begin(
-            samples.inputs, samples.target, sample_weight=weight, seed=seed, cancelled=cancelled
-        )
-        return Weighted(finish_search(known, cancelled=cancelled), weight)
     search = LmcSearch.begin(samples.inputs, samples.target, seed=seed, cancelled=cancelled)
     whole, need = None, None
     if search.is_expensive:  # a rough process may show the need for a tenth of the cost

@@ -7,6 +7,7 @@ from typing import Literal, get_args
 
 from glovecal_models.calibration.samples import DEFAULT_SAMPLES
 from glovecal_models.errors import BadInput
+from glovecal_models.regression.lmc_search import LmcOptimum
 
 Method = Literal["raw", "linear", "lmc_gpr", "spgp", "auto", "polynomial_gpr", "general_gpr"]
 METHODS: tuple[Method, ...] = get_args(Method)
@@ -35,8 +36,9 @@ class TrainingSettings:
     """(rotation, candidate kernel) already chosen: when a model is trained again, with an effect for example,
     its kernels stay, so that a change of the error is the effect's."""
 
-    sample_weights: tuple[tuple[str, float], ...] = ()
-    """(rotation, weight of each sample) already chosen: a fold of the same training does not choose again."""
+    optima: tuple[tuple[str, LmcOptimum], ...] = ()
+    """(rotation, optimum) already found with more takes: a fold of the same training keeps its sample weight
+    and begins its search there."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "kernels", tuple((str(name), str(kernel)) for name, kernel in self.kernels))

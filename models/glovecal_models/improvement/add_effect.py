@@ -73,9 +73,7 @@ def add_effect(
         proposal = proposed(model, takes, effect, rotations, cancelled, limits.diagnosis)
         constants, rotations = proposal.constants, proposal.rotations or rotations
     chosen = _chosen(model, effect, rotations)
-    fresh, live = EffectRequest(name, chosen, dict(constants or {})), None
-    if isinstance(effect, SignatureEffect):
-        fresh, live = _acting_live(model, takes, has, fresh, effect, cancelled)
+    fresh = EffectRequest(name, chosen, dict(constants or {}))
     wanted = (*(item for item in has if item.name != name), _joined(has, fresh))
     prepared = PreparedTakes.of(repaired_takes(takes, wanted), model.layout)
     if isinstance(effect, IntervalEffect):
@@ -94,13 +92,11 @@ def add_effect(
     fit = fit_with_effects(prepared, chosen, wanted, settings, cancelled=cancelled)
     with_it = part(report, 0.5, 0.9, f"with {name}")
     after = held_out_errors(
-        prepared, chosen, wanted, settings, sample_weights=fit.sample_weights, cancelled=cancelled,
+        prepared, chosen, wanted, settings, optima=fit.optima, cancelled=cancelled,
         report=with_it,
     )  # fmt: skip
     judged = tuple(judged or chosen)
-    undone = Addition(
-        name, chosen, False, before, after, model, has, judged=judged, least_gain=least_gain, live=live
-    )
+    undone = Addition(name, chosen, False, before, after, model, has, judged=judged, least_gain=least_gain)
     if undone.gain < least_gain:
         return undone
     has_form = any(item.name == name and item.curves for item in fit.effects)
@@ -114,6 +110,10 @@ def add_effect(
     # Who asks for an effect whatever it does (a negative least gain) gets it.
     if undone.is_beaten_by_control and least_gain >= 0:
         return undone
+    live = None
+    if isinstance(effect, SignatureEffect):
+        fresh, live = _acting_live(model, takes, has, fresh, effect, cancelled)
+        wanted = (*(item for item in has if item.name != name), _joined(has, fresh))
     evidence = _evidence(before, after, chosen, control_share) | dict(live.evidence if live else {})
     effects = [*kept_lanes(model.effects, chosen), *fit.effects, *columnless_effects(wanted, model.effects)]
     effects = [replace(item, evidence=evidence) if item.name == name else item for item in effects]
@@ -123,7 +123,7 @@ def add_effect(
     )
     mine = [item.described() for item in fit.effects if item.name == name]
     described = {key: value for each in mine for key, value in each.items()}
-    return replace(undone, added=True, model=child, wanted=tuple(wanted), parameters=described)
+    return replace(undone, added=True, model=child, wanted=tuple(wanted), parameters=described, live=live)
 
 
 def _chosen(model: CalibrationModel, effect: Effect, rotations: Sequence[str] | None) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.calibration.effect_fit import SampleWeights, chosen_weights
+from glovecal_models.calibration.effect_fit import Optima, found_optima
 from glovecal_models.calibration.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.calibration.left_out_wearings import left_out_wearings
 from glovecal_models.calibration.model import CalibrationModel
@@ -288,7 +288,7 @@ class _Loop:
     def _held_out(self, model: CalibrationModel) -> HeldOutErrors:
         prepared = PreparedTakes.of(self.takes, self.layout)
         return held_out_errors(
-            prepared, trained_rotations(model), [], self.settings, sample_weights=_weights_of(model),
+            prepared, trained_rotations(model), [], self.settings, optima=_optima_of(model),
             cancelled=self.cancelled,
         )  # fmt: skip
 
@@ -297,7 +297,7 @@ class _Loop:
         prepared = PreparedTakes.of(self.takes, self.layout)
         names = trained_rotations(model)
         left_out = left_out_wearings(
-            prepared, names, [], self.settings, sample_weights=_weights_of(model), cancelled=self.cancelled
+            prepared, names, [], self.settings, optima=_optima_of(model), cancelled=self.cancelled
         )
         wearings = [take.wearing for take in self.takes]
         return replace(model, unseen_wearing=unseen_wearing(wearings, left_out, noise_of(model.rotations)))
@@ -323,6 +323,6 @@ class _Loop:
             self.report(text, min(share, 1.0))
 
 
-def _weights_of(base: CalibrationModel) -> SampleWeights:
-    """Those with which a model without effects was trained."""
-    return (chosen_weights({item.rotation: item.regressor.settings() for item in base.rotations}),)
+def _optima_of(base: CalibrationModel) -> Optima:
+    """Those of a model without effects."""
+    return (found_optima({item.rotation: item.regressor.settings() for item in base.rotations}),)

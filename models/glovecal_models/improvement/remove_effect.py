@@ -60,9 +60,7 @@ def remove_effect(
     every = trained_rotations(model)
     prepared = PreparedTakes.of(repaired_takes(takes, wanted), model.layout)
     fit = fit_with_effects(prepared, every, wanted, settings, cancelled=cancelled)
-    errors = held_out_errors(
-        prepared, every, wanted, settings, sample_weights=fit.sample_weights, cancelled=cancelled
-    )
+    errors = held_out_errors(prepared, every, wanted, settings, optima=fit.optima, cancelled=cancelled)
     effects = [*fit.effects, *columnless_effects(wanted, model.effects)]
     return child_model(
         model, parent_id, prepared, fit, effects, errors, settings, take_hashes, wanted, cancelled

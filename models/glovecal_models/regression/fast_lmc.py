@@ -185,6 +185,7 @@ def _evidence(
         "certificate": certificate.how,
         "target_scale_deg": scale_deg,
         "lengthscales": lengthscales.tolist(),
+        "optimum": trained.parameters.tolist(),
         "evaluations": refined.evaluations,
         "exact_evaluation": trained.reference is not None,
         "served_nodes": len(served.pivots),

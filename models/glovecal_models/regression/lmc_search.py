@@ -10,8 +10,9 @@ samples. No nodes are chosen and nothing is certified: it is never served.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from glovecal_models.regression.multi_start import (
     Candidate,
     descend,
     screen,
+    screen_one,
     search_exactly,
     some_samples,
 )
@@ -35,6 +37,20 @@ from glovecal_models.regression.training_samples import Standardised, check_samp
 
 MOST_EXACT = 4000
 """Distinct inputs up to which an N x N matrix is formed; 128 MB each at this size."""
+
+
+class LmcOptimum(NamedTuple):
+    """What a training has found; one of nearly the same samples begins there, from no other start."""
+
+    sample_weight: float
+    parameters: tuple[float, ...] = ()
+    """Log lengthscales and log noise-to-signal ratio (D + 1,), standardised units; empty: not known."""
+
+    @classmethod
+    def of(cls, evidence: Mapping[str, Any]) -> LmcOptimum | None:
+        """From what a regressor tells of its training; None where it is no LMC-GPR."""
+        weight = evidence.get("sample_weight")
+        return None if weight is None else cls(float(weight), tuple(map(float, evidence.get("optimum", ()))))
 
 
 @dataclass(frozen=True)
@@ -59,15 +75,20 @@ class LmcSearch:
         target: np.ndarray,
         *,
         sample_weight: float = 1.0,
+        start: Sequence[float] = (),
         seed: int = 0,
         cancelled: Cancel | None = None,
     ) -> LmcSearch:
-        """From ``inputs`` (N, D), counts, and ``target`` (N,), degrees. Raises NotTrainable, Cancelled."""
+        """From ``inputs`` (N, D), counts, and ``target`` (N,), degrees. ``start``: ``LmcOptimum.parameters``,
+        where it is known; else several are tried. Raises NotTrainable, Cancelled."""
         standard = standardise(*check_samples(inputs, target))
         samples = MergedSamples.of(standard.x, standard.y, sample_weight)
         generator = np.random.default_rng(seed)
-        found, account = screen(samples, standard.x, standard.y, generator, cancelled, sample_weight)
-        on_nodes, distinct = None, len(samples.inputs)
+        distinct, on_nodes = len(samples.inputs), None
+        if len(start) == standard.x.shape[1] + 1:
+            found, account = screen_one(samples, np.array(start), cancelled)
+        else:
+            found, account = screen(samples, standard.x, standard.y, generator, cancelled, sample_weight)
         if distinct > FEW:
             nodes = min(MOST_NODES, distinct // 2)
             on_nodes = descend(samples, found[0].parameters, fine=True, most_nodes=nodes, cancelled=cancelled)

@@ -171,6 +171,18 @@ def screen(
     return _distinct(found), account
 
 
+def screen_one(
+    merged: MergedSamples, start: np.ndarray, cancelled: Cancel | None = None
+) -> tuple[list[Candidate], list[dict[str, object]]]:
+    """The same from one start (D + 1,) that is nearly an optimum already."""
+    account: list[dict[str, object]] = []
+    candidate = None
+    if len(merged.inputs) <= FEW:
+        candidate = descend(merged, start, fine=True, most_nodes=SCREENING_NODES, cancelled=cancelled)
+        _note(account, start, candidate)
+    return [candidate or Candidate(start, np.inf, 0, low_rank=False)], account
+
+
 def some_samples(
     x: np.ndarray, y: np.ndarray, most: int, generator: np.random.Generator, weight: float = 1.0
 ) -> MergedSamples:
