@@ -223,6 +223,11 @@ def _fitted_effects(
     return tuple(added)
 
 
+def _own_of_takes(rows: Sequence[int]) -> list[np.ndarray]:
+    """For each take (N, takes): one in its own column."""
+    return [np.eye(len(rows))[np.full(count, at)] for at, count in enumerate(rows)]
+
+
 def _learned_form(
     group: EffectGroup,
     values: Sequence[Mapping[str, np.ndarray]],
@@ -243,6 +248,11 @@ def _learned_form(
             np.column_stack([part[::FORM_EVERY] for part in parts])
             for parts in zip(*extra[name], strict=True)
         ]
+        prior = np.concatenate(priors[name])
+        if group.wanted.effect.take_sd_deg:
+            of_takes = _own_of_takes([len(part) for part in own])
+            own = [np.column_stack(parts) for parts in zip(own, of_takes, strict=True)]
+            prior = np.append(prior, np.full(len(of_takes), group.wanted.effect.take_sd_deg))
         inputs = {
             key: np.concatenate([take[key][index, lane] for take, index in zip(values, some, strict=True)])
             for key in values[0]
@@ -251,7 +261,7 @@ def _learned_form(
             FormRows(
                 np.concatenate([unit.base[::FORM_EVERY] for unit in bases[name]]),
                 np.concatenate(own),
-                np.concatenate(priors[name]),
+                prior,
                 {key: column[:, None] for key, column in inputs.items()},
                 np.concatenate([unit.target[::FORM_EVERY] for unit in bases[name]]),
             )

@@ -47,7 +47,7 @@ def example_signals(seed: int = 1, seconds: float = 20.0, lanes: int = 3) -> lis
         pressed = np.convolve(generator.random(frames) < 0.01, np.hanning(40), mode="same")
         context = {
             "supply_v": 4.1 - 0.15 * number + 0.02 * generator.normal(size=frames),
-            "temperature_c": 24.0 + 3.0 * number + np.linspace(0, 2, frames),
+            "temperature_c": 24.0 + 3.0 * number + np.linspace(0, 1.0 + 0.7 * number, frames),
             "humidity_pct": 40.0 + 5.0 * np.sin(number + np.linspace(0, 3, frames)),
             "power_on_s": 20.0 + 220.0 * number + np.arange(frames) / RATE_HZ,
             "contact_n": 8.0 * pressed,

@@ -75,6 +75,10 @@ class Effect(EffectFacts, ABC):
         unknown = [name for name in self.context if name not in context]
         return f"context {unknown[0]} is not sent" if unknown else None
 
+    def as_stored(self, settings: Settings) -> Effect:
+        """The effect as a model with these settings learned it, where it was another one then."""
+        return self
+
     def knows_wearing(self, settings: Settings, wearing: str) -> bool:
         """Whether it learned what is special about this wearing."""
         return False
@@ -116,6 +120,10 @@ class Effect(EffectFacts, ABC):
 
     form_unit: ClassVar[str] = ""
     """Of those signals, all alike; "" where they have none, or are context columns of any unit."""
+
+    take_sd_deg: ClassVar[float] = 0.0
+    """What single takes are expected to have of their own, as a standard deviation: a learned form is chosen
+    only for what it explains beyond that."""
 
     @abstractmethod
     def stream(self, settings: Settings, shape: np.ndarray) -> Stream:

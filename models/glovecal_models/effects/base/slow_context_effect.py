@@ -1,9 +1,7 @@
-"""A context column that the sensor follows late: besides the column's value its slope matters.
+"""A context column that the sensor follows late: besides the column's value, how far the sensor is behind it.
 
-A sensor that takes minutes T to take up what surrounds it feels h - T dh/dt, to first order; inside a take
-the second part is often the larger one. The slope is that of a line through the recent past, frame by frame:
-older frames count less, within ``MEMORY_S``. Until a line is known to better than chance it is taken as flat,
-so that a column's noise and steps of its last digit do not pass for a change.
+A sensor that takes minutes T to take up what surrounds it feels h - T s, where s is the column's mean slope
+over the past minutes (``followed_column``); inside a take the second part is often the larger one.
 """
 
 from __future__ import annotations
@@ -16,96 +14,48 @@ import numpy as np
 from glovecal_models.effects.base.context_effect import PRIOR_DEG, ContextEffect
 from glovecal_models.effects.base.effect import Stream
 from glovecal_models.effects.base.facts import Settings
-from glovecal_models.effects.base.history_effect import LONGEST_GAP_S, elapsed_s, unbroken
-from glovecal_models.effects.base.relaxation import relax, relax_once
+from glovecal_models.effects.base.followed_column import ColumnStart, FollowedColumn, mean_slopes
+from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
 from glovecal_models.effects.base.signals import Signals
 
-MEMORY_S = 40.0
-FLAT_S = 2.0
-"""A past that reaches back so far is believed by half."""
-_TAU = np.full(5, MEMORY_S)
-
-
-class SlopeState:
-    """Sums over the past, relative to its first frame. Unknown values (NaN) count for nothing."""
-
-    def __init__(self) -> None:
-        self._sums = np.zeros(5)
-        self._origin = np.nan
-        self._passed_s = 0.0
-
-    def step(self, elapsed_s: float, value: float) -> float:
-        """Slope per second after the next frame's value."""
-        self._passed_s += elapsed_s
-        relax_once(
-            self._sums, elapsed_s, self._moments(np.array([self._passed_s]), np.array([value]))[0], _TAU
-        )
-        return float(_slope(self._sums))
-
-    def run(self, elapsed_s: np.ndarray, value: np.ndarray) -> np.ndarray:
-        """Slopes (B,) after each of B frames: the same as so many steps."""
-        passed = self._passed_s + np.cumsum(elapsed_s)
-        sums = relax(self._sums, elapsed_s, self._moments(passed, value), _TAU)
-        self._passed_s = float(passed[-1])
-        return _slope(sums)
-
-    def _moments(self, passed: np.ndarray, value: np.ndarray) -> np.ndarray:
-        known = np.isfinite(value)
-        if not np.isfinite(self._origin) and known.any():
-            self._origin = float(value[known.argmax()])
-        height = np.where(known, value - self._origin, 0.0) if known.any() else np.zeros(len(value))
-        one = known.astype(float)
-        return np.column_stack([one, one * passed, one * passed**2, height, height * passed])
-
-
-def _slope(sums: np.ndarray) -> np.ndarray:
-    """(...,) of sums (..., 5)."""
-    one, time, square, height, product = np.moveaxis(sums, -1, 0)
-    spread = one * square - time**2 + (one * FLAT_S) ** 2
-    return np.where(spread > 0, (one * product - time * height) / np.maximum(spread, 1e-300), 0.0)
-
-
-def slopes(time_s: np.ndarray, value: np.ndarray) -> np.ndarray:
-    """(N,) per second; a gap in the frames begins anew."""
-    elapsed = elapsed_s(time_s)
-    result = np.zeros(len(time_s))
-    for part in unbroken(time_s):
-        if part.stop > part.start:
-            result[part] = SlopeState().run(elapsed[part], value[part])
-    return result
-
-
 STEEPEST_SHARE = 99.0
-"""Percentile of the slopes in training; steeper ones are held there."""
+"""Percentile of the slopes in training: the unit of the slope's column."""
+BEYOND = 1.5
+"""Steeper ones are followed so far, in that unit: the next take is seldom inside all others."""
+KNOWN_AFTER_S = 10.0
+"""From then on the slope is as good as known: on simulated takes the error it leaves falls no further."""
+START = "start"
+"""Where settings keep how takes begin; models stored before have none."""
 
 
 class SlowContextEffect(ContextEffect):
-    """Columns of the context column and its square, and one more: its slope over the last half minute."""
+    """Columns of the context column and its square, and one more: its mean slope over the past minutes."""
 
     has_memory: ClassVar[bool] = True
+    take_sd_deg: ClassVar[float] = 0.5  # what came before the first frame is known by its slope only
 
     def transient_s(self, shape: np.ndarray) -> float:
-        return MEMORY_S if len(shape) else 0.0
+        return KNOWN_AFTER_S if len(shape) else 0.0
 
     def fit_constants(self, takes: Sequence[Signals]) -> Settings:
         settings = super().fit_constants(takes)
-        found = [
-            slopes(take.time_s, take.context[self.column]) for take in takes if self.column in take.context
-        ]
-        steepest = float(np.percentile(np.abs(np.concatenate(found)), STEEPEST_SHARE))
-        return settings | {"steepest_per_s": max(steepest, 1e-9)}
+        known = [(take.time_s, take.context[self.column]) for take in takes if self.column in take.context]
+        start = ColumnStart.of_takes(known)
+        away = np.abs(np.concatenate([mean_slopes(*take, start) for take in known]) - start.slope)
+        steepest = float(np.percentile(away, STEEPEST_SHARE))
+        return settings | {START: start.to_settings(), "steepest_per_s": max(steepest, 1e-9)}
 
     def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
-        value = take.context.get(self.column)
-        slope = np.zeros(len(take)) if value is None else slopes(take.time_s, value)
+        value, start = take.context.get(self.column), ColumnStart(**settings[START])
+        slope = np.full(len(take), start.slope) if value is None else mean_slopes(take.time_s, value, start)
         return self.with_slope(take, slope, settings, shape)
 
     def with_slope(
         self, take: Signals, slope: np.ndarray, settings: Settings, shape: np.ndarray
     ) -> np.ndarray:
-        """Columns (N, L, C) with the column's slope (N,), per second, given."""
-        steepness = np.clip(slope / settings["steepest_per_s"], -1.0, 1.0)
-        each = np.repeat(steepness[:, None, None], len(shape), axis=1)
+        """Columns (N, L, C) with the column's mean slope (N,), per second, given."""
+        steepness = (slope - settings[START]["slope"]) / settings["steepest_per_s"]
+        each = np.repeat(np.clip(steepness, -BEYOND, BEYOND)[:, None, None], len(shape), axis=1)
         return np.concatenate([super().columns(take, settings, shape), each], axis=2)
 
     def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
@@ -126,7 +76,8 @@ class SlowContextEffect(ContextEffect):
 class _SlowContextStream(Stream):
     def __init__(self, effect: SlowContextEffect, settings: Settings, shape: np.ndarray) -> None:
         self._effect, self._settings, self._shape = effect, settings, shape
-        self._state: SlopeState | None = None
+        self._start = ColumnStart(**settings[START])
+        self._state: FollowedColumn | None = None
         self._last_s = 0.0
 
     def columns(self, frame: Signals) -> np.ndarray:
@@ -134,10 +85,10 @@ class _SlowContextStream(Stream):
         elapsed = time - self._last_s
         # A clock that was set back tells as little of what happened as a gap does.
         if self._state is None or not 0.0 <= elapsed <= LONGEST_GAP_S:
-            self._state, elapsed = SlopeState(), 0.0
+            self._state, elapsed = FollowedColumn(self._start), 0.0
         self._last_s = time
         value = frame.context.get(self._effect.column, np.full(1, np.nan))
-        slope = np.array([self._state.step(elapsed, float(value[0]))])
+        slope = self._state.run(np.array([elapsed]), np.asarray(value, dtype=float))
         return self._effect.with_slope(frame, slope, self._settings, self._shape)
 
     def reset(self) -> None:
