@@ -41,7 +41,7 @@ class KnownEffect:
             return None
         place = self.joints.index(joint)
         single = [one_lane(take, lane) for take in takes]
-        settings = self.effect.fit_constants(single)
+        settings = self.effect.fit_repair_constants(single)
         shape = self.shapes[place][None, :]
         plain = [self.effect.columns(take, settings, shape) for take in single]
         free = np.full(plain[0].shape[2], np.inf)

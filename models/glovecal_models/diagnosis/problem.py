@@ -109,7 +109,7 @@ def _with_learned_terms(known: KnownEffect, design: ForwardDesign) -> KnownEffec
     for joint, shape in zip(known.joints, known.shapes, strict=True):
         lane = design.rotations.index(joint)
         takes = design.of_joint(lane)
-        settings = known.effect.fit_constants(takes)
+        settings = known.effect.fit_repair_constants(takes)
         inputs = FormInputs.of(design, lane, known.effect, takes, settings, shape[None, :])
         terms.append(inputs.terms(design, lane, range(len(inputs.plain))))
     return replace(known, terms=tuple(terms))

@@ -23,8 +23,9 @@ from glovecal_models.effects.base.signals import Signals
 RATIO = 4.0
 """Between neighbouring time constants: close enough for a logarithmic or power law between them."""
 SLOW_S = (8.0, 12.0, 18.0, 26.0, 40.0)
-FOLLOWING = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
-"""Three states follow the joint, three decay to nothing."""
+BESIDE = (4.0, 1 / 64)
+"""Further relaxations where creep is learned, in times of the slow one: a logarithmic or power law has
+neither a fastest nor a slowest."""
 LONGEST_SHARE = 0.7
 """Of a take's length: a slower relaxation cannot be told from a constant."""
 
@@ -56,10 +57,13 @@ class Creep(ArrayStateEffect):
     def fit_constants(self, takes: Sequence[Signals]) -> Settings:
         return fit_joint_units(takes)
 
+    def fit_repair_constants(self, takes: Sequence[Signals]) -> Settings:
+        return self.fit_constants(takes) | {"beside": list(BESIDE)}
+
     def start(self, own: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
         usual = on_lanes(settings["own_centre_deg"], len(own)) if "own_centre_deg" in settings else own
         rested, away = own[:, None], (usual - own)[:, None]
-        return np.concatenate([rested, rested, rested, away, away, away], axis=1)
+        return np.where(_following(settings), rested, away)
 
     def step(
         self,
@@ -69,15 +73,15 @@ class Creep(ArrayStateEffect):
         settings: Settings,
         shape: np.ndarray,
     ) -> np.ndarray:
-        towards = own[..., None] * FOLLOWING
-        relax_once(state, elapsed_s, towards, np.tile(shape, 2))
-        return state - towards
+        towards = own[..., None] * _following(settings)
+        relax_once(state, elapsed_s, towards, _times(shape, settings))
+        return state - _without(towards, settings)
 
     def run(
         self, state: np.ndarray, elapsed_s: np.ndarray, own: np.ndarray, settings: Settings, shape: np.ndarray
     ) -> np.ndarray:
-        towards = own[:, :, None] * FOLLOWING
-        return relax(state, elapsed_s, towards, np.tile(shape, 2)) - towards
+        towards = own[:, :, None] * _following(settings)
+        return relax(state, elapsed_s, towards, _times(shape, settings)) - _without(towards, settings)
 
     def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
         return {name: columns[:, :, at] for at, name in enumerate(("fast", "middle", "slow"))}
@@ -90,4 +94,36 @@ class Creep(ArrayStateEffect):
             "fast_start_deg_per_deg",
             "middle_start_deg_per_deg",
             "slow_start_deg_per_deg",
+            *(f"share_of_{times:.3g}_slow_deg_per_deg" for times in _beside(settings)),
+            *(f"start_of_{times:.3g}_slow_deg_per_deg" for times in _beside(settings) if times > 1.0),
         )
+
+
+def _beside(settings: Settings) -> Sequence[float]:
+    """None in models that were stored without."""
+    return settings.get("beside", ())
+
+
+def _following(settings: Settings) -> np.ndarray:
+    """(C,): 1 for a state that follows the joint, 0 for one that decays to nothing, as the slow ones have."""
+    beside = _beside(settings)
+    return np.array(
+        [1.0] * 3 + [0.0] * 3 + [1.0] * len(beside) + [0.0] * sum(times > 1.0 for times in beside)
+    )
+
+
+def _without(towards: np.ndarray, settings: Settings) -> np.ndarray:
+    """(..., L, C): what a state is told apart from: the joint now, or its usual posture where the state is so
+    slow that joint and regressor would change places."""
+    slower = np.flatnonzero(np.array(_beside(settings)) > 1.0) + 6
+    if not len(slower):
+        return towards
+    result = towards.copy()
+    result[..., slower] = on_lanes(settings["own_centre_deg"], towards.shape[-2])[:, None]
+    return result
+
+
+def _times(shape: np.ndarray, settings: Settings) -> np.ndarray:
+    """(L, C) time constants of ``shape`` (L, 3)."""
+    beside = np.array(_beside(settings))
+    return np.concatenate([shape, shape, shape[:, 2:] * beside, shape[:, 2:] * beside[beside > 1.0]], axis=1)

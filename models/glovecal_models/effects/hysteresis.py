@@ -18,7 +18,9 @@ from glovecal_models.effects.base.motions import RAMPS
 from glovecal_models.effects.base.signals import Signals
 
 WIDTHS = (0.2, 0.5, 1.0)
-"""Of the widest play."""
+"""Of the widest play: enough to name it, and what models had that were stored without widths."""
+REPAIR_WIDTHS = (0.06, 0.13, 0.25, 0.4, 0.65, 1.0)
+"""Loops of many small switches need more."""
 WIDEST_SHARES = (0.12, 0.25, 0.5)
 """Half-width of the widest play, in standard deviations of the motion. Wider ones imitate creep."""
 
@@ -42,8 +44,11 @@ class Hysteresis(ArrayStateEffect):
         spread = np.sqrt(np.mean([take.own.var(axis=0) for take in takes], axis=0))
         return np.array(WIDEST_SHARES)[:, None, None] * spread[None, :, None]
 
+    def fit_repair_constants(self, takes: Sequence[Signals]) -> Settings:
+        return {"widths": list(REPAIR_WIDTHS)}
+
     def start(self, own: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
-        return np.repeat(own[:, None], len(WIDTHS), axis=1)
+        return np.repeat(own[:, None], len(_widths(settings)), axis=1)
 
     def step(
         self,
@@ -53,7 +58,7 @@ class Hysteresis(ArrayStateEffect):
         settings: Settings,
         shape: np.ndarray,
     ) -> np.ndarray:
-        width = shape * WIDTHS
+        width = shape * _widths(settings)
         joint = own[..., None]
         np.minimum(joint + width, state, out=state)
         np.maximum(joint - width, state, out=state)
@@ -62,9 +67,10 @@ class Hysteresis(ArrayStateEffect):
     def run(
         self, state: np.ndarray, elapsed_s: np.ndarray, own: np.ndarray, settings: Settings, shape: np.ndarray
     ) -> np.ndarray:
-        width = (shape * WIDTHS).ravel()
+        widths = _widths(settings)
+        width = (shape * widths).ravel()
         # One long axis: numpy is slow where it has to broadcast along a short last one.
-        joint = np.repeat(own, len(WIDTHS), axis=1)
+        joint = np.repeat(own, len(widths), axis=1)
         highest, lowest = joint + width, joint - width
         plays = np.empty_like(highest)
         before = state.ravel()
@@ -76,10 +82,14 @@ class Hysteresis(ArrayStateEffect):
         return np.subtract(plays, joint, out=plays).reshape(len(own), *state.shape)
 
     def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
-        return {f"play {width:g}": columns[:, :, at] for at, width in enumerate(WIDTHS)}
+        return {f"play {width:g}": columns[:, :, at] for at, width in enumerate(_widths(settings))}
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
-        return tuple(f"play_{width:g}_of_widest_deg_per_deg" for width in WIDTHS)
+        return tuple(f"play_{width:g}_of_widest_deg_per_deg" for width in _widths(settings))
+
+
+def _widths(settings: Settings) -> Sequence[float]:
+    return settings.get("widths", WIDTHS)
 
 
 def _turns(take: Signals) -> int:

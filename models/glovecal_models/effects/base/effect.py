@@ -94,6 +94,10 @@ class Effect(EffectFacts, ABC):
         """Constants from the training takes; the same settings are used wherever the effect is applied."""
         return {}
 
+    def fit_repair_constants(self, takes: Sequence[Signals]) -> Settings:
+        """The same where it is learned: with more columns than naming it needs, if a repair wants them."""
+        return self.fit_constants(takes)
+
     @abstractmethod
     def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
         """Shapes to try, (G, L, P); P is ``len(parameters)``, G at least 1."""
