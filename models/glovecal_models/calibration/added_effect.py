@@ -116,11 +116,19 @@ class AddedEffect:
         each, first = list(numbers.items()), len(self.effect.parameters)
         return {**dict(each[:first]), **self.curves[rotation].described(), **dict(each[first:])}
 
+    def corrections(self, takes: Sequence[Signals]) -> list[np.ndarray]:
+        """(N, L), degrees, of each take whose lanes are this effect's."""
+        found = self.effect.columns_of_takes(takes, self.settings, self.shape)
+        return [self._contribution(take, part, None).degrees for take, part in zip(takes, found, strict=True)]
+
     def contribution(self, take: Signals) -> Contribution:
         """To every frame of a take whose lanes are this effect's."""
+        plain = self.effect.columns(take, self.settings, self.shape)
+        return self._contribution(take, plain, self.variance_factor)
+
+    def _contribution(self, take: Signals, plain: np.ndarray, factor: np.ndarray | None) -> Contribution:
+        """Of the effect's own columns ``plain`` (N, L, C); without ``factor`` no variance."""
         effect = self.effect
-        plain = effect.columns(take, self.settings, self.shape)
-        factor = self.variance_factor
         if self.form is None and factor is None:
             return Contribution(np.einsum("nlc,lc->nl", plain, self.weights), None)
         inputs = form_values(effect, take, plain, self.settings) if self.form else {}

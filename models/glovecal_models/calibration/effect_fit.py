@@ -200,7 +200,7 @@ def _fitted_effects(
         shape = best_shape(group, rows, bases, extra, refinements=REFINEMENTS if is_last else 0)
         shapes.append(shape)
         effect = group.wanted.effect
-        found = [effect.columns(take, group.settings, shape) for take in group.signals]
+        found = effect.columns_of_takes(group.signals, group.settings, shape)
         own_prior = effect.prior_sd(group.settings)
         for lane, name in enumerate(group.lanes):
             extra[name].append([part[index, lane] for part, index in zip(found, rows[name], strict=True)])
@@ -364,8 +364,8 @@ def _explained(
     for added in effects:
         own = [own_signals(takes, columns[name], regressors[name])[0] for name in added.rotations]
         values = [np.column_stack(parts) for parts in zip(*own, strict=True)]
-        for number, take in enumerate(takes.signals(values, added.zero_deg, frozenset())):
-            part = added.contribution(take).degrees
+        signals = takes.signals(values, added.zero_deg, frozenset())
+        for number, part in enumerate(added.corrections(signals)):
             for lane, name in enumerate(added.rotations):
                 sums = total.setdefault(name, [np.zeros(len(item.time_s)) for item in takes.takes])
                 sums[number] += part[:, lane]

@@ -53,9 +53,10 @@ def best_shape(
     for _ in range(1 + refinements):
         shapes, lanes, numbers = grid.shape
         flat = grid.reshape(shapes * lanes, numbers)
+        tiled = [_tiled(take, shapes) for take in group.signals]
         found = [
-            effect.columns(_tiled(take, shapes), settings, flat).reshape(len(take), shapes, lanes, -1)
-            for take in group.signals
+            part.reshape(len(part), shapes, lanes, -1)
+            for part in effect.columns_of_takes(tiled, settings, flat)
         ]
         for lane, name in enumerate(group.lanes):
             mine = [part[index, :, lane] for part, index in zip(found, rows[name], strict=True)]

@@ -155,7 +155,7 @@ def _all_joints(
         """(L, N, G, C), in this order in memory, too: rows are taken lane by lane."""
         return columns.reshape(len(columns), shapes, lanes, -1).transpose(2, 0, 1, 3).copy()
 
-    true = [by_lane(effect.columns(take, settings, flat)) for take in tiled]
+    true = [by_lane(part) for part in effect.columns_of_takes(tiled, settings, flat)]
     control = [by_lane(part) for part in control_columns(effect, tiled, settings, flat, generator)]
     prior = effect.prior_sd(settings)
     found = []

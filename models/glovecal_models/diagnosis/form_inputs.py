@@ -39,7 +39,7 @@ class FormInputs:
         step: int = 1,
     ) -> FormInputs:
         """``takes`` of the joint alone, ``shape`` (1, P); ``step`` -1: their rows are in reverse."""
-        plain = [effect.columns(take, settings, shape) for take in takes]
+        plain = effect.columns_of_takes(takes, settings, shape)
         values = [form_values(effect, take, part, settings) for take, part in zip(takes, plain, strict=True)]
         units = list(design.units(joint))
         return cls(

@@ -43,7 +43,7 @@ class KnownEffect:
         single = [one_lane(take, lane) for take in takes]
         settings = self.effect.fit_repair_constants(single)
         shape = self.shapes[place][None, :]
-        plain = [self.effect.columns(take, settings, shape) for take in single]
+        plain = self.effect.columns_of_takes(single, settings, shape)
         free = np.full(plain[0].shape[2], np.inf)
         terms = self.terms[place] if self.terms else ()
         pairs = zip(single, plain, strict=True)

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from glovecal_models.effects.base.facts import Parameter, Rival, Settings
-from glovecal_models.effects.base.history_effect import ArrayStateEffect
+from glovecal_models.effects.base.history_effect import ArrayStateEffect, unbroken
 from glovecal_models.effects.base.motions import RAMPS
 from glovecal_models.effects.base.signals import Signals
 
@@ -21,6 +21,8 @@ WIDTHS = (0.2, 0.5, 1.0)
 """Of the widest play: enough to name it, and what models had that were stored without widths."""
 REPAIR_WIDTHS = (0.06, 0.13, 0.25, 0.4, 0.65, 1.0)
 """Loops of many small switches need more."""
+MOST_VALUES = 4_000_000
+"""Of plays that are held at once."""
 WIDEST_SHARES = (0.12, 0.25, 0.5)
 """Half-width of the widest play, in standard deviations of the motion. Wider ones imitate creep."""
 
@@ -81,11 +83,43 @@ class Hysteresis(ArrayStateEffect):
         state[...] = before.reshape(state.shape)
         return np.subtract(plays, joint, out=plays).reshape(len(own), *state.shape)
 
+    def columns_of_takes(
+        self, takes: Sequence[Signals], settings: Settings, shape: np.ndarray
+    ) -> list[np.ndarray]:
+        """Plays know no time: takes are run side by side, as many as there is room for."""
+        parts = [(number, part) for number, take in enumerate(takes) for part in unbroken(take.time_s)]
+        lanes, plays = shape.shape[0], len(_widths(settings))
+        found = [np.empty((len(take), lanes, plays)) for take in takes]
+        longest = max((part.stop - part.start for _, part in parts), default=0)
+        most = max(MOST_VALUES // max(longest * lanes * plays, 1), 1)
+        for first in range(0, len(parts), most):
+            some = parts[first : first + most]
+            frames = max(part.stop - part.start for _, part in some)
+            own = np.concatenate([_held(takes[number].own[part], frames) for number, part in some], axis=1)
+            if not frames:
+                continue
+            shapes = np.tile(shape, (len(some), 1))
+            state = self.start(own[0], settings, shapes)
+            columns = self.run(state, np.zeros(frames), own, settings, shapes)
+            for place, (number, part) in enumerate(some):
+                mine = slice(place * lanes, (place + 1) * lanes)
+                found[number][part] = columns[: part.stop - part.start, mine]
+        return found
+
     def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
         return {f"play {width:g}": columns[:, :, at] for at, width in enumerate(_widths(settings))}
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         return tuple(f"play_{width:g}_of_widest_deg_per_deg" for width in _widths(settings))
+
+
+def _held(own: np.ndarray, frames: int) -> np.ndarray:
+    """(frames, L): ``own`` (N, L), held at its end."""
+    return (
+        np.pad(own, ((0, frames - len(own)), (0, 0)), mode="edge")
+        if len(own)
+        else np.zeros((frames, own.shape[1]))
+    )
 
 
 def _widths(settings: Settings) -> Sequence[float]:

@@ -34,10 +34,10 @@ def control_columns(
     Raises BadInput when the takes allow no control: wearings with no other permutation.
     """
     if effect.control == "none":
-        return [np.zeros_like(effect.columns(take, settings, shape)) for take in takes]
+        return [np.zeros_like(part) for part in effect.columns_of_takes(takes, settings, shape)]
     step = -1 if effect.control == "time-reversed" else 1
     wrong = control_signals(effect, takes, generator)
-    return [effect.columns(take, settings, shape)[::step] for take in wrong]
+    return [part[::step] for part in effect.columns_of_takes(wrong, settings, shape)]
 
 
 def control_signals(

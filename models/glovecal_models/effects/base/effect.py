@@ -106,6 +106,12 @@ class Effect(EffectFacts, ABC):
     def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
         """(N, L, C), degrees for a weight of one; ``shape`` is (L, P). Zero weight changes nothing."""
 
+    def columns_of_takes(
+        self, takes: Sequence[Signals], settings: Settings, shape: np.ndarray
+    ) -> list[np.ndarray]:
+        """``columns`` of each take; to be overridden where all takes together are quicker."""
+        return [self.columns(take, settings, shape) for take in takes]
+
     tells_own_uncertainty: ClassVar[bool] = False
     """Whether ``uncertainty`` tells all that is unknown of its weights."""
 
