@@ -22,13 +22,14 @@ from glovecal_models.calibration.effect_shape import REFINEMENTS, EffectGroup, b
 from glovecal_models.calibration.fit_memory import KNOWN_FITS
 from glovecal_models.calibration.fit_task import FitResult
 from glovecal_models.calibration.form_choice import EVERY as FORM_EVERY
-from glovecal_models.calibration.form_choice import FormRows, chosen_form
+from glovecal_models.calibration.form_choice import FormRows, chosen_columns, chosen_form
 from glovecal_models.calibration.held_out import BaseFeatures, Rows, WeightPosterior, weight_posterior
 from glovecal_models.calibration.model import restore_regressor
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.samples import Samples, linear_correspondence
 from glovecal_models.calibration.training_plan import task_for
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.form_curve import LaneCurves
 from glovecal_models.effects.base.learned_form import LearnedForm
 from glovecal_models.layout import Correspondence
@@ -200,6 +201,8 @@ def _fitted_effects(
         shape = best_shape(group, rows, bases, extra, refinements=REFINEMENTS if is_last else 0)
         shapes.append(shape)
         effect = group.wanted.effect
+        if is_last:
+            group = groups[place] = _with_curves(group, shape, rows, bases, extra, priors)
         found = effect.columns_of_takes(group.signals, group.settings, shape)
         own_prior = effect.prior_sd(group.settings)
         for lane, name in enumerate(group.lanes):
@@ -244,6 +247,56 @@ def _own_of_takes(rows: Sequence[int]) -> list[np.ndarray]:
     return [np.eye(len(rows))[np.full(count, at)] for at, count in enumerate(rows)]
 
 
+def _form_rows(
+    base: Sequence[Rows],
+    extra: Sequence[Sequence[np.ndarray]],
+    priors: Sequence[np.ndarray],
+    take_sd_deg: float,
+    inputs: Mapping[str, np.ndarray],
+) -> FormRows:
+    """Of one lane, with each of ``inputs`` (N,) on the rows that count."""
+    own = [np.column_stack([part[::FORM_EVERY] for part in parts]) for parts in zip(*extra, strict=True)]
+    prior = np.concatenate(priors)
+    if take_sd_deg:
+        of_takes = _own_of_takes([len(part) for part in own])
+        own = [np.column_stack(parts) for parts in zip(own, of_takes, strict=True)]
+        prior = np.append(prior, np.full(len(of_takes), take_sd_deg))
+    return FormRows(
+        np.concatenate([unit.base[::FORM_EVERY] for unit in base]),
+        np.concatenate(own),
+        prior,
+        {key: column[:, None] for key, column in inputs.items()},
+        np.concatenate([unit.target[::FORM_EVERY] for unit in base]),
+    )
+
+
+def _with_curves(
+    group: EffectGroup,
+    shape: np.ndarray,
+    rows: Mapping[str, Sequence[np.ndarray]],
+    bases: Mapping[str, list[Rows]],
+    extra: Mapping[str, list[list[np.ndarray]]],
+    priors: Mapping[str, list[np.ndarray]],
+) -> EffectGroup:
+    """With those of the effect's further columns that the takes ask for; ``extra`` are of effects before."""
+    effect = group.wanted.effect
+    choices = [group.settings, *effect.settings_with_curves(group.signals, group.settings)]
+    if len(choices) == 1:
+        return group
+
+    def lanes(settings: Settings) -> list[FormRows]:
+        found = [effect.columns(take, settings, shape) for take in group.signals]
+        prior = effect.prior_sd(settings)
+        problems = []
+        for lane, name in enumerate(group.lanes):
+            mine = [part[index, lane] for part, index in zip(found, rows[name], strict=True)]
+            every, sd = [*extra[name], mine], [*priors[name], prior]
+            problems.append(_form_rows(bases[name], every, sd, effect.take_sd_deg, {}))
+        return problems
+
+    return replace(group, settings=choices[chosen_columns(map(lanes, choices))])
+
+
 def _learned_form(
     group: EffectGroup,
     values: Sequence[Mapping[str, np.ndarray]],
@@ -260,28 +313,12 @@ def _learned_form(
     problems = []
     for lane, name in enumerate(lanes):
         some = [index[::FORM_EVERY] for index in rows[name]]
-        own = [
-            np.column_stack([part[::FORM_EVERY] for part in parts])
-            for parts in zip(*extra[name], strict=True)
-        ]
-        prior = np.concatenate(priors[name])
-        if group.wanted.effect.take_sd_deg:
-            of_takes = _own_of_takes([len(part) for part in own])
-            own = [np.column_stack(parts) for parts in zip(own, of_takes, strict=True)]
-            prior = np.append(prior, np.full(len(of_takes), group.wanted.effect.take_sd_deg))
         inputs = {
             key: np.concatenate([take[key][index, lane] for take, index in zip(values, some, strict=True)])
             for key in values[0]
         }
-        problems.append(
-            FormRows(
-                np.concatenate([unit.base[::FORM_EVERY] for unit in bases[name]]),
-                np.concatenate(own),
-                prior,
-                {key: column[:, None] for key, column in inputs.items()},
-                np.concatenate([unit.target[::FORM_EVERY] for unit in bases[name]]),
-            )
-        )
+        sd = group.wanted.effect.take_sd_deg
+        problems.append(_form_rows(bases[name], extra[name], priors[name], sd, inputs))
     terms = chosen_form(problems)
     if not terms:
         return None

@@ -7,7 +7,7 @@ that many rows count for one (``ALIKE_ROWS``), as everywhere where weights are f
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -64,6 +64,26 @@ def chosen_form(lanes: Sequence[FormRows]) -> tuple[FormTerm, ...]:
     tried = [term for name in others for term in (*_terms((name,), ALONE), *_terms((name, OWN), TOGETHER))]
     tried += [term for pair in combinations(sorted(others), 2) for term in _terms(pair, TOGETHER[-1:])]
     return _chosen(problems, tried)
+
+
+def chosen_columns(choices: Iterable[Sequence[FormRows]]) -> int:
+    """Which of several choices of own columns, the first being the simplest: its number.
+
+    Each choice has the rows of every lane; they differ in their own columns only.
+    """
+    found: list[float] = []
+    simplest: list[_Lane] = []
+    for lanes in choices:
+        problems = [_Lane(lane) for lane in lanes if len(lane.target)]
+        if not simplest:
+            simplest = problems
+            for lane in simplest:
+                lane.settle(())
+        for lane, first in zip(problems, simplest, strict=True):
+            lane.share_noise(first)
+        found.append(sum(lane.evidence(()) for lane in problems))
+    best = int(np.argmax(found))
+    return best if found[best] - found[0] >= LEAST_GAIN_NATS else 0
 
 
 def _terms(inputs: tuple[str, ...], lengthscales: Sequence[float]) -> list[FormTerm]:
@@ -128,6 +148,9 @@ class _Lane:
             weights = np.linalg.solve(gram + noise * np.eye(len(gram)), right)
             square = self._target @ self._target - 2 * weights @ right + weights @ gram @ weights
             self._variance = max(float(square) / len(self._target), LEAST_VARIANCE_DEG2)
+
+    def share_noise(self, other: _Lane) -> None:
+        self._variance = other._variance
 
     def evidence(self, terms: Sequence[FormTerm]) -> float:
         """The log marginal likelihood, nats, up to what all choices share."""

@@ -17,7 +17,9 @@ from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.samples import require_layout
 from glovecal_models.calibration.sensor_sensitivity import SensorSensitivity, sensor_sensitivity
+from glovecal_models.effects.base.wearing_curves import CURVES, WearingCurves, joined_curves
 from glovecal_models.effects.base.wearing_effect import (
+    curve_weights,
     learned_spread,
     trained_wearings,
     with_checked_wearing,
@@ -159,15 +161,33 @@ def _effect_with_columns(model: CalibrationModel, sensitivity: SensorSensitivity
         columns += [count + column for column in columns]
         for place in _active(item):
             lane = sensitivity.rotations.index(item.rotations[place])
-            weights[lane, columns], zero[lane] = item.weights[place], item.zero_deg[place]
+            weights[lane, columns] = item.weights[place, : len(columns)]
+            zero[lane] = item.zero_deg[place]
             for name in ("own_centre_deg", "own_scale_deg"):
                 settings[name][lane] = item.settings[name][place]
         for name in ("checked", "prior_sd_deg"):
             if name in item.settings:
                 settings[name] = item.settings[name]
+    curves = _joined_curves(own, sensitivity)
+    if curves is not None:
+        settings[CURVES] = curves[0].to_document()
+        weights = np.column_stack([weights, curves[1]])
     shape = np.zeros((lanes, 0))
     evidence = own[0].evidence if own else {}
     return AddedEffect(_effect_name(), sensitivity.rotations, settings, shape, weights, zero, evidence)
+
+
+def _joined_curves(
+    own: Sequence[AddedEffect], sensitivity: SensorSensitivity
+) -> tuple[WearingCurves, np.ndarray] | None:
+    """Of the wearings of training, on all trained rotations."""
+    parts = []
+    for item in own:
+        curves = WearingCurves.of_settings(item.settings)
+        if curves is not None:
+            lanes = {place: sensitivity.rotations.index(item.rotations[place]) for place in _active(item)}
+            parts.append((curves, lanes, curve_weights(item.settings, item.weights)))
+    return joined_curves(parts, len(sensitivity.rotations))
 
 
 def _active(item: AddedEffect) -> list[int]:

@@ -135,6 +135,11 @@ class Effect(EffectFacts, ABC):
     """What single takes are expected to have of their own, as a standard deviation: a learned form is chosen
     only for what it explains beyond that."""
 
+    def settings_with_curves(self, takes: Sequence[Signals], settings: Settings) -> Sequence[Settings]:
+        """Settings of the same effect with more columns, of which a calibration takes the ones that its takes
+        ask for, or none."""
+        return ()
+
     @abstractmethod
     def stream(self, settings: Settings, shape: np.ndarray) -> Stream:
         """The same columns, frame by frame."""

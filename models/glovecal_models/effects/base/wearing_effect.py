@@ -1,7 +1,8 @@
 """Effects that differ from wearing to wearing: an offset and a gain of each joint in each wearing.
 
-Settings hold ``wearings``, the names in the order of the weights (offsets first, then gains). A quick check
-adds a wearing with the covariance of what its poses told (``checked``).
+Settings hold ``wearings``, the names in the order of the weights (offsets first, then gains, then those of
+the curves that wearings of training may have: ``wearing_curves``). A quick check adds a wearing with the
+covariance of what its poses told (``checked``), and no curve.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from glovecal_models.effects.base.effect import InstantEffect, Uncertainty
 from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.joint_units import in_joint_units
+from glovecal_models.effects.base.wearing_curves import WearingCurves
 
 PRIOR_DEG = 3.5
 """Expected standard deviation of offsets, and of gains for one standard deviation of the joint."""
@@ -42,10 +44,12 @@ class WearingEffect(InstantEffect):
         if covariance is None:
             return None
         offset, both, gain = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
+        curves = WearingCurves.of_settings(settings)
 
         def variance(own: np.ndarray) -> np.ndarray:
             joint = in_joint_units(own, settings)
-            return offset + 2 * joint * both + joint**2 * gain
+            shift = offset + 2 * joint * both + joint**2 * gain
+            return shift if curves is None else shift + curves.variance(own, curve_weights(settings, weights))
 
         return variance
 
@@ -61,6 +65,11 @@ def shift_covariance(settings: Settings, weights: np.ndarray, wearing: str) -> n
     if wearing in settings["wearings"]:
         return None
     return learned_spread(settings, weights)[:, :, None] ** 2 * np.eye(2)
+
+
+def curve_weights(settings: Settings, weights: np.ndarray) -> np.ndarray:
+    """Those of the curves, last of ``weights`` (L, C)."""
+    return weights[:, 2 * len(settings["wearings"]) :]
 
 
 def trained_wearings(settings: Settings) -> list[str]:
@@ -95,11 +104,12 @@ def with_checked_wearing(
     """Settings and weights (L, C) with one more wearing, known by a quick check: ``shift`` (L, 2) is its
     offset and gain, degrees, ``covariance`` (L, 2, 2). A check of the same wearing before is replaced."""
     wearings = list(settings["wearings"])
-    offsets, gains = weights[:, : len(wearings)], weights[:, len(wearings) :]
+    offsets, gains = np.split(weights[:, : 2 * len(wearings)], 2, axis=1)
     if wearing in wearings:
         at = wearings.index(wearing)
         offsets, gains = np.delete(offsets, at, axis=1), np.delete(gains, at, axis=1)
         wearings.remove(wearing)
     checked = settings.get("checked", {}) | {wearing: covariance.tolist()}
-    found = np.column_stack([offsets, shift[:, 0], gains, shift[:, 1]])
+    curves = curve_weights(settings, weights)
+    found = np.column_stack([offsets, shift[:, 0], gains, shift[:, 1], curves])
     return {**settings, "wearings": [*wearings, wearing], "checked": checked}, found
