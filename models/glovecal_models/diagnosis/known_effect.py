@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from glovecal_models.calibration.added_effect import form_values
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.learned_form import FormTerm, LearnedForm
 from glovecal_models.effects.base.signals import Signals
 
@@ -21,7 +22,7 @@ class KnownColumns(NamedTuple):
     parts: list[np.ndarray]
     """For each take (N, C)."""
     prior_sd: np.ndarray
-    """(C,) of their weights; infinite for those of the effect's own columns."""
+    """(C,) of their weights; infinite for those that the effect always has."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,8 @@ class KnownEffect:
     """For each joint (P,)."""
     terms: tuple[tuple[FormTerm, ...], ...] = ()
     """For each joint those of its learned form; none given: none was learned."""
+    stored: Settings = field(default_factory=dict)
+    """Its settings in the model."""
 
     def columns(self, takes: Sequence[Signals], lane: int, joint: str) -> KnownColumns | None:
         """Of one joint, a lane of ``takes``; None when it is not concerned."""
@@ -42,9 +45,12 @@ class KnownEffect:
         place = self.joints.index(joint)
         single = [one_lane(take, lane) for take in takes]
         settings = self.effect.fit_repair_constants(single)
+        own_count = len(self.effect.prior_sd(settings))
+        settings = self.effect.settings_as_stored(single, settings, self.stored)
         shape = self.shapes[place][None, :]
         plain = self.effect.columns_of_takes(single, settings, shape)
         free = np.full(plain[0].shape[2], np.inf)
+        free[own_count:] = self.effect.prior_sd(settings)[own_count:]
         terms = self.terms[place] if self.terms else ()
         pairs = zip(single, plain, strict=True)
         values = [form_values(self.effect, take, part, settings) for take, part in pairs] if terms else []
@@ -66,7 +72,7 @@ def known_effects(model: CalibrationModel) -> tuple[KnownEffect, ...]:
         active = item.active if item.weights.shape[1] else ()
         shapes = tuple(item.shape[item.rotations.index(name)] for name in active)
         terms = (item.form.terms,) * len(active) if item.form else ()
-        found.append(KnownEffect(item.effect, active, shapes, terms))
+        found.append(KnownEffect(item.effect, active, shapes, terms, item.settings))
     return tuple(found)
 
 

@@ -17,7 +17,7 @@ from glovecal_models.effects.base.facts import Certainty, Control, Rival, Settin
 from glovecal_models.effects.base.joint_units import fit_joint_units, in_joint_units
 from glovecal_models.effects.base.motions import CROSSED
 from glovecal_models.effects.base.signals import Signals
-from glovecal_models.effects.base.wearing_curves import CURVES, WearingCurves, possible_curves
+from glovecal_models.effects.base.wearing_curves import CURVES, WearingCurves, curves_over, possible_curves
 from glovecal_models.effects.base.wearing_effect import PRIOR_DEG, WearingEffect
 
 
@@ -66,6 +66,12 @@ class DonningShift(WearingEffect):
 
     def settings_with_curves(self, takes: Sequence[Signals], settings: Settings) -> list[Settings]:
         return [{**settings, CURVES: curves} for curves in possible_curves(takes, settings["wearings"])]
+
+    def settings_as_stored(self, takes: Sequence[Signals], settings: Settings, stored: Settings) -> Settings:
+        curves, wearings = WearingCurves.of_settings(stored), settings["wearings"]
+        if curves is None or len(wearings) < 2:
+            return settings
+        return {**settings, CURVES: curves_over(curves.form.terms, takes, wearings)}
 
     def prior_sd(self, settings: Settings) -> np.ndarray:
         curves = WearingCurves.of_settings(settings)

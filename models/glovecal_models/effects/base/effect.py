@@ -140,6 +140,10 @@ class Effect(EffectFacts, ABC):
         ask for, or none."""
         return ()
 
+    def settings_as_stored(self, takes: Sequence[Signals], settings: Settings, stored: Settings) -> Settings:
+        """``settings`` of other lanes with the further columns that a model with ``stored`` took."""
+        return settings
+
     @abstractmethod
     def stream(self, settings: Settings, shape: np.ndarray) -> Stream:
         """The same columns, frame by frame."""

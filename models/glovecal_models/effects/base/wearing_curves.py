@@ -153,11 +153,16 @@ def possible_curves(takes: Sequence[Signals], wearings: Sequence[str]) -> list[M
     """Documents of those that training may choose from; none with less than two wearings."""
     if len(wearings) < 2:
         return []
-    own = [{OWN: take.own} for take in takes]
     return [
-        WearingCurves(
-            tuple(wearings), LearnedForm.over([FormTerm((OWN,), lengthscale, sd)], own)
-        ).to_document()
+        curves_over([FormTerm((OWN,), lengthscale, sd)], takes, wearings)
         for lengthscale in LENGTHSCALES
         for sd in SD_DEG
     ]
+
+
+def curves_over(
+    terms: Sequence[FormTerm], takes: Sequence[Signals], wearings: Sequence[str]
+) -> Mapping[str, Any]:
+    """The document of curves of ``wearings``, two at least, in the range of ``takes``."""
+    form = LearnedForm.over(terms, [{OWN: take.own} for take in takes])
+    return WearingCurves(tuple(wearings), form).to_document()
