@@ -44,6 +44,9 @@ html_copy_source = False
 html_show_copyright = False
 html_use_index = False
 
+STUDY = ["The blind study <docs/study>"] if (HERE / "study.md").exists() else []
+"""``python3 do.py study --page docs/study.md`` writes that page once the study has run."""
+
 NAVIGATION = {
     "Start": ["Tutorial <docs/tutorial>", "docs/glossary"],
     "Tasks": [
@@ -64,7 +67,7 @@ NAVIGATION = {
         "docs/thresholds",
         "Messages on the wire <client/glovecal_client/wire/README>",
     ],
-    "Project": ["As measured <docs/measured>", "ARCHITECTURE", "CHANGELOG"],
+    "Project": ["As measured <docs/measured>", *STUDY, "ARCHITECTURE", "CHANGELOG"],
 }
 
 

@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 OF_DO_PY = {"--smoke": "do.py", "--quick": "tests/paper/paper.py", "--part": "tests/paper/paper.py"}
 OF_DO_PY |= {"--set-aside": "tests/study/study.py", "--gloves": "tests/bench/streaming_bench.py"}
-OF_DO_PY |= {"--limits": "tests/study/study.py"}
+OF_DO_PY |= {option: "tests/study/study.py" for option in ("--limits", "--minutes", "--page")}
 COMMAND = typer.main.get_command(app)
 
 

@@ -11,11 +11,12 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
+from wandering_reference import WANDER_DEG, with_wander
 
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import RecordedSession, record_session
-from glovecal_models.simulation.session_plan import FIVE_SENSORS, SessionPlan
+from glovecal_models.simulation.session_plan import FIVE_SENSORS, SessionPlan, TakeMotion
 from glovecal_models.takes.take import Take
 
 PALM_SENSORS = ("I_MCP", "M_MCP", "R_MCP", "P_MCP", "P_PIP", "PALM_ARCH")
@@ -23,7 +24,9 @@ PALM_SENSORS = ("I_MCP", "M_MCP", "R_MCP", "P_MCP", "P_PIP", "PALM_ARCH")
 BYSTANDER_DEG = 1e-3
 """A recorded column whose cause is this small explains nothing."""
 
-Nuisance = Literal["white", "drift", "posture"]
+Nuisance = Literal["white", "drift", "posture", "reference"]
+"""What a healthy glove has beside white noise (``SessionPlan``); or such a glove with only white noise, and a
+reference that wanders (``wandering_reference.py``)."""
 Bystander = Literal["none", "contact_pressure", "unknown:context"]
 
 
@@ -40,6 +43,7 @@ class BlindGlove:
     seed: int
     causes: tuple[Cause, ...] = ()
     bits: int = 8
+    rate_hz: float = 60.0
     nuisance: Nuisance = "drift"
     linear: bool = False
     """Whether the calibration is a straight line of the own sensor; else it bends (the flexible base)."""
@@ -67,7 +71,8 @@ class BlindGlove:
             seed=self.seed,
             sensors=PALM_SENSORS if self.palm else FIVE_SENSORS,
             bits=self.bits,
-            nuisance=self.nuisance,
+            nuisance="white" if self.nuisance == "reference" else self.nuisance,
+            rate_hz=self.rate_hz,
             wearings=self.wearings,
             takes_per_wearing=self.takes_per_wearing,
             take_s=self.lead_s + self.take_s,
@@ -90,17 +95,28 @@ class BlindGlove:
     @property
     def takes(self) -> tuple[Take, ...]:
         """What the diagnosis sees."""
-        return tuple(_reference_from(take, self.lead_s) for take in self.session.takes)
+        return tuple(self._measured(take) for take in self.session.takes)
 
     @property
     def clean_takes(self) -> tuple[Take, ...]:
         """The same glove and noise without causes."""
-        return tuple(_reference_from(take, self.lead_s) for take in self.session.clean)
+        return tuple(self._measured(take) for take in self.session.clean)
+
+    def also(self, motion: TakeMotion, take_s: float, wearing: int, *, repeat: int = 0) -> Take:
+        """One more take after the session, as ``RecordedSession.also``, of the same glove and reference."""
+        take = self.session.also(motion, take_s, wearing, repeat=repeat).take
+        return with_wander(take, self.seed) if self.nuisance == "reference" else take
+
+    @property
+    def duration_s(self) -> float:
+        """Measured seconds of the whole session."""
+        return self.wearings * self.takes_per_wearing * self.take_s
 
     @property
     def floor_deg(self) -> float:
         """RMS over joints of what a perfect static calibration of the healthy glove leaves."""
-        return float(np.sqrt(np.mean(np.square(list(self.session.floor_deg.values())))))
+        wander = WANDER_DEG if self.nuisance == "reference" else 0.0
+        return float(np.sqrt(np.mean(np.square(list(self.session.floor_deg.values()))) + wander**2))
 
     @property
     def column(self) -> str | None:
@@ -108,16 +124,18 @@ class BlindGlove:
         return next((item.column for item in self.session.causes[: len(self.causes)] if item.column), None)
 
     def told(self) -> dict[str, Any]:
-        """What was hidden, for the record: forms, sensors, and the strength that was reached."""
+        """The strength that was reached, for the record; forms and sensors stand among the settings."""
         return {
-            "forms": [item.form for item in self.session.causes[: len(self.causes)]],
-            "channels": [list(item.channels) for item in self.session.causes[: len(self.causes)]],
             "reached_deg": [
                 round(float(np.sqrt(np.mean(np.square(list(item.reached_deg.values()))))), 3)
                 for item in self.session.causes[: len(self.causes)]
             ],
             "floor_deg": round(self.floor_deg, 3),
         }
+
+    def _measured(self, take: Take) -> Take:
+        take = _reference_from(take, self.lead_s)
+        return with_wander(take, self.seed) if self.nuisance == "reference" else take
 
 
 def _reference_from(take: Take, begin_s: float) -> Take:

@@ -1,7 +1,7 @@
 """Which gloves the study makes: as unlike as can be, and the same ones in every run.
 
-Properties are dealt like cards: among any six gloves of one effect every form, bit depth, nuisance and
-number of channels comes in turn, in an order of their own that does not tie one property to another.
+Properties are dealt like cards: among any twelve gloves of one effect every form, frame rate, bit depth,
+nuisance and number of channels comes in turn, in an order of their own that ties no property to another.
 """
 
 from __future__ import annotations
@@ -20,10 +20,18 @@ from glovecal_models.simulation.session_plan import FIVE_SENSORS
 
 FLOOR_DEG = 0.77
 """The noise floor of such a glove; sizes are multiples of it."""
-BITS = (8, 12)
+BITS = (8, 10, 12)
+RATES_HZ = (30.0, 60.0, 100.0)
 NUISANCES: tuple[Nuisance, ...] = get_args(Nuisance)
 BYSTANDERS: tuple[Bystander, ...] = get_args(Bystander)
 CONTEXT_CAUSES = ("contact_pressure", "unknown:context")
+RECORDED_UNNAMED = ("unknown:context", "unknown:posture_locked")
+"""Causes without a name that follow a recorded column: of the context, or of the sensors themselves."""
+RECORDED_INPUTS = (
+    "cross_coupling", "palm_arch", "hysteresis", "creep", "lag", "warmup_drift", "temperature", "humidity",
+    "donning_shift", "supply_sag", "contact_pressure", "unknown:context",
+)  # fmt: skip
+"""Causes whose input is in the recording and which a static calibration of the own sensor lacks."""
 PARTNERS = (
     "cross_coupling", "hysteresis", "creep", "lag", "clock_offset", "warmup_drift", "temperature",
     "donning_shift", "supply_sag", "contact_pressure",
@@ -62,12 +70,20 @@ def with_cause(
     )  # fmt: skip
 
 
-def clean(number: int, *, linear: bool) -> BlindGlove:
+def clean(number: int, *, linear: bool, part: str = "clean") -> BlindGlove:
     """A glove that is healthy; one in four has a palm sensor too."""
-    label = ("clean", linear)
+    label = (part, linear)
     bystander = dealt(BYSTANDERS, number, *label, "bystander")
     palm = dealt((False, False, False, True), number, *label, "palm")
-    return _glove("clean", "none", 0.0, number, label, (), bystander, linear=linear, palm=palm)
+    return _glove(part, "none", 0.0, number, label, (), bystander, linear=linear, palm=palm)
+
+
+def in_turn(
+    part: str, names: Sequence[str], size: float, number: int, *, set_aside: bool = False
+) -> BlindGlove | None:
+    """The glove of this number among gloves that have ``names`` in turn; None where there is no such form."""
+    turn, place = divmod(number, len(names))
+    return with_cause(part, names[place], size, turn, set_aside=set_aside)
 
 
 def unknown(name: str, size: float, number: int) -> BlindGlove:
@@ -145,6 +161,7 @@ def _glove(
         seed=zlib.crc32(repr((*label, truth, number)).encode()),
         causes=causes,
         bits=dealt(BITS, number, *label, "bits"),
+        rate_hz=dealt(RATES_HZ, number, *label, "rate"),
         nuisance=dealt(NUISANCES, number, *label, "nuisance"),
         linear=linear,
         bystander=bystander,

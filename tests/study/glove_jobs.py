@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -28,18 +29,34 @@ class Job(Protocol):
 
 
 def answers(
-    gloves: Sequence[BlindGlove], job: Answer, finished: FinishedGloves, label: str, workers: int = WORKERS
+    gloves: Sequence[BlindGlove],
+    job: Answer,
+    finished: FinishedGloves,
+    label: str,
+    workers: int = WORKERS,
+    until: float = math.inf,
 ) -> list[Row]:
-    """The job's answer for every glove, in order. A job that fails is reported and left out."""
+    """The job's answer for every glove, in order. A job that fails is reported and left out.
+
+    ``until``: the time (``time.monotonic``) from which on no further glove is asked; those that are being
+    asked are waited for.
+    """
     waiting = [glove for glove in gloves if finished.get(glove.key) is None]
-    progress = _Progress(label, len(gloves), len(gloves) - len(waiting))
+    if time.monotonic() >= until:
+        waiting.clear()
+    known = sum(finished.get(glove.key) is not None for glove in gloves)
+    progress = _Progress(label, len(gloves), known)
     if waiting:
         with ProcessPoolExecutor(workers, get_context("spawn"), begin_worker) as pool:
             running: dict[Future[dict[str, Any]], BlindGlove] = {}
             while waiting or running:
+                if time.monotonic() >= until:
+                    waiting.clear()
                 while waiting and len(running) <= workers:  # few, so that Ctrl-C has little to wait for
                     glove = waiting.pop(0)
                     running[pool.submit(job, glove)] = glove
+                if not running:
+                    break
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
                     glove = running.pop(future)
                     _keep(future, glove, finished)

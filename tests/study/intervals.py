@@ -1,4 +1,4 @@
-"""95 % intervals: Wilson's for counts, bootstrap for means."""
+"""95 % intervals: Wilson's for counts, bootstrap for means and quantiles."""
 
 from __future__ import annotations
 
@@ -20,11 +20,14 @@ def wilson(count: int, total: int) -> tuple[float, float]:
     return max(float(middle - half), 0.0), min(float(middle + half), 1.0)
 
 
-def bootstrap(values: Sequence[float], seed: int = 0) -> tuple[float, float]:
-    """Between which means the true one lies, by drawing ``values`` again; NaN without values."""
+def bootstrap(
+    values: Sequence[float], seed: int = 0, *, quantile: float | None = None
+) -> tuple[float, float]:
+    """Between which means (or quantiles) the true one lies, by drawing ``values`` again; NaN without any."""
     if not len(values):
         return float("nan"), float("nan")
     random = np.random.default_rng(seed)
     drawn = random.choice(np.asarray(values, float), (RESAMPLES, len(values)))
-    low, high = np.quantile(drawn.mean(axis=1), [0.025, 0.975])
+    found = drawn.mean(axis=1) if quantile is None else np.quantile(drawn, quantile, axis=1)
+    low, high = np.quantile(found, [0.025, 0.975])
     return float(low), float(high)

@@ -35,7 +35,7 @@ def next_take_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_
             takes.append(_recorded(glove, found.next_take, len(motions) - 1))
         found: Diagnosis = diagnose(takes, glove.layout, linear=glove.linear, limits=limits.diagnosis)
         sets.append(list(found.naming.confidence_set))
-    return {"confidence_sets": sets, "motions": motions, **glove.told()}
+    return {"confidence_sets": sets, "motions": motions}
 
 
 def _tapped(glove: BlindGlove) -> KnownLatency:
@@ -48,5 +48,5 @@ def _recorded(glove: BlindGlove, asked: NextTake, repeat: int) -> Take:
     """The wearer does as told, in the last wearing; whatever is no motion is a new wearing in free motion."""
     if asked.motion in get_args(TakeMotion):
         motion = cast(TakeMotion, asked.motion)
-        return glove.session.also(motion, float(asked.seconds), glove.wearings - 1, repeat=repeat).take
-    return glove.session.also("natural", NEW_WEARING_S, glove.wearings + repeat).take
+        return glove.also(motion, float(asked.seconds), glove.wearings - 1, repeat=repeat)
+    return glove.also("natural", NEW_WEARING_S, glove.wearings + repeat)

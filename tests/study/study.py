@@ -1,15 +1,18 @@
 """``python3 do.py study``: does the diagnosis name what was hidden in gloves it has never seen?
 
 Simulated gloves with one effect, with two, with none and with causes outside the catalogue; figures with
-95 % intervals beside what is demanded, and pictures. Finished gloves are kept: an interrupted study goes on.
+95 % intervals beside what is demanded, pictures, and a page of the documentation. Finished gloves are kept:
+an interrupted study goes on.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
+import math
 import sys
+import time
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,9 +22,12 @@ from error_fall_picture import draw_error_fall
 from finished_gloves import FinishedGloves, software_hash
 from glove_choices import effect_names
 from glove_jobs import WORKERS, Row, answers
-from study_figure import StudyFigure, table
+from study_figure import table
 from study_limits import digest, other_limits, read_limits
-from study_parts import PARTS, StudyChoices
+from study_page import write_page
+from study_parts import PARTS, QUICK, StudyChoices
+from study_results import PartResults, StudyResults, counts
+from study_time import estimate, share_of_time
 
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS
@@ -35,7 +41,19 @@ LIMITS = (
     "other limits, by name, as a TOML file with the tables diagnosis, comparison and improvement; "
     "docs/thresholds.md lists them"
 )
-PICTURES = (".png", ".svg")
+MINUTES = "ask no further glove after so many; each part gets its share of them"
+PAGE = (
+    "write the page of the documentation from the answers at hand (also of set-aside forms); "
+    "asks no further glove unless --minutes is given"
+)
+COUNTS = {
+    "gloves": "per effect and size",
+    "clean": "clean gloves per base",
+    "pairs": "gloves with two effects per size",
+    "second_names": "gloves with one effect through improve, in all",
+    "ceilings": "gloves asked for their ceiling, in all; half of them clean",
+    "recorded": "gloves with a recorded cause without a name, in all",
+}
 SMOKE = ("names", "--effects", "lag", "--gloves", "1", "--workers", "1")
 
 
@@ -54,97 +72,107 @@ def main(arguments: Sequence[str]) -> int:
     except (ValueError, OSError, BadInput) as problem:
         _parser().error(str(problem))
     pin_blas_to_one_thread()
-    choices = StudyChoices(options.gloves, options.clean, options.pairs, wanted, options.set_aside, limits)
+    usual = QUICK if options.quick else StudyChoices()
+    numbers = {name: getattr(options, name) for name in COUNTS if getattr(options, name) is not None}
+    choices = replace(usual, **numbers, effects=wanted, set_aside=options.set_aside, limits=limits)
     parts = [name for name in PARTS if not options.parts or name in options.parts]
+    minutes = 0.0 if options.page and options.minutes is None else options.minutes
     try:
-        return 0 if run(parts, choices, options.folder, options.workers) else 1
+        complete = run(parts, choices, options.folder, options.workers, minutes)
     except KeyboardInterrupt:
         print("\nstopped; the same command goes on with what is finished", file=sys.stderr)
         return 130
+    if options.page and complete is not None:
+        _page(options.page, options.folder, digest(software_hash(), limits))
+    return 0 if complete else 1
 
 
-def run(parts: Sequence[str], choices: StudyChoices, folder: Path, workers: int = WORKERS) -> bool:
-    """Run parts and write what they found into ``folder``. Whether every glove could be judged."""
+def run(
+    parts: Sequence[str],
+    choices: StudyChoices,
+    folder: Path,
+    workers: int = WORKERS,
+    minutes: float | None = None,
+) -> bool | None:
+    """Run parts and write what they found into ``folder``.
+
+    Whether every glove could be judged, but for those that were not reached in ``minutes``. None: the
+    programs changed meanwhile.
+    """
     software = software_hash()
     judged = digest(software, choices.limits)
-    figures: dict[str, list[StudyFigure]] = {}
+    end = math.inf if minutes is None else time.monotonic() + 60 * minutes
+    gloves = {name: PARTS[name].gloves(choices) for name in parts}
+    kept = {name: FinishedGloves(folder, name, judged) for name in parts}
+    costs = [
+        PARTS[name].glove_s * sum(kept[name].get(glove.key) is None for glove in gloves[name])
+        for name in parts
+    ]
+    print(f"{sum(map(len, gloves.values()))} gloves; for what is missing {estimate(costs, workers)}")
+    ending = "-set-aside" if choices.set_aside else ""
+    path = folder / f"study{ending}"
+    results = StudyResults.read(path, judged) or StudyResults(
+        judged, choices.set_aside, other_limits(choices.limits)
+    )
     confused: list[Row] = []
     complete = True
-    ending = "-set-aside" if choices.set_aside else ""
-    for name in parts:
+    for place, name in enumerate(parts):
         part = PARTS[name]
         print(f"\n== {name}: {part.sentence} ==", flush=True)
-        gloves = part.gloves(choices)
-        finished = FinishedGloves(folder, name, judged)
-        rows = answers(gloves, partial(part.job, limits=choices.limits), finished, name, workers)
-        complete &= len(rows) == len(gloves)
-        figures[name] = part.figures(rows)
-        print(table(figures[name]), flush=True)
+        now = time.monotonic()
+        until = end if math.isinf(end) else now + share_of_time(end - now, costs[place:])
+        job = partial(part.job, limits=choices.limits)
+        rows = answers(gloves[name], job, kept[name], name, workers, until)
+        complete &= len(rows) == len(gloves[name]) or time.monotonic() >= until
+        found = PartResults(len(gloves[name]), len(rows), part.figures(rows) if rows else [])
+        results.parts[name] = found
+        print(f"{counts(found)}\n{table(found.figures)}", flush=True)
         if part.confusion:
             confused += rows
         if name == "repair" and rows:
             title = f"Blind study: what is left once the missing effect is added{ending.replace('-', ' ', 1)}"
-            for suffix in PICTURES:
-                draw_error_fall(rows, title, folder / f"error-fall{ending}{suffix}")
+            draw_error_fall(rows, title, folder / f"error-fall{ending}.png")
+            results.pictures[f"error-fall{ending}.png"] = title
         if software_hash() != software:
             print(
                 f"the programs changed while {name} ran: its answers are mixed, run it again", file=sys.stderr
             )
-            return False
-    if confused:
-        _draw(confused, folder, ending)
-    _write(figures, choices, judged, folder / f"study{ending}")
+            return None
+    results.pictures |= _draw(confused, folder, ending)
+    results.write(path)
+    print(f"\nwritten: {path.with_suffix('.md')}, {path.with_suffix('.json')} and pictures beside them")
     return complete
 
 
-def _draw(rows: Sequence[Row], folder: Path, ending: str) -> None:
-    """One matrix for each size of effect; healthy gloves stand in all of them."""
+def _draw(rows: Sequence[Row], folder: Path, ending: str) -> dict[str, str]:
+    """One matrix for each size of effect, healthy gloves in all of them. Titles by the name of the file."""
     sizes = sorted({glove.size for glove, _ in rows if glove.size}) or [0.0]
-    for size in sizes:
+    drawn = {}
+    for size in sizes if rows else []:
         some = [row for row in rows if row[0].size in (size, 0.0)]
         title = f"Blind study: effects of {size:g} x the noise floor" if size else "Blind study: clean gloves"
-        for suffix in PICTURES:
-            draw_confusion(
-                some, title + ending.replace("-", " ", 1), folder / f"confusion-{size:g}{ending}{suffix}"
-            )
+        title, name = title + ending.replace("-", " ", 1), f"confusion-{size:g}{ending}.png"
+        draw_confusion(some, title, folder / name)
+        drawn[name] = title
+    return drawn
 
 
-def _write(figures: dict[str, list[StudyFigure]], choices: StudyChoices, software: str, path: Path) -> None:
-    """Parts that were not run now keep what they found with the same programs."""
-    kept = _earlier(path.with_suffix(".json"), software) | figures
-    forms = "set-aside forms" if choices.set_aside else "open forms"
-    others = other_limits(choices.limits)
-    told = "".join(f"; {name} = {value:g}" for name, value in others.items())
-    head = f"# Blind study of the diagnosis\n\nSimulated gloves, {forms}; programs {software[:10]}{told}.\n"
-    parts = [(name, part, kept[name]) for name, part in PARTS.items() if name in kept]
-    text = [head, *(f"## {name}\n\n{part.sentence}\n\n{table(some)}\n" for name, part, some in parts)]
-    path.with_suffix(".md").write_text("\n".join(text), encoding="utf-8")
-    document = {
-        "software": software,
-        "set_aside": choices.set_aside,
-        "limits": others,
-        "figures": {name: [figure.to_document() for figure in some] for name, _, some in parts},
-    }
-    path.with_suffix(".json").write_text(json.dumps(document, indent=1), encoding="utf-8")
-    print(f"\nwritten: {path.with_suffix('.md')}, {path.with_suffix('.json')} and pictures beside them")
-
-
-def _earlier(path: Path, software: str) -> dict[str, list[StudyFigure]]:
-    document = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
-    if document.get("software") != software:
-        return {}
-    return {
-        name: [StudyFigure.from_document(each) for each in some] for name, some in document["figures"].items()
-    }
+def _page(page: Path, folder: Path, judged: str) -> None:
+    found = [StudyResults.read(folder / f"study{ending}", judged) for ending in ("", "-set-aside")]
+    write_page(page, [each for each in found if each is not None], folder)
+    print(f"written: {page}")
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="do.py study", description=(__doc__ or "").partition("\n")[0])
     lines = "; ".join(f"{name}: {part.sentence}" for name, part in PARTS.items())
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"default: all. {lines}")
-    parser.add_argument("--gloves", type=int, default=20, help="per effect and size (default 20)")
-    parser.add_argument("--clean", type=int, default=150, help="clean gloves per base (default 150)")
-    parser.add_argument("--pairs", type=int, default=24, help="gloves with two effects per size (default 24)")
+    for name, meaning in COUNTS.items():
+        text = f"{meaning} (default {getattr(StudyChoices(), name)})"
+        parser.add_argument(f"--{name.replace('_', '-')}", type=int, metavar="N", help=text)
+    parser.add_argument("--quick", action="store_true", help="everything with one or two gloves")
+    parser.add_argument("--minutes", type=float, metavar="N", help=MINUTES)
+    parser.add_argument("--page", type=Path, metavar="FILE", help=PAGE)
     parser.add_argument("--effects", default="", help="only these, separated by commas")
     parser.add_argument("--set-aside", action="store_true", help=SET_ASIDE)
     parser.add_argument("--limits", type=Path, metavar="FILE", help=LIMITS)
