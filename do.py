@@ -9,8 +9,8 @@
     python3 do.py bench     speed against other libraries, as ratios, with a picture
     python3 do.py paper     Wang & Neff 2013 reproduced: every table and figure, as one page (5 minutes)
     python3 do.py docs      the documentation as a site in site/, readable without a network
-    python3 do.py study     the blind study of the diagnosis: figures beside what is demanded, pictures (hours;
-                            --quick, --minutes N; --page docs/study.md writes the page of what was found);
+    python3 do.py study     the blind study of the diagnosis: figures, confusion matrix, a page (hours;
+                            --quick, --minutes N; --page docs/study.md writes what was found);
                             study active: active sampling against the fixed protocol (half an hour)
 
 uv is installed into .tools and the locked packages into .venv; nothing outside this folder is touched.

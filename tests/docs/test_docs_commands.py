@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 OF_DO_PY = {"--smoke": "do.py", "--quick": "tests/paper/paper.py", "--part": "tests/paper/paper.py"}
 OF_DO_PY |= {"--set-aside": "tests/study/study.py", "--gloves": "tests/bench/streaming_bench.py"}
-OF_DO_PY |= {option: "tests/study/study.py" for option in ("--limits", "--minutes", "--page")}
+OF_DO_PY |= dict.fromkeys(("--limits", "--minutes", "--page"), "tests/study/study.py")
 COMMAND = typer.main.get_command(app)
 
 

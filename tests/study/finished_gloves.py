@@ -16,6 +16,8 @@ import glovecal_models
 MODELS = Path(glovecal_models.__file__).resolve().parent
 HASHED = (".py", ".toml")
 SHOWN = 10
+FEW = 5
+"""Gloves from which on their mean time is believed."""
 RECIPE = 2
 """Rises when the same glove and programs get another answer: older answers are not used then."""
 
@@ -35,6 +37,7 @@ class FinishedGloves:
         folder.mkdir(parents=True, exist_ok=True)
         self.path = folder / f"{part}-{software[:SHOWN]}.jsonl"
         self._answers: dict[str, dict[str, Any]] = {}
+        self._took_s: list[float] = []
         if self.path.exists():
             for line in self.path.read_text(encoding="utf-8").splitlines():
                 self._read(line)
@@ -42,15 +45,25 @@ class FinishedGloves:
     def get(self, key: str) -> dict[str, Any] | None:
         return self._answers.get(key)
 
-    def keep(self, key: str, answer: dict[str, Any]) -> None:
+    @property
+    def glove_s(self) -> float | None:
+        """Mean seconds of processor time of a glove; None before a few were asked."""
+        return sum(self._took_s) / len(self._took_s) if len(self._took_s) >= FEW else None
+
+    def keep(self, key: str, answer: dict[str, Any], took_s: float = 0.0) -> None:
         """Written to the end of the file at once."""
-        self._answers[key] = answer
+        document = {"glove": json.loads(key), "answer": answer, "took_s": round(took_s, 1)}
+        self._keep(document)
         with self.path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps({"glove": json.loads(key), "answer": answer}) + "\n")
+            file.write(json.dumps(document) + "\n")
 
     def _read(self, line: str) -> None:
         try:
             document = json.loads(line)
         except ValueError:
             return  # the line that was being written when the study was stopped
+        self._keep(document)
+
+    def _keep(self, document: dict[str, Any]) -> None:
         self._answers[json.dumps(document["glove"], sort_keys=True)] = document["answer"]
+        self._took_s.append(document["took_s"])

@@ -27,6 +27,8 @@ BYSTANDERS: tuple[Bystander, ...] = get_args(Bystander)
 CONTEXT_CAUSES = ("contact_pressure", "unknown:context")
 RECORDED_UNNAMED = ("unknown:context", "unknown:posture_locked")
 """Causes without a name that follow a recorded column: of the context, or of the sensors themselves."""
+NOT_RECORDED = ("thumb_across",)
+"""Forms of these that follow nothing in the recording: no sensor is on the thumb."""
 RECORDED_INPUTS = (
     "cross_coupling", "palm_arch", "hysteresis", "creep", "lag", "warmup_drift", "temperature", "humidity",
     "donning_shift", "supply_sag", "contact_pressure", "unknown:context",

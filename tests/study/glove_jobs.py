@@ -48,13 +48,13 @@ def answers(
     progress = _Progress(label, len(gloves), known)
     if waiting:
         with ProcessPoolExecutor(workers, get_context("spawn"), begin_worker) as pool:
-            running: dict[Future[dict[str, Any]], BlindGlove] = {}
+            running: dict[Future[tuple[dict[str, Any], float]], BlindGlove] = {}
             while waiting or running:
                 if time.monotonic() >= until:
                     waiting.clear()
                 while waiting and len(running) <= workers:  # few, so that Ctrl-C has little to wait for
                     glove = waiting.pop(0)
-                    running[pool.submit(job, glove)] = glove
+                    running[pool.submit(_timed, job, glove)] = glove
                 if not running:
                     break
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
@@ -65,10 +65,16 @@ def answers(
     return [(glove, answer) for glove in gloves if (answer := finished.get(glove.key)) is not None]
 
 
-def _keep(future: Future[dict[str, Any]], glove: BlindGlove, finished: FinishedGloves) -> None:
+def _timed(job: Answer, glove: BlindGlove) -> tuple[dict[str, Any], float]:
+    """The answer, and the seconds of processor time that it took."""
+    begin = time.process_time()
+    return job(glove), time.process_time() - begin
+
+
+def _keep(future: Future[tuple[dict[str, Any], float]], glove: BlindGlove, finished: FinishedGloves) -> None:
     problem = future.exception()
     if problem is None:
-        finished.keep(glove.key, future.result())
+        finished.keep(glove.key, *future.result())
     else:
         print(
             f"\n{glove.part}: glove {glove.truth} {glove.number} (seed {glove.seed}) failed: "

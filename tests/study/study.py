@@ -49,10 +49,11 @@ PAGE = (
 COUNTS = {
     "gloves": "per effect and size",
     "clean": "clean gloves per base",
+    "repairs": "gloves with one effect at 2.6 floors to be repaired, per effect",
     "pairs": "gloves with two effects per size",
     "second_names": "gloves with one effect through improve, in all",
     "ceilings": "gloves asked for their ceiling, in all; half of them clean",
-    "recorded": "gloves with a recorded cause without a name, in all",
+    "recorded": "gloves with a recorded cause without a name, in all; a quarter of them is left out",
 }
 SMOKE = ("names", "--effects", "lag", "--gloves", "1", "--workers", "1")
 
@@ -105,7 +106,8 @@ def run(
     gloves = {name: PARTS[name].gloves(choices) for name in parts}
     kept = {name: FinishedGloves(folder, name, judged) for name in parts}
     costs = [
-        PARTS[name].glove_s * sum(kept[name].get(glove.key) is None for glove in gloves[name])
+        (kept[name].glove_s or PARTS[name].glove_s)
+        * sum(kept[name].get(glove.key) is None for glove in gloves[name])
         for name in parts
     ]
     print(f"{sum(map(len, gloves.values()))} gloves; for what is missing {estimate(costs, workers)}")

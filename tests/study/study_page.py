@@ -23,6 +23,7 @@ gets the takes and the layout. Sizes are multiples of the noise floor. Open form
 diagnosis was made; set-aside forms nobody had looked at.
 """
 FOLDER = "pictures"
+FORMS = ("open forms", "set-aside forms")
 
 
 def write_page(page: Path, results: Sequence[StudyResults], folder: Path) -> None:
@@ -53,14 +54,15 @@ def demanded_table(results: Sequence[StudyResults]) -> str:
     """Markdown: a row for each thing demanded, open and set-aside forms apart."""
     rows = ["| | demanded | measured (count; 95 % interval) | met |\n|---|---|---|---|"]
     for name, part in PARTS.items():
-        if not part.demanded:
-            continue
-        for found in _of(results, name):
-            judged = [figure for figure in found.parts[name].figures if figure.headline]
-            label = f"{part.demanded}, {found.forms}" if part.of_forms else part.demanded
+        for forms in FORMS if part.of_forms else ("",):
+            if not part.demanded:
+                continue
+            some = [found for found in _of(results, name) if forms in ("", found.forms)]
+            judged = [each for found in some for each in found.parts[name].figures if each.headline]
+            label = f"{part.demanded}, {forms}" if forms else part.demanded
             columns = (
                 [f"{each.headline} {each.demanded}" for each in judged],
-                [_measured(each) for each in judged],
+                [_measured(each) for each in judged] or ["not measured"],
                 [each.verdict or "not measured" for each in judged],
             )
             rows.append(" | ".join([f"| {label}", *("<br>".join(lines) for lines in columns)]) + " |")

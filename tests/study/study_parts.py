@@ -14,6 +14,7 @@ from ceiling_figures import ceiling_figures, recorded_figures
 from delay_gloves import delay_figures, delay_gloves
 from diagnosis_answer import diagnosis_answer
 from glove_choices import (
+    NOT_RECORDED,
     RECORDED_INPUTS,
     RECORDED_UNNAMED,
     clean,
@@ -64,21 +65,23 @@ class StudyChoices:
     """Per effect and size."""
     clean: int = 150
     """Clean gloves per base."""
+    repairs: int = 16
+    """Gloves that are repaired, per effect."""
     pairs: int = 60
     """Gloves with two effects per size."""
     second_names: int = 216
     """Gloves with one effect that is added, in all."""
     ceilings: int = 200
     """Gloves that are asked for their ceiling, in all; every second one is clean."""
-    recorded: int = 80
-    """Gloves with a recorded cause without a name, in all."""
+    recorded: int = 104
+    """Gloves with a cause without a name, in all; a quarter follows nothing recorded and is left out."""
     effects: tuple[str, ...] = ()
     """None given means all."""
     set_aside: bool = False
     limits: ImprovementLimits = IMPROVEMENT_LIMITS
 
 
-QUICK = StudyChoices(gloves=1, clean=2, pairs=2, second_names=18, ceilings=24, recorded=4)
+QUICK = StudyChoices(gloves=1, clean=2, repairs=1, pairs=2, second_names=18, ceilings=24, recorded=8)
 """Everything once: what can go wrong, no figure to rely on."""
 
 
@@ -91,7 +94,7 @@ class StudyPart:
     job: Job
     figures: Callable[[Sequence[Row]], list[StudyFigure]]
     glove_s: float
-    """What a glove costs, seconds of one processor: what the time of a study is shared by."""
+    """What a glove costs, seconds of one processor, until some have been asked: time is shared by it."""
     confusion: bool = False
     """Whether its first names go into the confusion matrix."""
     demanded: str = ""
@@ -111,7 +114,7 @@ def _sizes(choices: StudyChoices) -> list[BlindGlove]:
 def _repair(choices: StudyChoices) -> list[BlindGlove]:
     """Effects that remember twice: from the first frame on, and with frames before the reference."""
     found = []
-    for glove in _single("repair", (LARGE_SIZE,), choices):
+    for glove in _single("repair", (LARGE_SIZE,), replace(choices, gloves=choices.repairs)):
         found.append(glove)
         if glove.truth in REMEMBERING:
             found.append(replace(glove, lead_s=LEAD_S))
@@ -133,9 +136,10 @@ def _clean(choices: StudyChoices) -> list[BlindGlove]:
 
 
 def _unknown(choices: StudyChoices) -> list[BlindGlove]:
+    """Half as many of each: nothing of the study's table is judged by them."""
     return [
         unknown(name, size, number)
-        for number in range(choices.gloves)
+        for number in range((choices.gloves + 1) // 2)
         for size in UNKNOWN_SIZES
         for name in unknown_names(choices.effects)
     ]
@@ -183,7 +187,7 @@ def _recorded(choices: StudyChoices) -> list[BlindGlove]:
         with_cause("recorded", *cells[number % len(cells)], number // len(cells), set_aside=choices.set_aside)
         for number in range(choices.recorded if cells else 0)
     ]
-    return [glove for glove in made if glove is not None]
+    return [glove for glove in made if glove and glove.causes[0].form not in NOT_RECORDED]
 
 
 def _in_turn(
@@ -219,7 +223,7 @@ PARTS: dict[str, StudyPart] = {
         _repair,
         repair_answer,
         repair_figures,
-        glove_s=10,
+        glove_s=35,
         demanded="Error after adding / clean twin, 2.6 x floor",
     ),
     "recorded": StudyPart(
@@ -227,7 +231,7 @@ PARTS: dict[str, StudyPart] = {
         _recorded,
         recorded_answer,
         recorded_figures,
-        glove_s=40,
+        glove_s=75,
         demanded="Recorded causes without a name in the catalogue",
     ),
     "second-names": StudyPart(
@@ -262,7 +266,7 @@ PARTS: dict[str, StudyPart] = {
         _pairs,
         pair_answer,
         pairs_figures,
-        glove_s=25,
+        glove_s=30,
         demanded="Two effects",
     ),
     "next-take": StudyPart(
@@ -278,7 +282,7 @@ PARTS: dict[str, StudyPart] = {
         _ceilings,
         ceiling_answer,
         ceiling_figures,
-        glove_s=16,
+        glove_s=32,
         demanded="The black-box ceiling, 1.3 x floor",
     ),
     "unknown": StudyPart(

@@ -14,7 +14,7 @@ from wandering_reference import WANDER_DEG
 
 from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES, forms
 
-FEW = StudyChoices(gloves=3, clean=6, pairs=6, second_names=36, ceilings=48, recorded=16)
+FEW = StudyChoices(gloves=3, clean=6, repairs=2, pairs=6, second_names=36, ceilings=48, recorded=16)
 
 
 def open_forms(name: str) -> set[str]:
@@ -54,8 +54,8 @@ def test_an_early_stop_has_a_little_of_everything() -> None:
     assert [bool(glove.causes) for glove in ceilings] == [True, False] * 24
     assert {glove.truth for glove in ceilings[: 2 * len(RECORDED_INPUTS)]} == {*RECORDED_INPUTS, "none"}
     recorded = PARTS["recorded"].gloves(FEW)
-    assert {glove.truth for glove in recorded[:2]} == set(RECORDED_UNNAMED)
-    assert {(glove.truth, glove.size) for glove in recorded[:4]} == set(product(RECORDED_UNNAMED, (1.3, 2.6)))
+    assert {(glove.truth, glove.size) for glove in recorded[:6]} == set(product(RECORDED_UNNAMED, (1.3, 2.6)))
+    assert {glove.causes[0].form for glove in recorded} == {"context_hump", "context_wave", "grip_pressure"}
     sizes = PARTS["sizes"].gloves(FEW)
     assert {(glove.truth, glove.size) for glove in sizes[:36]} == set(product(KNOWN_CAUSES, (0.65, 2.6)))
     repair = PARTS["repair"].gloves(FEW)

@@ -32,6 +32,15 @@ def test_every_part_gets_its_share_of_the_time() -> None:
     assert whole / 2 <= 8 * 3600
 
 
+def test_what_gloves_took_tells_what_the_others_will_cost(tmp_path: Path) -> None:
+    finished = FinishedGloves(tmp_path, "names", SOFTWARE)
+    for number, took_s in enumerate([10.0, 20.0, 30.0, 40.0, 50.0]):
+        assert finished.glove_s is None
+        finished.keep(clean(number, linear=False).key, {}, took_s)
+    assert finished.glove_s == pytest.approx(30.0)
+    assert FinishedGloves(tmp_path, "names", SOFTWARE).glove_s == pytest.approx(30.0)
+
+
 def test_no_glove_is_asked_after_the_time_and_the_others_are_asked_later(tmp_path: Path) -> None:
     gloves = [clean(number, linear=False) for number in range(40)]
     finished = FinishedGloves(tmp_path, "names", SOFTWARE)
@@ -77,6 +86,10 @@ def test_the_page_tells_what_is_demanded_first_and_joins_set_aside_forms(tmp_pat
     assert f"{label}set-aside forms | {measured}" in text
     assert text.count("| Clean gloves |") == 1  # they are the same gloves
     assert "| effect added <= 1 % | 50.0 % (1 of 2 gloves; 9.5 to 90.5 %) | **no** |" in text
+    for part in PARTS.values():
+        rows = text.count(f"\n| {part.demanded}, ") + text.count(f"\n| {part.demanded} |")
+        assert not part.demanded or rows == (2 if part.of_forms else 1)
+    assert "| Two effects, open forms |  | not measured |" in text
     assert "Open forms: 102 of 124 gloves done; programs `aaaaaaaaaa`." in text
     assert "Open forms: 100 of 120 gloves, 20 missing." in text
     assert text.index("| demanded |") < text.index("![A matrix](pictures/study-confusion-1.3.png)")
