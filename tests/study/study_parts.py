@@ -65,7 +65,7 @@ class StudyChoices:
     """Per effect and size."""
     clean: int = 150
     """Clean gloves per base."""
-    repairs: int = 16
+    repairs: int = 20
     """Gloves that are repaired, per effect."""
     pairs: int = 60
     """Gloves with two effects per size."""
@@ -205,7 +205,7 @@ PARTS: dict[str, StudyPart] = {
         _names,
         diagnosis_answer,
         names_figures,
-        glove_s=7,
+        glove_s=6,
         confusion=True,
         demanded="The right effect first, 1.3 x floor",
     ),
@@ -214,7 +214,7 @@ PARTS: dict[str, StudyPart] = {
         _sizes,
         diagnosis_answer,
         sizes_figures,
-        glove_s=7,
+        glove_s=6,
         confusion=True,
         demanded="Confidence sets, 0.65 x floor",
     ),
@@ -223,7 +223,7 @@ PARTS: dict[str, StudyPart] = {
         _repair,
         repair_answer,
         repair_figures,
-        glove_s=35,
+        glove_s=15,
         demanded="Error after adding / clean twin, 2.6 x floor",
     ),
     "recorded": StudyPart(
@@ -231,7 +231,7 @@ PARTS: dict[str, StudyPart] = {
         _recorded,
         recorded_answer,
         recorded_figures,
-        glove_s=75,
+        glove_s=25,
         demanded="Recorded causes without a name in the catalogue",
     ),
     "second-names": StudyPart(
@@ -239,7 +239,7 @@ PARTS: dict[str, StudyPart] = {
         _second_names,
         only_walk_answer,
         second_name_figures,
-        glove_s=25,
+        glove_s=18,
         demanded="Second names that are not there",
     ),
     "clean": StudyPart(
@@ -247,7 +247,7 @@ PARTS: dict[str, StudyPart] = {
         _clean,
         walk_answer,
         lambda rows: [*false_alarm_figures(rows), *clean_figures(rows)],
-        glove_s=25,
+        glove_s=12,
         confusion=True,
         demanded="Clean gloves",
         of_forms=False,
@@ -257,7 +257,7 @@ PARTS: dict[str, StudyPart] = {
         lambda choices: delay_gloves(choices.gloves),
         diagnosis_answer,
         delay_figures,
-        glove_s=7,
+        glove_s=5,
         demanded="Delays",
         of_forms=False,
     ),
@@ -266,7 +266,7 @@ PARTS: dict[str, StudyPart] = {
         _pairs,
         pair_answer,
         pairs_figures,
-        glove_s=30,
+        glove_s=20,
         demanded="Two effects",
     ),
     "next-take": StudyPart(
@@ -274,7 +274,7 @@ PARTS: dict[str, StudyPart] = {
         _next_take,
         next_take_answer,
         next_take_figures,
-        glove_s=8,
+        glove_s=7,
         demanded="The proposed next take",
     ),
     "ceiling": StudyPart(
@@ -282,7 +282,7 @@ PARTS: dict[str, StudyPart] = {
         _ceilings,
         ceiling_answer,
         ceiling_figures,
-        glove_s=32,
+        glove_s=12,
         demanded="The black-box ceiling, 1.3 x floor",
     ),
     "unknown": StudyPart(
@@ -290,7 +290,7 @@ PARTS: dict[str, StudyPart] = {
         _unknown,
         walk_answer,
         lambda rows: [*unknown_figures(rows), *alarm_figures(rows)],
-        glove_s=30,
+        glove_s=18,
         confusion=True,
         of_forms=False,
     ),
