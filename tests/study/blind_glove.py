@@ -19,8 +19,8 @@ from glovecal_models.simulation.session import RecordedSession, record_session
 from glovecal_models.simulation.session_plan import FIVE_SENSORS, SessionPlan, TakeMotion
 from glovecal_models.takes.take import Take
 
-PALM_SENSORS = ("I_MCP", "M_MCP", "R_MCP", "P_MCP", "P_PIP", "PALM_ARCH")
-"""Five joints, and the sensor without which no palm arch can be seen."""
+PALM_SENSORS = ("I_MCP", "M_MCP", "R_MCP", "P_MCP", "P_PIP", "T_TMC", "PALM_ARCH")
+"""Six joints, and the sensor without which no palm arch can be seen; the thumb, as its opposition enters."""
 BYSTANDER_DEG = 1e-3
 """A recorded column whose cause is this small explains nothing."""
 

@@ -21,6 +21,8 @@ WIDTHS = (0.2, 0.5, 1.0)
 """Of the widest play: enough to name it, and what models had that were stored without widths."""
 REPAIR_WIDTHS = (0.06, 0.13, 0.25, 0.4, 0.65, 1.0)
 """Loops of many small switches need more."""
+MOST_FORM_PLAYS = 3
+"""A learned form is a function of so many plays."""
 MOST_VALUES = 4_000_000
 """Of plays that are held at once."""
 WIDEST_SHARES = (0.12, 0.25, 0.5)
@@ -107,7 +109,9 @@ class Hysteresis(ArrayStateEffect):
         return found
 
     def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
-        return {f"play {width:g}": columns[:, :, at] for at, width in enumerate(_widths(settings))}
+        widths = list(enumerate(_widths(settings)))
+        every = max(len(widths) // MOST_FORM_PLAYS, 1)
+        return {f"play {width:g}": columns[:, :, at] for at, width in widths[every - 1 :: every]}
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         return tuple(f"play_{width:g}_of_widest_deg_per_deg" for width in _widths(settings))
