@@ -24,7 +24,7 @@ from glovecal_models.calibration.fit_task import FitResult
 from glovecal_models.calibration.form_choice import EVERY as FORM_EVERY
 from glovecal_models.calibration.form_choice import FormRows, chosen_columns, chosen_form
 from glovecal_models.calibration.held_out import BaseFeatures, Rows, WeightPosterior, weight_posterior
-from glovecal_models.calibration.model import restore_regressor
+from glovecal_models.calibration.model import CalibrationModel, restore_regressor
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.samples import Samples, linear_correspondence
 from glovecal_models.calibration.training_plan import task_for
@@ -122,6 +122,11 @@ def found_optima(settings: Mapping[str, Mapping[str, Any]]) -> dict[str, LmcOpti
     """From the ``settings`` of each rotation's regressor; processes only."""
     found = {name: LmcOptimum.of(item.get("evidence", {})) for name, item in settings.items()}
     return {name: optimum for name, optimum in found.items() if optimum is not None}
+
+
+def optima_of(model: CalibrationModel) -> Optima:
+    """Where searches begin that train a model anew with fewer takes."""
+    return (found_optima({item.rotation: item.regressor.settings() for item in model.rotations}),)
 
 
 def correspondence_for(takes: PreparedTakes, rotation: str, settings: TrainingSettings) -> Correspondence:

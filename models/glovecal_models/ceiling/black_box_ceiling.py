@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glovecal_models.calibration.effect_fit import optima_of
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.model_recipe import (
     repaired_takes,
@@ -74,6 +75,7 @@ def black_box_ceiling(
         names,
         wanted,
         settings,
+        optima=optima_of(model),
         cancelled=cancelled,
         report=part(report, 0.0, 0.25, "held-out error"),
     )

@@ -14,7 +14,13 @@ import numpy as np
 from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.child_model import columnless_effects
 from glovecal_models.calibration.effect_correction import EffectCorrection
-from glovecal_models.calibration.effect_fit import EffectFit, correspondence_for, fit_with_effects
+from glovecal_models.calibration.effect_fit import (
+    EffectFit,
+    Optima,
+    correspondence_for,
+    fit_with_effects,
+    optima_of,
+)
 from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.folds import folds_over_takes
 from glovecal_models.calibration.held_out_check import HeldOutErrors
@@ -53,7 +59,9 @@ def add_interval(
     others = [item for item in has if item.name != fresh.name]
     earlier = next((item for item in has if item.name == fresh.name), None)
     found = dict(earlier.settings if earlier else {}) | fresh.settings
-    held_out = claimed_errors(takes, fresh.rotations, others, settings, limits=limits, cancelled=cancelled)
+    held_out = claimed_errors(
+        takes, fresh.rotations, others, settings, optima=optima_of(model), limits=limits, cancelled=cancelled
+    )
     errors = _sums(held_out)
     claim = check_claim(effect, held_out, found, limits)
     learned = effect.learned(held_out, found)
@@ -133,6 +141,7 @@ def claimed_errors(
     wanted: Sequence[EffectRequest],
     settings: TrainingSettings,
     *,
+    optima: Optima = (),
     limits: ImprovementLimits = IMPROVEMENT_LIMITS,
     cancelled: Cancel | None = None,
 ) -> tuple[ClaimedErrors, ...]:
@@ -147,7 +156,7 @@ def claimed_errors(
     for fold in folds_over_takes(np.arange(len(takes.takes)), max(settings.folds, 2)):
         kept = takes.some(np.flatnonzero(~fold.held_out).tolist())
         left = takes.some(np.flatnonzero(fold.held_out).tolist())
-        fit = fit_with_effects(kept, rotations, wanted, settings, cancelled=cancelled)
+        fit = fit_with_effects(kept, rotations, wanted, settings, optima=optima, cancelled=cancelled)
         found += _errors_of(fit, left, rotations, wanted, settings)
     return tuple(found)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.calibration.effect_fit import Optima, found_optima
+from glovecal_models.calibration.effect_fit import optima_of
 from glovecal_models.calibration.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.calibration.left_out_wearings import left_out_wearings
 from glovecal_models.calibration.model import CalibrationModel
@@ -288,7 +288,7 @@ class _Loop:
     def _held_out(self, model: CalibrationModel) -> HeldOutErrors:
         prepared = PreparedTakes.of(self.takes, self.layout)
         return held_out_errors(
-            prepared, trained_rotations(model), [], self.settings, optima=_optima_of(model),
+            prepared, trained_rotations(model), [], self.settings, optima=optima_of(model),
             cancelled=self.cancelled,
         )  # fmt: skip
 
@@ -297,7 +297,7 @@ class _Loop:
         prepared = PreparedTakes.of(self.takes, self.layout)
         names = trained_rotations(model)
         left_out = left_out_wearings(
-            prepared, names, [], self.settings, optima=_optima_of(model), cancelled=self.cancelled
+            prepared, names, [], self.settings, optima=optima_of(model), cancelled=self.cancelled
         )
         wearings = [take.wearing for take in self.takes]
         return replace(model, unseen_wearing=unseen_wearing(wearings, left_out, noise_of(model.rotations)))
@@ -321,8 +321,3 @@ class _Loop:
     def _say(self, text: str, share: float) -> None:
         if self.report:
             self.report(text, min(share, 1.0))
-
-
-def _optima_of(base: CalibrationModel) -> Optima:
-    """Those of a model without effects."""
-    return (found_optima({item.rotation: item.regressor.settings() for item in base.rotations}),)

@@ -7,35 +7,34 @@ where the reference is nearest to what the model predicts.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
 from glovecal_models.effects.base.assessment import Assessment
-from glovecal_models.effects.base.facts import Control, Kind, Parameter, Rival, Settings, Stage
+from glovecal_models.effects.base.facts import Parameter, Rival, Settings
 from glovecal_models.effects.base.motions import FAST, TAPS
 from glovecal_models.effects.base.problem import Problem
-from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.base.signature_effect import (
     Finding,
     Proposal,
     Recorded,
-    SignatureEffect,
     check_signature_input,
 )
 from glovecal_models.effects.delay.clock_drift import LARGEST_PPM, ClockDrift, clock_drift, without_drift
-from glovecal_models.effects.delay.delay_grid import delay_errors, held_out_beside, why_no_delay_shows
+from glovecal_models.effects.delay.delay_grid import DelayErrors
 from glovecal_models.effects.delay.delay_verdict import (
     CLOCK,
     LAG,
     LATENCY,
+    ClockChoice,
     clock_choice,
-    first_delay,
     if_the_glove_is_late,
 )
 from glovecal_models.effects.delay.large_delay import is_one_latency, large_latency_s, large_offsets
+from glovecal_models.effects.delay.time_shift import TimeShift
 from glovecal_models.takes.clock_scan import RANGE_S, ClockOffset, aligned, clock_offsets, without_reference
 from glovecal_models.takes.take import Take
 
@@ -97,45 +96,21 @@ class TakeClock:
         return aligned(take, self.scan.offset_s) if self.scan.verdict == "offset" else take
 
 
-class ClockOffsetEffect(SignatureEffect):
+class ClockOffsetEffect(TimeShift):
     name = CLOCK
     explanation = "Glove and reference system were recorded with clocks that disagree."
     source = "two recorders without a common clock; real ankle recordings: -2.0 to 0.6 s, each take its own"
-    kind: ClassVar[Kind] = "repair"
-    stage: ClassVar[Stage] = "compared"
-    control: ClassVar[Control] = "time-reversed"
     alike: ClassVar = (LAG, LATENCY)
-    shown_by: ClassVar = FAST
     rivals: ClassVar = (Rival(LATENCY, TAPS), Rival("hysteresis", FAST), Rival("creep", FAST))
-    looked_for_once: ClassVar[bool] = True
     needs_prediction: ClassVar[bool] = True
     parameters: ClassVar = (
         Parameter("offset", "s", -RANGE_S, RANGE_S, "some tenths of a second, each take its own"),
         Parameter("drift", "ppm", -LARGEST_PPM, LARGEST_PPM, "below 100 ppm for two good clocks"),
     )
 
-    @property
-    def needs_movement(self) -> bool:
-        return True
-
-    def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
-        return why_no_delay_shows(takes)
-
-    def assess(self, problem: Problem) -> Assessment:
+    def choice(self, grids: Sequence[DelayErrors], problem: Problem) -> ClockChoice:
         """One offset for all joints and, where that pays, one for each take."""
-        grids = delay_errors(problem)
-        clock = clock_choice(grids, problem.limits)
-        errors = held_out_beside(problem, *clock.errors(grids))
-        offsets, nothing = tuple(clock.offset_s for _ in grids), tuple(np.empty(0) for _ in grids)
-        return Assessment(
-            self.name, problem.rotations, errors, offsets, nothing, None, ("offset_s",), limits=problem.limits
-        )
-
-    def told_from_alikes(self, problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]]:
-        return first_delay(problem)
-
-    def reference_delay_s(self, found: Assessment) -> np.ndarray:
-        return found.shapes[0]
+        return clock_choice(grids, problem.limits)
 
     def consequence(self, found: Assessment, confidence_set: Sequence[str]) -> str:
         late = if_the_glove_is_late(float(np.median(found.shapes[0])), confidence_set)

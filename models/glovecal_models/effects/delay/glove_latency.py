@@ -6,68 +6,44 @@ the reference is read when the hand was where the frame says. Only here live pos
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 
 from glovecal_models.effects.base.assessment import Assessment
-from glovecal_models.effects.base.facts import Control, Kind, Parameter, Rival, Settings, Stage
+from glovecal_models.effects.base.facts import Parameter, Rival, Settings
 from glovecal_models.effects.base.motions import FAST, TAPS
 from glovecal_models.effects.base.problem import Problem
-from glovecal_models.effects.base.signals import Signals
-from glovecal_models.effects.base.signature_effect import Finding, Proposal, Recorded, SignatureEffect
-from glovecal_models.effects.delay.delay_grid import delay_errors, held_out_beside, why_no_delay_shows
+from glovecal_models.effects.base.signature_effect import Finding, Proposal, Recorded
+from glovecal_models.effects.delay.delay_grid import DelayErrors
 from glovecal_models.effects.delay.delay_verdict import (
     CLOCK,
     LAG,
     LATENCY,
+    ClockChoice,
     common_choice,
-    first_delay,
     if_the_glove_is_late,
 )
 from glovecal_models.effects.delay.large_delay import large_latency_s
+from glovecal_models.effects.delay.time_shift import TimeShift
 from glovecal_models.takes.clock_scan import aligned
 from glovecal_models.takes.take import Take
 
 LONGEST_S = 0.5
 
 
-class GloveLatency(SignatureEffect):
+class GloveLatency(TimeShift):
     name = LATENCY
     explanation = "The whole glove is late by the same time: its transport, buffers and filters."
     source = "wireless gloves: 10 to 40 ms (Santos, NIME 2021); a linear-phase filter: half its length"
-    kind: ClassVar[Kind] = "repair"
-    stage: ClassVar[Stage] = "compared"
-    control: ClassVar[Control] = "time-reversed"
     alike: ClassVar = (CLOCK, LAG)
-    shown_by: ClassVar = FAST
     rivals: ClassVar = (Rival(CLOCK, TAPS), Rival(LAG, FAST), Rival("hysteresis", FAST))
-    looked_for_once: ClassVar[bool] = True
     parameters: ClassVar = (Parameter("latency", "s", 0.0, LONGEST_S, "10 to 100 ms"),)
 
-    @property
-    def needs_movement(self) -> bool:
-        return True
-
-    def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
-        return why_no_delay_shows(takes)
-
-    def assess(self, problem: Problem) -> Assessment:
-        """One delay of all joints and takes, never an advance; the control is as early."""
-        grids = delay_errors(problem)
-        delay = common_choice(grids)
-        errors = held_out_beside(problem, *delay.errors(grids))
-        late, nothing = tuple(delay.offset_s for _ in grids), tuple(np.empty(0) for _ in grids)
-        return Assessment(
-            self.name, problem.rotations, errors, late, nothing, None, ("latency_s",), limits=problem.limits
-        )
-
-    def told_from_alikes(self, problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]]:
-        return first_delay(problem)
-
-    def reference_delay_s(self, found: Assessment) -> np.ndarray:
-        return found.shapes[0]
+    def choice(self, grids: Sequence[DelayErrors], problem: Problem) -> ClockChoice:
+        """One delay of all joints and takes, never an advance."""
+        return common_choice(grids)
 
     def consequence(self, found: Assessment, confidence_set: Sequence[str]) -> str:
         return if_the_glove_is_late(float(np.median(found.shapes[0])), confidence_set)
