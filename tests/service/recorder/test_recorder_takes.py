@@ -13,24 +13,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from realtime_support import LAYOUT, WireGlove, eventually, part_of_service
-from recorder_support import GLOVE, capturing, recorder_settings, recording_thread, store_with_glove
+from recorder_support import GLOVE, capturing, recording_thread
 
 from glovecal_client.session import open_client, open_router
 from glovecal_service.serve import recorder
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 from glovecal_service.store.records import RecordingRecord
-
-
-@pytest.fixture
-def settings(tmp_path: Path) -> Settings:
-    return recorder_settings(tmp_path)
-
-
-@pytest.fixture
-def store(settings: Settings) -> Iterator[Store]:
-    with store_with_glove(settings) as store:
-        yield store
 
 
 def frames(store: Store, id: str, at_least: int) -> Callable[[], RecordingRecord | None]:

@@ -6,9 +6,7 @@ import os
 import shutil
 import signal
 import time
-from collections.abc import Iterator
 from contextlib import suppress
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,9 +16,7 @@ from recorder_support import (
     capture_process,
     capturing,
     logged,
-    recorder_settings,
     recording_thread,
-    store_with_glove,
 )
 
 from glovecal_client import DamagedLog, Recording
@@ -31,17 +27,6 @@ from glovecal_service.serve import recorder
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 from glovecal_service.store.records import RecordingRecord
-
-
-@pytest.fixture
-def settings(tmp_path: Path) -> Settings:
-    return recorder_settings(tmp_path)
-
-
-@pytest.fixture
-def store(settings: Settings) -> Iterator[Store]:
-    with store_with_glove(settings) as store:
-        yield store
 
 
 @pytest.fixture(autouse=True)
