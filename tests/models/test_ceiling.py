@@ -9,6 +9,7 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.ceiling.black_box_ceiling import black_box_ceiling
+from glovecal_models.ceiling.boosted_trees import left_by_box
 from glovecal_models.ceiling.ceiling import Gain, sign_flip_p_value, verdict_of
 from glovecal_models.ceiling.limits import CEILING_LIMITS
 from glovecal_models.ceiling.text import ceiling_sentence, not_left_to_gain
@@ -62,6 +63,17 @@ def test_few_takes_are_undecided_and_a_cancel_stops_it() -> None:
     assert "4 takes were measured, 6 are needed" in ceiling_sentence(found)
     with pytest.raises(Cancelled):
         black_box_ceiling(model, takes, cancelled=lambda: True)
+
+
+def test_a_column_of_which_nothing_is_known_changes_nothing() -> None:
+    random = np.random.default_rng(3)
+    take = np.repeat(np.arange(8), 100)
+    columns = random.standard_normal((800, 3))
+    target = np.sin(2 * columns[:, 0]) + 0.3 * random.standard_normal(800)
+    unknown = np.column_stack([columns, np.full(800, np.nan)])
+    assert left_by_box(unknown, target, take, 1).square.sum() == pytest.approx(
+        left_by_box(columns, target, take, 1).square.sum(), rel=0.1
+    )
 
 
 def test_flipping_signs_of_whole_takes() -> None:

@@ -76,6 +76,7 @@ class _Box:
 
         known = np.isfinite(columns)
         counts = np.maximum(known.sum(axis=0), 1)
+        self._some = known.any(axis=0)
         self._mean = np.where(known, columns, 0.0).sum(axis=0) / counts
         spread = np.sqrt((np.where(known, columns - self._mean, 0.0) ** 2).sum(axis=0) / counts)
         self._scale = np.where(spread > 0, spread, np.inf)
@@ -89,10 +90,11 @@ class _Box:
             early_stopping=False,  # pyright: ignore[reportArgumentType]
             random_state=seed,
         )  # fmt: skip
-        self._trees.fit(columns, target - self._line(x))
+        # Trees cannot be grown on a column of which nothing is known, such as the past in takes of a second.
+        self._trees.fit(columns[:, self._some], target - self._line(x))
 
     def predict(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return self._line(self._scaled(columns)), self._trees.predict(columns)
+        return self._line(self._scaled(columns)), self._trees.predict(columns[:, self._some])
 
     def _line(self, scaled: np.ndarray) -> np.ndarray:
         return self._level + scaled @ self._weights
