@@ -41,7 +41,8 @@ def draw_confusion(rows: Sequence[Row], title: str, path: Path) -> None:
             if name in _right(truth):
                 axes.add_patch(Rectangle((column - 0.5, place - 0.5), 1, 1, fill=False, edgecolor="#c05020"))
     axes.set_xticks(range(len(names)), names, rotation=55, ha="right", rotation_mode="anchor", fontsize=8)
-    labels = [f"{truth} ({counts[truth].total()} gloves)" for truth in truths]
+    totals = {truth: counts[truth].total() for truth in truths}
+    labels = [f"{truth} ({total} {'glove' if total == 1 else 'gloves'})" for truth, total in totals.items()]
     axes.set_yticks(range(len(truths)), labels, fontsize=8)
     axes.set_xlabel("named first by the diagnosis")
     axes.set_ylabel("hidden in the glove")
