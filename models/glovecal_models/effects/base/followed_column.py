@@ -19,11 +19,11 @@ from glovecal_models.effects.base.relaxation import relax
 
 FOLLOWS_S = 150.0
 """Cloth takes one to several minutes."""
-START_S = 60.0
+START_LASTS_S = 60.0
 """Frames so long after the start tell how it began; a parabola holds no longer."""
 FIRST_FRAME_S = 0.01
 """The first frame's value is as certain as the mean of so long a time."""
-LEAST_FRAMES, LEAST_S, BLOCK_S = 20, 2.0, 1.0
+LEAST_START_FRAMES, LEAST_S, BLOCK_S = 20, 2.0, 1.0
 EXPECTED_STEADY_TAKES = 2.0
 """Takes without any slope that are counted beside those of training: the mean of few is held near zero."""
 LEAST = 1e-12
@@ -65,9 +65,9 @@ def _start(time_s: np.ndarray, value: np.ndarray) -> tuple[float, float, float] 
     """Noise, slope and curvature of one take's start, by a cubic; None where it is too short."""
     if not len(time_s):
         return None
-    known = np.isfinite(value) & (time_s - time_s[0] <= START_S)
+    known = np.isfinite(value) & (time_s - time_s[0] <= START_LASTS_S)
     time, height = time_s[known], value[known]
-    if len(time) < LEAST_FRAMES or time[-1] - time[0] < LEAST_S:
+    if len(time) < LEAST_START_FRAMES or time[-1] - time[0] < LEAST_S:
         return None
     time = time - time[0]
     end = time[-1]
@@ -117,7 +117,7 @@ class FollowedColumn:
         held = np.maximum.accumulate(np.where(known, np.arange(len(value)), -1))
         height = np.where(held < 0, self._height, value[np.maximum(held, 0)] - self._origin)
         followed = relax(self._followed, elapsed_s, height[:, None], np.array([FOLLOWS_S]))[:, 0]
-        weight = np.where(known & (passed <= START_S), elapsed_s, 0.0) / self._start.noise
+        weight = np.where(known & (passed <= START_LASTS_S), elapsed_s, 0.0) / self._start.noise
         terms = np.column_stack([np.ones(len(passed)), passed, passed**2 / 2])
         products = terms[:, :, None] * np.column_stack([terms, height])[:, None, :] * weight[:, None, None]
         sums = np.cumsum(np.concatenate([self._sums[None], products]), axis=0)[1:]

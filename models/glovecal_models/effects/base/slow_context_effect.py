@@ -20,7 +20,7 @@ from glovecal_models.effects.base.signals import Signals
 
 STEEPEST_SHARE = 99.0
 """Percentile of the slopes in training: the unit of the slope's column."""
-BEYOND = 1.5
+SLOPE_REACH = 1.5
 """Steeper ones are followed so far, in that unit: the next take is seldom inside all others."""
 KNOWN_AFTER_S = 10.0
 """From then on the slope is as good as known: on simulated takes the error it leaves falls no further."""
@@ -55,7 +55,7 @@ class SlowContextEffect(ContextEffect):
     ) -> np.ndarray:
         """Columns (N, L, C) with the column's mean slope (N,), per second, given."""
         steepness = (slope - settings[START]["slope"]) / settings["steepest_per_s"]
-        each = np.repeat(np.clip(steepness, -BEYOND, BEYOND)[:, None, None], len(shape), axis=1)
+        each = np.repeat(np.clip(steepness, -SLOPE_REACH, SLOPE_REACH)[:, None, None], len(shape), axis=1)
         return np.concatenate([super().columns(take, settings, shape), each], axis=2)
 
     def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
