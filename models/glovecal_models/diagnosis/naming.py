@@ -21,6 +21,10 @@ class Naming:
     """The first, and all that these takes cannot tell from it."""
 
 
+ALIKE_SHARE = 1e-4
+"""Of the squared error: two columns that go together differ by rounding, however sure it is."""
+
+
 def named(assessments: Sequence[Assessment], limits: DiagnosisLimits = DIAGNOSIS_LIMITS) -> Naming:
     """Rank the effects that beat their control significantly."""
     passing = sorted(
@@ -46,6 +50,6 @@ def _is_significantly_worse(item: Assessment, best: Assessment, standard_errors:
     takes = [best.errors[j].take for j in joints]
     by_take = item.p_value is not None and best.p_value is not None
     worse = over_joints(worse, takes, by_take=by_take)
-    if len(worse) < 2:
+    if len(worse) < 2 or worse.sum() <= ALIKE_SHARE:
         return False
     return bool(worse.mean() > standard_errors * worse.std(ddof=1) / np.sqrt(len(worse)))
