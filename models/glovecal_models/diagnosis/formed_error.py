@@ -65,8 +65,8 @@ def _inputs_of_control(design: ForwardDesign, effect: Effect, joint: int, seed: 
 
 
 def _settings(effect: Effect, takes: Sequence[Signals]) -> tuple[Settings, np.ndarray]:
-    """Of the effect, with the middle shape (1, P) of its grid."""
-    settings = effect.fit_constants(takes)
+    """Of the effect as a repair learns it, with the middle shape (1, P) of its grid."""
+    settings = effect.fit_repair_constants(takes)
     grid = effect.grid(takes, settings)
     return settings, grid[len(grid) // 2]
 

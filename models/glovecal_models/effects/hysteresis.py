@@ -97,9 +97,9 @@ class Hysteresis(ArrayStateEffect):
         for first in range(0, len(parts), most):
             some = parts[first : first + most]
             frames = max(part.stop - part.start for _, part in some)
-            own = np.concatenate([_held(takes[number].own[part], frames) for number, part in some], axis=1)
             if not frames:
                 continue
+            own = np.concatenate([_held(takes[number].own[part], frames) for number, part in some], axis=1)
             shapes = np.tile(shape, (len(some), 1))
             state = self.start(own[0], settings, shapes)
             columns = self.run(state, np.zeros(frames), own, settings, shapes)
