@@ -34,6 +34,7 @@ DECLARED = [
 ]
 EFFECTS = [*catalogue().values(), *DECLARED]
 WITH_COLUMNS = [item for item in EFFECTS if not isinstance(item, ColumnlessEffect)]
+REPAIRED = [item for item in EFFECTS if type(item).fit_repair_constants is not Effect.fit_repair_constants]
 FIXED_NAMES = [
     "nonlinearity", "cross_coupling", "palm_arch", "hysteresis", "creep", "lag", "clock_offset",
     "glove_latency", "repeated_samples", "warmup_drift", "temperature", "humidity", "donning_shift",
@@ -172,13 +173,40 @@ def test_settings_of_other_lanes_are_refused(signals: list[Signals]) -> None:
         effect.columns(one_lane(signals[0], 0), settings, np.zeros((1, 0)))
 
 
-def test_frame_by_frame_gives_the_same(effect: Effect, signals: list[Signals], settings: Settings) -> None:
-    """On uneven frame times, with a gap of 0.5 s that is bridged and one of 3 s that is not."""
-    take = first_frames(signals[0], 400)
+def with_gaps(take: Signals) -> Signals:
+    """Uneven frame times, with a gap of 0.5 s that is bridged and one of 3 s that is not."""
+    take = first_frames(take, 400)
     time = take.time_s.copy()
     time[150:] += 0.5
     time[300:] += 3.0
-    take = replace(take, time_s=time)
+    return replace(take, time_s=time)
+
+
+def test_all_takes_together_are_each_take(effect: Effect, signals: list[Signals], settings: Settings) -> None:
+    takes = [*signals, with_gaps(signals[0]), first_frames(signals[1], 1)]
+    shape = effect.grid(signals, settings)[-1]
+    for take, found in zip(takes, effect.columns_of_takes(takes, settings, shape), strict=True):
+        assert np.array_equal(found, effect.columns(take, settings, shape))
+
+
+@pytest.mark.parametrize("repaired", REPAIRED, ids=lambda effect: effect.name)
+def test_columns_of_a_repair_keep_the_promises_too(repaired: Effect, signals: list[Signals]) -> None:
+    settings = json.loads(json.dumps(repaired.fit_repair_constants(signals)))
+    shape, take = repaired.grid(signals, settings)[-1], with_gaps(signals[0])
+    columns = repaired.columns(take, settings, shape)
+    names = repaired.weight_names(settings)
+    assert columns.shape[2] == len(names) == len(repaired.prior_sd(settings)) == len(set(names))
+    assert len(names) > len(repaired.weight_names(repaired.fit_constants(signals)))
+    stream = repaired.stream(settings, shape)
+    live = np.concatenate([stream.columns(frame) for frame in each_frame(take)])
+    np.testing.assert_allclose(live, columns, rtol=0, atol=1e-9)
+    together = repaired.columns_of_takes([*signals, take], settings, shape)
+    assert np.array_equal(together[-1], columns)
+    assert np.array_equal(together[0], repaired.columns(signals[0], settings, shape))
+
+
+def test_frame_by_frame_gives_the_same(effect: Effect, signals: list[Signals], settings: Settings) -> None:
+    take = with_gaps(signals[0])
     shape = effect.grid(signals, settings)[0]
     stream = effect.stream(settings, shape)
     live = np.concatenate([stream.columns(frame) for frame in each_frame(take)])

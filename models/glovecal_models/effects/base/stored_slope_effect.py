@@ -6,7 +6,7 @@ Only models that were stored so read it; new ones have ``SlowContextEffect``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -73,10 +73,6 @@ def slopes(time_s: np.ndarray, value: np.ndarray) -> np.ndarray:
     return result
 
 
-STEEPEST_SHARE = 99.0
-"""Percentile of the slopes in training; steeper ones are held there."""
-
-
 class StoredSlopeEffect(ContextEffect):
     """Columns of the context column and its square, and one more: its slope over the last half minute."""
 
@@ -84,14 +80,6 @@ class StoredSlopeEffect(ContextEffect):
 
     def transient_s(self, shape: np.ndarray) -> float:
         return MEMORY_S if len(shape) else 0.0
-
-    def fit_constants(self, takes: Sequence[Signals]) -> Settings:
-        settings = super().fit_constants(takes)
-        found = [
-            slopes(take.time_s, take.context[self.column]) for take in takes if self.column in take.context
-        ]
-        steepest = float(np.percentile(np.abs(np.concatenate(found)), STEEPEST_SHARE))
-        return settings | {"steepest_per_s": max(steepest, 1e-9)}
 
     def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
         value = take.context.get(self.column)
