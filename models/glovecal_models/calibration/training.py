@@ -46,7 +46,9 @@ def assemble(
     take_hashes: Sequence[str],
     parent: str | None = None,
 ) -> CalibrationModel:
-    """The model made of the finished fits of ``plan``, in any order."""
+    """The model made of the finished fits of ``plan``: the same, to the byte, in whatever order they come."""
+    planned = {(task.rotation, task.fold, task.without): place for place, task in enumerate(plan.tasks)}
+    results = sorted(results, key=lambda item: planned[item.rotation, item.fold, item.without])
     rotations = []
     squared, count = 0.0, 0
     for correspondence in plan.layout.correspondences:
