@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from glovecal_models.calibration.held_out import ALIKE_ROWS, LEAST_VARIANCE_DEG2
+from glovecal_models.calibration.held_out import ALIKE_ROWS, LEAST_VARIANCE_DEG2, Rows
 from glovecal_models.effects.base.learned_form import MOST_INPUTS, OWN, FormTerm, LearnedForm
 
 EVERY = 3
@@ -46,6 +46,41 @@ class FormRows:
     """Each (N, 1)."""
     target: np.ndarray
     """(N,), degrees."""
+
+    @classmethod
+    def of(
+        cls,
+        base: Sequence[Rows],
+        own: Sequence[np.ndarray],
+        own_sd: np.ndarray,
+        takes: Sequence[int],
+        take_sd_deg: float,
+        inputs: Sequence[Mapping[str, np.ndarray]] = (),
+    ) -> FormRows:
+        """Of several stretches, each of the take in ``takes``, every third row.
+
+        ``own``: for each stretch (N, C), ``own_sd`` (C,); ``inputs``: for each stretch, each (N, 1). Where
+        ``take_sd_deg`` is not zero, each take may have an offset of that size beside the effect.
+        """
+        plain = [part[::EVERY] for part in own]
+        if take_sd_deg:
+            different, which = np.unique(np.asarray(takes), return_inverse=True)
+            offsets = np.eye(len(different))
+            plain = [
+                np.column_stack([part, np.repeat(offsets[[at]], len(part), axis=0)])
+                for part, at in zip(plain, which, strict=True)
+            ]
+            own_sd = np.append(own_sd, np.full(len(different), take_sd_deg))
+        return cls(
+            np.concatenate([unit.base[::EVERY] for unit in base]),
+            np.concatenate(plain),
+            own_sd,
+            {
+                name: np.concatenate([part[name][::EVERY] for part in inputs])
+                for name in (inputs[0] if inputs else ())
+            },
+            np.concatenate([unit.target[::EVERY] for unit in base]),
+        )
 
 
 def chosen_form(lanes: Sequence[FormRows]) -> tuple[FormTerm, ...]:

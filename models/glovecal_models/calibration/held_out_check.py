@@ -13,10 +13,10 @@ from glovecal_models.calibration.effect_fit import (
     Optima,
     correspondence_for,
     fit_with_effects,
-    own_signals,
 )
 from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.folds import are_short, first_measured, folds_over_takes, pieces
+from glovecal_models.calibration.own_signal import OwnSignal
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import NotTrainable
@@ -108,7 +108,7 @@ def frame_errors_of(
 ) -> list[np.ndarray]:
     """For each take (N, R), predicted minus measured, degrees; NaN where nothing was measured."""
     base = {
-        name: own_signals(takes, correspondence_for(takes, name, settings), fit.regressor(name))[0]
+        name: OwnSignal.of(takes, correspondence_for(takes, name, settings), fit.regressor(name)).takes
         for name in rotations
     }
     correction = EffectCorrection(fit.effects, list(rotations), takes.scale)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.calibration.added_effect import form_values
-from glovecal_models.calibration.form_choice import EVERY, FormRows, chosen_form
+from glovecal_models.calibration.form_choice import FormRows, chosen_form
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Settings
@@ -26,6 +26,7 @@ class FormInputs:
     """For each unit, each (N, 1); empty for an effect without a form."""
     prior_sd: np.ndarray
     """(C,) of the own columns' weights."""
+    take_sd_deg: float
 
     @classmethod
     def of(
@@ -46,21 +47,20 @@ class FormInputs:
             [plain[take][::step][index, 0] for take, index in units],
             [{name: each[::step][index] for name, each in values[take].items()} for take, index in units],
             effect.prior_sd(settings),
+            effect.take_sd_deg,
         )
 
     def terms(self, design: ForwardDesign, joint: int, units: Sequence[int]) -> tuple[FormTerm, ...]:
         """Those that ``units`` of the design ask for; none where there is nothing to choose from."""
         if not self.values[0]:
             return ()
-        base, some = design.products[joint].units, slice(None, None, EVERY)
-        rows = FormRows(
-            np.concatenate([base[unit].base[some] for unit in units]),
-            np.concatenate([self.plain[unit][some] for unit in units]),
+        base = design.products[joint].units
+        rows = FormRows.of(
+            [base[unit] for unit in units],
+            [self.plain[unit] for unit in units],
             self.prior_sd,
-            {
-                name: np.concatenate([self.values[unit][name][some] for unit in units])
-                for name in self.values[0]
-            },
-            np.concatenate([base[unit].target[some] for unit in units]),
+            [design.unit_take[unit] for unit in units],
+            self.take_sd_deg,
+            [self.values[unit] for unit in units],
         )
         return chosen_form([rows])

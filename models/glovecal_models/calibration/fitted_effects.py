@@ -1,0 +1,225 @@
+"""Shapes, forms and weights of effects on top of a base that is given.
+
+Shapes and forms are found one effect after another, then all weights of a joint together.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from glovecal_models.calibration.added_effect import CURVES, FORM, AddedEffect, form_values
+from glovecal_models.calibration.effect_request import EffectRequest
+from glovecal_models.calibration.effect_shape import REFINEMENTS, EffectGroup, best_shape
+from glovecal_models.calibration.form_choice import FormRows, chosen_columns, chosen_form
+from glovecal_models.calibration.held_out import BaseFeatures, Rows, WeightPosterior, weight_posterior
+from glovecal_models.calibration.own_signal import OwnSignal
+from glovecal_models.calibration.prepared_takes import PreparedTakes
+from glovecal_models.effects.base.facts import Settings
+from glovecal_models.effects.base.form_curve import LaneCurves
+from glovecal_models.effects.base.learned_form import LearnedForm
+from glovecal_models.layout import Correspondence
+from glovecal_models.progress import Cancel, stop_if
+
+
+def fitted_effects(
+    takes: PreparedTakes,
+    columns: Mapping[str, Correspondence],
+    own: Mapping[str, OwnSignal],
+    wanted: Sequence[EffectRequest],
+    *,
+    is_linear: bool,
+    is_last: bool,
+    cancelled: Cancel | None,
+) -> tuple[AddedEffect, ...]:
+    """``wanted`` on the rotations of ``own``; forms and further columns are learned where ``is_last``.
+
+    ``is_linear``: the base is a straight line. Raises Cancelled.
+    """
+    touched = list(own)
+    groups = [group for item in wanted for group in _groups(takes, item, columns, own)]
+    rows = {name: takes.rows(name) for name in touched}
+    bases = {name: _base(takes, columns[name], rows[name], is_linear) for name in touched}
+    extra: dict[str, list[list[np.ndarray]]] = {name: [] for name in touched}
+    priors: dict[str, list[np.ndarray]] = {name: [] for name in touched}
+    shapes: list[np.ndarray] = []
+    inputs: dict[int, dict[str, dict[str, np.ndarray]]] = {}
+    for place, group in enumerate(groups):
+        stop_if(cancelled, "adding an effect")
+        # The first turn's shapes only tell the base what to leave out: the grid is fine enough for that.
+        shape = best_shape(group, rows, bases, extra, refinements=REFINEMENTS if is_last else 0)
+        shapes.append(shape)
+        effect = group.wanted.effect
+        if is_last:
+            group = groups[place] = _with_curves(group, shape, rows, bases, extra, priors)
+        found = effect.columns_of_takes(group.signals, group.settings, shape)
+        own_prior = effect.prior_sd(group.settings)
+        for lane, name in enumerate(group.lanes):
+            extra[name].append([part[index, lane] for part, index in zip(found, rows[name], strict=True)])
+            priors[name].append(own_prior)
+        if is_last:  # while the base still holds a part of the effect, its form cannot be seen
+            values = [
+                form_values(effect, take, part, group.settings)
+                for take, part in zip(group.signals, found, strict=True)
+            ]
+            form = _learned_form(group, values, rows, bases, extra, priors)
+            if form is not None:
+                groups[place] = replace(group, settings=group.settings | {FORM: form.to_document()})
+                inputs[place] = _form_inputs(group, form, values, rows)
+    weights = {name: _weights(bases[name], extra[name], priors[name]) for name in touched}
+    used = dict.fromkeys(touched, 0)
+    added = []
+    for place, (group, shape) in enumerate(zip(groups, shapes, strict=True)):
+        mine, curves = [], {}
+        for name in group.lanes:
+            mine.append(weights[name][used[name]])
+            if place in inputs and any(map(len, rows[name])):
+                degrees = np.concatenate(extra[name][used[name]]) @ mine[-1].mean
+                drawn = LaneCurves.over(inputs[place][name], group.wanted.effect.form_unit, degrees)
+                curves[name] = drawn.to_document()
+            used[name] += 1
+        zero = np.array([own[name].zero_deg for name in group.lanes])
+        mean = np.array([each.mean for each in mine])
+        is_told = group.wanted.effect.tells_own_uncertainty
+        covariance = None if is_told else np.array([each.covariance for each in mine])
+        settled = group.settings
+        if curves:
+            settled = settled | {FORM: settled[FORM] | {CURVES: curves}}
+        added.append(
+            AddedEffect(group.wanted.name, group.lanes, settled, shape, mean, zero, covariance=covariance)
+        )
+    return tuple(added)
+
+
+def _form_rows(
+    base: Sequence[Rows],
+    extra: Sequence[Sequence[np.ndarray]],
+    priors: Sequence[np.ndarray],
+    take_sd_deg: float,
+    inputs: Sequence[Mapping[str, np.ndarray]] = (),
+) -> FormRows:
+    """Of one lane; ``extra`` for each effect so far its columns in each take."""
+    own = [np.column_stack(parts) for parts in zip(*extra, strict=True)]
+    return FormRows.of(base, own, np.concatenate(priors), range(len(base)), take_sd_deg, inputs)
+
+
+def _with_curves(
+    group: EffectGroup,
+    shape: np.ndarray,
+    rows: Mapping[str, Sequence[np.ndarray]],
+    bases: Mapping[str, list[Rows]],
+    extra: Mapping[str, list[list[np.ndarray]]],
+    priors: Mapping[str, list[np.ndarray]],
+) -> EffectGroup:
+    """With those of the effect's further columns that the takes ask for; ``extra`` are of effects before."""
+    effect = group.wanted.effect
+    choices = [group.settings, *effect.settings_with_curves(group.signals, group.settings)]
+    if len(choices) == 1:
+        return group
+
+    def lanes(settings: Settings) -> list[FormRows]:
+        found = [effect.columns(take, settings, shape) for take in group.signals]
+        prior = effect.prior_sd(settings)
+        problems = []
+        for lane, name in enumerate(group.lanes):
+            mine = [part[index, lane] for part, index in zip(found, rows[name], strict=True)]
+            every, sd = [*extra[name], mine], [*priors[name], prior]
+            problems.append(_form_rows(bases[name], every, sd, effect.take_sd_deg))
+        return problems
+
+    return replace(group, settings=choices[chosen_columns(map(lanes, choices))])
+
+
+def _learned_form(
+    group: EffectGroup,
+    values: Sequence[Mapping[str, np.ndarray]],
+    rows: Mapping[str, Sequence[np.ndarray]],
+    bases: Mapping[str, list[Rows]],
+    extra: Mapping[str, list[list[np.ndarray]]],
+    priors: Mapping[str, list[np.ndarray]],
+) -> LearnedForm | None:
+    """What the takes ask for beyond the effect's own columns, which stand last in ``extra``; the form's
+    columns are joined to those. ``values``: for each take the form's possible inputs (N, L)."""
+    lanes = group.lanes
+    if not values or not values[0]:
+        return None
+    problems = []
+    for lane, name in enumerate(lanes):
+        inputs = [
+            {key: column[index][:, [lane]] for key, column in take.items()}
+            for take, index in zip(values, rows[name], strict=True)
+        ]
+        sd = group.wanted.effect.take_sd_deg
+        problems.append(_form_rows(bases[name], extra[name], priors[name], sd, inputs))
+    terms = chosen_form(problems)
+    if not terms:
+        return None
+    form = LearnedForm.over(terms, values)
+    for lane, name in enumerate(lanes):
+        for number, (take, index) in enumerate(zip(values, rows[name], strict=True)):
+            learned = form.of_lane(lane).columns(
+                {key: column[index][:, [lane]] for key, column in take.items()}
+            )
+            extra[name][-1][number] = np.column_stack([extra[name][-1][number], learned[:, 0, :]])
+        priors[name][-1] = np.concatenate([priors[name][-1], np.ones(form.count)])
+    return form
+
+
+def _form_inputs(
+    group: EffectGroup,
+    form: LearnedForm,
+    values: Sequence[Mapping[str, np.ndarray]],
+    rows: Mapping[str, Sequence[np.ndarray]],
+) -> dict[str, dict[str, np.ndarray]]:
+    """For each lane the fitted rows (N,) of each input that the form uses."""
+    used = dict.fromkeys(key for term in form.terms for key in term.inputs)
+    return {
+        name: {
+            key: np.concatenate(
+                [take[key][index, lane] for take, index in zip(values, rows[name], strict=True)]
+            )
+            for key in used
+        }
+        for lane, name in enumerate(group.lanes)
+    }
+
+
+def _groups(
+    takes: PreparedTakes,
+    item: EffectRequest,
+    columns: Mapping[str, Correspondence],
+    own: Mapping[str, OwnSignal],
+) -> list[EffectGroup]:
+    names = [name for name in item.rotations if name in own]
+    sets = [(name,) for name in names] if item.effect.one_joint_at_a_time else [tuple(names)]
+    groups = []
+    for lanes in sets:
+        values = [np.column_stack(parts) for parts in zip(*(own[name].takes for name in lanes), strict=True)]
+        without = frozenset(columns[lanes[0]].sensors) if item.effect.one_joint_at_a_time else frozenset()
+        signals = takes.signals(values, np.array([own[name].zero_deg for name in lanes]), without)
+        groups.append(EffectGroup(item, lanes, signals, item.effect.fit_repair_constants(signals)))
+    return groups
+
+
+def _base(
+    takes: PreparedTakes, correspondence: Correspondence, rows: Sequence[np.ndarray], linear: bool
+) -> list[Rows]:
+    inputs = takes.inputs(correspondence)
+    features = BaseFeatures.fit_constants(inputs, linear=linear)
+    return [
+        Rows(features.columns(part[index]), target[index])
+        for part, target, index in zip(inputs, takes.target(correspondence.rotation), rows, strict=True)
+    ]
+
+
+def _weights(
+    base: list[Rows], extra: list[list[np.ndarray]], priors: list[np.ndarray]
+) -> list[WeightPosterior]:
+    """For each effect of one joint, all fitted together."""
+    together = [np.column_stack(parts) for parts in zip(*extra, strict=True)]
+    whole = weight_posterior(base, together, np.concatenate(priors))
+    ends = np.cumsum([0, *(len(part) for part in priors)])
+    return [whole.part(slice(start, end)) for start, end in itertools.pairwise(ends)]
