@@ -145,3 +145,44 @@ def test_a_sensor_that_stands_still_with_the_hand_is_sound(glove):
         reference[600:900] = 45.0
         takes.append(replace(take, reference=reference))
     assert [item.kind for item in FAULT.find(takes, glove.sensor_of)] == []
+
+
+def stretched(takes, gains):
+    """Two wearings; the first sensor answers so many times as much in each take."""
+    return [
+        replace(
+            take,
+            wearing="w1" if number < len(takes) // 2 else "w2",
+            readings=take.readings * [gain, 1.0, 1.0] + [40.0 * (1.0 - gain), 0.0, 0.0],
+        )
+        for number, (take, gain) in enumerate(zip(takes, gains, strict=True))
+    ]
+
+
+def test_a_gain_that_changes_between_takes_is_a_fault_from_there_on(glove):
+    takes = stretched(glove.takes(count=10), [1.0] * 7 + [1.08] * 3)
+    [finding] = FAULT.find(takes, glove.sensor_of)
+    assert (finding.where, finding.kind) == (("I_PIP",), "changed")
+    assert finding.evidence["gain_change_share"] == pytest.approx(0.08, abs=0.02)
+    assert [item.take for item in finding.stretches] == [f"take{number}" for number in range(7)]
+    mended = FAULT.repaired(takes)
+    assert not np.isfinite(mended[6].reference_at_frames(["I_PIP"])).any()
+    assert mended[7] is takes[7]
+
+
+@pytest.mark.parametrize(
+    "gains",
+    [
+        [1.0] * 5 + [1.08] * 5,  # just where the glove was put on again
+        np.linspace(1.0, 1.1, 10),  # as the battery below
+        [1.0] * 10,
+    ],
+)
+def test_gains_that_a_wearing_or_a_column_explains_are_no_fault(glove, gains):
+    takes = stretched(glove.takes(count=10), gains)
+    volts = np.linspace(4.1, 3.8, 10)
+    takes = [
+        replace(take, context={"supply_v": np.full(len(take.time_s), volt)})
+        for take, volt in zip(takes, volts, strict=True)
+    ]
+    assert FAULT.find(takes, glove.sensor_of) == ()

@@ -15,6 +15,8 @@ from glovecal_models.effects.sensor_fault.fault_watch import (
 )
 from glovecal_models.takes.take import Take
 
+LASTING = ("jump", "changed")
+"""Kinds that leave a sound sensor, if another one than before."""
 LEAST_OF_RANGE = (0.5, 99.5)
 JUMP_LAGS = 8
 CHANGE_QUANTILE, CHANGE_MARGIN = 0.9998, 1.3
@@ -37,7 +39,7 @@ def fault_limits(
     still = np.array([_longest_still(takes, readings, sound, column) for column in range(len(sensors))])
     surprise = _largest_surprises(takes, readings, sound, lags) / span[:, None]
     # Not every fault of a failing sensor is found, least while its joint rests: sound ones tell more.
-    failing = {name for item in found for name in item.where if item.kind != "jump"}
+    failing = {name for item in found for name in item.where if item.kind not in LASTING}
     fails = np.array([name in failing for name in sensors])
     if not fails.all():
         still = np.where(fails, still[~fails].max(), still)
@@ -55,11 +57,11 @@ def fault_limits(
 
 
 def _sound(take: Take, sensors: Sequence[str], found: Sequence[Finding]) -> np.ndarray:
-    """(N, S) False in the stretches that were found faulty; a jump for good leaves a sound sensor."""
+    """(N, S) False in the stretches that were found faulty; a change for good leaves a sound sensor."""
     sound = np.ones((len(take.time_s), len(sensors)), dtype=bool)
     for item in found:
         for name in item.where:
-            if name in sensors and item.kind != "jump":
+            if name in sensors and item.kind not in LASTING:
                 sound[:, list(sensors).index(name)] &= ~frames_inside(take, item.stretches)
     return sound
 

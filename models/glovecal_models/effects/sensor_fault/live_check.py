@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from glovecal_models.effects.base.signature_effect import Finding, LiveCheck, frames_inside
-from glovecal_models.effects.sensor_fault.fault_limits import fault_limits
+from glovecal_models.effects.sensor_fault.fault_limits import LASTING, fault_limits
 from glovecal_models.effects.sensor_fault.fault_watch import FaultLimits, FaultWatch
 from glovecal_models.progress import Cancel, stop_if
 from glovecal_models.takes.take import Take
@@ -75,11 +75,11 @@ def _sentence(evidence: Mapping[str, float], is_served: bool) -> str:
 
 
 def _marked(take: Take, sensors: Sequence[str], found: Sequence[Finding]) -> np.ndarray:
-    """(N, S) True where the reference shows a fault that passes; after a jump for good readings are sound."""
+    """(N, S) True where the reference shows a fault that passes; after a lasting change readings are sound."""
     marks = np.zeros((len(take.time_s), len(sensors)), dtype=bool)
     for item in found:
         for name in item.where:
-            if item.kind != "jump":
+            if item.kind not in LASTING:
                 marks[:, list(sensors).index(name)] |= frames_inside(take, item.stretches)
     return marks
 

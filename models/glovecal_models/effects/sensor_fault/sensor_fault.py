@@ -1,7 +1,9 @@
 """Sensor fault: a broken wire, a loose plug. The stretches concerned should not train anything.
 
-Four signatures: *stuck* (one value while the reference moves), *spikes* (gone after a frame or two),
-*dropouts* (jumps to a constant and back) and a *jump* of gain or offset in the middle of a take.
+Five signatures: *stuck* (one value while the reference moves), *spikes* (gone after a frame or two),
+*dropouts* (jumps to a constant and back), a *jump* of gain or offset in the middle of a take, and a gain that
+has *changed* from one take to another. What a sensor answered before a change says nothing of what it answers
+now: that is left out.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from glovecal_models.effects.base.signature_effect import (
     stretches_of,
 )
 from glovecal_models.effects.sensor_fault.fault_watch import FaultHold
+from glovecal_models.effects.sensor_fault.gain_change import GainChange, gain_change
 from glovecal_models.effects.sensor_fault.gain_jump import gain_jump
 from glovecal_models.effects.sensor_fault.live_check import live_check
 from glovecal_models.effects.sensor_fault.reading_faults import GRADUAL_SHARE, dropouts, spikes, stuck
@@ -51,7 +54,7 @@ class SensorFault(SignatureEffect):
     rivals: ClassVar = (Rival("nonlinearity", SHUFFLED),)
     explanation = "A wire or plug fails: the sensor stands still, spikes, drops out or jumps."
     source = "signatures of readings against reference"
-    kinds: ClassVar[tuple[str, ...]] = ("stuck", "spikes", "dropouts", "jump")
+    kinds: ClassVar[tuple[str, ...]] = ("stuck", "spikes", "dropouts", "jump", "changed")
 
     def find(
         self,
@@ -65,7 +68,7 @@ class SensorFault(SignatureEffect):
             rotation_of.setdefault(sensor, rotation)
         found: list[Finding] = []
         for sensor, rotation in rotation_of.items():
-            found += _faults(takes, sensor, rotation)
+            found += _faults(takes, sensor, rotation, len(rotation_of))
         return tuple(sorted(found, key=lambda item: (-len(item.stretches), item.where)))
 
     def find_between_levels(self, takes: Sequence[Take], sensor_of: Mapping[str, str]) -> tuple[Finding, ...]:
@@ -102,13 +105,13 @@ class SensorFault(SignatureEffect):
         return tuple(_without_faults(take, found) for take in takes)
 
 
-def _faults(takes: Sequence[Take], sensor: str, rotation: str) -> list[Finding]:
+def _faults(takes: Sequence[Take], sensor: str, rotation: str, sensors: int) -> list[Finding]:
     columns = [take.readings[:, take.sensors.index(sensor)] for take in takes]
     low, high = (float(v) for v in np.percentile(np.concatenate(columns), LEAST_OF_RANGE))
     short = _short_faults(takes, sensor, rotation, low, high)
     stretches: dict[str, list[Stretch]] = {kind: [] for kind in SensorFault.kinds}
     frames = dict.fromkeys(SensorFault.kinds, 0)
-    jumps = []
+    jumps, sound_angles = [], []
     for take, readings, brief in zip(takes, columns, short, strict=True):
         angles = take.reference_at_frames([rotation])[:, 0]
         masks = {
@@ -123,6 +126,7 @@ def _faults(takes: Sequence[Take], sensor: str, rotation: str) -> list[Finding]:
         margin = GRADUAL_SHARE * (high - low)
         inside = (readings >= low + margin) & (readings <= high - margin)
         broken = masks["stuck"] | masks["dropouts"] | masks["spikes"]
+        sound_angles.append(np.where(broken | ~inside, np.nan, angles))
         jump = gain_jump(take.time_s, readings, np.where(broken, np.nan, angles), inside)
         if jump is not None:
             jumps.append(jump)
@@ -130,11 +134,33 @@ def _faults(takes: Sequence[Take], sensor: str, rotation: str) -> list[Finding]:
             stretches["jump"].append(Stretch(take.name, jump.at_s, float(take.time_s[-1])))
     least = {"stuck": 1, "dropouts": 1, "spikes": LEAST_SPIKES, "jump": 1}
     size = max((jump.size_deg for jump in jumps), default=None)
-    return [
+    change = gain_change(takes, columns, sound_angles, sensors)
+    lasting = [_finding_changed(sensor, rotation, change, takes)] if change else []
+    return lasting + [
         _finding(sensor, rotation, kind, stretches[kind], frames[kind], size if kind == "jump" else None)
-        for kind in SensorFault.kinds
+        for kind in least
         if len(stretches[kind]) >= least[kind]
     ]
+
+
+def _finding_changed(sensor: str, rotation: str, change: GainChange, takes: Sequence[Take]) -> Finding:
+    concerned = takes[: change.after]
+    more = "more" if change.share > 0 else "less"
+    sentence = (
+        f"{sensor} answers {abs(change.share):.0%} {more} to {rotation} from take {takes[change.after].name}"
+        f" on, {change.size_deg:.1f} deg over a standard deviation of its angles (p = {change.p_value:.1g});"
+        f" the {len(concerned)} takes before are left out for it."
+    )
+    evidence = {
+        "gain_change_share": change.share,
+        "p_value_1": change.p_value,
+        "concerned_frames": float(sum(len(take.time_s) for take in concerned)),
+    }
+    stretches = tuple(Stretch(take.name, float(take.time_s[0]), float(take.time_s[-1])) for take in concerned)
+    return Finding(
+        SensorFault.name, (sensor,), sentence, kind="changed", size_deg=change.size_deg, count=1,
+        evidence=evidence, stretches=stretches,
+    )  # fmt: skip
 
 
 def _short_faults(
