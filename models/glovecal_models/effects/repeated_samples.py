@@ -3,6 +3,10 @@
 A hand at rest repeats 8-bit frames too. Padding shows inside a movement: a sensor goes on in the same
 direction right before and right after a frame (or a run of frames) in which nothing at all has changed. The
 same is looked for in the rows of the reference, whose padding is usual when it is slower than its file.
+
+A stream that halts now and then repeats too few frames for that. But when it goes on it leaps over what
+it missed, and then moves more slowly; a hand that rested starts slowly. How often movements leap by chance is
+told by the frames that follow one another without a repeat.
 """
 
 from __future__ import annotations
@@ -12,6 +16,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
+from scipy.special import bdtrc
 
 from glovecal_models.effects.base.facts import Kind, Settings
 from glovecal_models.effects.base.signature_effect import (
@@ -34,6 +39,15 @@ CLEAR_STEP = 2.0
 """A sensor moves for certain when it steps by so many quanta in one frame."""
 NEAR_FRAMES = 5
 """A repeat is dropped when something moves clearly within so many frames; a hand at rest keeps its own."""
+LEAP_RATIO = 1.5
+"""A leap is so many times longer than the steps before and after it, summed over columns."""
+LEAP_STEP = 4.0
+"""And some column makes so many quanta in it: slow movements of coarse sensors step unevenly."""
+LONGEST_HALT = 60
+"""Frames; a hand may rest for longer."""
+LEAST_LEAPS = 8
+LEAPS_P_VALUE = 1e-4
+"""That so many repeats end in a leap by chance (binomial)."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +64,15 @@ class Repeats:
     """Share of the rows in or near a movement in which all columns repeat."""
     by_chance: float = 0.0
     """What that share would be if each column repeated for itself, as coarse steps of a slow movement do."""
+
+    halts: int = 0
+    """Runs of repeats, but for long ones and those at the ends."""
+    leaps: int = 0
+    """Halts that end in a leap."""
+    steps: int = 0
+    """Steps without a halt, for comparison."""
+    plain_leaps: int = 0
+    """Those of them that are leaps."""
 
     @property
     def share(self) -> float:
@@ -104,7 +127,24 @@ def repeats(values: np.ndarray) -> Repeats:
     near = np.convolve(moving, np.ones(2 * NEAR_FRAMES + 1), mode="same") > 0
     together = float(same[near].mean()) if near.any() else 0.0
     interrupted, going = int((goes_on & padded).sum()), int((goes_on & ~padded).sum())
-    return Repeats(same & near, interrupted, going, together, _by_chance(values, steps, near, together))
+    leaping, lasts = _leaps(between, quantum), np.diff(fresh)[1:-1]
+    halting = (lasts > 1) & (lasts <= LONGEST_HALT)
+    missed = np.zeros(len(values), dtype=bool)
+    for start, end in zip(fresh[1:-2][leaping & halting], fresh[2:-1][leaping & halting], strict=True):
+        missed[start + 1 : end] = True
+    return Repeats(
+        same & (near | missed), interrupted, going, together, _by_chance(values, steps, near, together),
+        int(halting.sum()), int((leaping & halting).sum()), int((lasts == 1).sum()),
+        int((leaping & (lasts == 1)).sum()),
+    )  # fmt: skip
+
+
+def _leaps(between: np.ndarray, quantum: np.ndarray) -> np.ndarray:
+    """For each step (S, K) between fresh rows but the first and last: whether it is a leap."""
+    quanta = np.abs(between[:, quantum > 0]) / quantum[quantum > 0]
+    length, largest = quanta.sum(axis=1), quanta.max(axis=1, initial=0.0)
+    around = np.maximum(length[:-2], length[2:])
+    return (length[1:-1] >= LEAP_RATIO * around) & (largest[1:-1] >= LEAP_STEP)
 
 
 def _by_chance(values: np.ndarray, steps: np.ndarray, near: np.ndarray, together: float) -> float:
@@ -118,6 +158,20 @@ def _by_chance(values: np.ndarray, steps: np.ndarray, near: np.ndarray, together
 
 
 def _is_found(found: Sequence[Repeats]) -> bool:
+    return _are_many(found) or _leap_beyond_chance(found)
+
+
+def _leap_beyond_chance(found: Sequence[Repeats]) -> bool:
+    halts, leaps, steps, plain = (
+        sum(getattr(item, name) for item in found) for name in ("halts", "leaps", "steps", "plain_leaps")
+    )
+    if leaps < LEAST_LEAPS:
+        return False
+    chance = (plain + 1.0) / (steps + 2.0)
+    return float(bdtrc(leaps - 1, halts, chance)) <= LEAPS_P_VALUE
+
+
+def _are_many(found: Sequence[Repeats]) -> bool:
     interrupted, moving = sum(item.interrupted for item in found), sum(item.moving for item in found)
     if interrupted < LEAST_COUNT or interrupted < LEAST_REPEATED_SHARE * (interrupted + moving):
         return False
@@ -130,17 +184,23 @@ def _is_found(found: Sequence[Repeats]) -> bool:
 def _finding(kind: str, takes: Sequence[Take], found: Sequence[Repeats]) -> Finding | None:
     if not _is_found(found):
         return None
-    concerned = [(take, item) for take, item in zip(takes, found, strict=True) if item.interrupted]
+    concerned = [
+        (take, item) for take, item in zip(takes, found, strict=True) if item.interrupted or item.leaps
+    ]
     count = sum(int(item.rows.sum()) for _, item in concerned)
     total = sum(len(item.rows) for item in found)
     interrupted = sum(item.interrupted for item in found)
-    share = interrupted / (interrupted + sum(item.moving for item in found))
+    share = interrupted / max(interrupted + sum(item.moving for item in found), 1)
     names = tuple(take.name for take, _ in concerned)
     sentence = (
         f"{count} of {total} {kind} repeat the one before in the middle of a movement "
         f"({named(names)}); they were filled in and should be dropped."
     )
-    evidence = {"repeated_share_of_moving_pct": 100.0 * share, "interrupted_movements_count": interrupted}
+    evidence = {
+        "repeated_share_of_moving_pct": 100.0 * share,
+        "interrupted_movements_count": interrupted,
+        "leaps_after_halts_count": sum(item.leaps for item in found),
+    }
     return Finding(RepeatedSamples.name, names, sentence, kind=kind, count=count, evidence=evidence)
 
 

@@ -44,6 +44,22 @@ def test_padded_frames_are_found_and_dropped(glove, share):
     assert REPEATED.find(mended, glove.sensor_of) == ()
 
 
+def test_a_stream_that_halts_now_and_then_leaps_when_it_goes_on(glove):
+    takes, held = [], np.zeros(1800, dtype=bool)
+    for start in range(60, 1800, 120):
+        held[start : start + 9] = True
+    for take in glove.takes():
+        rows = np.maximum.accumulate(np.where(held, 0, np.arange(1800)))
+        takes.append(replace(take, readings=take.readings[rows]))
+    [finding] = REPEATED.find(takes, glove.sensor_of)
+    assert finding.evidence["leaps_after_halts_count"] > 20
+    mended = REPEATED.repaired(takes)
+    dropped = [~np.isin(old.time_s, new.time_s) for old, new in zip(takes, mended, strict=True)]
+    assert np.mean([rows[held].mean() for rows in dropped]) > 0.7
+    assert np.mean([rows[~held].mean() for rows in dropped]) < 0.05
+    assert REPEATED.find(mended, glove.sensor_of) == ()
+
+
 def test_padded_reference_rows_become_unknown(glove):
     takes = [replace(take, reference=padded(take.reference, 0.2)[0]) for take in glove.takes()]
     [finding] = REPEATED.find(takes, glove.sensor_of)

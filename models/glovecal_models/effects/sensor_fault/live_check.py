@@ -75,7 +75,7 @@ def _sentence(evidence: Mapping[str, float], is_served: bool) -> str:
 
 
 def _marked(take: Take, sensors: Sequence[str], found: Sequence[Finding]) -> np.ndarray:
-    """(N, S) True where the reference shows a fault that passes; after a lasting change readings are sound."""
+    """(N, S) True where the reference shows a fault that passes; after a lasting one readings are sound."""
     marks = np.zeros((len(take.time_s), len(sensors)), dtype=bool)
     for item in found:
         for name in item.where:
