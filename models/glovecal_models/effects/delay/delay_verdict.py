@@ -140,6 +140,8 @@ def possible_delays(
     kept = forms_kept(grids, together, clear)
     if DelayForm.PURE in kept and DelayForm.DELAYED_WINDOW in kept:
         kept.remove(DelayForm.DELAYED_WINDOW)  # hardly told from a mere delay
+    # A filter may gain by what noise it takes away: while a mere delay is not ruled out, it comes first.
+    kept.sort(key=lambda form: form is not DelayForm.PURE)
     return tuple(dict.fromkeys(name for form in kept for name in ACCOUNTS_FOR[form]))
 
 

@@ -1,0 +1,36 @@
+"""Forms of delay: a filter is named before a mere delay only where it clearly explains more."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from glovecal_models.effects.delay.delay_grid import DelayErrors, DelayForm
+from glovecal_models.effects.delay.delay_verdict import possible_delays
+
+DELAYS_S = np.array([-0.02, 0.0, 0.02, 0.04])
+
+
+def errors(lowpass_gain: float) -> DelayErrors:
+    """Of 48 blocks in 4 takes, 20 ms late; a pole leaves less by so much of the motion, with scatter."""
+    generator = np.random.default_rng(3)
+    fast, scatter = generator.uniform(0.2, 2.0, 48), generator.normal(0.0, 0.1, 48)
+    blocks, forms = [], []
+    for form in DelayForm:
+        less = {DelayForm.PURE: 0.0, DelayForm.ONE_POLE: lowpass_gain}.get(form, -2.0)
+        for delay in DELAYS_S:
+            away = abs(delay - 0.02) / 0.02
+            blocks.append(5.0 + fast * (2.0 * away - less) + (scatter if form else 0.0))
+            forms.append(form)
+    return DelayErrors(
+        np.array(forms), np.tile(DELAYS_S, len(DelayForm)), np.stack(blocks, axis=1),
+        5.0 + 4.0 * fast, np.repeat(np.arange(4), 12), fast,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("lowpass_gain", "named"),
+    [(0.04, ("clock_offset", "glove_latency", "lag")), (1.0, ("lag",))],
+)
+def test_a_mere_delay_comes_first_until_it_is_ruled_out(lowpass_gain, named):
+    assert possible_delays([errors(lowpass_gain)]) == named
