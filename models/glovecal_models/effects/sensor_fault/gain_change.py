@@ -2,8 +2,8 @@
 
 It may be too small, or too near the end of a take, to be seen as a jump. The slopes of the takes show it: of
 what the reading has beyond its usual curve, against the angle. A glove that slips changes offsets, and no
-slopes. One change for good must explain the slopes beyond chance, and still do so beside the wearings and
-beside any recorded column. A change just where the glove was put on again may as well be of the donning: it
+slopes. One change for good must explain the slopes beyond chance, and still do so beside the wearings, a
+steady drift and any recorded column. A change just where the glove was put on again may as well be of the donning: it
 is not named.
 """
 
@@ -169,9 +169,11 @@ def _changed(takes: int, before: int, after: int) -> np.ndarray:
 
 
 def _rivals(takes: Sequence[Take]) -> Iterator[np.ndarray]:
-    """(T, K) of each cause that may change slopes too: the wearings, and columns that all takes know."""
+    """(T, K) of each cause that may change slopes too: the wearings, a steady drift, and columns that all
+    takes know."""
     wearings = np.array([take.wearing for take in takes])
     yield np.column_stack([wearings == name for name in dict.fromkeys(wearings.tolist())]).astype(float)
+    yield np.vander(np.arange(len(takes)) / len(takes), 2)
     for name in sorted(set.intersection(*(set(take.context) for take in takes))):
         values = [take.context[name][np.isfinite(take.context[name])] for take in takes]
         if all(map(len, values)):
