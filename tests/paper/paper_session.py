@@ -18,7 +18,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from asked_session import RECORDING, asked_session
+from asked_session import AT_ONCE_S, RECORDING, asked_session
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
@@ -145,14 +145,22 @@ class PaperSession:
 
 
 @cache
-def paper_session(seed: int = 1, *, rate_hz: float = SAMPLING_HZ, samples: int = SAMPLES) -> PaperSession:
+def paper_session(
+    seed: int = 1, *, rate_hz: float = SAMPLING_HZ, samples: int = SAMPLES, at_once_s: float = AT_ONCE_S
+) -> PaperSession:
     """The subject of ``seed``, sampled and taught; models are trained when they are asked for.
 
-    The full session takes about a minute; ``rate_hz=30`` and few ``samples`` make a cheap one for tests.
+    The full session takes about a minute; ``rate_hz=30``, few ``samples`` and a person who listens less often
+    (``at_once_s``) make a cheap one for tests.
     """
     protocol = make_protocol("new_subject", LAYOUT, EQUIPMENT)
     session = asked_session(
-        protocol, SimulatedGlove(seed, LAYOUT), seed=seed, rate_hz=rate_hz, skeleton=SKELETON
+        protocol,
+        SimulatedGlove(seed, LAYOUT),
+        seed=seed,
+        rate_hz=rate_hz,
+        skeleton=SKELETON,
+        at_once_s=at_once_s,
     )
     cut = sampled_takes(session.state, {RECORDING: session.take}, name="sampling")
     takes = tuple(LabelledTake.of(each) for each in cut)

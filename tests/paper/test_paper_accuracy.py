@@ -1,22 +1,29 @@
-"""The paper's accuracy results on one small session: the order of calibrations, and the paper's figures."""
+"""The paper's accuracy results on one small session: the order of calibrations, and the paper's figures.
+
+Table 4 is here too, though it is about time: to sample the session costs more than what is learned from it.
+"""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from figure_11 import figure_11
 from figure_12 import figure_12
 from multiple_wearings import multiple_wearings
+from paper_page.table_4_section import table_4_section
 from paper_session import EQUIPMENT, LAYOUT, PaperSession, paper_session
 from table_3 import PAPER_DEG, table_3
+from table_4 import PAPER, SIZES, Table4Row, size_row, started
 
 from glovecal_models.sampling.catalogue import make_protocol
 
 
 @pytest.fixture(scope="module")
 def session() -> PaperSession:
-    """A quarter of the frames and a tenth of the samples of ``main``."""
-    return paper_session(1, rate_hz=30.0, samples=250)
+    """A quarter of the frames and less than a tenth of the samples of ``main``."""
+    return paper_session(1, rate_hz=30.0, samples=150, at_once_s=0.2)
 
 
 def test_sampled_in_five_minutes(session: PaperSession) -> None:
@@ -66,3 +73,30 @@ def test_multiple_wearings(session: PaperSession) -> None:
     assert rows[0].checked_deg is None
     assert rows[0].mean_deg < rows[1].mean_deg < 2
     assert np.isclose(rows[1].checked_deg or 0, rows[1].mean_deg, atol=0.6)
+
+
+@pytest.fixture(scope="module")
+def table_4_rows(session: PaperSession) -> list[Table4Row]:
+    begun = started(replace(session, samples=40, models={}))
+    return [size_row(begun, size, fingers="I") for size in (20, None)]
+
+
+def test_sparse_processes_are_near_the_exact_one(table_4_rows: list[Table4Row]) -> None:
+    assert set(PAPER) == set(SIZES)
+    *sparse, exact = table_4_rows
+    assert exact.fk_deg < 4
+    assert exact.ik_cm < 1
+    assert exact.rotations == 22
+    for row in sparse:
+        assert row.fk_deg < exact.fk_deg + 0.5
+        assert row.ik_cm < exact.ik_cm + 0.3
+        assert 0 < row.kept <= row.rotations
+    assert [row.paper_train_s for row in table_4_rows] == [6.224, None]
+
+
+def test_the_section_of_table_4_has_the_papers_figures_beside(table_4_rows: list[Table4Row]) -> None:
+    html = "".join(table_4_section(table_4_rows).parts)
+    assert "LMC-GPR, exact" in html
+    assert f"{table_4_rows[0].ik_cm:.2f} cm" in html
+    assert "6.22 s" in html
+    assert html.count("<svg") == 2

@@ -24,7 +24,7 @@ def sampled(dispatched) -> Store:
     store, _ = dispatched
     skeleton = hand_skeleton()
     session = asked_session(
-        make_protocol("new_subject", LAYOUT), GLOVE, seed=5, rate_hz=30, skeleton=skeleton
+        make_protocol("new_subject", LAYOUT), GLOVE, seed=5, rate_hz=30, skeleton=skeleton, at_once_s=0.2
     )
     store.layouts.put(LAYOUT)
     for name, dimensions in (("measured-anna", {"hand_length": 190.0}), ("bea", {})):

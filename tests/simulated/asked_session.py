@@ -48,10 +48,12 @@ def asked_session(
     does: Callable[[Step], Step] = lambda step: step,
     patience: int = 3,
     skeleton: Skeleton | None = None,
+    at_once_s: float = AT_ONCE_S,
 ) -> AskedSession:
     """Run the protocol on its timer. A step that is bad ``patience`` times is left out. Raises BadInput when
     it does not come to an end. ``does``: what the person does who is asked for a step. ``skeleton``: the
-    person's hand, where tips shall really touch."""
+    person's hand, where tips shall really touch. ``at_once_s``: how often the person listens;
+    0.2 s is a quick person's reaction, and costs half the time."""
     state = begin_sampling(protocol, glove.sensors, trigger="timer", counts=glove.layout.counts)
     sampling = Sampling(state, touch_check=touch_check, choose=choose)
     sampling.recording = RECORDING
@@ -59,7 +61,7 @@ def asked_session(
     hand, random = AskedHand(seed, touches), np.random.default_rng([seed, 43, glove.wearing])
     order = [ROTATIONS.index(rotation) for rotation in glove.rotations]
     truths, frames = [], []
-    chunk = max(1, round(AT_ONCE_S * rate_hz))
+    chunk = max(1, round(at_once_s * rate_hz))
     for first in range(0, round(LONGEST_S * rate_hz), chunk):
         time_s = np.arange(first, first + chunk) / rate_hz
         hand.ask(does(state.now()) if state.step else None, float(time_s[0]))

@@ -51,7 +51,9 @@ def sampled() -> tuple[LabelledTake, ...]:
     """Poses, the thumb's widgets, touches of index and middle finger, a rod."""
     steps = make_protocol("new_subject", LAYOUT).steps
     wanted = tuple(s for s in steps if s.part in PARTS or s.name in ("touch-I", "touch-M", "rod-I-60"))
-    session = asked_session(Protocol("some", wanted), GLOVE, seed=SEED, rate_hz=RATE_HZ, skeleton=HAND)
+    session = asked_session(
+        Protocol("some", wanted), GLOVE, seed=SEED, rate_hz=RATE_HZ, skeleton=HAND, at_once_s=0.2
+    )
     cut = sampled_takes(session.state, {RECORDING: session.take}, name="s")
     return tuple(LabelledTake.of(each) for each in cut)
 

@@ -32,6 +32,7 @@ def verdicts() -> dict[str, tuple[str, ...]]:
         touch_check=TouchWatch(glove.layout, skeleton),
         does=does,
         patience=1,
+        at_once_s=0.2,
     )
     return {attempt.step: attempt.reasons for attempt in session.state.attempts if attempt.frames}
 

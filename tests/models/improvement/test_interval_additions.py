@@ -29,9 +29,17 @@ LAYOUT = Layout.from_columns("three", SENSORS, SENSORS)
 SETTINGS = TrainingSettings(samples=200, folds=3)
 
 
-def recorded(seed: int, *causes: Cause, takes: int = 3, take_s: float = 40.0) -> RecordedSession:
+def recorded(
+    seed: int, *causes: Cause, takes: int = 3, take_s: float = 40.0, rate_hz: float = 60.0
+) -> RecordedSession:
     plan = SessionPlan(
-        seed=seed, sensors=SENSORS, wearings=2, takes_per_wearing=takes, take_s=take_s, bits=12
+        seed=seed,
+        sensors=SENSORS,
+        wearings=2,
+        takes_per_wearing=takes,
+        take_s=take_s,
+        rate_hz=rate_hz,
+        bits=12,
     )
     return record_session(plan, causes)
 
@@ -66,7 +74,7 @@ def test_a_slip_makes_long_sessions_claim_what_is_true():
     """One walk may happen to stay near its start: the law is asked of the mean over gloves and wearings."""
     nlpd, coverage = [], []
     for seed in (20, 21, 22):
-        session = recorded(seed, Cause("garment_slip", "random_walk", 2.0))
+        session = recorded(seed, Cause("garment_slip", "random_walk", 2.0), rate_hz=20.0)
         model = trained(session)
         every = trained_rotations(model)
         added = add_effect(

@@ -101,7 +101,7 @@ def test_the_step_asked_twice_tells_of_a_slip(motion: str) -> None:
     protocol = next(
         protocol for seed in SEEDS if (protocol := in_random_order(SHORT, seed)).steps[-1].motion == motion
     )
-    whole = asked_session(protocol, SimulatedGlove(1), seed=1)
+    whole = asked_session(protocol, SimulatedGlove(1), seed=1, at_once_s=0.2)
     found = repeatability(whole.state)
     assert found is not None
     assert found.rms_deg is not None
@@ -112,7 +112,7 @@ def test_the_step_asked_twice_tells_of_a_slip(motion: str) -> None:
     takes = sampled_takes(whole.state, {RECORDING: whole.take}, name="s")
     (check,) = [each for each in takes if each.part == REPEAT_PART]
     assert (check.kind, check.take.rotations) == ("verification", ())
-    slipped = asked_session(protocol, SimulatedGlove(1), seed=1, disturb=slipping(25.0))
+    slipped = asked_session(protocol, SimulatedGlove(1), seed=1, disturb=slipping(25.0), at_once_s=0.2)
     much = repeatability(slipped.state)
     assert much is not None
     assert much.is_much

@@ -28,7 +28,7 @@ LAYOUT = Layout.built_in("cyberglove18")
 
 @pytest.fixture(scope="module")
 def session() -> AskedSession:
-    return asked_session(make_protocol("new_subject", LAYOUT), SimulatedGlove(1), seed=1)
+    return asked_session(make_protocol("new_subject", LAYOUT), SimulatedGlove(1), seed=1, at_once_s=0.2)
 
 
 def cut(session: AskedSession):
