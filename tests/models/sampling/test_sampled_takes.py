@@ -154,9 +154,9 @@ def test_a_wrong_widget_is_found_in_a_whole_session() -> None:
 
     for seed in range(3):
         glove = SimulatedGlove(seed)
-        right = asked_session(Protocol("t", tuple(thumb)), glove, seed=seed)
+        right = asked_session(Protocol("t", tuple(thumb)), glove, seed=seed, at_once_s=0.2)
         assert [attempt.outcome for attempt in right.state.attempts] == ["good"] * 5
-        wrong = asked_session(Protocol("t", tuple(thumb)), glove, seed=seed, does=does)
+        wrong = asked_session(Protocol("t", tuple(thumb)), glove, seed=seed, does=does, at_once_s=0.2)
         said = [reason for attempt in wrong.state.attempts for reason in attempt.reasons]
         assert any(reason.startswith("TI_ABD at ") for reason in said)
 
@@ -180,7 +180,7 @@ def test_a_glove_that_jumps_or_loses_frames_costs_one_try() -> None:
         gone = state.step == "spread-2" and 20 < tries["spread-2"] <= 90
         return None if dropped or gone else reading
 
-    session = asked_session(poses_only(), SimulatedGlove(3), seed=3, disturb=disturb)
+    session = asked_session(poses_only(), SimulatedGlove(3), seed=3, disturb=disturb, at_once_s=0.2)
     bad = {a.step: a.reasons[0] for a in session.state.attempts if a.outcome == "bad"}
     assert {"fist-1", "flat-2"} <= set(bad)
     assert bad["fist-1"].startswith("sensor I_MCP jumped by ")
@@ -190,7 +190,7 @@ def test_a_glove_that_jumps_or_loses_frames_costs_one_try() -> None:
 
 
 def test_a_step_that_is_not_in_its_recording_is_left_out_of_the_takes() -> None:
-    session = asked_session(poses_only(), SimulatedGlove(3), seed=3)
+    session = asked_session(poses_only(), SimulatedGlove(3), seed=3, at_once_s=0.2)
     attempt = session.state.finished()["fist-1"]
     assert attempt.begins_s is not None
     kept = session.take.time_s < attempt.begins_s - 0.1
@@ -207,7 +207,7 @@ def test_a_glove_that_slips_is_found_by_the_last_poses() -> None:
         moved = 15.0 * (np.arange(len(reading.values)) == 4) * state.step.endswith("-end")
         return replace(reading, values=reading.values + moved)
 
-    session = asked_session(poses_only(), SimulatedGlove(3), seed=3, disturb=slip)
+    session = asked_session(poses_only(), SimulatedGlove(3), seed=3, disturb=slip, at_once_s=0.2)
     (sentence,) = session.state.sentences
     assert sentence.startswith("I_MCP reads otherwise at the end, in every pose")
 
@@ -216,7 +216,7 @@ def test_the_second_wearing_is_a_quick_check(session: AskedSession) -> None:
     takes = [each.take for each in cut(session) if each.take.rotations]
     model = train(takes, LAYOUT, "anna", TrainingSettings(method="linear", folds=0))
     glove = SimulatedGlove(1, wearing=1)
-    worn = asked_session(make_protocol("second_wearing", LAYOUT), glove, seed=2)
+    worn = asked_session(make_protocol("second_wearing", LAYOUT), glove, seed=2, at_once_s=0.2)
     assert worn.state.capture_s <= 30
     checks = [each.take for each in sampled_takes(worn.state, {RECORDING: worn.take}, name="c")]
     found = quick_check(model, [take for take in checks if take.poses])

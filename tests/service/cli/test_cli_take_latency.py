@@ -33,7 +33,7 @@ from glovecal_service.serve import real_time
 from glovecal_service.settings import Settings
 
 GLOVE, LATENCY_S, RATE_HZ = "tapper", 0.06, 120.0
-TAPS, EVERY_S, FIRST_S = 26, (0.45, 0.6), 0.6
+TAPS, EVERY_S, FIRST_S = 21, (0.4, 0.5), 0.6
 STRIKE_S, REST_S, LIFT_S, WIDE = 0.05, 0.06, 0.2, 60.0
 
 
