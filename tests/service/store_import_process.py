@@ -1,12 +1,14 @@
-"""A process that is killed by tests: it imports files of many takes and says which are kept."""
+"""Processes that are killed by tests: each imports files of many takes and says which are kept."""
 
 from __future__ import annotations
 
 import hashlib
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
+from forked_children import fork_for_each_line
 from stored_takes import LAYOUT, make_take
 
 from glovecal_service.settings import Settings
@@ -29,4 +31,5 @@ def import_files(settings: Settings) -> None:
 
 
 if __name__ == "__main__":
-    import_files(Settings(data=Path(sys.argv[1]), database=sys.argv[2] or None, artifacts=None))
+    given = Settings(data=Path(sys.argv[1]), database=sys.argv[2] or None, artifacts=None)
+    fork_for_each_line(partial(import_files, given))

@@ -1,10 +1,13 @@
-"""A process that is killed by tests: it writes to a store and says what was acknowledged."""
+"""Processes that are killed by tests: each writes to a store and says what was acknowledged."""
 
 from __future__ import annotations
 
 import sys
 import time
+from functools import partial
 from pathlib import Path
+
+from forked_children import fork_for_each_line
 
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
@@ -27,4 +30,5 @@ def write_rows(settings: Settings) -> None:
 
 
 if __name__ == "__main__":
-    write_rows(Settings(data=Path(sys.argv[1]), database=sys.argv[2] or None, artifacts=None))
+    given = Settings(data=Path(sys.argv[1]), database=sys.argv[2] or None, artifacts=None)
+    fork_for_each_line(partial(write_rows, given))

@@ -7,8 +7,11 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
+from forked_children import Child, forked
 from jobs_counting import noted
 from jobs_waiting import result_of, wait_for
 from store_import_process import TAKES_OF_A_FILE
@@ -22,13 +25,9 @@ KILLS = 5
 IMPORTS_KILLED = 3
 
 
-def start(program: str, settings: Settings, output: int | None = None) -> subprocess.Popen[str]:
-    command = [sys.executable, str(HERE / program), str(settings.data), settings.database or ""]
-    return subprocess.Popen(command, start_new_session=True, stdout=output, text=True)
-
-
-def start_writer(settings: Settings) -> subprocess.Popen[str]:
-    return start("store_writer_process.py", settings, subprocess.PIPE)
+def start_jobs(settings: Settings) -> subprocess.Popen[str]:
+    command = [sys.executable, str(HERE / "jobs_process.py"), str(settings.data), settings.database or ""]
+    return subprocess.Popen(command, start_new_session=True, text=True)
 
 
 def kill(process: subprocess.Popen) -> None:
@@ -36,21 +35,22 @@ def kill(process: subprocess.Popen) -> None:
     process.wait()
 
 
-def test_no_acknowledged_write_is_lost(store_settings):
+def children(program: str, settings: Settings, folder: Path) -> AbstractContextManager[Callable[[], Child]]:
+    return forked(HERE / program, folder, str(settings.data), settings.database or "")
+
+
+def test_no_acknowledged_write_is_lost(store_settings, tmp_path):
     """Writers are killed at random moments; what they had printed must be there, verified."""
     Store.open(store_settings).close()
     rng, acknowledged = random.Random(4), []
-    writers = [start_writer(store_settings) for _ in range(2)]
-    for number in range(KILLS):
-        process = writers.pop(0)
-        assert process.stdout is not None
-        lines = [process.stdout.readline() for _ in range(rng.randint(2, 12))]
-        if number + len(writers) + 1 < KILLS:
-            writers.append(start_writer(store_settings))
-        kill(process)
-        lines += process.stdout.read().splitlines(keepends=True)
-        process.stdout.close()
-        acknowledged += [line.split() for line in lines if line.endswith("\n")]
+    with children("store_writer_process.py", store_settings, tmp_path) as start:
+        writers = [start() for _ in range(2)]
+        for number in range(KILLS):
+            writer = writers.pop(0)
+            writer.wait_for_lines(rng.randint(2, 12))
+            if number + len(writers) + 1 < KILLS:
+                writers.append(start())
+            acknowledged += [line.split() for line in writer.kill() if line.endswith("\n")]
     with Store.open(store_settings) as store:
         subjects = {record.name for record in store.subjects.list()}
         models = {record.id: record for record in store.models.list()}
@@ -65,21 +65,18 @@ def test_no_acknowledged_write_is_lost(store_settings):
     assert len(acknowledged) >= 2 * KILLS
 
 
-def test_no_half_of_a_file_is_imported(store_settings):
+def test_no_half_of_a_file_is_imported(store_settings, tmp_path):
     """Importers are killed at random moments: of each file all takes are there, or none."""
     with Store.open(store_settings) as store:
         store.subjects.create("anna")
         store.layouts.put(LAYOUT)
     rng, acknowledged = random.Random(5), set()
-    for _ in range(IMPORTS_KILLED):
-        process = start("store_import_process.py", store_settings, subprocess.PIPE)
-        assert process.stdout is not None
-        lines = [process.stdout.readline()]
-        time.sleep(rng.uniform(0, 0.1))
-        kill(process)
-        lines += process.stdout.read().splitlines(keepends=True)
-        process.stdout.close()
-        acknowledged |= {line.strip() for line in lines if line.endswith("\n")}
+    with children("store_import_process.py", store_settings, tmp_path) as start:
+        for _ in range(IMPORTS_KILLED):
+            importer = start()
+            importer.wait_for_lines(1)
+            time.sleep(rng.uniform(0, 0.1))
+            acknowledged |= {line.strip() for line in importer.kill() if line.endswith("\n")}
     with Store.open(store_settings) as store:
         records = store.takes.list("anna")
         counts = Counter(record.original_sha256 for record in records)
@@ -98,12 +95,12 @@ def test_a_killed_service_repeats_only_the_fits_in_flight(sqlite_settings, tmp_p
     with Store.open(sqlite_settings) as store:
         payload = {"numbers": [1, 2, 3, 4, 5, 6], "seconds": 0.4, "ledger": str(ledger)}
         job = store.jobs.create("count", payload)
-        process = start("jobs_process.py", sqlite_settings)
+        process = start_jobs(sqlite_settings)
         wait_for(lambda: len(noted(ledger, "done")) >= 2)
         kill(process)
         before = noted(ledger, "done")
         assert store.jobs.get(job.id).state == "running"
-        process = start("jobs_process.py", sqlite_settings)
+        process = start_jobs(sqlite_settings)
         try:
             assert result_of(store, job.id)["sums"] == [1, 3, 6, 10, 15, 21]
             assert process.wait(120) == 0

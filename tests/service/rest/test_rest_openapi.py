@@ -63,7 +63,7 @@ def test_schemathesis(
             # its 20,000 x 512 readings take longer to make than to refuse
             "--exclude-path=/v1/models/{id}/predict",
             "--phases=coverage,fuzzing",
-            "--max-examples=3",
+            "--max-examples=1",
             "--generation-deterministic",
             "--continue-on-failure",
             "--request-timeout=60",
