@@ -88,7 +88,7 @@ def check_nothing_is_left(process: subprocess.Popen[str], folder: Path, ports: s
 @linux
 @pytest.mark.timeout(1200)
 def test_the_demo_keeps_its_promises(tmp_path):
-    process = start(tmp_path, "--json", "--seed", "1", "--effect", "lag")
+    process = start(tmp_path, "--json", "--seed", "2", "--effect", "hysteresis")
     try:
         ports = ports_while_streaming(process)
         said, complaints = process.communicate(timeout=1100)
@@ -115,10 +115,10 @@ def test_the_demo_keeps_its_promises(tmp_path):
     assert "simulated" in said
     hidden, fall = figures["hidden"], figures["error_fall_deg"]
     assert (hidden["truth"], hidden["named"], hidden["right"], hidden["seed"]) == (
-        "lag",
-        "lag",
+        "hysteresis",
+        "hysteresis",
         True,
-        1,
+        2,
     )
     assert fall["with_effect"] < 0.6 * fall["lmc_gpr"]
     assert re.search(r"poses from it, [01]\.\d+ degrees from what the hand really did", said), said

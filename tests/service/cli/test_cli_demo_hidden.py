@@ -39,13 +39,13 @@ def walked(
 
 
 def test_a_hidden_effect_is_compared_placed_named_added_and_revealed(service, tmp_path):
-    found, said, ending, figures = walked(service, tmp_path, "hysteresis", 3)
+    found, said, ending, figures = walked(service, tmp_path, "cross_coupling", 3)
     assert figures["hidden"] == {
-        "truth": "hysteresis",
+        "truth": "cross_coupling",
         "form": figures["hidden"]["form"],
         "seed": 3,
-        "named": "hysteresis",
-        "confidence_set": ["hysteresis"],
+        "named": "cross_coupling",
+        "confidence_set": ["cross_coupling"],
         "right": True,
     }
     fall = figures["error_fall_deg"]
@@ -54,12 +54,18 @@ def test_a_hidden_effect_is_compared_placed_named_added_and_revealed(service, tm
     assert 0 < figures["noise_floor_deg"] < fall["with_effect"]
     assert found.child is not None
     text = "\n".join(said)
-    for part in ("noise floor", "Where: ", "Diagnosis: hysteresis on", "control: ", "Confidence set: hys"):
+    for part in (
+        "noise floor",
+        "Where: ",
+        "Diagnosis: cross_coupling on",
+        "control: ",
+        "Confidence set: cross",
+    ):
         assert part in text
     assert "so far" in text, "the held-out error is reported while it is measured"
-    assert "Added: hysteresis" in text
-    assert "Right: hysteresis was named." in ending
-    assert any(line.strip().startswith("+ hysteresis") for line in ending)
+    assert "Added: cross_coupling" in text
+    assert "Right: cross_coupling was named." in ending
+    assert any(line.strip().startswith("+ cross_coupling") for line in ending)
 
 
 def test_a_cause_without_a_name_is_said_to_be_left(service, tmp_path):
