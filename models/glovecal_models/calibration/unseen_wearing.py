@@ -15,8 +15,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2, norm
-from scipy.stats import t as student_t
+from scipy.special import chdtri, ndtr, stdtrit
 
 from glovecal_models.effects.base.wearing_effect import PRIOR_DEG, PRIOR_WEARINGS
 
@@ -124,7 +123,7 @@ def unseen_wearing(
     seen = max(len(items) for items in own.values())
     spread = between_variance(own)
     freedom = seen - 1 + PRIOR_WEARINGS
-    quantile = student_t.ppf(norm.cdf(1.0), freedom)
+    quantile = stdtrit(freedom, ndtr(1.0))
     added = {}
     for name, variance in spread.items():
         within = float(np.mean([item.noise for item in own[name]]))
@@ -132,7 +131,7 @@ def unseen_wearing(
         total = within + variance * (1 + 1 / len(names)) * quantile**2
         added[name] = max(total - noise[name], 0.0)
     rmse = _rmse(left_out)
-    low, high = (chi2.ppf(p, freedom) for p in ((1 - INTERVAL_LEVEL) / 2, (1 + INTERVAL_LEVEL) / 2))
+    low, high = (chdtri(freedom, 1.0 - p) for p in ((1 - INTERVAL_LEVEL) / 2, (1 + INTERVAL_LEVEL) / 2))
     return UnseenWearing(
         names,
         rmse,

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t
+from scipy.special import stdtrit
 
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.diagnosis.forward_design import ForwardDesign
@@ -93,4 +93,4 @@ def _lower_deg(squares: np.ndarray, counts: np.ndarray, limits: DiagnosisLimits)
     mean = squares.sum() / counts.sum()
     differing = squares - mean * counts
     error = np.sqrt(number / (number - 1) * np.sum(differing**2)) / counts.sum()
-    return float(np.sqrt(max(mean - t.ppf(limits.slow_confidence, number - 1) * error, 0.0)))
+    return float(np.sqrt(max(mean - stdtrit(number - 1, limits.slow_confidence) * error, 0.0)))

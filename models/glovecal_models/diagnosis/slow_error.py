@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
-from scipy.stats import chi2, t
+from scipy.special import chdtri, stdtrit
 
 from glovecal_models.calibration.held_out import ALIKE_ROWS, BaseProducts
 from glovecal_models.diagnosis.forward_design import ForwardDesign
@@ -149,8 +149,8 @@ def _lower(square: float, variance: float, of_noise: float, count: int, limits: 
     freedom = min(2 * square**2 / lasting, most) if lasting > 2 * square**2 / most else most
     if freedom < limits.slow_least_freedom:
         return 0.0
-    of_lasting = square * (1.0 - min(freedom / float(chi2.ppf(confidence, freedom)), 1.0))
-    distance = float(np.hypot(t.ppf(confidence, count - 1) * np.sqrt(of_noise), of_lasting))
+    of_lasting = square * (1.0 - min(freedom / float(chdtri(freedom, 1.0 - confidence)), 1.0))
+    distance = float(np.hypot(stdtrit(count - 1, confidence) * np.sqrt(of_noise), of_lasting))
     return max(square - distance, 0.0)
 
 

@@ -20,7 +20,6 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS, WRIST
@@ -110,6 +109,8 @@ class Skeleton:
     @cached_property
     def turns(self) -> np.ndarray:
         """(J, 3, 3, 3): a joint's turn is the first matrix + sin(angle) second + (1 - cos(angle)) third."""
+        from scipy.spatial.transform import Rotation  # a fifth of what starting the service costs
+
         quaternions = [joint.orientation for joint in self.joints]
         oriented = Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
         cross = np.cross(self.axes[:, None, :], np.eye(3)).swapaxes(1, 2)

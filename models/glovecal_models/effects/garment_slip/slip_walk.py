@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 MEAN_S = 10.0
 SHORT_S = 1.0
@@ -73,7 +73,7 @@ def slip_walk(
     excess = max(variance - expected, 0.0)
     # The means of a walk hold one another: about half of them count as independent.
     independent = max(free / 2.0, 1.0)
-    least = max(variance * independent / float(chi2.ppf(1.0 - WALK_P_VALUE, independent)) - expected, 0.0)
+    least = max(variance * independent / float(chdtri(independent, WALK_P_VALUE)) - expected, 0.0)
     # A walk of rate q gives J means of length T a variance of q² T (J + 1) / 6.
     walked = sum(MEAN_S * (len(means) + 1) / 6.0 * (len(means) - 1) for means in long) / free
     return SlipWalk(

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from glovecal_models.takes.take import Take
 
@@ -62,7 +62,7 @@ def spread_of_takes(takes: Sequence[Take], errors: Sequence[np.ndarray]) -> Take
         return None
     left = target - explained @ (explained.T @ target)
     variance = float(left @ left) / free
-    least = float(np.sqrt(variance * free / float(chi2.ppf(1.0 - SPREAD_P_VALUE, free))))
+    least = float(np.sqrt(variance * free / float(chdtri(free, SPREAD_P_VALUE))))
     inside = float(np.mean([each.var(ddof=1) for each in means]))
     length = float(np.median([len(each) for each in means])) * MEAN_S
     healthy = _wander_of_mean(length)

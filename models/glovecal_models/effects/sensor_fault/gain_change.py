@@ -3,8 +3,8 @@
 It may be too small, or too near the end of a take, to be seen as a jump. The slopes of the takes show it: of
 what the reading has beyond its usual curve, against the angle. A glove that slips changes offsets, and no
 slopes. One change for good must explain the slopes beyond chance, and still do so beside the wearings, a
-steady drift and any recorded column. A change just where the glove was put on again may as well be of the donning: it
-is not named.
+steady drift and any recorded column. A change just where the glove was put on again may as well be of the
+donning: it is not named.
 """
 
 from __future__ import annotations
