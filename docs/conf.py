@@ -57,6 +57,7 @@ NAVIGATION = {
         "docs/effects",
         "An effect of your own <docs/own-effect>",
         "In a notebook <docs/notebook>",
+        "docs/studio",
         "docs/live",
         "docs/deploy",
     ],

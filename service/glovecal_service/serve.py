@@ -159,11 +159,13 @@ def _port_problem(part: Part) -> str:
 
 def _banner(settings: Settings) -> str:
     shown = f"[{settings.host}]" if ":" in settings.host else settings.host
+    studio = f"\n  studio  http://{shown}:{settings.port}/studio/live" if settings.studio else ""
     return (
         "Glovecal is running. Ctrl-C stops it.\n"
         f"  REST    http://{shown}:{settings.port}/v1  (in a browser: / and /docs)\n"
         f"  zenoh   {settings.zenoh}, keys glovecal/{settings.site}/<glove>/...\n"
         f"  data    {settings.data.resolve()}"
+        f"{studio}"
     )
 
 
@@ -264,7 +266,12 @@ def web(settings: Settings, stopped: Event, started: Callable[[], None]) -> None
     from glovecal_service.rest.app import create_app
     from glovecal_service.rest.http.server import server_config
 
-    server = uvicorn.Server(server_config(create_app(settings), settings.host, settings.port))
+    app = create_app(settings)
+    if settings.studio:
+        from glovecal_service.studio.mount import mount_studio
+
+        mount_studio(app, settings)
+    server = uvicorn.Server(server_config(app, settings.host, settings.port))
     setattr(server, "capture_signals", nullcontext)  # noqa: B010  signals are ours, uvicorn takes them over
     Thread(target=_follow_server, args=(server, stopped, started), daemon=True).start()
     server.run()
@@ -284,5 +291,5 @@ def _log_to_stderr() -> None:
     logging.basicConfig(
         stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(name)s %(levelname)s %(message)s"
     )
-    for chatty in ("alembic", "uvicorn.error", "distributed"):
+    for chatty in ("alembic", "uvicorn.error", "distributed", "httpx"):
         logging.getLogger(chatty).setLevel(logging.WARNING)

@@ -39,6 +39,8 @@ class Settings(BaseSettings):
     scheduler: str | None = None
     """Address ``tls://HOST:PORT`` of a Dask scheduler whose workers share ``data``; None: workers of our own,
     started when they are needed."""
+    studio: bool = True
+    """Serve the pages below ``/studio``."""
     upload_limit_mb: Annotated[int, Field(ge=1)] = 256
 
     @field_validator("site")

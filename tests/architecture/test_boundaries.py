@@ -45,6 +45,24 @@ def test_no_forbidden_import(distribution):
         assert not wrong, f"{path.relative_to(ROOT)} imports {sorted(wrong)}"
 
 
+def test_a_page_of_the_studio_computes_nothing_that_rest_cannot_give():
+    """It asks REST's own routes in its process, and has neither the mathematics nor the store."""
+    allowed = (
+        "glovecal_service.studio",
+        "glovecal_service.settings",
+        "glovecal_service.rest.http.observation",
+    )
+    for path in sorted((SOURCES["service"] / "studio").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [node.module] if isinstance(node, ast.ImportFrom) else []
+            names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            ours = [
+                name for name in names if name and name.startswith(("glovecal_models", "glovecal_service"))
+            ]
+            wrong = [name for name in ours if not name.startswith(allowed)]
+            assert not wrong, f"{path.relative_to(ROOT)} imports {wrong}"
+
+
 @pytest.mark.parametrize("distribution", ["models", "client"])
 def test_every_module_imports_without_what_it_must_not_need(distribution):
     """Optional extras (pyarrow, pyserial, httpx) must not be needed just to import a module."""

@@ -12,13 +12,16 @@ def serve(
         bool,
         typer.Option("--smoke", help="Start on free ports in a temporary folder and stop once ready."),
     ] = False,
+    no_studio: Annotated[
+        bool, typer.Option("--no-studio", help="REST only, without the pages below /studio.")
+    ] = False,
 ) -> None:
-    """Run the service: zenoh router, real-time prediction, recorder and REST. Ctrl-C stops it.
+    """Run the service: zenoh router, real-time prediction, recorder, REST and the studio. Ctrl-C stops it.
 
     Settings are environment variables: GLOVECAL_DATA, GLOVECAL_HOST, GLOVECAL_PORT, GLOVECAL_ZENOH,
     GLOVECAL_SITE, GLOVECAL_DATABASE, GLOVECAL_ARTIFACTS, GLOVECAL_WORKERS, GLOVECAL_WORKERS_IDLE_S,
     GLOVECAL_SCHEDULER (with GLOVECAL_SCHEDULER_CA, GLOVECAL_SCHEDULER_CERTIFICATE, GLOVECAL_SCHEDULER_KEY),
-    GLOVECAL_UPLOAD_LIMIT_MB.
+    GLOVECAL_UPLOAD_LIMIT_MB, GLOVECAL_STUDIO.
     """
     import sys
 
@@ -30,7 +33,8 @@ def serve(
     if smoke:
         _smoke()
         return
-    sys.exit(run(settings_of_environment()))
+    settings = settings_of_environment()
+    sys.exit(run(settings.model_copy(update={"studio": False}) if no_studio else settings))
 
 
 def _smoke() -> None:

@@ -34,7 +34,7 @@ from glovecal_service.rest.model import (
     where,
 )
 from glovecal_service.rest.sampling import next_steps, samplings
-from glovecal_service.rest.subject import subjects
+from glovecal_service.rest.subject import subjects, usual_hand
 from glovecal_service.rest.take import clocks, examination, holds, reference, table_import, takes, uploads
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
@@ -43,7 +43,7 @@ JSON_LIMIT_BYTES = 8_000_000
 """Enough for 20,000 frames of 18 sensors to predict."""
 BODY_PATIENCE_S = 30.0
 ROUTERS = (
-    *(subjects, layouts, recordings, samplings),
+    *(subjects, usual_hand, layouts, recordings, samplings),
     *(clocks, holds, examination, table_import, takes, reference, uploads),
     *(training, models, predictions, comparison, where, ceiling, diagnosis, changes, catalogue, improvement),
     *(detectability, explanation, quick_check, next_steps),

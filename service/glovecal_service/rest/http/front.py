@@ -45,7 +45,7 @@ START = """SwaggerUIBundle({
 @router.get("/")
 def front(parts: PartsNeeded) -> HTMLResponse:
     """A page for whoever opens the service's address in a browser."""
-    page = render("front.html", "the service", state=_state(parts))
+    page = render("front.html", "the service", state=_state(parts), studio=parts.settings.studio)
     return HTMLResponse(page, headers={"Content-Security-Policy": FRONT_POLICY, "Cache-Control": "no-store"})
 
 

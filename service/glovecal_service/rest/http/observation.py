@@ -19,6 +19,9 @@ PREFIX = "/v1"
 # ours: asgi-correlation-id 5.0.1 replaces 7 lines here by 10 of set-up, and logs a warning for each bad id
 REQUEST_ID = re.compile(r"[A-Za-z0-9_-]{8,64}\Z")
 
+STUDIO = "studio"
+"""The client's name in requests that its pages make, and where they are: looking there again and again
+fills no log."""
 log: Any = structlog.wrap_logger(
     logging.getLogger("glovecal.rest"),
     processors=[
@@ -59,7 +62,9 @@ class Observation:
     def _note(self, scope: Scope, answer: _Answer, request_id: str, seconds: float) -> None:
         route = _route(scope)
         self.metrics.answered(scope["method"], route, answer.status, seconds)
-        log.info(
+        for_a_page = (scope.get("client") or ("",))[0] == STUDIO or scope["path"].startswith(f"/{STUDIO}/")
+        only_looks = for_a_page and scope["method"] == "GET" and answer.status < 400
+        (log.debug if only_looks else log.info)(
             "request",
             request_id=request_id,
             method=plain_text(scope["method"], 20),

@@ -1,0 +1,22 @@
+"""``skeleton``: a hand of usual size, for viewers of a glove that nobody is known to wear."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import APIRouter
+
+from glovecal_models.hand.skeleton import Handedness, hand_skeleton
+from glovecal_models.hand.skeleton_document import skeleton_document
+from glovecal_service.rest.http.answers import problems
+from glovecal_service.rest.subject.subjects import SkeletonView
+
+router = APIRouter(prefix="/skeleton", tags=["subjects"])
+
+
+@router.get(
+    "", response_model=SkeletonView, summary="A hand of usual size, for viewers", responses=problems()
+)
+def get_usual_skeleton(hand: Handedness = "right") -> dict[str, Any]:
+    """As a subject's skeleton, where nothing was measured."""
+    return skeleton_document(hand_skeleton(hand=hand))

@@ -1,0 +1,93 @@
+"""Joins the studio to the web application: its pages below ``/studio``, and the live feed of each glove.
+
+NiceGUI, because pages are written in Python beside the service, it works without a network, brings three.js,
+charts and accessible widgets, and needs no build step. It has one application in a process: mount it once.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from functools import partial
+from importlib.resources import files
+from typing import Any
+
+from fastapi import FastAPI, WebSocket
+from nicegui import app as pages
+from nicegui import ui
+from starlette.concurrency import run_in_threadpool
+from starlette.websockets import WebSocketDisconnect
+
+from glovecal_client.errors import ClientError
+from glovecal_service.settings import Settings
+from glovecal_service.studio.live_feed import GloveFeed, LiveFeeds, names_message
+from glovecal_service.studio.pages import diagnose, effects, fall, live, models
+from glovecal_service.studio.service import Service
+from glovecal_service.studio.studio import Studio
+
+PATH = "/studio"
+LONGEST_WAIT_S = 1.0
+FRAME_S = 1.0 / 30.0
+PAGES = (live, diagnose, fall, models, effects)
+
+
+def mount_studio(app: FastAPI, settings: Settings) -> None:
+    """Add the studio to ``app``, which serves REST; call it once in a process."""
+    feeds = LiveFeeds(settings)
+    studio = Studio(Service(app), feeds)
+    app.add_api_websocket_route(f"{PATH}/feed/{{glove}}", partial(_feed, feeds))
+    pages.add_static_files("/static", str(files("glovecal_service.studio") / "static"))
+    for page in PAGES:
+        page.add(studio)
+    ui.run_with(
+        app, mount_path=PATH, title="Glovecal", dark=None, show_welcome_message=False, language="en-US",
+        tailwind=False, reconnect_timeout=10.0,
+    )  # fmt: skip
+    _close_with(app, studio)
+
+
+def _close_with(app: FastAPI, studio: Studio) -> None:
+    inner = app.router.lifespan_context
+
+    @asynccontextmanager
+    async def lifespan(started: FastAPI) -> AsyncIterator[Any]:
+        async with inner(started) as state:
+            yield state
+        await studio.service.close()
+        await run_in_threadpool(studio.feeds.close)
+
+    app.router.lifespan_context = lifespan
+
+
+async def _feed(feeds: LiveFeeds, socket: WebSocket, glove: str) -> None:
+    """The newest pose of a glove, at most 30 a second, until the page goes."""
+    await socket.accept()
+    try:
+        feed = await run_in_threadpool(feeds.open, glove)
+    except ClientError as error:
+        await socket.close(1013, str(error)[:120])
+        return
+    watching = asyncio.create_task(_follow(feed, socket))
+    try:
+        while True:  # a page says nothing; this ends when it goes
+            await socket.receive_text()
+    except WebSocketDisconnect:
+        pass
+    finally:
+        watching.cancel()
+        await run_in_threadpool(feeds.release, feed)
+
+
+async def _follow(feed: GloveFeed, socket: WebSocket) -> None:
+    told, shown = None, None
+    while True:
+        pose = feed.pose
+        if pose is not None and pose is not shown:
+            names = (pose.model_sha256, len(pose.degrees), tuple(feed.sensors))
+            if names != told:
+                await socket.send_text(names_message(await run_in_threadpool(feed.names)))
+                told = names
+            await socket.send_bytes(feed.array(pose))
+            shown = pose
+        await asyncio.sleep(FRAME_S)

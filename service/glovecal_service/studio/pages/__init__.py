@@ -1,0 +1,1 @@
+"""One module is one page: ``add(studio)`` declares its address."""

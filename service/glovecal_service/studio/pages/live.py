@@ -1,0 +1,51 @@
+"""Live: each glove that is connected, its state in a word and a colour, its hand, its sensors."""
+
+from __future__ import annotations
+
+from nicegui import ui
+from starlette.concurrency import run_in_threadpool
+
+from glovecal_client.errors import ClientError
+from glovecal_service.studio.pages.glove_card import GloveCard
+from glovecal_service.studio.shell import shell
+from glovecal_service.studio.studio import Studio
+
+EVERY_S = 0.5
+
+
+def add(studio: Studio) -> None:
+    """``/studio/live``, also the first page."""
+
+    @ui.page("/")
+    @ui.page("/live")
+    async def live() -> None:
+        with shell(studio, "live", "Live"):
+            await LivePage(studio).build()
+
+
+class LivePage:
+    """One open page; gloves come and go."""
+
+    def __init__(self, studio: Studio) -> None:
+        self._studio = studio
+        self._cards: dict[str, GloveCard] = {}
+
+    async def build(self) -> None:
+        self._notice = ui.label("").classes("studio-notice").props('role="status"')
+        self._gloves = ui.element("div").classes("gloves")
+        await self._look()
+        ui.timer(EVERY_S, self._look)
+
+    async def _look(self) -> None:
+        try:
+            states = await run_in_threadpool(self._studio.feeds.states)
+        except ClientError as error:
+            self._notice.set_text(f"The real-time process does not answer: {error}")
+            return
+        self._notice.set_text("" if states else "No glove is connected: glovecal capture starts one.")
+        for glove, state in states.items():
+            if glove not in self._cards:
+                with self._gloves:
+                    card = self._cards[glove] = GloveCard(self._studio, glove)
+                    await card.build()
+            await self._cards[glove].show(state)

@@ -1,0 +1,65 @@
+"""The service as the studio sees it: the routes of REST, called in the same process.
+
+Whatever a page shows, a script can ask for; every check and refusal of REST holds for pages too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import httpx
+from fastapi import FastAPI
+
+from glovecal_service.rest.http.observation import STUDIO
+
+PATIENCE_S = 300.0
+
+
+class Refusal(Exception):
+    """The service refused; ``str()`` is its sentence for a user."""
+
+    def __init__(self, status: int, sentence: str) -> None:
+        super().__init__(sentence)
+        self.status = status
+
+
+class Service:
+    """Paths are below ``/v1``: ``await service.get("/takes", subject="anna")``; answers are plain data."""
+
+    def __init__(self, app: FastAPI) -> None:
+        transport = httpx.ASGITransport(app, raise_app_exceptions=False, client=(STUDIO, 0))
+        self._http = httpx.AsyncClient(
+            base_url="http://localhost/v1", transport=transport, timeout=PATIENCE_S, trust_env=False
+        )
+
+    async def get(self, path: str, **query: Any) -> Any:
+        return await self._ask("GET", path, query, None)
+
+    async def post(self, path: str, body: Mapping[str, Any] | None = None, **query: Any) -> Any:
+        return await self._ask("POST", path, query, body or {})
+
+    async def put(self, path: str, body: Mapping[str, Any], **query: Any) -> Any:
+        return await self._ask("PUT", path, query, body)
+
+    async def delete(self, path: str, **query: Any) -> Any:
+        return await self._ask("DELETE", path, query, None)
+
+    async def close(self) -> None:
+        await self._http.aclose()
+
+    async def _ask(
+        self, method: str, path: str, query: Mapping[str, Any], body: Mapping[str, Any] | None
+    ) -> Any:
+        given = {name: value for name, value in query.items() if value is not None}
+        answer = await self._http.request(method, path, params=given, json=body)
+        if answer.is_success:
+            return answer.json() if answer.content else None
+        try:
+            problem = answer.json()
+        except ValueError:
+            problem = {}
+        sentence = str(
+            problem.get("detail") or problem.get("title") or f"The service answered {answer.status_code}."
+        )
+        raise Refusal(answer.status_code, sentence)

@@ -1,0 +1,101 @@
+"""A running service with its studio, on the data of an earlier version, and a real browser."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import tarfile
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, NoReturn
+
+import httpx
+import pytest
+from playwright.sync_api import Browser, sync_playwright
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from realtime_support import free_endpoint, part_of_service, store_model
+from studio_support import Open, Opened
+
+from glovecal_service.serve import real_time, web
+from glovecal_service.settings import Settings
+from glovecal_service.store import Store
+
+STORED = Path(__file__).parents[1] / "stored_example" / "data-2026-11-22.tar.xz"
+FLAGS = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--enable-unsafe-swiftshader",
+)  # fmt: skip
+HARMLESS = "GPU stall due to ReadPixels"
+
+
+@pytest.fixture(scope="package")
+def settings(tmp_path_factory: pytest.TempPathFactory) -> Settings:
+    folder = tmp_path_factory.mktemp("studio")
+    with tarfile.open(STORED) as packed:
+        packed.extractall(folder, filter="data")
+    port = int(free_endpoint().rpartition(":")[2])
+    return Settings(data=folder / "data", zenoh=free_endpoint(), port=port, workers=1)
+
+
+@pytest.fixture(scope="package")
+def model(settings: Settings) -> str:
+    """The id of a linear model of subject anna for three sensors."""
+    store = Store.open(settings)
+    try:
+        return store_model(store, "anna", degrees_per_count=0.5)
+    finally:
+        store.close()
+
+
+@pytest.fixture(scope="package")
+def address(settings: Settings, model: str) -> Iterator[str]:
+    """Of the service; its real-time and web processes run."""
+    with ExitStack() as running:
+        for work in (real_time, web):
+            running.enter_context(part_of_service(work, settings))
+        url = f"http://127.0.0.1:{settings.port}"
+        assert httpx.get(f"{url}/v1/health/live").is_success
+        yield url
+
+
+@pytest.fixture(scope="package")
+def browser(not_here: Callable[[str], NoReturn]) -> Iterator[Browser]:
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        not_here("Chromium is not installed (Debian: apt-get install chromium)")
+    with sync_playwright() as running:
+        browser = running.chromium.launch(executable_path=chromium, args=list(FLAGS))
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def opened(browser: Browser, address: str) -> Iterator[Open]:
+    """``opened("live", size=(390, 844), dark=True)``: the page once its heading is there."""
+    contexts = []
+
+    def open_page(name: str, *, size: tuple[int, int] = (1280, 800), dark: bool = False) -> Opened:
+        context = browser.new_context(
+            viewport={"width": size[0], "height": size[1]}, color_scheme="dark" if dark else "light"
+        )
+        contexts.append(context)
+        seen = Opened(context.new_page())
+
+        def complain(message: Any) -> None:
+            if message.type == "error" and HARMLESS not in message.text:
+                seen.complaints.append(message.text)
+
+        seen.page.on("console", complain)
+        seen.page.on("pageerror", lambda error: seen.complaints.append(str(error)))
+        seen.page.on("request", lambda request: seen.asked.append(request.url))
+        seen.page.goto(f"{address}/studio/{name}")
+        seen.page.wait_for_selector("h1", timeout=60_000)
+        return seen
+
+    yield open_page
+    for context in contexts:
+        context.close()

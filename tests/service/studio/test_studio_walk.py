@@ -1,0 +1,94 @@
+"""What the pages do, by mouse and by keyboard, against the running service."""
+
+from __future__ import annotations
+
+import httpx
+import pytest
+from playwright.sync_api import expect
+from realtime_support import store_model
+from studio_support import Open
+
+from glovecal_service.settings import Settings
+from glovecal_service.store import Store
+
+pytestmark = pytest.mark.needs_chromium
+
+
+def models(address: str, subject: str) -> list[dict]:
+    return httpx.get(f"{address}/v1/models", params={"subject": subject}).json()
+
+
+def test_a_version_is_activated_and_rolled_back_by_keyboard(opened: Open, address: str) -> None:
+    subject = next(each["subject"] for each in httpx.get(f"{address}/v1/models").json() if each["parent"])
+    own = models(address, subject)
+    own = [each for each in own if each["layout"] == next(item for item in own if item["parent"])["layout"]]
+    active, other = (next(each["id"] for each in own if each["active"] is flag) for flag in (True, False))
+    page = opened("models").page
+    button = page.locator(f'[data-model="{other}"] button', has_text="Activate")
+    button.focus()
+    page.keyboard.press("Enter")
+    expect(page.locator(f'[data-model="{other}"] .state-word')).to_have_text("active")
+    layout = own[0]["layout"]
+    now = [each for each in models(address, subject) if each["layout"] == layout]
+    assert [each["id"] for each in now if each["active"]] == [other]
+    tree = page.locator("section.tree", has_text=f"{subject}, {layout}")
+    tree.get_by_role("button", name="Return to the model before").press("Enter")
+    expect(page.locator(f'[data-model="{active}"] .state-word')).to_have_text("active")
+
+
+def test_a_model_made_elsewhere_appears_without_a_reload(
+    opened: Open, address: str, settings: Settings
+) -> None:
+    page = opened("models").page
+    expect(page.locator("[data-model]")).to_have_count(len(httpx.get(f"{address}/v1/models").json()))
+    store = Store.open(settings)
+    made = store_model(store, "made-elsewhere", degrees_per_count=0.7)
+    store.close()
+    expect(page.locator(f'[data-model="{made}"]')).to_be_visible(timeout=20_000)
+
+
+def test_a_diagnosis_of_before_is_shown_with_what_to_do(opened: Open, address: str) -> None:
+    job = next(
+        each
+        for each in httpx.get(f"{address}/v1/jobs").json()
+        if each["kind"] == "diagnose" and each["state"] == "done"
+    )
+    whole = httpx.get(f"{address}/v1/jobs/{job['id']}").json()
+    page = opened(f"diagnose?model={job['payload']['model']}").page
+    named = whole["result"]["named"]
+    if named is not None:
+        expect(page.locator(".finding-named")).to_contain_text(named["effect"])
+        expect(page.get_by_role("button", name=f"Add {named['effect']}")).to_be_visible()
+    expect(page.get_by_role("link", name="Report with pictures")).to_have_attribute(
+        "href", f"../v1/jobs/{job['id']}/report"
+    )
+
+
+def test_the_error_falls_along_the_line_of_descent(opened: Open, address: str) -> None:
+    child = next(each for each in httpx.get(f"{address}/v1/models").json() if each["parent"])
+    page = opened(f"fall?model={child['id']}").page
+    expect(page.locator(".fall canvas")).to_be_visible()
+    expect(page.locator(".finding-sentence")).to_contain_text(f"{child['held_out_rmse_deg']:.2f}°")
+
+
+def test_every_effect_of_the_catalogue_is_explained(opened: Open, address: str) -> None:
+    page = opened("effects").page
+    told = {each["name"]: each["explanation"] for each in httpx.get(f"{address}/v1/effects").json()}
+    assert page.locator(".card h2").all_inner_texts() == list(told)
+    for sentence in told.values():
+        assert sentence in page.locator("#main").inner_text()
+
+
+def test_the_skip_link_is_first_and_leads_to_the_content(opened: Open) -> None:
+    page = opened("effects").page
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.innerText") == "Skip to content"
+    page.keyboard.press("Enter")
+    assert page.url.endswith("#main")
+
+
+def test_without_the_studio_nothing_of_it_is_served(settings: Settings) -> None:
+    from glovecal_service.rest.app import create_app
+
+    paths = [getattr(route, "path", "") for route in create_app(settings).routes]
+    assert not [path for path in paths if path.startswith("/studio")]
