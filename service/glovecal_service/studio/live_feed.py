@@ -5,7 +5,6 @@ A page gets the newest pose at most 30 times a second, never a queue: who is slo
 
 from __future__ import annotations
 
-import json
 import threading
 import time
 from contextlib import ExitStack, suppress
@@ -172,7 +171,3 @@ class LiveFeeds:
         status = json_object(message)
         if status is not None:
             self._statuses[parse_glove_key(key)[0].glove] = time.monotonic(), status
-
-
-def names_message(names: dict[str, Any]) -> str:
-    return json.dumps(names)

@@ -7,8 +7,9 @@ charts and accessible widgets, and needs no build step. It has one application i
 from __future__ import annotations
 
 import asyncio
+import json
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from functools import partial
 from importlib.resources import files
 from typing import Any
@@ -21,13 +22,13 @@ from starlette.websockets import WebSocketDisconnect
 
 from glovecal_client.errors import ClientError
 from glovecal_service.settings import Settings
-from glovecal_service.studio.live_feed import GloveFeed, LiveFeeds, names_message
+from glovecal_service.studio.live_feed import GloveFeed, LiveFeeds
+from glovecal_service.studio.page_policy import PagePolicy
 from glovecal_service.studio.pages import diagnose, effects, fall, live, models
 from glovecal_service.studio.service import Service
 from glovecal_service.studio.studio import Studio
 
 PATH = "/studio"
-LONGEST_WAIT_S = 1.0
 FRAME_S = 1.0 / 30.0
 PAGES = (live, diagnose, fall, models, effects)
 
@@ -38,6 +39,7 @@ def mount_studio(app: FastAPI, settings: Settings) -> None:
     studio = Studio(Service(app), feeds)
     app.add_api_websocket_route(f"{PATH}/feed/{{glove}}", partial(_feed, feeds))
     pages.add_static_files("/static", str(files("glovecal_service.studio") / "static"))
+    pages.add_middleware(PagePolicy)
     for page in PAGES:
         page.add(studio)
     ui.run_with(
@@ -68,15 +70,21 @@ async def _feed(feeds: LiveFeeds, socket: WebSocket, glove: str) -> None:
     except ClientError as error:
         await socket.close(1013, str(error)[:120])
         return
-    watching = asyncio.create_task(_follow(feed, socket))
+    both = {asyncio.create_task(_until_gone(socket)), asyncio.create_task(_follow(feed, socket))}
     try:
-        while True:  # a page says nothing; this ends when it goes
-            await socket.receive_text()
-    except WebSocketDisconnect:
-        pass
+        await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
     finally:
-        watching.cancel()
+        for task in both:
+            task.cancel()
+        await asyncio.gather(*both, return_exceptions=True)
         await run_in_threadpool(feeds.release, feed)
+
+
+async def _until_gone(socket: WebSocket) -> None:
+    """A page says nothing; this ends when it goes."""
+    with suppress(WebSocketDisconnect):
+        while True:
+            await socket.receive_text()
 
 
 async def _follow(feed: GloveFeed, socket: WebSocket) -> None:
@@ -86,7 +94,7 @@ async def _follow(feed: GloveFeed, socket: WebSocket) -> None:
         if pose is not None and pose is not shown:
             names = (pose.model_sha256, len(pose.degrees), tuple(feed.sensors))
             if names != told:
-                await socket.send_text(names_message(await run_in_threadpool(feed.names)))
+                await socket.send_text(json.dumps(await run_in_threadpool(feed.names)))
                 told = names
             await socket.send_bytes(feed.array(pose))
             shown = pose

@@ -75,13 +75,11 @@ def browser(not_here: Callable[[str], NoReturn]) -> Iterator[Browser]:
 
 @pytest.fixture
 def opened(browser: Browser, address: str) -> Iterator[Open]:
-    """``opened("live", size=(390, 844), dark=True)``: the page once its heading is there."""
+    """``opened("live")``: the page once its heading is there."""
     contexts = []
 
-    def open_page(name: str, *, size: tuple[int, int] = (1280, 800), dark: bool = False) -> Opened:
-        context = browser.new_context(
-            viewport={"width": size[0], "height": size[1]}, color_scheme="dark" if dark else "light"
-        )
+    def open_page(name: str) -> Opened:
+        context = browser.new_context(viewport={"width": 1280, "height": 800}, color_scheme="light")
         contexts.append(context)
         seen = Opened(context.new_page())
 
