@@ -4,7 +4,7 @@
     python3 do.py demo      calibrate a simulated glove over real zenoh, in under two minutes
     python3 do.py serve     run the service (real time, REST) on this machine
     python3 do.py glovecal  the command line: python3 do.py glovecal take list
-    python3 do.py test      the test suite
+    python3 do.py test      the test suite; with -m slow what it leaves out because it takes minutes
     python3 do.py check     format, lint, types
     python3 do.py bench     speed against other libraries, as ratios, with a picture
     python3 do.py paper     Wang & Neff 2013 reproduced: every table and figure, as one page (5 minutes)
@@ -78,17 +78,17 @@ def glovecal(arguments: list[str]) -> int:
 
 
 def test(arguments: list[str]) -> int:
-    """Two files at a time: many tests wait for a glove, a cable or a process."""
+    """Three files at a time: many tests wait for a glove, a cable or a process. Slow ones: -m slow."""
     if SMOKE in arguments:
         return run("pytest", "-q", *SMOKE_TESTS, dev=True)
-    two = ("-n", "2", "--dist", "loadfile", "--no-loadscope-reorder")
-    return run("pytest", *two, *arguments, dev=True)
+    three = ("-n", "3", "--dist", "loadfile", "--no-loadscope-reorder")
+    return run("pytest", *three, *arguments, dev=True)
 
 
 def check(arguments: list[str]) -> int:
     where = "do.py" if SMOKE in arguments else "."
     ruff = (["ruff", "format", "--no-cache", "--check", where], ["ruff", "check", "--no-cache", where])
-    steps = (*ruff, ["pyright", *(["do.py"] if SMOKE in arguments else arguments)])
+    steps = (*ruff, ["pyright", "--threads", "2", *(["do.py"] if SMOKE in arguments else arguments)])
     return max(run(*step, dev=True) for step in steps)
 
 

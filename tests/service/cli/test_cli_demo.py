@@ -86,6 +86,7 @@ def check_nothing_is_left(process: subprocess.Popen[str], folder: Path, ports: s
 
 
 @linux
+@pytest.mark.slow
 @pytest.mark.timeout(1200)
 def test_the_demo_keeps_its_promises(tmp_path):
     process = start(tmp_path, "--json", "--seed", "2", "--effect", "hysteresis")
