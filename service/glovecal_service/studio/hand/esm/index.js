@@ -7,6 +7,7 @@ import { THREE } from "nicegui-scene";
 const RADIANS = Math.PI / 180;
 const BONE_MM = 5.5;
 const JOINT_MM = 7.5;
+const FIELD_DEG = 28;
 
 /** Angles of every rotation of the hand: what is given, else its rule, else its rest. */
 export function completed(skeleton, given) {
@@ -130,7 +131,7 @@ export class Stage {
     this.canvas = canvas;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
     this.scene = new THREE.Scene();
-    this.camera = new THREE.PerspectiveCamera(32, 1, 10, 4000);
+    this.camera = new THREE.PerspectiveCamera(FIELD_DEG, 1, 10, 4000);
     this.camera.up.set(1, 0, 0); // fingers point up
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0x667788, 2.2));
     const light = new THREE.DirectionalLight(0xffffff, 1.6);
@@ -170,6 +171,9 @@ export class Stage {
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.camera.aspect = clientWidth / clientHeight;
+    // On a narrow screen the width decides how much is seen.
+    const narrow = Math.max(1, 0.95 / this.camera.aspect);
+    this.camera.fov = 2 * Math.atan(Math.tan((FIELD_DEG / 2) * RADIANS) * narrow) / RADIANS;
     this.camera.updateProjectionMatrix();
     this.dirty = true;
   }
