@@ -13,3 +13,8 @@ def degrees(value: float | None) -> str:
 def made_of(model: Mapping[str, Any]) -> str:
     """The method and the effects on top of it."""
     return " + ".join([model["method"], *model["effects"]])
+
+
+def version_name(model: Mapping[str, Any]) -> str:
+    """The same with its held-out error and the first digits of its id."""
+    return f"{made_of(model)}, {degrees(model['held_out_rmse_deg'])} ({model['id'][:12]})"

@@ -12,7 +12,6 @@ from glovecal_service.studio.studio import Studio
 
 EVERY_S = 1.0
 SHOWN = 12
-UNFINISHED = ("queued", "running")
 
 
 class JobsDrawer:
@@ -62,7 +61,7 @@ class JobsDrawer:
     def _row(self, job: dict[str, Any]) -> None:
         with ui.element("section").classes("job"):
             ui.label(f"{job['kind']}: {job['state']}").classes("job-kind")
-            if job["state"] in UNFINISHED:
+            if job["finished_at"] is None:
                 share = job["fraction"]
                 ui.linear_progress(share, show_value=False).props(f'aria-label="{job["kind"]}"')
                 ui.button("Cancel", on_click=lambda: self._cancel(job["id"])).props("flat no-caps").classes(

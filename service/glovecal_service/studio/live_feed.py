@@ -16,7 +16,7 @@ import zenoh
 from glovecal_client.errors import NoAnswer, WireError
 from glovecal_client.keys import GloveKeys, all_gloves, parse_glove_key
 from glovecal_client.pose_subscriber import PoseSubscriber
-from glovecal_client.queries import json_object
+from glovecal_client.queries import ask, ask_json, json_object
 from glovecal_client.session import open_client
 from glovecal_client.wire.frame import decode_frame
 from glovecal_client.wire.pose import Pose
@@ -42,9 +42,8 @@ class GloveFeed:
             session.declare_subscriber(keys.raw, hear(self._hear_raw, indirect=False)),
             session.declare_subscriber(keys.meta, hear(self._hear_meta, indirect=False)),
         ]
-        for reply in session.get(keys.meta, timeout=1.0):
-            if reply.ok is not None:
-                self._meta = json_object(reply.ok.payload.to_bytes()) or {}
+        with suppress(NoAnswer):
+            self._meta = ask_json(session, keys.meta, timeout_s=1.0)
 
     @property
     def pose(self) -> Pose | None:
@@ -60,25 +59,19 @@ class GloveFeed:
         return list(self._meta.get("sensors", []))
 
     def names(self) -> dict[str, Any]:
-        """What the numbers of ``array`` are: rotations and sensors, in their order; the model."""
+        """What the numbers of ``array`` are: rotations and sensors, in their order."""
         pose = self.pose
         rotations: tuple[str, ...] = ()
         if pose is not None and not pose.uncalibrated:
             with suppress(NoAnswer):
                 rotations = self._poses.rotations(pose)
-        return {
-            "rotations": list(rotations),
-            "sensors": self.sensors,
-            "model": None if pose is None else pose.model_sha256,
-            "hand": self._meta.get("hand", "unknown"),
-        }
+        return {"rotations": list(rotations), "sensors": self.sensors}
 
     def array(self, pose: Pose) -> bytes:
-        """Float32: flags, age (ms), R, S, R angles, R standard deviations (degrees), S readings, R flags."""
+        """Float32: R, S, R angles and R standard deviations (degrees), S readings (counts)."""
         raw = self._readings()
-        head = np.array([pose.flags, pose.age_us / 1000.0, len(pose.degrees), len(raw)])
-        parts = (head, pose.degrees, pose.deviations, raw, pose.rotation_flags)
-        return np.concatenate(parts).astype("<f4").tobytes()
+        head = np.array([len(pose.degrees), len(raw)])
+        return np.concatenate((head, pose.degrees, pose.deviations, raw)).astype("<f4").tobytes()
 
     def close(self) -> None:
         self._poses.close()
@@ -134,7 +127,7 @@ class LiveFeeds:
         with self._lock:
             self._connected()
         now, states = time.monotonic(), {}
-        for glove, (heard, status) in sorted(self._statuses.items()):
+        for glove, (heard, status) in sorted(self._statuses.copy().items()):
             feed = self._feeds.get(glove, (None, 0))[0]
             states[glove] = glove_state(
                 status, now - heard > LOST_AFTER_S, None if feed is None else feed.pose,
@@ -159,15 +152,12 @@ class LiveFeeds:
             key = all_gloves(self._settings.site, "status")
             hear = zenoh.handlers.Callback(self._hear_status, indirect=False)
             self._kept.callback(self._session.declare_subscriber(key, hear).undeclare)
-            for reply in self._session.get(key, timeout=1.0):
-                if reply.ok is not None:
-                    self._keep_status(str(reply.ok.key_expr), reply.ok.payload.to_bytes())
+            with suppress(NoAnswer):
+                for sample in ask(self._session, key, timeout_s=1.0):
+                    self._hear_status(sample)
         return self._session
 
     def _hear_status(self, sample: zenoh.Sample) -> None:
-        self._keep_status(str(sample.key_expr), sample.payload.to_bytes())
-
-    def _keep_status(self, key: str, message: bytes) -> None:
-        status = json_object(message)
+        status = json_object(sample.payload.to_bytes())
         if status is not None:
-            self._statuses[parse_glove_key(key)[0].glove] = time.monotonic(), status
+            self._statuses[parse_glove_key(str(sample.key_expr))[0].glove] = time.monotonic(), status

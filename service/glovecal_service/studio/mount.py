@@ -94,8 +94,10 @@ async def _follow(feed: GloveFeed, socket: WebSocket) -> None:
         if pose is not None and pose is not shown:
             names = (pose.model_sha256, len(pose.degrees), tuple(feed.sensors))
             if names != told:
-                await socket.send_text(json.dumps(await run_in_threadpool(feed.names)))
-                told = names
+                given = await run_in_threadpool(feed.names)
+                await socket.send_text(json.dumps(given))
+                # The service may not have said yet what a new model's rotations are: then it is asked again.
+                told = names if len(given["rotations"]) == len(pose.degrees) else None
             await socket.send_bytes(feed.array(pose))
             shown = pose
         await asyncio.sleep(FRAME_S)

@@ -109,8 +109,8 @@ def test_the_page_and_python_agree_where_every_joint_is(
             places = page.evaluate(
                 """([id, angles]) => {
                     const view = getElement(id);
-                    view.show("reference", angles);
-                    return view.places("reference");
+                    view.show(angles);
+                    return view.places();
                 }""",
                 [int(element[1:]), given],
             )

@@ -5,9 +5,10 @@ from __future__ import annotations
 import httpx
 import pytest
 from playwright.sync_api import expect
-from realtime_support import store_model
+from realtime_support import free_endpoint, part_of_service, store_model
 from studio_support import Open
 
+from glovecal_service.serve import web
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 
@@ -56,9 +57,9 @@ def test_a_diagnosis_of_before_is_shown_with_what_to_do(opened: Open, address: s
     whole = httpx.get(f"{address}/v1/jobs/{job['id']}").json()
     page = opened(f"diagnose?model={job['payload']['model']}").page
     named = whole["result"]["named"]
-    if named is not None:
-        expect(page.locator(".finding-named")).to_contain_text(named["effect"])
-        expect(page.get_by_role("button", name=f"Add {named['effect']}")).to_be_visible()
+    assert named is not None
+    expect(page.locator(".finding-named")).to_contain_text(named["effect"])
+    expect(page.get_by_role("button", name=f"Add {named['effect']}")).to_be_visible()
     expect(page.get_by_role("link", name="Report with pictures")).to_have_attribute(
         "href", f"../v1/jobs/{job['id']}/report"
     )
@@ -88,7 +89,8 @@ def test_the_skip_link_is_first_and_leads_to_the_content(opened: Open) -> None:
 
 
 def test_without_the_studio_nothing_of_it_is_served(settings: Settings) -> None:
-    from glovecal_service.rest.app import create_app
-
-    paths = [getattr(route, "path", "") for route in create_app(settings).routes]
-    assert not [path for path in paths if path.startswith("/studio")]
+    port = int(free_endpoint().rpartition(":")[2])
+    bare = settings.model_copy(update={"studio": False, "port": port})
+    with part_of_service(web, bare):
+        assert httpx.get(f"http://127.0.0.1:{port}/studio/live").status_code == 404
+        assert "studio/live" not in httpx.get(f"http://127.0.0.1:{port}/").text

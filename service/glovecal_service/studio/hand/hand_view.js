@@ -1,15 +1,10 @@
-// A hand that can be turned. Layers are hands over each other: one solid, the others ghosts.
+// A hand that can be turned and shows live poses.
 import { Hand, Stage, THREE } from "glovecal-hand";
 import { OrbitControls } from "nicegui-scene";
 
-const LAYERS = {
-  calibrated: { color: 0x8fa3b8, opacity: 1 },
-  raw: { color: 0xd9822b, opacity: 0.35 },
-  reference: { color: 0x2a9d5c, opacity: 0.4 },
-};
 const SURE = new THREE.Color(0x8fa3b8), UNSURE = new THREE.Color(0xc2410c), CHOSEN = 0x1d4ed8;
 const UNSURE_DEG = 8; // standard deviation at which a joint has the full colour
-const FEED_FIELDS = 4; // flags, age in ms, number of rotations, number of sensors
+const FEED_FIELDS = 2; // number of rotations, number of sensors
 
 export default {
   template: `
@@ -22,7 +17,7 @@ export default {
   data: () => ({ shows: false }),
   mounted() {
     this.stage = new Stage(this.$refs.canvas, OrbitControls);
-    this.hands = new Map();
+    this.hand = null;
     this.chosen = null;
     this.updates = 0;
     this.build();
@@ -38,35 +33,25 @@ export default {
     this.gone = true;
     this.socket?.close();
     clearTimeout(this.again);
-    for (const hand of this.hands.values()) hand.dispose();
+    this.hand?.dispose();
     this.stage.dispose();
   },
   watch: { skeleton() { this.build(); } },
   methods: {
     build() {
-      for (const hand of this.hands.values()) {
-        this.stage.scene.remove(hand.root);
-        hand.dispose();
-      }
-      this.hands.clear();
-      if (!this.skeleton) return;
-      for (const [layer, look] of Object.entries(LAYERS)) {
-        const hand = new Hand(this.skeleton, look);
-        hand.root.visible = false;
-        this.stage.scene.add(hand.root);
-        this.hands.set(layer, hand);
-      }
+      if (this.hand) this.stage.scene.remove(this.hand.root);
+      this.hand?.dispose();
+      this.hand = new Hand(this.skeleton);
+      this.hand.root.visible = false;
+      this.stage.scene.add(this.hand.root);
     },
-    /** Pose one layer; `angles` by rotation in degrees, null hides it. `deviations` colour the joints. */
-    show(layer, angles, deviations) {
-      const hand = this.hands.get(layer);
-      if (!hand) return;
-      hand.root.visible = angles !== null;
+    /** `angles` by rotation in degrees, null hides the hand; `deviations` colour the joints. */
+    show(angles, deviations) {
+      this.shows = this.hand.root.visible = angles !== null;
       if (angles !== null) {
-        hand.pose(angles);
-        if (layer === "calibrated") this.colour(hand, deviations ?? {});
+        this.hand.pose(angles);
+        this.colour(this.hand, deviations ?? {});
       }
-      this.shows = [...this.hands.values()].some((each) => each.root.visible);
       this.stage.dirty = true;
     },
     colour(hand, deviations) {
@@ -83,13 +68,12 @@ export default {
     choose(rotation) { this.chosen = rotation; },
     /** What the page has drawn, for tests and the bench. */
     drawn() { return { drawn: this.stage.drawn, updates: this.updates }; },
-    places(layer) { return this.hands.get(layer)?.places() ?? null; },
+    places() { return this.hand.places(); },
     down(event) { this.at = [event.clientX, event.clientY]; },
     up(event) {
       const moved = Math.hypot(event.clientX - this.at[0], event.clientY - this.at[1]);
-      const hand = this.hands.get("calibrated");
-      if (moved > 4 || !hand?.root.visible) return; // it was a turn
-      const rotation = this.stage.picked(event, hand);
+      if (moved > 4 || !this.shows) return; // it was a turn
+      const rotation = this.stage.picked(event, this.hand);
       if (rotation) this.$emit("rotation", rotation);
     },
     key(event) {
@@ -106,36 +90,32 @@ export default {
       this.socket = new WebSocket(url);
       this.socket.binaryType = "arraybuffer";
       this.socket.onmessage = ({ data }) => {
-        if (typeof data === "string") {
-          this.names = JSON.parse(data);
-          this.$emit("state", this.names);
-        } else this.receive(new Float32Array(data));
+        if (typeof data === "string") this.names = JSON.parse(data);
+        else this.receive(new Float32Array(data));
       };
       this.socket.onclose = () => {
-        if (this.gone) return;
-        this.$emit("silent");
-        this.again = setTimeout(() => this.listen(), 1000);
+        if (!this.gone) this.again = setTimeout(() => this.listen(), 1000);
       };
     },
     receive(values) {
       if (!this.names) return;
-      const [flags, , rotations, sensors] = values;
+      const [rotations, sensors] = values;
       const names = this.names.rotations;
       this.updates += 1;
       if (rotations !== names.length || !rotations) {
-        this.show("calibrated", null);
+        this.show(null);
       } else {
         const angles = {}, deviations = {};
         for (let i = 0; i < rotations; i++) {
           angles[names[i]] = values[FEED_FIELDS + i];
           deviations[names[i]] = values[FEED_FIELDS + rotations + i];
         }
-        this.show("calibrated", angles, deviations);
+        this.show(angles, deviations);
       }
       const from = (start, count) => values.subarray(FEED_FIELDS + start, FEED_FIELDS + start + count);
       window.dispatchEvent(new CustomEvent("glovecal-frame", {
         detail: {
-          feed: this.feed, names: this.names, time: performance.now(), flags, rotations,
+          feed: this.feed, names: this.names, time: performance.now(), rotations,
           angles: from(0, rotations), deviations: from(rotations, rotations), raw: from(2 * rotations, sensors),
         },
       }));

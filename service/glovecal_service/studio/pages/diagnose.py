@@ -9,14 +9,14 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from glovecal_service.studio.amounts import degrees, made_of
+from glovecal_service.studio.amounts import degrees
 from glovecal_service.studio.heading import heading
 from glovecal_service.studio.job_watch import JobWatch
+from glovecal_service.studio.pages.model_select import model_select
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.shell import shell
 from glovecal_service.studio.studio import Studio
 
-VERDICTS = {"named": "named", "ambiguous": "one of a set", "unsure": "not sure"}
 SHOWN_CANDIDATES = 6
 
 
@@ -37,26 +37,20 @@ class DiagnosePage:
         self._model = model
 
     async def build(self) -> None:
-        models = await self._studio.service.get("/models")
-        if not models:
-            ui.label("No model yet: record takes and train one.").classes("studio-notice")
-            return
-        names = {each["id"]: _title(each) for each in reversed(models)}
-        active = next((each["id"] for each in reversed(models) if each["active"]), models[-1]["id"])
-        self._model = self._model if self._model in names else active
         with ui.row().classes("choices"):
-            ui.select(names, value=self._model, label="Model", on_change=self._choose).classes("choice")
-            self._begin = (
-                ui.button("Diagnose", on_click=self._diagnose)
-                .props("unelevated no-caps color=indigo-8")
-                .classes("studio-main-act")
+            model = await model_select(self._studio.service, self._model, self._choose)
+            if model is None:
+                return
+            self._model = model
+            ui.button("Diagnose", on_click=self._diagnose).props("unelevated no-caps color=indigo-8").classes(
+                "studio-main-act"
             )
         self._watch = JobWatch(self._studio, self._finished)
         self._findings = ui.element("div").classes("findings").props('aria-live="polite"')
         await self._show_last()
 
-    async def _choose(self, event: Any) -> None:
-        self._model = event.value
+    async def _choose(self, model: str) -> None:
+        self._model = model
         await self._show_last()
 
     async def _show_last(self) -> None:
@@ -123,14 +117,14 @@ class DiagnosePage:
         if found["next_take"]:
             with ui.element("section").classes("finding"):
                 heading(2, "What to record next")
-                ui.label(found["next_take"].get("sentence") or found["next_take"]["what"])
+                ui.label(found["next_take"]["what"])
         ui.link("Report with pictures", f"../v1/jobs/{job['id']}/report", new_tab=True).classes("studio-link")
 
     def _named(self, named: Mapping[str, Any]) -> None:
         with ui.element("section").classes("finding finding-named"):
             heading(2, f"{named['effect']} on {', '.join(named['where'])}")
             with ui.row():
-                ui.label(VERDICTS.get(named["verdict"]) or named["verdict"]).classes("state-word")
+                ui.label(named["verdict"]).classes("state-word")
                 saved, control = degrees(named["saved_deg"]), degrees(named["control_saved_deg"])
                 ui.label(f"saves {saved} on held-out takes, its control {control}")
             if len(named["confidence_set"]) > 1:
@@ -185,8 +179,3 @@ class DiagnosePage:
         with ui.expansion("What these takes could not show, and why").classes("finding"):
             for item in found["not_identifiable"]:
                 ui.label(f"{item['effect']}: {item['why']}")
-
-
-def _title(model: Mapping[str, Any]) -> str:
-    error = degrees(model["held_out_rmse_deg"])
-    return f"{model['subject']}: {made_of(model)}, {error} ({model['id'][:12]})"

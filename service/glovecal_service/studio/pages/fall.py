@@ -7,8 +7,9 @@ from typing import Any
 
 from nicegui import ui
 
-from glovecal_service.studio.amounts import degrees, made_of
+from glovecal_service.studio.amounts import degrees
 from glovecal_service.studio.pages.fall_chart import Bar, fall_chart
+from glovecal_service.studio.pages.model_select import model_select
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.shell import shell
 from glovecal_service.studio.studio import Studio
@@ -31,21 +32,15 @@ class FallPage:
         self._model = model
 
     async def build(self) -> None:
-        models = await self._studio.service.get("/models")
-        if not models:
-            ui.label("No model yet: record takes and train one.").classes("studio-notice")
+        model = await model_select(self._studio.service, self._model, self._choose)
+        if model is None:
             return
-        names = {
-            each["id"]: f"{each['subject']}: {made_of(each)} ({each['id'][:12]})" for each in reversed(models)
-        }
-        active = next((each["id"] for each in reversed(models) if each["active"]), models[-1]["id"])
-        self._model = self._model if self._model in names else active
-        ui.select(names, value=self._model, label="Model", on_change=self._choose).classes("choice")
+        self._model = model
         self._shown = ui.element("div").classes("findings")
         await self._show()
 
-    async def _choose(self, event: Any) -> None:
-        self._model = event.value
+    async def _choose(self, model: str) -> None:
+        self._model = model
         await self._show()
 
     async def _show(self) -> None:

@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from glovecal_service.studio.amounts import degrees, made_of
+from glovecal_service.studio.amounts import version_name
 from glovecal_service.studio.glove_state import GloveState
 from glovecal_service.studio.hand.hand_view import HandView, Side
 from glovecal_service.studio.heading import heading
@@ -27,7 +27,6 @@ class GloveCard:
     def __init__(self, studio: Studio, glove: str) -> None:
         self._studio = studio
         self._glove = glove
-        self._shown: object = None
 
     async def build(self) -> None:
         feed = f"/studio/feed/{quote(self._glove)}"
@@ -57,9 +56,10 @@ class GloveCard:
                     angles = AngleList(feed, label="Angles and their standard deviations")
                     SensorStrips(feed, label=f"Readings of glove {self._glove}, last seconds")
             angles.on_rotation(view.choose)
+            view.on_rotation(view.choose)
         await self._offer_models(glove)
 
-    async def show(self, state: GloveState) -> None:
+    def show(self, state: GloveState) -> None:
         self._word.set_text(state.word + (", simulated" if state.is_simulated else ""))
         if self._word.props.get("data-word") != state.word:
             self._word.props["data-word"] = state.word
@@ -89,10 +89,7 @@ class GloveCard:
         models = await self._studio.service.get("/models", subject=glove["subject"], layout=glove["layout"])
         if not models:
             return
-        names = {
-            each["id"]: f"{made_of(each)}, {degrees(each['held_out_rmse_deg'])} ({each['id'][:12]})"
-            for each in models
-        }
+        names = {each["id"]: version_name(each) for each in models}
         active = next((each["id"] for each in models if each["active"]), None)
         with self._models:
             ui.select(

@@ -48,4 +48,4 @@ class LivePage:
                 with self._gloves:
                     card = self._cards[glove] = GloveCard(self._studio, glove)
                     await card.build()
-            await self._cards[glove].show(state)
+            self._cards[glove].show(state)

@@ -31,17 +31,15 @@ export function completed(skeleton, given) {
   return angles;
 }
 
-/** One hand: solid, or a ghost of another colour. */
+/** One hand. */
 export class Hand {
-  constructor(skeleton, { color = 0x9aa7b5, opacity = 1 } = {}) {
+  constructor(skeleton) {
     this.skeleton = skeleton;
     this.root = new THREE.Group();
     this.joints = new Map();
     this.balls = new Map();
     this.tips = new Map();
-    this.material = new THREE.MeshStandardMaterial({
-      color, roughness: 0.75, transparent: opacity < 1, opacity, depthWrite: opacity === 1,
-    });
+    this.material = new THREE.MeshStandardMaterial({ color: 0x9aa7b5, roughness: 0.75 });
     const ball = new THREE.SphereGeometry(JOINT_MM, 20, 14);
     this.geometries = [ball];
     for (const joint of skeleton.joints) {

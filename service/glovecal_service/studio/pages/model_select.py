@@ -1,0 +1,31 @@
+"""The choice of a model at the head of a page."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+
+from nicegui import ui
+from nicegui.events import ValueChangeEventArguments
+
+from glovecal_service.studio.amounts import version_name
+from glovecal_service.studio.service import Service
+
+
+async def model_select(service: Service, wanted: str, chosen: Callable[[str], Awaitable[None]]) -> str | None:
+    """The id to begin with: ``wanted`` if it is there, else the newest active one; None without any model.
+
+    ``chosen`` is called with each other one.
+    """
+    models = await service.get("/models")
+    if not models:
+        ui.label("No model yet: record takes and train one.").classes("studio-notice")
+        return None
+    names = {each["id"]: f"{each['subject']}: {version_name(each)}" for each in reversed(models)}
+    active = next((each["id"] for each in reversed(models) if each["active"]), models[-1]["id"])
+    first = wanted if wanted in names else active
+
+    async def change(event: ValueChangeEventArguments) -> None:
+        await chosen(str(event.value))
+
+    ui.select(names, value=first, label="Model", on_change=change).classes("choice")
+    return first
