@@ -8,11 +8,15 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from typing import Any
 
+from glovecal_models.simulation.protocol import segments
+from glovecal_models.simulation.simulated_glove import SimulatedGlove
+from glovecal_models.simulation.simulated_take import simulate_take
+from glovecal_models.takes.take import Take
 from glovecal_service.cli.command import main
 
 COMMAND = [sys.executable, "-m", "glovecal_service.cli.command"]
@@ -37,6 +41,16 @@ class Answer:
         """Standard error as one line, without the frame that typer draws around wrong use."""
         words = " ".join(line.strip("│╭╮╰╯─ ") for line in self.err.splitlines()).split()
         return " ".join(words)
+
+
+Run = Callable[..., Answer]
+"""The command on one data folder; called with the arguments."""
+
+
+def simulated(motion: str, name: str, *, wearing: int = 0) -> Take:
+    """A take of the one simulated glove of these tests, 20 frames a second."""
+    glove = SimulatedGlove(1, "cyberglove18", wearing=wearing)
+    return simulate_take(glove, segments(motion, 1), rate_hz=20, name=name).take
 
 
 def environment(given: Mapping[str, str]) -> dict[str, str]:

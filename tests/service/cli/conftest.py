@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import sys
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -12,20 +11,9 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from cli_running import Answer, glovecal
+from cli_running import Run, glovecal, simulated
 
-from glovecal_models.simulation.protocol import segments
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import simulate_take
-from glovecal_models.takes.take import Take
 from glovecal_models.takes.write_table import write_takes
-
-Run = Callable[..., Answer]
-
-
-def simulated(motion: str, name: str, *, wearing: int = 0) -> Take:
-    glove = SimulatedGlove(1, "cyberglove18", wearing=wearing)
-    return simulate_take(glove, segments(motion, 1), rate_hz=20, name=name).take
 
 
 @pytest.fixture(scope="session")

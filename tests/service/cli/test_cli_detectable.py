@@ -6,8 +6,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from cli_running import glovecal
-from conftest import Run
+from cli_running import Run, glovecal
 
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan

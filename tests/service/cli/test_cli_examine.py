@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from cli_running import Answer
-from conftest import Run, simulated
+from cli_running import Answer, Run, simulated
 from still_take import still_take
 
 from glovecal_models.simulation.simulated_glove import SimulatedGlove

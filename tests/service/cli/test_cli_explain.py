@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cli_running import glovecal
-from conftest import Run
+from cli_running import Run, glovecal
 from effect_models import CREEP, HYSTERESIS, model_with
 from realtime_support import LAYOUT
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from conftest import Run
+from cli_running import Run
 
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.write_table import write_takes

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from conftest import simulated
+from cli_running import simulated
 
 from glovecal_models.takes.write_table import write_takes
 

@@ -7,8 +7,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from cli_running import glovecal
-from conftest import Run
+from cli_running import Run, glovecal
 from small_session import CAUSE, ROTATIONS, sticky_session, write_sticky
 
 from glovecal_models.takes.write_table import write_takes

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Run
+from cli_running import Run
 
 from glovecal_models.takes.table import read_takes
 from glovecal_models.takes.take import Take

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Run
+from cli_running import Run
 
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.write_table import write_takes

@@ -7,8 +7,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from cli_running import glovecal
-from conftest import Run, simulated
+from cli_running import Run, glovecal, simulated
 
 from glovecal_models.takes.write_table import write_takes
 
