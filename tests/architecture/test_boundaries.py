@@ -4,6 +4,7 @@ nor the service. Checked on the source, and by importing each distribution with 
 import ast
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -28,9 +29,14 @@ FORBIDDEN = {
 PICKLES = {"pickle", "cPickle", "dill", "cloudpickle", "joblib", "shelve", "marshal"}
 
 
+@cache
+def nodes(path: Path) -> tuple[ast.AST, ...]:
+    return tuple(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+
+
 def imports(path: Path) -> set[str]:
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in nodes(path):
         if isinstance(node, ast.Import):
             found |= {alias.name.split(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
@@ -53,7 +59,7 @@ def test_a_page_of_the_studio_computes_nothing_that_rest_cannot_give():
         "glovecal_service.rest.http.observation",
     )
     for path in sorted((SOURCES["service"] / "studio").rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in nodes(path):
             names = [node.module] if isinstance(node, ast.ImportFrom) else []
             names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             ours = [
@@ -94,7 +100,7 @@ def test_eval_and_exec_are_not_used():
         for path in package.rglob("*.py"):
             calls = [
                 node.func.id
-                for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+                for node in nodes(path)
                 if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
             ]
             assert not {"eval", "exec", "compile"} & set(calls), path

@@ -16,6 +16,7 @@ import glovecal_models
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
@@ -40,9 +41,14 @@ def recorded() -> list[Take]:
 def noted(files: set[str]) -> Iterator[None]:
     """Adds the files of models whose functions are called meanwhile."""
 
+    seen = set[str]()
+
     def note(frame: FrameType, event: str, argument: object) -> None:
         code = frame.f_code
-        if event == "call" and code.co_name != "<module>" and Path(code.co_filename).is_relative_to(MODELS):
+        if event != "call" or code.co_name == "<module>" or code.co_filename in seen:
+            return
+        seen.add(code.co_filename)
+        if Path(code.co_filename).is_relative_to(MODELS):
             files.add(Path(code.co_filename).relative_to(MODELS).as_posix())
 
     before = sys.getprofile()
@@ -55,6 +61,7 @@ def noted(files: set[str]) -> Iterator[None]:
 
 def entered(call: Callable[[list[Take]], object]) -> list[str]:
     takes, files = recorded(), set[str]()
+    catalogue()  # loads the effects: their class bodies would be taken for calls
     with noted(files):
         call(takes)
     return sorted(name for name in files if name.partition("/")[0] not in APART)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections import defaultdict
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -25,6 +26,7 @@ def modules() -> dict[str, Path]:
     return found
 
 
+@cache
 def importers() -> dict[str, set[str]]:
     """For each module those that import it or something from it."""
     known, found = modules(), defaultdict(set)

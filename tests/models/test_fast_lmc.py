@@ -15,10 +15,6 @@ from glovecal_models.errors import Cancelled, NotTrainable
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
 from glovecal_models.regression.process_regressor import ProcessRegressor
 
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")
-    import GPy
-
 
 def make_joint(count: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """An abduction sensor stretched by two flexions, 8 bits, 1 degree noise: inputs, target, truth."""
@@ -54,6 +50,8 @@ def test_optimum_is_gpys_or_better() -> None:
     y = (target - target.mean()) / target.std()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
+        import GPy  # here, because every process of the suite would wait seconds for it
+
         mean = GPy.mappings.Additive(GPy.mappings.Linear(3, 1), GPy.mappings.Constant(3, 1))
         model = GPy.models.GPRegression(x, y[:, None], GPy.kern.RBF(3, ARD=True), mean_function=mean)
         model.optimize(max_iters=300)

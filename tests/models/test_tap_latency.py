@@ -40,20 +40,23 @@ def tapped(latency_s: float, *, rate_hz: float = 120.0, taps: int = 25, seed: in
 
 @pytest.mark.parametrize(("latency_s", "rate_hz"), [(0.0, 120.0), (0.045, 60.0), (0.25, 120.0)])
 def test_a_planted_latency_comes_back_with_its_standard_deviation(latency_s, rate_hz):
-    found = tap_latency(*_ordered(tapped(latency_s, rate_hz=rate_hz)))
+    found = tap_latency(*_ordered(tapped(latency_s, rate_hz=rate_hz)), key_latency_s=0.0)
     assert latency_s - 0.002 <= found.seconds <= latency_s + KEY_STOPS_LATER_S + 0.002
     assert 0.0001 < found.sd_s < 0.002
     assert (found.taps, found.used) == (25, 25)
     assert set(found.sensors[:2]) == {"A", "B"}
     later = tap_latency(*_ordered(tapped(latency_s, rate_hz=rate_hz)), key_latency_s=0.01)
     assert later.seconds == pytest.approx(found.seconds + 0.01)
+    usual = tap_latency(*_ordered(tapped(latency_s, rate_hz=rate_hz)))
+    assert usual.seconds == pytest.approx(found.seconds + 0.0125)
+    assert usual.sd_s**2 == pytest.approx(found.sd_s**2 + 0.015**2 / 12)
 
 
 def test_a_press_without_a_tap_is_left_out():
     time, readings, pressed = tapped(0.03)
     stray = pressed[3::6][:3] + 0.5
     found = tap_latency(time, readings, SENSORS, np.sort([*pressed, *stray]))
-    assert found.seconds == pytest.approx(0.033, abs=0.003)
+    assert found.seconds == pytest.approx(0.033 + 0.0125, abs=0.003)
     assert found.used <= 25
 
 

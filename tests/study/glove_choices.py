@@ -113,9 +113,13 @@ def pair(number: int, size: float, *, set_aside: bool = False) -> BlindGlove:
     return _glove("pairs", "+".join(names), size, number, label, tuple(causes), "none", set_aside=set_aside)
 
 
+UNDECIDED_SIZES = (0.65, 1.3)
+"""Noise floors, in turn: delays of about 12 and 22 ms, of which no recording settles the shorter."""
+
+
 def undecided(name: str, number: int, *, set_aside: bool = False) -> BlindGlove | None:
     """A weak cause in few short takes, as leaves rivals; None where there is no such form."""
-    found = with_cause("next-take", name, 0.65, number, set_aside=set_aside)
+    found = with_cause("next-take", name, UNDECIDED_SIZES[number % 2], number, set_aside=set_aside)
     return None if found is None else replace(found, wearings=2, takes_per_wearing=3, take_s=25.0)
 
 

@@ -16,21 +16,25 @@ from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLi
 from glovecal_models.simulation.session_plan import TakeMotion
 from glovecal_models.takes.known_latency import KnownLatency
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.tap_latency import USUAL_KEY_S, usual_key
 
 MOST_TAKES = 2
 NEW_WEARING_S = 40.0
 TAPS_SD_S = 0.003
+"""What taps scatter and the finger's stop is misjudged by."""
 
 
 def next_take_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_LIMITS) -> dict[str, Any]:
     """Confidence sets before and after each recorded take, and the motions that were asked for."""
-    takes = list(glove.takes)
+    takes, random = list(glove.takes), np.random.default_rng(glove.seed)
     found = diagnose(takes, glove.layout, linear=glove.linear, limits=limits.diagnosis)
     sets, motions = [list(found.naming.confidence_set)], []
-    while len(motions) < MOST_TAKES and len(sets[-1]) > 1 and found.next_take is not None:
+    while len(motions) < MOST_TAKES and len(sets[-1]) > 1 and _decides(found):
+        assert found.next_take is not None
         motions.append(found.next_take.motion)
         if found.next_take.motion == TAPS.name:
-            takes = [replace(take, glove_latency=_tapped(glove)) for take in takes]
+            tapped = _tapped(glove, random)
+            takes = [replace(take, glove_latency=tapped) for take in takes]
         else:
             takes.append(_recorded(glove, found.next_take, len(motions) - 1))
         found: Diagnosis = diagnose(takes, glove.layout, linear=glove.linear, limits=limits.diagnosis)
@@ -38,10 +42,23 @@ def next_take_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_
     return {"confidence_sets": sets, "motions": motions}
 
 
-def _tapped(glove: BlindGlove) -> KnownLatency:
-    """What taps on a key measure: how late the whole glove is, its sensors' lag included."""
-    late = [item for item in glove.session.causes if item.name in ("glove_latency", "lag")]
-    return KnownLatency(float(sum(np.mean(list(item.sizes.values())) for item in late)), TAPS_SD_S)
+def _decides(found: Diagnosis) -> bool:
+    """Whether the take asked for is about the set, not about what could not be judged."""
+    asked = found.next_take
+    return asked is not None and bool(set(asked.separates) & set(found.naming.confidence_set))
+
+
+def _tapped(glove: BlindGlove, random: np.random.Generator) -> KnownLatency:
+    """What taps on some key measure: how late the whole glove is, its sensors' lag included."""
+    hidden = zip(glove.causes, glove.session.causes, strict=False)
+    late = [(mine, item) for mine, item in hidden if item.name in ("glove_latency", "lag")]
+    true_s = sum(
+        float(np.mean(list(item.sizes.values()))) * (0.5 if mine.form == "moving_average" else 1.0)
+        for mine, item in late
+    )
+    usual_s, key_sd_s = usual_key()
+    wrong_s = usual_s - random.uniform(*USUAL_KEY_S) + random.normal(0.0, TAPS_SD_S)
+    return KnownLatency(true_s + wrong_s, float(np.hypot(TAPS_SD_S, key_sd_s)))
 
 
 def _recorded(glove: BlindGlove, asked: NextTake, repeat: int) -> Take:

@@ -36,4 +36,5 @@ def _clocks(takes: Sequence[Take]) -> dict[str, Any]:
     """What the scan of the clocks says of every take."""
     clocks = ClockOffsetEffect().clocks(takes, drift=False)
     offsets = {take.name: float(clock.offset_s) for take, clock in zip(takes, clocks, strict=True)}
-    return {"offset_s": offsets, "common_s": float(np.median(list(offsets.values()))), "per_take": True}
+    common = float(np.median(list(offsets.values())))
+    return {"offset_s": offsets, "common_s": common, "per_take": True, "within_takes": True}

@@ -199,7 +199,8 @@ def test_pairs_next_takes_and_alarms() -> None:
     assert found["two effects: last error / clean twin"].value == pytest.approx(1.25)
     assert pairs_figures([(both, answer)] * 119)[0].verdict == "too few"
     sets = [[["creep", "lag"], ["lag"]], [["creep", "lag", "hysteresis"], ["creep"]], [["lag"]]]
-    settled = next_take_figures([(glove("lag"), {"confidence_sets": each}) for each in sets])
+    answers = [{"confidence_sets": each, "motions": ["fast"] * (len(each) - 1)} for each in sets]
+    settled = next_take_figures([(glove("lag"), answer) for answer in answers])
     assert (settled[0].count, settled[0].gloves) == (1, 2)
     unknown = replace(both, truth="unknown:tilt")
     assert [figure.is_met for figure in alarm_figures([(unknown, answer | {"right": []})])[:2]] == [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from delay_gloves import true_names
 from glove_choices import NUISANCES
 from glove_jobs import Row
 from naming_figures import SAME_IN_TAKES
@@ -104,11 +105,12 @@ def pairs_figures(rows: Sequence[Row]) -> list[StudyFigure]:
 
 
 def next_take_figures(rows: Sequence[Row]) -> list[StudyFigure]:
-    """Of gloves whose first diagnosis was ambiguous."""
-    many = [row for row in rows if len(row[1]["confidence_sets"][0]) > 1]
+    """Of gloves whose first diagnosis was ambiguous, and named what to record."""
+    every = [row for row in rows if len(row[1]["confidence_sets"][0]) > 1]
+    many = [row for row in every if row[1]["motions"]]
     two = [row for row in many if len(row[1]["confidence_sets"][0]) == 2]
     wrongly = [
-        len(answer["confidence_sets"][-1]) == 1 and glove.truth not in answer["confidence_sets"][-1]
+        len(answer["confidence_sets"][-1]) == 1 and not true_names(glove) & set(answer["confidence_sets"][-1])
         for glove, answer in many
     ]
     label = "sets settled rightly with at most two proposed takes"
@@ -122,12 +124,14 @@ def next_take_figures(rows: Sequence[Row]) -> list[StudyFigure]:
         ),
         StudyFigure.share(f"two-member {label}", [_settled(row) for row in two]),
         StudyFigure.share("ambiguous sets settled wrongly", wrongly),
-        StudyFigure.share("gloves whose first set is ambiguous", [row in many for row in rows]),
+        StudyFigure.share("ambiguous sets for which a take is proposed", [row in many for row in every]),
+        StudyFigure.share("gloves whose first set is ambiguous", [row in every for row in rows]),
     ]
 
 
 def _settled(row: Row) -> bool:
-    return row[1]["confidence_sets"][-1] == [row[0].truth]
+    last = set(row[1]["confidence_sets"][-1])
+    return bool(last) and last <= true_names(row[0])
 
 
 def _pairs(rows: Sequence[Row], label: str, *, judged: bool) -> list[StudyFigure]:

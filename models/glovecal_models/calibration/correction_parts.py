@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -40,6 +40,20 @@ class CorrectionParts:
         self.faulty_sensors: list[tuple[str, ...]] = [()] * frames
         """For each frame those that fail."""
         self._shape = frames, rotations
+
+    def of_frame(self, row: int) -> CorrectionParts:
+        """Of one frame alone."""
+        at = slice(row, row + 1)
+        one = CorrectionParts(1, self._shape[1])
+        one.faulty_sensors = self.faulty_sensors[at]
+        one.found = [
+            replace(
+                part, degrees=part.degrees[at], variance=part.variance[at], claimed=part.claimed[at],
+                acts=part.acts[at],
+            )
+            for part in self.found
+        ]  # fmt: skip
+        return one
 
     def held(self, name: str, frames: Sequence[Held], base: np.ndarray, first: int = 0) -> None:
         """``frames`` from row ``first`` on, held by an effect whose input was ``base`` (N, R), degrees."""

@@ -105,6 +105,29 @@ class FrameExplanation:
 
 
 @dataclass(frozen=True)
+class PredictedFrame:
+    """One frame as it was predicted; base and angles have one row."""
+
+    time_s: float
+    readings: np.ndarray
+    """(S,), raw, in the order of the model's sensors."""
+    base: GloveAngles
+    """The regressors alone."""
+    angles: GloveAngles
+    """With the effects, as served."""
+    correction: np.ndarray
+    """(1, R), degrees: the sum of what ``parts`` hold."""
+    parts: CorrectionParts
+    """Its last row is this frame."""
+    since_start_s: float
+    """How long ago effects with a memory began anew."""
+    settling_s: float
+    """How long they take; 0: nothing is remembered."""
+    silent: Sequence[str]
+    """As ``EffectCorrection.silent`` says."""
+
+
+@dataclass(frozen=True)
 class Explanation:
     """One frame of a take."""
 
@@ -142,10 +165,11 @@ class FrameExplainer:
         )
         angles = self._predictor.corrected(base, found.degrees, found.undefined, found.inflation)
         known = [name for name, value in context.items() if np.isfinite(value)]
-        return _explained(
-            self._model, self._predictor, self._stream, (base, angles), found.degrees, parts,
-            readings, time_s, time_s - self._began_s, self._stream.silent(known, wearing),
+        frame = PredictedFrame(
+            time_s, readings, base, angles, found.degrees, parts, time_s - self._began_s,
+            self._stream.settling_s, self._stream.silent(known, wearing),
         )  # fmt: skip
+        return explained(self._model, self._predictor, frame)
 
     def reset(self) -> None:
         """A new run or wearing."""
@@ -178,10 +202,11 @@ def explain(model: CalibrationModel, take: Take, at_s: float) -> Explanation:
     gaps = np.flatnonzero(np.diff(time_s) > LONGEST_GAP_S)
     began_s = float(time_s[gaps[-1] + 1]) if len(gaps) else first
     known = [name for name, column in context.items() if np.isfinite(column[-1])]
-    frame = _explained(
-        model, predictor, effects, (_last(base), _last(angles)), found.degrees[-1:], parts,
-        readings[-1], float(time_s[-1]), float(time_s[-1]) - began_s, effects.silent(known, take.wearing),
+    last = PredictedFrame(
+        float(time_s[-1]), readings[-1], _last(base), _last(angles), found.degrees[-1:], parts,
+        float(time_s[-1]) - began_s, effects.settling_s, effects.silent(known, take.wearing),
     )  # fmt: skip
+    frame = explained(model, predictor, last)
     measured = _measured(model, take, number, predictor)
     return Explanation(take.name, take.wearing, take.simulated, at_s, number, frame, measured)
 
@@ -199,21 +224,13 @@ def _last(angles: GloveAngles) -> GloveAngles:
     return GloveAngles(angles.mean[-1:], angles.sd[-1:], angles.flags[-1:])
 
 
-def _explained(
-    model: CalibrationModel,
-    predictor: GlovePredictor,
-    effects: EffectCorrection,
-    base_and_angles: tuple[GloveAngles, GloveAngles],
-    correction: np.ndarray,
-    parts: CorrectionParts,
-    readings: np.ndarray,
-    time_s: float,
-    since_start_s: float,
-    silent: Sequence[str],
-) -> FrameExplanation:
-    """Of the last frame that ``parts`` know; ``correction`` (1, R) is its sum."""
-    base, angles = base_and_angles
-    usable = usable_correction(correction[0])
+def explained(model: CalibrationModel, predictor: GlovePredictor, frame: PredictedFrame) -> FrameExplanation:
+    """What the angles of a frame that was predicted already are made of; ``predictor`` is the model's.
+
+    Safe beside a prediction in another thread: it only reads what was written down.
+    """
+    base, angles, parts = frame.base, frame.angles, frame.parts
+    usable = usable_correction(frame.correction[0])
     noise = np.array([item.regressor.noise_variance for item in model.rotations])
     every = np.ones(len(noise), dtype=bool)
     sure = np.maximum(base.sd[0] ** 2 - noise, 0.0)
@@ -239,7 +256,7 @@ def _explained(
     rows.sort(key=lambda row: ORDER.index(row.kind))
     names = predictor.rotations
     by_rule = {target: tuple(names[at] for at in sources) for target, sources, _ in predictor.rules}
-    of_sensor = dict(zip(model.layout.sensors, readings.tolist(), strict=True))
+    of_sensor = dict(zip(model.layout.sensors, frame.readings.tolist(), strict=True))
     found = tuple(
         AngleTerms(
             rotation=item.rotation,
@@ -253,16 +270,15 @@ def _explained(
         )
         for at, item in enumerate(model.rotations)
     )
-    settling_s = effects.settling_s
     remembering = [item.name for item in model.effects if item.effect.has_memory and item.weights.any()]
     return FrameExplanation(
-        time_s=time_s,
+        time_s=frame.time_s,
         angles=found,
         faulty_sensors=parts.faulty_sensors[-1],
-        transient_s=since_start_s if since_start_s < settling_s else None,
-        settling_s=settling_s,
+        transient_s=frame.since_start_s if frame.since_start_s < frame.settling_s else None,
+        settling_s=frame.settling_s,
         remembering=tuple(dict.fromkeys(remembering)),
-        silent=tuple(silent),
+        silent=tuple(frame.silent),
     )
 
 

@@ -13,8 +13,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
-from scipy.signal import lfilter
 
 from glovecal_models.takes.take import Take
 
@@ -84,8 +82,7 @@ def smoothed_error(time_s: np.ndarray, take: Take, error: np.ndarray) -> np.ndar
         return np.full(len(time_s), np.nan)
     near = np.interp(time_s, take.time_s, known.astype(float)) > 0.99
     values = np.where(near, np.interp(time_s, take.time_s[known], error[known]), 0.0)
-    weight = gaussian_filter1d(near.astype(float), KERNEL_S * CEILING_HZ, mode="constant")
-    total = gaussian_filter1d(values, KERNEL_S * CEILING_HZ, mode="constant")
+    weight, total = (_smoothed(part, "constant") for part in (near.astype(float), values))
     return np.where(near, total / np.maximum(weight, 1e-9), np.nan)
 
 
@@ -130,8 +127,11 @@ def _at(time: np.ndarray, frames: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(time, frames, column) for column in values.T])
 
 
-def _smoothed(values: np.ndarray) -> np.ndarray:
-    return gaussian_filter1d(values, KERNEL_S * CEILING_HZ, axis=0, mode="nearest")
+def _smoothed(values: np.ndarray, beyond: str = "nearest") -> np.ndarray:
+    """``beyond``: what stands beyond the ends, a ``mode`` of SciPy's filters."""
+    from scipy.ndimage import gaussian_filter1d  # slow to load, and every service loads this file
+
+    return gaussian_filter1d(values, KERNEL_S * CEILING_HZ, axis=0, mode=beyond)
 
 
 def _context(take: Take, time: np.ndarray, names: Sequence[str]) -> np.ndarray:
@@ -166,6 +166,8 @@ def _before(x: np.ndarray, lag_s: float) -> np.ndarray:
 
 def _average(x: np.ndarray, tau_s: float) -> np.ndarray:
     """Exponential, of what was seen so far."""
+    from scipy.signal import lfilter  # takes a second to load, which most commands need not wait for
+
     keep = np.exp(-1.0 / (tau_s * CEILING_HZ))
     total, weight = (lfilter([1.0], [1.0, -keep], values) for values in (x, np.ones(len(x))))
     return np.asarray(total) / np.asarray(weight)

@@ -61,6 +61,15 @@ def covariates(found: Residuals, rotation: str) -> Iterator[Covariate]:
         yield _of_context(name, values)
 
 
+def joint_columns(found: Residuals, rotation: str) -> Iterator[Covariate]:
+    """The measured angle of every other rotation: asked for one by one, as a hand's joints move together and
+    most would seem to matter."""
+    for name in found.measured_rotations:
+        if name != rotation:
+            angle = tuple(_smooth(item, found.column(name)) for item in found.takes)
+            yield Covariate(f"joint {name}", "deg", f"the angle of {name}", angle)
+
+
 def context_unit(name: str) -> str:
     """The unit of a context column by the end of its name; "" when that says nothing."""
     before, _, ending = name.rpartition("_")

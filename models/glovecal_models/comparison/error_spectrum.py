@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import dct, idct
 
 from glovecal_models.comparison.floor_estimate import RESAMPLES, NoiseFloor, pooled
 from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
@@ -108,6 +107,8 @@ def _slow_part(values: np.ndarray, rate_hz: float) -> np.ndarray:
     """By the cosine transform: it mirrors the series at its ends, so that they do not look fast."""
     if not len(values):
         return values
+    from scipy.fft import dct, idct  # slow to load, and every service loads this file
+
     frequency = 0.5 * rate_hz * np.arange(len(values)) / len(values)
     coefficients = np.asarray(dct(values, norm="ortho"))
     return np.asarray(idct(np.where(frequency < SLOW_HZ, coefficients, 0.0), norm="ortho"))

@@ -28,7 +28,7 @@ _WRIST = [HAND_ROTATIONS.index(name) for name in WRIST]
 
 @dataclass(frozen=True)
 class HandPoses:
-    """N frames in which at least one fingertip counts, and R rotations in the order of ``HAND_ROTATIONS``."""
+    """N frames, and R rotations in the order of ``HAND_ROTATIONS``."""
 
     predicted: np.ndarray
     """(N, R), degrees."""
@@ -45,18 +45,24 @@ class HandPoses:
 
     def every(self, most: int) -> HandPoses:
         """At most ``most`` frames, evenly spread."""
-        rows = slice(None, None, max(1, -(-len(self.time_s) // most)))
+        return self.at(slice(None, None, max(1, -(-len(self.time_s) // most))))
+
+    def at(self, rows: slice | np.ndarray) -> HandPoses:
+        """Some frames: a slice, a mask or indexes."""
         return HandPoses(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
 def hand_poses(found: Residuals) -> HandPoses | None:
-    """Both hands; None where no finger's chain was predicted and measured."""
-    takes = [_of_take(index, item, found.rotations) for index, item in enumerate(found.takes)]
-    joined = [np.concatenate(parts) for parts in zip(*takes, strict=True)]
-    return HandPoses(*joined) if len(joined[0]) else None
+    """Both hands, where a fingertip counts; None where no finger's chain was predicted and measured."""
+    takes = [poses_of_take(item, found.rotations, index) for index, item in enumerate(found.takes)]
+    counting = [one.at(np.flatnonzero(one.counts.any(axis=1))) for one in takes]
+    names = HandPoses.__dataclass_fields__
+    joined = HandPoses(*(np.concatenate([getattr(one, name) for one in counting]) for name in names))
+    return joined if len(joined.time_s) else None
 
 
-def _of_take(index: int, item: TakeResiduals, rotations: tuple[str, ...]) -> tuple[np.ndarray, ...]:
+def poses_of_take(item: TakeResiduals, rotations: tuple[str, ...], index: int = 0) -> HandPoses:
+    """Every frame of a take, those too in which no fingertip counts; ``rotations``: of the residuals."""
     measured = item.take.reference_at_frames(HAND_ROTATIONS)
     predicted = np.full_like(measured, np.nan)
     for column, name in enumerate(HAND_ROTATIONS):
@@ -67,14 +73,12 @@ def _of_take(index: int, item: TakeResiduals, rotations: tuple[str, ...]) -> tup
     compared[:, _WRIST] = False
     places = [[HAND_ROTATIONS.index(name) for name in NEEDED[finger]] for finger in FINGERS]
     counts = np.column_stack([compared[:, needed].all(axis=1) for needed in places])
-    rows = counts.any(axis=1)
-    measured, predicted, compared = measured[rows], predicted[rows], compared[rows]
     whole = completed(HAND_ROTATIONS, np.where(np.isfinite(measured), measured, predicted))
     whole[:, _WRIST] = 0.0
-    time = item.take.time_s[rows] - item.take.time_s[:1]
-    return (
-        np.where(compared, predicted, whole), whole, compared, counts[rows], np.full(len(time), index), time
-    )  # fmt: skip
+    time = item.take.time_s - item.take.time_s[:1]
+    return HandPoses(
+        np.where(compared, predicted, whole), whole, compared, counts, np.full(len(time), index), time
+    )
 
 
 def tips_mm(skeleton: Skeleton, angles_deg: np.ndarray) -> np.ndarray:

@@ -8,10 +8,12 @@ import numpy as np
 
 from glovecal_models.comparison.compare import Comparison
 from glovecal_models.comparison.cross_validation_difference import CrossValidationDifference
+from glovecal_models.comparison.dependence import Dependence
 from glovecal_models.comparison.fingertips import FingertipErrors, TipErrors
 from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
 from glovecal_models.comparison.wearings import WearingErrors
-from glovecal_models.comparison.where_it_fails import RotationFindings
+from glovecal_models.comparison.where_it_fails import RotationFindings, is_structure
 
 
 def rotation_sentence(item: RotationFindings) -> str:
@@ -33,6 +35,23 @@ def rotation_sentence(item: RotationFindings) -> str:
     return (
         f"{start}. It depends on {first.phrase}: from {low:+.1f} to {high:+.1f} degrees, "
         f"RMS contribution {first.explained_deg:.1f} degrees{also}."
+    )
+
+
+def dependence_sentence(
+    rotation: str, rmse_deg: float, one: Dependence, limits: ComparisonLimits = COMPARISON_LIMITS
+) -> str:
+    """How far the error of a rotation goes with one column, and whether chance goes as far."""
+    if is_structure(one, rmse_deg, limits):
+        verdict = "significant"
+    elif one.p_value <= limits.structure_p_value:
+        verdict = f"significant, but a small part of {rmse_deg:.1f} degrees"
+    else:
+        verdict = "not significant"
+    return (
+        f"Against {one.phrase} the mean error of {rotation} goes from {np.min(one.mean_deg):+.1f} to "
+        f"{np.max(one.mean_deg):+.1f} degrees; RMS contribution {one.explained_deg:.1f} degrees, "
+        f"p = {one.p_value:.3f}: {verdict}."
     )
 
 

@@ -168,18 +168,24 @@ class Stretch:
     rotation_rmse_deg: float
     pose: str
     """What the take calls the pose in its middle, "" for nothing."""
+    number: int
+    """Of the take among those given, as two may have one name."""
 
 
 def worst_stretches(found: Residuals, most: int = MOST) -> tuple[Stretch, ...]:
     """Up to ``most`` stretches of about a second that do not overlap, worst first."""
-    candidates = [stretch for item in found.takes for stretch in _stretches(item, found.rotations)]
+    candidates = [
+        stretch
+        for number, item in enumerate(found.takes)
+        for stretch in _stretches(number, item, found.rotations)
+    ]
     candidates.sort(key=lambda stretch: -stretch.rmse_deg)
     chosen: list[Stretch] = []
     for stretch in candidates:
         if len(chosen) == most:
             break
         if all(
-            stretch.take != other.take or stretch.end_s <= other.start_s or stretch.start_s >= other.end_s
+            stretch.number != other.number or stretch.end_s <= other.start_s or stretch.start_s >= other.end_s
             for other in chosen
         ):
             chosen.append(stretch)
@@ -197,7 +203,7 @@ def windows(time: np.ndarray, length_s: float) -> Iterator[slice]:
             yield slice(int(first), int(end))
 
 
-def _stretches(item: TakeResiduals, rotations: tuple[str, ...]) -> list[Stretch]:
+def _stretches(number: int, item: TakeResiduals, rotations: tuple[str, ...]) -> list[Stretch]:
     """Stretches that overlap by half."""
     time, squared = item.take.time_s, item.error**2
     found = []
@@ -218,6 +224,7 @@ def _stretches(item: TakeResiduals, rotations: tuple[str, ...]) -> list[Stretch]
                 rotation=rotations[worst],
                 rotation_rmse_deg=float(np.sqrt(each[worst])),
                 pose=item.take.poses[middle] if item.take.poses is not None else "",
+                number=number,
             )
         )
     return found

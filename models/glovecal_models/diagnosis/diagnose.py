@@ -17,7 +17,7 @@ from glovecal_models.diagnosis.hold_drift import hold_drift
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.naming import Naming, named
-from glovecal_models.diagnosis.next_take import hold_next_take, next_take
+from glovecal_models.diagnosis.next_take import NextTake, hold_next_take, next_take
 from glovecal_models.diagnosis.not_identifiable import (
     ONLY_POSE_NAMES,
     SINGLE_POSES,
@@ -33,6 +33,7 @@ from glovecal_models.diagnosis.resampled import SMOOTHING
 from glovecal_models.diagnosis.signatures import are_held_levels, beside_levels, signature_findings
 from glovecal_models.diagnosis.unexplained_residual import UnexplainedResidual, unexplained_residual
 from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.facts import Motion
 from glovecal_models.effects.catalogue import candidates
 from glovecal_models.layout import Layout
 from glovecal_models.progress import Cancel, Report, stop_if
@@ -123,12 +124,21 @@ def diagnose(
         reference_problems=problems,
         findings=findings,
         residual=residual,
-        next_take=next_take(naming.confidence_set, by_name) or take_to_decide(impossible, residual),
+        next_take=_next_take(naming, by_name, takes) or take_to_decide(impossible, residual),
         actions=actions,
         effects=by_name,
         linear=linear,
         limits=limits,
     )
+
+
+def _next_take(naming: Naming, effects: Mapping[str, Effect], takes: Sequence[Take]) -> NextTake | None:
+    found = {item.effect: item for item in naming.ranked}
+
+    def decides(effect: Effect, motion: Motion) -> bool:
+        return effect.name not in found or effect.decided_by(motion, found[effect.name], takes)
+
+    return next_take(naming.confidence_set, effects, decides)
 
 
 def _has(known: Sequence[KnownEffect]) -> set[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from glovecal_models.diagnosis.hold_drift import HAND, HoldDrift
@@ -43,17 +43,26 @@ class NextTake:
     """Effects; "chance" where the takes are too few to tell an effect from it."""
 
 
-def next_take(rivals: Sequence[str], effects: Mapping[str, Effect]) -> NextTake | None:
-    """For the members of a confidence set, the best first; None when nothing is to be decided.
+Decides = Callable[[Effect, Motion], bool]
+
+
+def next_take(
+    rivals: Sequence[str], effects: Mapping[str, Effect], decides: Decides = lambda effect, motion: True
+) -> NextTake | None:
+    """For the members of a confidence set, the best first; None when nothing is to be decided, or can be.
 
     The first pair of which one names the other as its rival decides; without such a pair the recording in
-    which the first shows most, as far as the others do not show in the same.
+    which the first shows most, as far as the others do not show in the same. ``decides``: whether a declared
+    recording can still tell an effect from its rivals.
     """
     if len(rivals) < 2:
         return None
     known = [effects[name] for name in rivals if name in effects]
-    pairs = itertools.combinations(known, 2)
-    motion = next((found for a, b in pairs if (found := _declared(a, b) or _declared(b, a))), None)
+    pairs = list(itertools.combinations(known, 2))
+    declared = [(a, found) for a, b in pairs if (found := _declared(a, b) or _declared(b, a))]
+    motion = next((found for item, found in declared if decides(item, found)), None)
+    if motion is None and len(declared) == len(pairs):
+        return None
     motion = motion or _shown_by_one(known) or ANYTHING
     return NextTake(motion.name, motion.what, motion.seconds, tuple(rivals))
 

@@ -27,9 +27,11 @@ class ColumnDependence(InstantEffect):
     form_unit: ClassVar[str] = "SD"
     control: ClassVar[Control] = "circularly shifted"
     is_physical: ClassVar[bool] = False
+    shown_over: ClassVar = "neighbour"
 
     def __init__(self, column: str) -> None:
         self.column = column
+        self.neighbours = (column,)  # pyright: ignore[reportAttributeAccessIssue]
         self.name = PREFIX + column  # pyright: ignore[reportAttributeAccessIssue]
         self.explanation = f"The error goes along with the reading of {column}; why is not known."  # pyright: ignore[reportAttributeAccessIssue]
 

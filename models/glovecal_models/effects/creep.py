@@ -37,6 +37,7 @@ class Creep(ArrayStateEffect):
     form_unit: ClassVar[str] = "deg"
     shown_by: ClassVar = RAMPS
     shows_in: ClassVar = ("direction", "time in take")
+    shown_over: ClassVar = "hold"
     drift_in_holds: ClassVar = "begins anew with each hold"
     parameters: ClassVar = (
         Parameter("fast_tau", "s", 0.4, 60.0, "1 to 60 s"),

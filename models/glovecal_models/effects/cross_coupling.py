@@ -29,6 +29,7 @@ class CrossCoupling(InstantEffect):
     form_unit: ClassVar[str] = "SD"
     one_joint_at_a_time: ClassVar[bool] = True
     shows_in: ClassVar = ("joint", "sensor")
+    shown_over: ClassVar = "neighbour"
     shown_by: ClassVar = ONE_FINGER
     rivals: ClassVar = (Rival("palm_arch", ONE_FINGER), Rival("contact_pressure", ONE_FINGER))
     caveat = "a common cause that was not recorded, such as grip pressure or a strap, looks the same"

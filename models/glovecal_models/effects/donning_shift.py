@@ -27,6 +27,7 @@ class DonningShift(WearingEffect):
     source = "offset about 3.5 deg from day to day: Gracia-Ibanez 2016; random effect per wearing"
     shown_by: ClassVar = CROSSED
     shows_in: ClassVar = ("wearing",)
+    shown_over: ClassVar = "wearing"
     rivals: ClassVar = tuple(
         Rival(name, CROSSED) for name in ("warmup_drift", "temperature", "humidity", "supply_sag")
     )

@@ -38,6 +38,7 @@ class Hysteresis(ArrayStateEffect):
     form_unit: ClassVar[str] = "deg"
     shown_by: ClassVar = RAMPS
     shows_in: ClassVar = ("direction", "speed")
+    shown_over: ClassVar = "angle both ways"
     rivals: ClassVar = (Rival("creep", RAMPS),)
     parameters: ClassVar = (Parameter("widest_play", "deg", 0.2, 30.0, "1 to 7 deg in bend sensors"),)
 

@@ -29,6 +29,8 @@ class PalmArch(InstantEffect):
     form_unit: ClassVar[str] = "SD"
     one_joint_at_a_time: ClassVar[bool] = True
     shows_in: ClassVar = (f"sensor {PALM}", f"joint {PALM}")
+    shown_over: ClassVar = "neighbour"
+    neighbours: ClassVar = (PALM,)
     shown_by: ClassVar = ONE_FINGER
     control: ClassVar[Control] = "circularly shifted"
 

@@ -84,6 +84,7 @@ class RepeatedSamples(SignatureEffect):
     explanation = "Lost samples were filled with the one before: the recording halts and jumps."
     source = "padded samples of recorders without synchronisation: docs.optitrack.com, Manus in Motive"
     kind: ClassVar[Kind] = "repair"
+    shown_over: ClassVar = "time in take"
 
     def find(
         self,

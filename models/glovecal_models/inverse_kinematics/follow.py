@@ -16,7 +16,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from glovecal_models.errors import BadInput
 from glovecal_models.inverse_kinematics.contact import Contact
@@ -64,6 +63,8 @@ def clamped_step(
 
 def _nearest_step(slopes: np.ndarray, pull: np.ndarray, back: np.ndarray, room: np.ndarray) -> np.ndarray:
     """The step that brings the tips nearest, where the limits do not let them go the whole way."""
+    from scipy.optimize import lsq_linear  # slow to load, and needed at the joint limits only
+
     little = np.sqrt(SINGULAR * (slopes * slopes).sum())
     rows = np.vstack([slopes, little * np.eye(len(back))])
     return lsq_linear(rows, np.concatenate([pull, little * back]), bounds=tuple(room)).x

@@ -8,7 +8,6 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 WINDOW_S = 0.15
 """A parabola follows a hand over this long: its tremor, the fastest it does, is at 7 to 11 Hz."""
@@ -30,6 +29,8 @@ def steadied(time_s: np.ndarray, angles_deg: np.ndarray, window_s: float = WINDO
     window = 2 * round(window_s / usual / 2) + 1
     if window < DEGREE + 2:
         return angles_deg
+    from scipy.signal import savgol_filter  # takes a second to load, which most commands need not wait for
+
     smooth = angles_deg.copy()
     ends = [0, *np.flatnonzero(intervals > GAP * usual) + 1, len(time_s)]
     for start, end in itertools.pairwise(ends):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.rotations import FINGERS
@@ -159,5 +158,7 @@ def closest_approach(chains: TipChains, contact: Contact) -> tuple[np.ndarray, f
     angles, distance = found.angles_deg[0], float(found.missing_mm[0])
     if distance <= TIP_TOLERANCE_MM:
         return angles, distance
+    from scipy.optimize import minimize  # slow to load, and seldom needed
+
     best = minimize(squared, angles, jac=True, bounds=chains.limits_deg)
     return best.x, float(np.sqrt(best.fun))

@@ -138,9 +138,10 @@ class Sampling(UserEvents):
             self._ask(now_s, speech.BACK)
 
     def _maybe_begin(self, now_s: float, waited: float) -> None:
-        percent = self._recent.percent(SETTLE_S, self._ranges)
-        moving = self.limits.moving_times_still * self.limits.still_percent
-        self._recent.moved |= percent is not None and percent > moving
+        if not self._recent.moved:
+            percent = self._recent.percent(SETTLE_S, self._ranges)
+            moving = self.limits.moving_times_still * self.limits.still_percent
+            self._recent.moved = percent is not None and percent > moving
         step, trigger = self.state.now(), self.state.trigger
         if trigger == "timer" and waited >= TIMER_S:
             self._enter("countdown", now_s, speech.COUNTDOWN)

@@ -47,16 +47,16 @@ class Cloth:
 
     def __init__(self, sensors: Sequence[str], rotations: Sequence[str], slack: float = 0.25) -> None:
         self._own = [rotations.index(name) for name in sensors]
-        self._rotations = tuple(rotations)
         self._slack = slack
         self._column = {name: column for column, name in enumerate(sensors)}
         self._stretches = [stretch for stretch in stretches() if stretch.sensor in self._column]
+        neighbours = {pull.neighbour for stretch in self._stretches for pull in stretch.pulls}
+        self._neighbours = {name: rotations.index(name) for name in neighbours}
 
     def strain(self, angles: np.ndarray) -> np.ndarray:
         """Shape (N, S) degrees, from ``angles`` of shape (N, len(rotations)), degrees."""
         strain = angles[:, self._own]
-        names = {pull.neighbour for stretch in self._stretches for pull in stretch.pulls}
-        bent = {name: bent_share(name, angles[:, self._rotations.index(name)]) for name in names}
+        bent = {name: bent_share(name, angles[:, column]) for name, column in self._neighbours.items()}
         for stretch in self._stretches:
             low, high = ACTIVE_RANGE_DEG[stretch.sensor]
             column = self._column[stretch.sensor]

@@ -3,7 +3,8 @@
 A finger that strikes a key moves fast and stops at the key's bottom. Each tap's readings become one signal,
 the speed of the sensors that follow the taps; taps are aligned with each other by their shape, and the moment
 where the mean speed has fallen to half its peak is the stop. Taps of another shape, or far from the others,
-are left out. What the key itself takes to report is in the result, unless it is given.
+are left out. Keys report a press late, by a time that is mostly unknown: half the range of usual keys is
+added to the result and its uncertainty to the standard deviation, unless the key's own latency is given.
 """
 
 from __future__ import annotations
@@ -12,12 +13,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.known_latency import KnownLatency
 
 FEWEST_TAPS = 20
+USUAL_KEY_S = (0.005, 0.02)
+"""Keyboards report a key so long after it was hit; any time between is taken for equally likely."""
 TAP_STEP_S = 0.001
 BEFORE_TAP_S, AFTER_TAP_S = 0.3, 0.7
 """Of a key's time: what is looked at, and so the latencies that can be found."""
@@ -43,9 +45,9 @@ class TapLatency:
     """What taps say of a glove's latency."""
 
     seconds: float
-    """Median over taps; what the key was said to take is added."""
+    """Median over taps, with the key's own latency added."""
     sd_s: float
-    """Standard deviation of ``seconds``: bootstrap over taps."""
+    """Standard deviation of ``seconds``: bootstrap over taps, and the key's where it is not known."""
     tap_sd_s: float
     """Standard deviation of a single tap."""
     taps: int
@@ -71,13 +73,14 @@ def tap_latency(
     sensors: Sequence[str],
     key_s: np.ndarray,
     *,
-    key_latency_s: float = 0.0,
+    key_latency_s: float | None = None,
     seed: int = 0,
 ) -> TapLatency:
     """From frames, (N,) seconds and (N, S) readings, and the times (K,) of key presses on the same clock.
 
-    ``key_latency_s``: how long the key takes to report a press. Raises BadInput for fewer than
-    ``FEWEST_TAPS`` taps that can be used, and where no sensor follows them.
+    ``key_latency_s``: how long the key takes to report a press; None: not known, a usual key
+    (``USUAL_KEY_S``). Raises BadInput for fewer than ``FEWEST_TAPS`` taps that can be used, and where no
+    sensor follows them.
     """
     keys = _usable(np.sort(np.asarray(key_s, dtype=float)), time_s)
     if len(keys) < FEWEST_TAPS:
@@ -87,6 +90,8 @@ def tap_latency(
         )
     grid = np.arange(-BEFORE_TAP_S, AFTER_TAP_S, TAP_STEP_S)
     moved = np.stack([_around(time_s, readings, key + grid) for key in keys])
+    from scipy.ndimage import gaussian_filter1d  # slow to load, and every service loads this file
+
     weights = _weights(moved)
     interval_s = float(np.median(np.diff(time_s)))
     smoothing = max(SMOOTHING_S, 0.5 * interval_s) / TAP_STEP_S
@@ -101,14 +106,21 @@ def tap_latency(
         )
     draws = np.random.default_rng(seed).choice(used, (DRAWS, len(used)))
     order = np.argsort(-np.abs(weights * moved.std(axis=(0, 1))))
+    key, key_sd = usual_key() if key_latency_s is None else (key_latency_s, 0.0)
     return TapLatency(
-        float(np.median(used)) + key_latency_s,
-        float(np.median(draws, axis=1).std()),
+        float(np.median(used)) + key,
+        float(np.hypot(np.median(draws, axis=1).std(), key_sd)),
         float(used.std(ddof=1)),
         len(key_s),
         len(used),
         tuple(sensors[int(place)] for place in order[:3]),
     )
+
+
+def usual_key() -> tuple[float, float]:
+    """Mean and standard deviation, seconds, of what a key takes to report a press."""
+    low, high = USUAL_KEY_S
+    return (low + high) / 2, (high - low) / np.sqrt(12.0)
 
 
 def _usable(keys: np.ndarray, time_s: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""``glovecal demo``: the whole spine and the whole loop on a bare machine, no question asked."""
+"""``glovecal demo``: the whole spine and the whole loop on a bare machine; on a terminal one may stay."""
 
 from __future__ import annotations
 
@@ -30,7 +30,14 @@ def demo(
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the figures as one line of JSON at the end.")
     ] = False,
-    keep: Annotated[bool, typer.Option("--keep", help="Leave the service and a live glove running.")] = False,
+    stay: Annotated[
+        bool | None,
+        typer.Option(
+            "--stay/--no-stay",
+            help="At the end, open the studio and keep the glove with the hidden effect moving until Ctrl-C. "
+            "Default: ask on a terminal, else end.",
+        ),
+    ] = None,
     seed: Annotated[
         int | None,
         typer.Option(min=0, help="Seed of the simulation. Default: another hidden effect each time."),
@@ -66,15 +73,16 @@ def demo(
     if write_takes is not None:
         _write(hidden_session(effect, drawn), write_takes, effect)
         return
-    _run(FIRST_ACT_SEED if seed is None else seed, effect, drawn, as_json=as_json, keep=keep)
+    _run(FIRST_ACT_SEED if seed is None else seed, effect, drawn, as_json=as_json, stay=stay)
 
 
-def _run(seed: int, effect: str, drawn: int, *, as_json: bool, keep: bool) -> None:
+def _run(seed: int, effect: str, drawn: int, *, as_json: bool, stay: bool | None) -> None:
     from glovecal_service.demo.error_fall import hidden_contract
     from glovecal_service.demo.hidden_session import hidden_session
-    from glovecal_service.demo.keeping import keep_running
     from glovecal_service.demo.processes import demo_place, running_service
     from glovecal_service.demo.second_act import prepare
+    from glovecal_service.demo.staying import stay as stay_there
+    from glovecal_service.demo.staying import wants_to_stay
     from glovecal_service.demo.table import contract, error_table, sentences
     from glovecal_service.demo.walk import walk
 
@@ -83,6 +91,7 @@ def _run(seed: int, effect: str, drawn: int, *, as_json: bool, keep: bool) -> No
         place = demo_place(Path(folder))
         err.print("Starting glovecal serve ...")
         with running_service(place) as service:
+            err.print(f"The studio, as long as the demo runs: {place.url}/studio/live")
             hidden = hidden_session(effect, drawn)
             # its models are trained while the takes of the first act are recorded, at their own pace
             second = prepare(service, hidden, place.folder / "hidden")
@@ -102,8 +111,8 @@ def _run(seed: int, effect: str, drawn: int, *, as_json: bool, keep: bool) -> No
             if as_json:
                 sys.stdout.write(json.dumps(contract(found) | hidden_contract(hidden, second)) + "\n")
                 sys.stdout.flush()
-            if keep:
-                keep_running(place, seed, lambda sentence: err.print(sentence))
+            if stay or (stay is None and wants_to_stay(as_json=as_json)):
+                stay_there(service, place, hidden, second, lambda sentence: err.print(sentence))
 
 
 def _smoke(seed: int) -> None:
@@ -157,7 +166,7 @@ NEXT = """
 Next:
   docs/tutorial.md          the second part step by step, command by command
   glovecal demo --effect hysteresis | none | unknown   another effect, none, or one outside the catalogue
-  glovecal demo --keep      keeps the service running and prints its REST address
+  glovecal demo --stay      opens the studio at the end and keeps its glove moving
   glovecal serve            your own service; then glovecal capture --device cyberglove --glove right
   glovecal take import      calibrate from recordings you have (CSV, Parquet)
   README.md                 connect your glove, improve its model, deploy"""

@@ -60,7 +60,9 @@ def active(proposals: list[NextSteps]) -> AskedSession:
         proposals.append(choose(state) if state.capture_s < until_s else NextSteps((), True, ""))
         return proposals[-1]
 
-    return asked_session(make_protocol("active", LAYOUT), SimulatedGlove(SEED), seed=SEED, choose=chosen)
+    return asked_session(
+        make_protocol("active", LAYOUT), SimulatedGlove(SEED), seed=SEED, choose=chosen, at_once_s=0.2
+    )
 
 
 def labelled(session: AskedSession) -> list[Take]:
@@ -83,7 +85,7 @@ def assumed_rmse(takes: list[Take]) -> float:
 
 
 def test_60_percent_of_time_and_samples_are_as_good_as_the_fixed_protocol(active: AskedSession) -> None:
-    fixed = asked_session(make_protocol("fk_only", LAYOUT), SimulatedGlove(SEED), seed=SEED)
+    fixed = asked_session(make_protocol("fk_only", LAYOUT), SimulatedGlove(SEED), seed=SEED, at_once_s=0.2)
     assert active.state.capture_s <= SHARE * fixed.state.capture_s
     assert samples(labelled(active)) <= SHARE * samples(labelled(fixed))
     assert assumed_rmse(labelled(active)) < 1.2 * assumed_rmse(labelled(fixed))

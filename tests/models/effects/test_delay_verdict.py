@@ -5,8 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from glovecal_models.effects.delay.delay_grid import DelayErrors, DelayForm
+from glovecal_models.diagnosis.problem import DiagnosisProblem
+from glovecal_models.effects.delay.delay_grid import DelayErrors, DelayForm, delay_errors
 from glovecal_models.effects.delay.delay_verdict import possible_delays
+from glovecal_models.layout import Layout
+from glovecal_models.simulation.causes.form import Cause
+from glovecal_models.simulation.session import record_session
+from glovecal_models.simulation.session_plan import FIVE_SENSORS, SessionPlan
+
+LAYOUT = Layout.from_columns("five", FIVE_SENSORS, FIVE_SENSORS)
 
 DELAYS_S = np.array([-0.02, 0.0, 0.02, 0.04])
 
@@ -34,3 +41,14 @@ def errors(lowpass_gain: float) -> DelayErrors:
 )
 def test_a_mere_delay_comes_first_until_it_is_ruled_out(lowpass_gain, named):
     assert possible_delays([errors(lowpass_gain)]) == named
+
+
+@pytest.mark.parametrize(("form", "ruled_out"), [("transport", "lag"), ("common_average", "clock_offset")])
+def test_in_fast_motion_20_ms_are_told_from_a_filter(form, ruled_out):
+    plan = SessionPlan(seed=5, wearings=2, takes_per_wearing=3, take_s=25.0, rate_hz=100.0)
+    session = record_session(plan, [Cause("glove_latency", form, 1.0)])
+    fast = [session.also("fast", 25.0, 1, repeat=number).take for number in range(2)]
+    problem = DiagnosisProblem.of([*session.takes, *fast], LAYOUT, False, ()).design()
+    possible = possible_delays(delay_errors(problem))
+    assert "glove_latency" in possible
+    assert ruled_out not in possible

@@ -28,6 +28,7 @@ def verdicts() -> dict[str, tuple[str, ...]]:
         make_protocol("new_subject", glove.layout),
         glove,
         seed=4,
+        rate_hz=30,
         skeleton=skeleton,
         touch_check=TouchWatch(glove.layout, skeleton),
         does=does,

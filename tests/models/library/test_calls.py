@@ -127,7 +127,9 @@ def test_workers_give_the_same_model_to_the_byte(model, takes):
 def test_a_script_that_cannot_be_imported_is_told_so(tmp_path: Path):
     script = tmp_path / "script.py"
     script.write_text(
-        LONG.format(call="glovecal.train(takes, workers=2)").replace('if __name__ == "__main__"', "if True")
+        LONG.format(call="glovecal.train(takes, workers=2)")
+        .replace('if __name__ == "__main__"', "if True")
+        .replace("seed=1", "seed=1, wearings=1, takes_per_wearing=2, take_s=5")
     )
     run = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=120)
     assert run.returncode == 1

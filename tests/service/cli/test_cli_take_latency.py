@@ -33,7 +33,9 @@ from glovecal_service.serve import real_time
 from glovecal_service.settings import Settings
 
 GLOVE, LATENCY_S, RATE_HZ = "tapper", 0.06, 120.0
-TAPS, EVERY_S, FIRST_S = 21, (0.4, 0.5), 0.6
+USUAL_KEY_S = 0.0125
+"""Added for a key of unknown latency."""
+TAPS, EVERY_S, FIRST_S = 25, (0.4, 0.5), 0.6
 STRIKE_S, REST_S, LIFT_S, WIDE = 0.05, 0.06, 0.2, 60.0
 
 
@@ -115,7 +117,7 @@ def test_taps_on_a_key_measure_the_glove_and_live_poses_say_so(settings, session
     (glove,) = glovecal(reach, "glove", "list", "--json").json["seen"]
     measured = glove["latency"]
     # the terminal, its process and this test's clock add some milliseconds to the key
-    assert measured["latency_s"] == pytest.approx(LATENCY_S, abs=0.02)
+    assert measured["latency_s"] == pytest.approx(LATENCY_S + USUAL_KEY_S, abs=0.02)
     assert 0 < measured["sd_s"] < 0.01
     assert measured["taps"] == TAPS
     assert measured["measured_at"]
@@ -209,7 +211,7 @@ def test_a_table_of_frames_and_a_file_of_key_times_will_do(tmp_path: Path):
     assert glovecal(reach, "glove", "list", "--json").json["seen"] == []
     assert "Kept with the glove" in run().out
     (glove,) = glovecal(reach, "glove", "list", "--json").json["seen"]
-    assert glove["latency"]["latency_s"] == pytest.approx(0.03, abs=0.006)
+    assert glove["latency"]["latency_s"] == pytest.approx(0.03 + USUAL_KEY_S, abs=0.006)
     keys.write_text("1.0\nsoon\n")
     assert "'soon' is no time in seconds" in run().said
     keys.write_text("1.0\n2.0\n")

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from glovecal_models.effects.base.effect import InstantEffect
-from glovecal_models.effects.base.facts import Control, Settings
+from glovecal_models.effects.base.facts import Control, Settings, ShownOver
 from glovecal_models.effects.base.joint_units import fit_joint_units, in_joint_units
 from glovecal_models.effects.base.signals import Signals
 
@@ -25,6 +25,7 @@ class ContextEffect(InstantEffect):
     """
 
     control: ClassVar[Control] = "context of other takes"
+    shown_over: ClassVar[ShownOver] = "context"
 
     @property
     def column(self) -> str:

@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Settings
@@ -84,6 +83,8 @@ def _with_other_context(takes: Sequence[Signals], generator: np.random.Generator
     """
     if len(takes) < 2:
         return [replace(take, context=_shifted(take, generator).context) for take in takes]
+    from scipy.optimize import linear_sum_assignment  # slow to load, and every effect imports this file
+
     cost = generator.uniform(0.0, 1e-3, (len(takes), len(takes)))
     for row, take in enumerate(takes):
         cost[row] += [1.0 if take.wearing == other.wearing else 0.0 for other in takes]

@@ -19,9 +19,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from glovecal_models.effects.base.assessment import Assessment
-from glovecal_models.effects.base.facts import Control, EffectFacts, Settings
+from glovecal_models.effects.base.facts import Control, EffectFacts, Motion, Settings
 from glovecal_models.effects.base.problem import Problem
 from glovecal_models.effects.base.signals import GloveFrames, Signals
+from glovecal_models.takes.take import Take
 
 LEAST_SETTLING_S = 1.0
 """An effect with a memory counts as settled after this or, if longer, its longest time constant."""
@@ -61,6 +62,10 @@ class Effect(EffectFacts, ABC):
         """How much later the reference has to come, seconds, (1,) for all takes or (takes,); None: it is no
         matter of time."""
         return None
+
+    def decided_by(self, motion: Motion, found: Assessment, takes: Sequence[Take]) -> bool:
+        """Whether a rival's ``motion`` can still tell the two apart, given what was found in ``takes``."""
+        return True
 
     def consequence(self, found: Assessment, confidence_set: Sequence[str]) -> str:
         """What else a user has to know where it is named, with all that the takes cannot tell from it: a

@@ -17,6 +17,14 @@ compared explains the error; or not at all."""
 Control = Literal[
     "time-reversed", "circularly shifted", "context of other takes", "permuted wearings", "none"
 ]
+ShownOver = Literal[
+    "angle", "angle both ways", "speed", "hold", "time in take", "wearing", "take", "neighbour", "context",
+    "clock shift",
+]  # fmt: skip
+"""What the one picture of an error that an effect leaves is drawn over: the joint's angle, apart for both
+directions of motion where it says so, its speed, the seconds since it came to rest, the take's own time, one
+value a wearing or a take, the reading of another sensor, a context column, or trial shifts of the reference
+in time."""
 HoldDrift = Literal["begins anew with each hold", "slows down", "goes on"]
 """How readings drift while a pose is held."""
 
@@ -108,6 +116,10 @@ class EffectFacts:
     """What an error that it leaves goes along with, as ``glovecal where`` calls it: "angle", "speed",
     "direction", "time in take", "wearing", and "joint" or "sensor" for any other one. Context columns that it
     reads count by themselves."""
+    shown_over: ClassVar[ShownOver] = "angle"
+    """Over what an error that it leaves is drawn."""
+    neighbours: ClassVar[tuple[str, ...]] = ()
+    """Of an effect shown over a neighbour the sensors that may be it; empty: any."""
     learned_by: ClassVar[str | None] = None
     """The training method whose base learns it by itself: asked for where the base is a straight line."""
     is_physical: ClassVar[bool] = True

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from glovecal_models.effects.base.effect import Effect, Stream
-from glovecal_models.effects.base.facts import Settings
+from glovecal_models.effects.base.facts import Settings, ShownOver
 from glovecal_models.effects.base.history_effect import LONGEST_GAP_S, elapsed_s, unbroken
 from glovecal_models.effects.base.joint_units import fit_joint_units, in_joint_units
 from glovecal_models.effects.base.signals import Signals
@@ -50,6 +50,8 @@ class ExpressionEffect(Effect):
             explanation=shown,
             parameters=declaration.parameters,
             context=declaration.context,
+            neighbours=declaration.signals,
+            shown_over=_shown_over(declaration),
             control=declaration.control,
             has_memory=any(node.has_memory for node in declaration.columns),
         )
@@ -231,6 +233,15 @@ class ExpressionEffect(Effect):
                     f"effect {self.name!r}: {node.text!r} reaches {column[frame].max():.3g} at"
                     f" {_place(take, frame)}; {TOO_LARGE}"
                 )
+
+
+def _shown_over(declaration: Declaration) -> ShownOver:
+    if declaration.context:
+        return "context"
+    if declaration.signals:
+        return "neighbour"
+    reads_time = any("t" in node.names for node in declaration.columns)
+    return "time in take" if reads_time else "angle"
 
 
 class ExpressionStream(Stream):

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize
 
 from glovecal_models.takes.clock_scan import FINE_S, WORTHWHILE, Grid, on_grid, unexplained
 from glovecal_models.takes.take import Take
@@ -67,6 +66,8 @@ def clock_drift(take: Take, offset_s: float) -> ClockDrift | None:
     coarse = END_STEP_S * np.arange(-steps, steps + 1)
     start = float(coarse[int(np.argmin([left(offset_s, shift) for shift in coarse]))])
     without = _polished_offset(left, offset_s)
+    from scipy.optimize import minimize  # slow to load, and each service loads all effects
+
     simplex = [(offset_s, start), (offset_s + END_STEP_S, start), (offset_s, start + END_STEP_S)]
     best = minimize(
         lambda pair: left(*pair), (offset_s, start), method="Nelder-Mead",

@@ -1,8 +1,8 @@
 """Clock offset: the reference system's clock and the glove's do not agree, in each take by its own amount.
 
 A reference-side effect: it is repaired in the measurement, not predicted. The offset comes from the clock
-scan; a drift is added in takes of a minute or more where it pays. In a take that training never saw it is
-where the reference is nearest to what the model predicts.
+scan; a drift is added in takes of a minute or more where it pays, and an offset that changes within a take is
+followed. In a take that training never saw it is where the reference is nearest to what the model predicts.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from glovecal_models.effects.base.signature_effect import (
     check_signature_input,
 )
 from glovecal_models.effects.delay.clock_drift import LARGEST_PPM, ClockDrift, clock_drift, without_drift
+from glovecal_models.effects.delay.clock_wander import clock_wander, without_wander
 from glovecal_models.effects.delay.delay_grid import DelayErrors
 from glovecal_models.effects.delay.delay_verdict import (
     CLOCK,
@@ -125,6 +126,7 @@ class ClockOffsetEffect(TimeShift):
             "offset_s": dict(zip(takes, map(float, offsets), strict=True)),
             "common_s": float(np.median(offsets)),
             "per_take": bool(np.ptp(offsets) > 0),
+            "within_takes": True,
         }
 
     def proposed(self, recorded: Recorded) -> Proposal | None:
@@ -138,7 +140,7 @@ class ClockOffsetEffect(TimeShift):
         common = float(np.median(list(offsets.values())))
         each = {item.take: _offset_of(item, common) for item in found if not item.is_unknown}
         unknown = [item.take for item in found if item.is_unknown]
-        settings: Settings = {"offset_s": each, "common_s": common, "per_take": True}
+        settings: Settings = {"offset_s": each, "common_s": common, "per_take": True, "within_takes": True}
         if unknown:
             settings["left_out"] = unknown
         sentences = [offsets_sentence(list(each.values())), *map(_left_out_sentence, unknown)]
@@ -175,12 +177,13 @@ class ClockOffsetEffect(TimeShift):
             return tuple(clock.repaired(take) for take, clock in zip(takes, self.clocks(takes), strict=True))
         offsets, common = settings["offset_s"], float(settings["common_s"])
         left_out = set(settings.get("left_out", ()))
-        return tuple(
+        moved = tuple(
             without_reference(take)
             if take.name in left_out
             else aligned(take, float(offsets.get(take.name, common)))
             for take in takes
         )
+        return without_wander(moved) if settings.get("within_takes") else moved
 
     def repaired_to(
         self, take: Take, settings: Settings, rotations: Sequence[str], predicted: np.ndarray
@@ -189,6 +192,13 @@ class ClockOffsetEffect(TimeShift):
         training never saw is where its reference fits the prediction best."""
         if len(take.reference_time_s) < 2:
             return take
+        moved = self._moved_to(take, settings, rotations, predicted)
+        wander = clock_wander(moved, rotations, predicted) if settings.get("within_takes") else None
+        return moved if wander is None else wander.removed(moved)
+
+    def _moved_to(
+        self, take: Take, settings: Settings, rotations: Sequence[str], predicted: np.ndarray
+    ) -> Take:
         offsets = {str(name): float(value) for name, value in settings["offset_s"].items()}
         if not settings["per_take"]:
             return aligned(take, float(settings["common_s"]))

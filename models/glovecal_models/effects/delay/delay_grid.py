@@ -14,13 +14,16 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from scipy.signal import lfilter
 
 from glovecal_models.effects.base.assessment import JointErrors, block_starts, squared_in_blocks
 from glovecal_models.effects.base.problem import Problem
 from glovecal_models.effects.base.signals import Signals
 
-STEP_S = 0.005
+STEP_S = 0.0025
+SHORT_S = 0.03
+"""Up to here, cells lie ``STEP_S`` apart: what a short filter leaves bends so much that a parabola through
+cells of 10 ms makes a mere delay look like one."""
+DELAY_STEP_S = 0.005
 FILTER_STEP_S = 0.01
 LARGEST_DELAY_S = 0.2
 EVEN_S = 1e-6
@@ -55,7 +58,7 @@ class DelayErrors:
     form: np.ndarray
     """(K,) ``DelayForm``."""
     delay_s: np.ndarray
-    """(K,), evenly spaced and rising within each form; of a filter below zero: run backwards in time."""
+    """(K,), rising within each form; of a filter below zero: run backwards in time."""
     blocks: np.ndarray
     """(B, K), degrees squared, summed over the rows of each block."""
     unmoved: np.ndarray
@@ -133,9 +136,10 @@ def _cells() -> tuple[np.ndarray, np.ndarray]:
     """Form and delay (K,) of each."""
     form, delay = [], []
     for item in DelayForm:
-        step = STEP_S if item == DelayForm.PURE else FILTER_STEP_S
-        steps = round(LARGEST_DELAY_S / step)
-        delays = step * np.arange(-steps if item in RUN_BACKWARDS else 0, steps + 1)
+        step = DELAY_STEP_S if item == DelayForm.PURE else FILTER_STEP_S
+        long = np.arange(SHORT_S + step, LARGEST_DELAY_S + step / 2, step)
+        late = np.concatenate([np.arange(STEP_S, SHORT_S + STEP_S / 2, STEP_S), long])
+        delays = np.concatenate([-late[::-1] if item in RUN_BACKWARDS else [], [0.0], late])
         form.append(np.full(len(delays), item))
         delay.append(delays)
     return np.concatenate(form), np.concatenate(delay)
@@ -185,29 +189,29 @@ def _slope(base: np.ndarray, coefficients: np.ndarray, own: np.ndarray) -> np.nd
 
 @dataclass(frozen=True)
 class _Track:
-    """The angle of one take on times ``STEP_S`` apart, straight lines between its rows."""
+    """The angle of one take on times ``STEP_S`` apart, cubic between its rows: straight lines would flatten
+    fast motion as a filter does."""
 
     fine: np.ndarray
     """(F,), degrees."""
-    every: int
-    """Of the fine times: between these the angle is a straight line."""
     at: np.ndarray
     """(N,) places of the fitted rows among the fine times."""
 
     @classmethod
     def of(cls, time: np.ndarray, own: np.ndarray, rows: np.ndarray) -> _Track:
         if len(time) < 2:
-            return cls(own.astype(float), 1, rows)
+            return cls(own.astype(float), rows)
+        from scipy.interpolate import CubicSpline  # slow to load, too
+
         factor = max(1, round(float(np.median(np.diff(time))) / STEP_S))
         fine_time = time[0] + STEP_S * np.arange((len(time) - 1) * factor + 1)
-        is_even = np.allclose(fine_time[::factor], time, rtol=0.0, atol=EVEN_S)
-        fine = np.interp(fine_time, time, own)
+        fine = np.asarray(CubicSpline(time, own)(np.clip(fine_time, time[0], time[-1])))
         at = np.clip(np.searchsorted(fine_time, time[rows] - EVEN_S), 0, len(fine) - 1)
-        return cls(fine, factor if is_even else 1, at)
+        return cls(fine, at)
 
     @property
     def backwards(self) -> _Track:
-        return _Track(self.fine[::-1], self.every, len(self.fine) - 1 - self.at)
+        return _Track(self.fine[::-1], len(self.fine) - 1 - self.at)
 
 
 def _moved(tracks: Sequence[_Track], form: np.ndarray, delay: np.ndarray) -> np.ndarray:
@@ -242,11 +246,13 @@ def _filter(result: np.ndarray, tracks: Sequence[_Track], form: np.ndarray, late
 
 
 def _low_passes(tracks: Sequence[_Track]) -> Callable[[float], np.ndarray]:
-    """The first-order filter of all tracks by its time constant: exact for straight lines between samples,
-    and at rest before the first."""
-    every = tracks[0].every if len({track.every for track in tracks}) == 1 else 1
-    coarse = [track.fine[::every] for track in tracks]
+    """The first-order filter of all tracks by its time constant: exact for straight lines between every
+    second fine time, where all rows lie on such, and at rest before the first."""
+    every = 2 if all(not (track.at % 2).any() for track in tracks) else 1
     # Side by side, filled up behind their ends, where nothing is read.
+    from scipy.signal import lfilter  # takes a second to load, which a model that only predicts does not have
+
+    coarse = [track.fine[::every] for track in tracks]
     together = np.zeros((len(coarse), max(map(len, coarse))))
     for signal, part in zip(together, coarse, strict=True):
         signal[: len(part)] = part - part[:1]

@@ -19,6 +19,7 @@ from glovecal_models.effects.base.limits import SIGNIFICANCE_LIMITS, Significanc
 from glovecal_models.effects.base.problem import Problem
 from glovecal_models.effects.delay.delay_grid import DelayErrors, DelayForm, delay_errors
 from glovecal_models.takes.known_latency import KnownLatency
+from glovecal_models.takes.tap_latency import usual_key
 
 SMOOTHING = 13
 """Even times."""
@@ -29,8 +30,15 @@ APART_TIMES = 1.5
 mostly 6 to 17."""
 SLOW_MOTION_SHARE = 0.3
 """Of the mean motion: blocks with less count alike."""
-KEYS_LATE_S = 0.015
-"""Keyboards report a key 5 to 20 ms after it was hit: so much a measured latency may be wrong."""
+MEASURED_SE = 2.0
+"""A measured latency and a delay of takes this many standard errors apart are two different times."""
+ASKED_SE = 3.0
+"""Taps are asked for where the delay of takes is so many: it will hardly come out in between."""
+FAST_DECIDES_S = 0.02
+"""Shorter filters look like mere delays in 25 s of fast motion too (simulated gloves: of 12 with 10 to 14 ms
+one became clear, of 12 with 22 to 25 ms ten within two such takes)."""
+STOP_SD_S = 0.003
+"""Taps find the finger's stop 2 to 4 ms late (simulated)."""
 ACCOUNTS_FOR = {
     DelayForm.PURE: (CLOCK, LATENCY),
     DelayForm.ONE_POLE: (LAG,),
@@ -118,7 +126,7 @@ def first_delay(problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]
     possible = possible_delays(grids, usual.limits)
     latency = usual.signals[0].glove_latency
     if latency is not None and {CLOCK, LATENCY} <= set(possible):
-        possible = _told_by_latency(possible, common_delay(grids), latency, usual.limits.delay_clear_se)
+        possible = _told_by_latency(possible, common_delay(grids), latency)
     return possible[0], possible
 
 
@@ -202,9 +210,9 @@ def common_delay(grids: Sequence[DelayErrors]) -> CommonDelay:
         ]
     )
     whole = each.sum(axis=0)
-    without = np.array([_least(whole - part).at(delay) for part in each if part.any()])
+    without = np.array([_least(whole - part, delay).at(delay) for part in each if part.any()])
     spread = np.sqrt((len(without) - 1) * without.var()) if len(without) > 1 else np.inf
-    return CommonDelay(_least(whole).at(delay), float(spread))
+    return CommonDelay(_least(whole, delay).at(delay), float(spread))
 
 
 def if_the_glove_is_late(late_s: float, confidence_set: Sequence[str]) -> str:
@@ -213,21 +221,30 @@ def if_the_glove_is_late(late_s: float, confidence_set: Sequence[str]) -> str:
         return ""
     if len(confidence_set) == 1:
         return f"Live poses are {1000 * late_s:.0f} ms late; their time and age say so."
+    if not taps_decide(late_s, None):
+        return (
+            f"If it is the glove, live poses are {1000 * late_s:.0f} ms late: too little for taps on a key to"
+            f" decide, as keys report a press 5 to 20 ms late."
+        )
     return (
         f"If it is the glove, live poses are {1000 * late_s:.0f} ms late: glovecal take latency measures the"
         " glove's own delay and decides."
     )
 
 
-def _told_by_latency(
-    possible: tuple[str, ...], delay: CommonDelay, latency: KnownLatency, clear_se: float
-) -> tuple[str, ...]:
+def taps_decide(late_s: float, latency: KnownLatency | None) -> bool:
+    """Whether a glove that is ``late_s`` late, and one that is not, can be told by taps on a key, where
+    ``latency`` is what was measured before."""
+    return latency is None and abs(late_s) > ASKED_SE * float(np.hypot(STOP_SD_S, usual_key()[1]))
+
+
+def _told_by_latency(possible: tuple[str, ...], delay: CommonDelay, latency: KnownLatency) -> tuple[str, ...]:
     """``possible`` with what a measured latency rules out left out.
 
     A glove that is as late as its readings says that the clocks agree, and another latency that they do not:
     what taps measure holds the sensors' lag too.
     """
-    within = max(KEYS_LATE_S, clear_se * float(np.hypot(delay.se_s, latency.sd_s)))
+    within = MEASURED_SE * float(np.linalg.norm((delay.se_s, latency.sd_s, STOP_SD_S)))
     if abs(delay.seconds - latency.seconds) <= within:
         if abs(delay.seconds) <= within:
             return possible
@@ -238,7 +255,7 @@ def _told_by_latency(
 
 @dataclass(frozen=True)
 class _Least:
-    """The least of a curve over even cells, between them."""
+    """The least of a curve over rising cells, between them."""
 
     cells: np.ndarray
     """Three neighbours; one at an end of the curve."""
@@ -249,15 +266,20 @@ class _Least:
         return float(values[self.cells] @ self.weights)
 
 
-def _least(curve: np.ndarray) -> _Least:
-    """Cells are up to 10 ms apart, and long takes tell one from two."""
+def _least(curve: np.ndarray, delay_s: np.ndarray) -> _Least:
+    """Of the parabola through the least of ``curve`` (K,) at ``delay_s`` (K,) and its neighbours.
+
+    Cells are up to 10 ms apart, and long takes tell one from two.
+    """
     at = int(np.argmin(curve))
     if at in (0, len(curve) - 1):
         return _Least(np.array([at]), np.ones(1))
-    before, here, after = (float(value) for value in curve[at - 1 : at + 2])
-    bend = before - 2 * here + after
-    x = 0.5 * (before - after) / bend if bend > 0 else 0.0
-    return _Least(np.arange(at - 1, at + 2), np.array([x * (x - 1) / 2, 1 - x * x, x * (x + 1) / 2]))
+    cells = np.arange(at - 1, at + 2)
+    x = delay_s[cells] - delay_s[at]
+    slope, bend = np.linalg.solve(x[[0, 2], None] ** [1, 2], curve[cells[[0, 2]]] - curve[at])
+    least = -slope / (2 * bend) if bend > 0 else 0.0
+    others = [[1, 2], [0, 2], [0, 1]]
+    return _Least(cells, np.prod((least - x[others]) / (x[:, None] - x[others]), axis=1))
 
 
 def _forward(grid: DelayErrors, form: DelayForm) -> np.ndarray:
@@ -269,7 +291,7 @@ def _forward(grid: DelayErrors, form: DelayForm) -> np.ndarray:
 def _together(grids: Sequence[DelayErrors], form: DelayForm) -> np.ndarray:
     """(B,) shares of the error with one delay for all joints."""
     every = _over_joints(grids, [grid.blocks[:, _forward(grid, form)] for grid in grids])
-    least = _least(every.sum(axis=0))
+    least = _least(every.sum(axis=0), grids[0].delay_s[_forward(grids[0], form)])
     return every[:, least.cells] @ least.weights
 
 
@@ -277,8 +299,9 @@ def _apart(grids: Sequence[DelayErrors], form: DelayForm) -> np.ndarray:
     """(B,) shares of the error with a delay of each joint."""
     found = []
     for grid in grids:
-        blocks = grid.blocks[:, _forward(grid, form)]
-        least = _least(blocks.sum(axis=0))
+        cells = _forward(grid, form)
+        blocks = grid.blocks[:, cells]
+        least = _least(blocks.sum(axis=0), grid.delay_s[cells])
         found.append(blocks[:, least.cells] @ least.weights)
     return _over_joints(grids, found)
 

@@ -41,6 +41,7 @@ class Lag(ArrayStateEffect):
     alike: ClassVar = (CLOCK, LATENCY)
     shown_by: ClassVar = FAST
     shows_in: ClassVar = ("speed", "direction")
+    shown_over: ClassVar = "speed"
     rivals: ClassVar = (
         Rival(CLOCK, FAST),
         Rival(LATENCY, FAST),

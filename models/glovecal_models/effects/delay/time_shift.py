@@ -12,8 +12,8 @@ from typing import ClassVar
 import numpy as np
 
 from glovecal_models.effects.base.assessment import Assessment
-from glovecal_models.effects.base.facts import Control, Kind, Stage
-from glovecal_models.effects.base.motions import FAST
+from glovecal_models.effects.base.facts import Control, Kind, Motion, Stage
+from glovecal_models.effects.base.motions import FAST, TAPS
 from glovecal_models.effects.base.problem import Problem
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.base.signature_effect import SignatureEffect
@@ -23,7 +23,8 @@ from glovecal_models.effects.delay.delay_grid import (
     held_out_beside,
     why_no_delay_shows,
 )
-from glovecal_models.effects.delay.delay_verdict import ClockChoice, first_delay
+from glovecal_models.effects.delay.delay_verdict import FAST_DECIDES_S, ClockChoice, first_delay, taps_decide
+from glovecal_models.takes.take import Take
 
 
 class TimeShift(SignatureEffect):
@@ -32,6 +33,7 @@ class TimeShift(SignatureEffect):
     kind: ClassVar[Kind] = "repair"
     stage: ClassVar[Stage] = "compared"
     control: ClassVar[Control] = "time-reversed"
+    shown_over: ClassVar = "clock shift"
     shown_by: ClassVar = FAST
     looked_for_once: ClassVar[bool] = True
 
@@ -58,6 +60,13 @@ class TimeShift(SignatureEffect):
 
     def told_from_alikes(self, problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]]:
         return first_delay(problem)
+
+    def decided_by(self, motion: Motion, found: Assessment, takes: Sequence[Take]) -> bool:
+        late_s = float(np.median(found.shapes[0]))
+        if motion == FAST:
+            return abs(late_s) >= FAST_DECIDES_S
+        measured = next((take.glove_latency for take in takes if take.glove_latency is not None), None)
+        return motion != TAPS or taps_decide(late_s, measured)
 
     def reference_delay_s(self, found: Assessment) -> np.ndarray:
         return found.shapes[0]

@@ -75,6 +75,7 @@ class GarmentSlip(IntervalEffect):
     stage: ClassVar[Stage] = "last"  # creep looks like a slip
     shows_later: ClassVar[bool] = True
     learns_unfound: ClassVar[bool] = True
+    shown_over: ClassVar = "take"
     # A walk over minutes differs between wearings, and goes along with one slow column or other, by chance.
     also_explained_by: ClassVar = ("donning_shift", "temperature", "humidity", "warmup_drift", "supply_sag")
     also_explained_share: ClassVar = 0.55  # a true cause of those saves more at 1.3 noise floors, a walk less

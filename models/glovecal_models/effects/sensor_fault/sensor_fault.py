@@ -50,6 +50,7 @@ LEAST_OF_RANGE = (0.5, 99.5)
 class SensorFault(SignatureEffect):
     name = "sensor_fault"
     kind: ClassVar[Kind] = "repair"
+    shown_over: ClassVar = "time in take"
     alike_between_levels: ClassVar = ("nonlinearity",)
     rivals: ClassVar = (Rival("nonlinearity", SHUFFLED),)
     explanation = "A wire or plug fails: the sensor stands still, spikes, drops out or jumps."

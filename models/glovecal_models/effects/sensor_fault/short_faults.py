@@ -10,7 +10,6 @@ All work on the readings (N,) of one sensor in one take and give a mask (N,) of 
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import median_filter, uniform_filter1d
 
 from glovecal_models.effects.base.signature_effect import smallest_step
 from glovecal_models.effects.sensor_fault.reading_faults import GRADUAL_SHARE, constant_runs
@@ -58,6 +57,8 @@ def shortly_stuck(
 
     ``low`` and ``high`` are the sensor's range, ``gain`` its counts per degree.
     """
+    from scipy.ndimage import uniform_filter1d  # slow to load, and every model with effects loads this file
+
     found = np.zeros(len(readings), dtype=bool)
     smooth = uniform_filter1d(expected, SMOOTHED)
     margin = GRADUAL_SHARE * (high - low)
@@ -87,6 +88,8 @@ def small_dropouts(
 
     ``span`` is the sensor's range in readings; ``others_move`` (N,): no repeated frame.
     """
+    from scipy.ndimage import median_filter
+
     found = np.zeros(len(readings), dtype=bool)
     fresh = others_move | (np.diff(readings, prepend=np.nan) != 0)
     change = np.diff(readings - expected, prepend=np.nan)

@@ -6,6 +6,8 @@ Mattmann 2008, Sensors 8(6) 3719).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from glovecal_models.simulation.causes.form import Draws, Stage, form
@@ -40,7 +42,7 @@ def bouc_wen(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -
 def single_play(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Cloth that moves along only after its slack is taken up."""
     radius = draws.each("radius_deg", 2.5, 9.0)
-    return signal + size * (_play(signal, radius) - signal)
+    return signal + size * (_plays(signal, [radius])[0] - signal)
 
 
 @form(
@@ -56,8 +58,8 @@ def several_plays(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Dra
     )]  # fmt: skip
     weights = [draws.each(f"weight_{number}", 0.1, 1.0) for number in range(len(radii))]
     total = np.sum(weights, axis=0)
-    for radius, weight in zip(radii, weights, strict=True):
-        result += size * weight / total * (_play(signal, radius) - signal)
+    for play, weight in zip(_plays(signal, radii), weights, strict=True):
+        result += size * weight / total * (play - signal)
     return result
 
 
@@ -85,14 +87,18 @@ def relays(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> 
     return signal + size * (scene.low + bent - signal)
 
 
-def _play(signal: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    follower = np.empty_like(signal)
-    now = signal[:, 0].copy()
-    above, below = signal + radius, signal - radius
-    for frame in range(signal.shape[1]):
-        now = np.maximum(below[:, frame], np.minimum(above[:, frame], now))
-        follower[:, frame] = now
-    return follower
+def _plays(signal: np.ndarray, radii: Sequence[np.ndarray]) -> np.ndarray:
+    """Followers (K, takes, frames, sensors) of ``signal`` with K slacks: all in one walk over the frames."""
+    frames = np.moveaxis(signal, 1, 0)[:, None]
+    radius = np.array(radii)[:, None, :]
+    above, below = frames + radius, frames - radius
+    followers = np.empty_like(above)
+    before = np.broadcast_to(frames[0], above.shape[1:])
+    for high, low, now in zip(above, below, followers, strict=True):
+        np.minimum(high, before, out=now)
+        np.maximum(low, now, out=now)
+        before = now
+    return np.moveaxis(followers, 0, 2)
 
 
 FORMS = (bouc_wen, single_play, several_plays, relays)

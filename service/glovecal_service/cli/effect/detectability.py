@@ -21,7 +21,6 @@ from glovecal_service.cli.terminal.writing import (
     require_place,
     write_report,
 )
-from glovecal_service.views.detectability import size_text
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
@@ -153,6 +152,8 @@ def _print(found: Mapping[str, Any]) -> None:
 
 
 def _row(item: Mapping[str, Any]) -> dict[str, Any]:
+    from glovecal_service.views.detectability import size_text  # brings the mathematics with it
+
     row = {
         "effect": item["effect"],
         "where": ", ".join(item["rotations"]),

@@ -32,9 +32,14 @@ def latency(
     glove: Glove,
     taps: Annotated[int, typer.Option(min=FEWEST, max=1000, help="How many taps.")] = 30,
     key_latency_ms: Annotated[
-        float,
-        typer.Option("--key-latency-ms", min=0, max=200, help="What the key takes to report; often 5 to 20."),
-    ] = 0.0,
+        float | None,
+        typer.Option(
+            "--key-latency-ms",
+            min=0,
+            max=200,
+            help="What the key takes to report; not given: any time from 5 to 20. 0 for an LED or a clap.",
+        ),
+    ] = None,
     frames: Annotated[
         Path | None,
         typer.Option("--frames", exists=True, dir_okay=False, help="A take table instead of the live glove."),
@@ -52,7 +57,7 @@ def latency(
 
     Strike fast, once a second, lift slowly. With --frames and --keys other events serve too: a clap, an LED.
     """
-    from glovecal_models.takes.tap_latency import tap_latency
+    from glovecal_models.takes.tap_latency import tap_latency, usual_key
 
     if (frames is None) != (keys is None):
         raise typer.BadParameter("--frames and --keys go together")
@@ -60,13 +65,14 @@ def latency(
         times, readings, sensors, pressed = _recorded(frames, keys)
     else:
         times, readings, sensors, pressed = _live(glove, taps, connect_to, site)
-    found = tap_latency(times, readings, sensors, pressed, key_latency_s=key_latency_ms / 1000)
+    key_s = None if key_latency_ms is None else key_latency_ms / 1000
+    found = tap_latency(times, readings, sensors, pressed, key_latency_s=key_s)
     answer = {
         "latency_s": found.seconds,
         "sd_s": found.sd_s,
         "taps": found.taps,
         "used": found.used,
-        "key_latency_s": key_latency_ms / 1000,
+        "key_latency_s": usual_key()[0] if key_s is None else key_s,
     }
     if store:
         with connect() as service:
@@ -74,7 +80,7 @@ def latency(
     if as_json:
         print_json(answer | {"tap_sd_s": found.tap_sd_s, "sensors": list(found.sensors), "stored": store})
     else:
-        _print(found, key_latency_ms, store)
+        _print(found, key_s, store)
 
 
 Times = tuple[np.ndarray, np.ndarray, tuple[str, ...], np.ndarray]
@@ -178,13 +184,13 @@ def _pressed(taps: int) -> list[float]:
     return found
 
 
-def _print(found: TapLatency, key_latency_ms: float, stored: bool) -> None:
+def _print(found: TapLatency, key_s: float | None, stored: bool) -> None:
     out.print(found.sentence)
     out.print(f"Sensors that follow the taps: {', '.join(found.sensors)}.")
-    if not key_latency_ms:
+    if key_s is None:
         err.print(
-            "Keyboards report a key 5 to 20 ms after it was hit: the glove is later by so much. If you know"
-            " it, give --key-latency-ms."
+            "Keyboards report a key 5 to 20 ms after it was hit: 12.5 ms are added, and most of the standard"
+            " deviation is the key's. If you know what yours takes, give --key-latency-ms."
         )
     if stored:
         out.print("Kept with the glove: it is taken off the time of live poses and added to their age.")
