@@ -8,7 +8,7 @@ from glovecal_client.errors import BadName
 from glovecal_client.names import check_identifier
 
 ROOT = "glovecal"
-PLANES = ("raw", "pose", "pose/meta", "status", "meta", "alive", "log")
+PLANES = ("raw", "pose", "pose/meta", "pose/explain", "status", "meta", "alive", "log")
 _RESERVED_GLOVES = frozenset({"service"})
 JSON_ENCODING = "application/json"
 
@@ -43,6 +43,11 @@ class GloveKeys:
     def pose_meta(self) -> str:
         """JSON by the service: model, subject, layout, rotations, state."""
         return self._key("pose/meta")
+
+    @property
+    def pose_explain(self) -> str:
+        """Queryable by the service: what the angles of the newest pose are made of."""
+        return self._key("pose/explain")
 
     @property
     def status(self) -> str:

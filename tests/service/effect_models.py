@@ -12,6 +12,7 @@ from realtime_support import LAYOUT, linear_model
 from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.effects.catalogue import stored_effect
+from glovecal_models.effects.sensor_fault.fault_watch import FaultLimits
 
 UNITS: dict[str, Any] = {"own_centre_deg": [20.0], "own_scale_deg": [30.0]}
 """Settings of effects that read the joint in its own units; one lane stands for all."""
@@ -46,3 +47,16 @@ def model_with(*effects: AddedEffect) -> CalibrationModel:
 
 MODEL = model_with(HYSTERESIS, CREEP, LAG)
 """Every kind of memory at once."""
+
+FAULT_LIMITS = FaultLimits(
+    sensors=LAYOUT.sensors,
+    lag_s=(0.01, 0.1, 0.5),
+    surprise_counts=((12.0, 20.0, 60.0),) * 3,
+    still_s=(0.2,) * 3,
+    rotations=LAYOUT.rotations,
+    move_lag_s=(0.01, 0.1, 1.0),
+    move_deg=((0.5, 5.0, 30.0),) * len(LAYOUT.rotations),
+    reads=tuple((LAYOUT.correspondence(name).sensors[0],) for name in LAYOUT.rotations),
+)
+FAULT = added("sensor_fault", (), (), settings={"where": ["I_MCP"], "live": FAULT_LIMITS.to_settings()})
+"""A sensor that fails is watched for live."""

@@ -6,28 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from effect_models import CREEP, HYSTERESIS, added, model_with
+from effect_models import CREEP, FAULT, FAULT_LIMITS, HYSTERESIS, added, model_with
 from loop_by_hand import LoopByHand, moving_frames, served_in_turns
 from realtime_support import LAYOUT
 
 from glovecal_client.wire.frame import Frame
 from glovecal_client.wire.pose import PoseFlag, RotationFlag
 from glovecal_models.calibration.predictor import FAULTY_SENSOR, GloveAngles, GlovePredictor
-from glovecal_models.effects.sensor_fault.fault_watch import FaultLimits
 
-LIMITS = FaultLimits(
-    sensors=LAYOUT.sensors,
-    lag_s=(0.01, 0.1, 0.5),
-    surprise_counts=((12.0, 20.0, 60.0),) * 3,
-    still_s=(0.2,) * 3,
-    rotations=LAYOUT.rotations,
-    move_lag_s=(0.01, 0.1, 1.0),
-    move_deg=((0.5, 5.0, 30.0),) * len(LAYOUT.rotations),
-    reads=tuple((LAYOUT.correspondence(name).sensors[0],) for name in LAYOUT.rotations),
-)
 WALK = {"rate_deg_per_sqrt_min": 6.0}
 SLIP = added("garment_slip", (), (), settings={"rotations": dict.fromkeys(LAYOUT.rotations, WALK)})
-FAULT = added("sensor_fault", (), (), settings={"where": ["I_MCP"], "live": LIMITS.to_settings()})
 MODEL = model_with(HYSTERESIS, CREEP, SLIP, FAULT)
 DROPPED = slice(150, 160)
 
@@ -70,7 +58,7 @@ def test_the_last_good_angle_is_kept_flagged_and_counted() -> None:
     poses = by_hand.poses["g1"]
     served = np.array([pose.sequence for pose in poses])  # a busy computer may have skipped some
     fails = (served >= DROPPED.start) & (served < DROPPED.stop)
-    row = next(i for i, read in enumerate(LIMITS.reads) if read == (LAYOUT.sensors[0],))
+    row = next(i for i, read in enumerate(FAULT_LIMITS.reads) if read == (LAYOUT.sensors[0],))
     flagged = np.array([bool(pose.rotation_flags[row] & RotationFlag.FAULTY_SENSOR) for pose in poses])
     np.testing.assert_array_equal(flagged, fails)
     assert [bool(pose.flags & PoseFlag.FAULTY_SENSOR) for pose in poses] == fails.tolist()

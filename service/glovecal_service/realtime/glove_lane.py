@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from glovecal_client.keys import GloveKeys
 from glovecal_client.wire.frame import Frame
 from glovecal_service.realtime.frame_gate import FrameGate, Standing
+from glovecal_service.realtime.frame_record import FrameRecord
 from glovecal_service.realtime.lane_effects import LaneEffects
 from glovecal_service.realtime.refusal import RefusalCount, Refused
 from glovecal_service.realtime.served_model import ServedModel
@@ -48,6 +49,8 @@ class GloveLane:
         self.model_id: str | None = None
         self.effects: LaneEffects | None = None
         """State of its model's effects; None for a model without."""
+        self.record: FrameRecord | None = None
+        """Put here by who wants the next frame's prediction written down; taken away with it."""
         self._waiting: deque[Waiting] = deque()
 
     def __len__(self) -> int:

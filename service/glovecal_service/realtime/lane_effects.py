@@ -70,6 +70,11 @@ class LaneEffects:
         if self.stream.faulty_sensors:
             self.faulty.update(self.stream.faulty_sensors)
 
+    @property
+    def since_start_s(self) -> float:
+        """How long before the last frame the effects with a memory began anew."""
+        return self._last_s - self._started_s
+
     def status(self) -> dict[str, Any]:
         """For the status document: what is not corrected, and why; which sensors fail."""
         failing = [

@@ -28,6 +28,7 @@ from glovecal_client.wire.pose import (
 from glovecal_models.calibration.predictor import GloveAngles
 from glovecal_service.realtime.arrivals import Arrival, Arrivals
 from glovecal_service.realtime.corrected_frames import corrected
+from glovecal_service.realtime.frame_record import angles_of
 from glovecal_service.realtime.glove_lane import GloveLane
 from glovecal_service.realtime.glove_lanes import GloveLanes
 from glovecal_service.realtime.refusal import Refusal, Refused
@@ -166,8 +167,8 @@ class PoseLoop:
     ) -> None:
         rotations = encode_rotations(angles.mean.astype("<f4"), angles.sd.astype("<f4"), angles.flags)
         any_flags = np.bitwise_or.reduce(angles.flags, axis=1).tolist()
-        for item, of_frame, any_flag, effect_flag in zip(
-            opened, rotations, any_flags, effect_flags, strict=True
+        for row, (item, of_frame, any_flag, effect_flag) in enumerate(
+            zip(opened, rotations, any_flags, effect_flags, strict=True)
         ):
             lane, frame, received_ns = item
             flags = _simulated(frame) | _POSE_FLAGS[any_flag & 3] | effect_flag
@@ -178,6 +179,10 @@ class PoseLoop:
             )  # fmt: skip
             self._publish(lane.glove, message)
             lane.note_pose(message, received_ns, model.model_id)
+            record = lane.record  # another thread takes it away when it waited too long
+            if record is not None and record.is_of(frame):
+                record.served(angles_of(angles, row))
+                lane.record = None
 
     def _serve_uncalibrated(self, lane: GloveLane) -> None:
         lane.effects = None

@@ -18,6 +18,7 @@ from glovecal_client.session import open_router
 from glovecal_models.threads import pin_blas_to_one_thread
 from glovecal_service.realtime.arrivals import Arrivals
 from glovecal_service.realtime.glove_metas import GloveMetas
+from glovecal_service.realtime.live_explanations import LiveExplanations
 from glovecal_service.realtime.model_watcher import ModelWatcher
 from glovecal_service.realtime.pose_loop import PoseLoop
 from glovecal_service.realtime.pose_meta import PoseMetas
@@ -81,11 +82,17 @@ def _serve(
         lambda: watcher.database_problem,
         settings.data,
     )
+    explanations = LiveExplanations(session, settings.site, lambda: loop.lanes)
     _settle_garbage()
     failures: list[str] = []
     threads = [
         _thread(name, work, stopped, failures)
-        for name, work in (("poses", loop.run), ("models", watcher.run), ("status", status.run))
+        for name, work in (
+            ("poses", loop.run),
+            ("models", watcher.run),
+            ("status", status.run),
+            ("explanations", explanations.run),
+        )
     ]
     if started is not None:
         started()

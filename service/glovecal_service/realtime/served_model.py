@@ -36,6 +36,7 @@ class ServedModel:
     rotations: tuple[str, ...]
     counts: tuple[float, float] | None
     predictor: GlovePredictor
+    model: CalibrationModel
     effects: tuple[str, ...] = ()
     """Names of the effects that correct the prediction."""
     pace: Pace = field(default_factory=Pace)
@@ -60,6 +61,7 @@ class ServedModel:
             rotations=tuple(predictor.rotations),
             counts=model.layout.counts,
             predictor=predictor,
+            model=model,
             effects=predictor.stream().names,
             pace=Pace(2 * seconds + BESIDES_PREDICTION_S),
         )

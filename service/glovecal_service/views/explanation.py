@@ -7,7 +7,13 @@ from dataclasses import asdict
 
 from pydantic import BaseModel, Field
 
-from glovecal_models.calibration.explanation import AngleTerms, Explanation, TermKind
+from glovecal_models.calibration.explanation import (
+    AngleTerms,
+    Explanation,
+    FrameExplanation,
+    Measured,
+    TermKind,
+)
 from glovecal_models.calibration.text import angle_sentences, frame_sentences
 
 
@@ -55,6 +61,22 @@ class AngleView(BaseModel):
     sentences: list[str]
 
 
+class LiveExplanationView(BaseModel):
+    glove: str
+    model: str
+    run_id: str = Field(description="16 hexadecimal digits, with `sequence` the frame and its pose.")
+    sequence: int
+    settling_s: float = Field(
+        description="So long after a start effects with a memory are uncertain; 0: none has a memory."
+    )
+    transient_s: float | None = Field(
+        description="How long ago they started, while they have not settled; else null."
+    )
+    faulty_sensors: list[str]
+    rotations: list[AngleView]
+    sentences: list[str] = Field(description="What holds for all rotations of the frame.")
+
+
 class ExplanationView(BaseModel):
     model: str
     take: str
@@ -84,13 +106,33 @@ def explanation_view(found: Explanation, model: str, take: str, rotations: Seque
         time_s=frame.time_s,
         settling_s=frame.settling_s,
         faulty_sensors=list(frame.faulty_sensors),
-        rotations=[_angle(angle, found) for angle in frame.angles if angle.rotation in rotations],
+        rotations=[
+            _angle(angle, found.measured.get(angle.rotation))
+            for angle in frame.angles
+            if angle.rotation in rotations
+        ],
         sentences=frame_sentences(frame),
     )
 
 
-def _angle(angle: AngleTerms, found: Explanation) -> AngleView:
-    measured = found.measured.get(angle.rotation)
+def live_explanation_view(
+    frame: FrameExplanation, *, glove: str, model: str, run_id: int, sequence: int, rotations: Sequence[str]
+) -> LiveExplanationView:
+    """Of a pose that was served; only ``rotations``."""
+    return LiveExplanationView(
+        glove=glove,
+        model=model,
+        run_id=f"{run_id:016x}",
+        sequence=sequence,
+        settling_s=frame.settling_s,
+        transient_s=frame.transient_s,
+        faulty_sensors=list(frame.faulty_sensors),
+        rotations=[_angle(angle, None) for angle in frame.angles if angle.rotation in rotations],
+        sentences=frame_sentences(frame),
+    )
+
+
+def _angle(angle: AngleTerms, measured: Measured | None) -> AngleView:
     shown = None
     if measured is not None:
         error = None if measured.degrees is None else angle.degrees - measured.degrees
