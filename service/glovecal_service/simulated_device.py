@@ -42,6 +42,7 @@ OPTION_HELP = {
     "layout": f"{'|'.join(LAYOUTS)} (cyberglove18)",
     "motion": f"{'|'.join((*MOTIONS, ASKED))} (free)",
     "service": f"URL, where motion=asked asks ({DEFAULT_SERVICE})",
+    "hand": "right|left (right)",
     "wearing": "N (0; another is another donning)",
     "rate_hz": f"HZ, 1 to {FASTEST_HZ:g} (120)",
     "reference": "FILE, reference angles are written there",
@@ -59,6 +60,8 @@ class SimulationOptions:
     motion: str = "free"
     service: str = DEFAULT_SERVICE
     """Where it is asked, with ``motion="asked"``."""
+    hand: str = "right"
+    """A left one reads as its mirror image."""
     wearing: int = 0
     rate_hz: float = 120.0
     reference: Path | None = None
@@ -77,6 +80,7 @@ class SimulationOptions:
             layout=_choice(options, "layout", "cyberglove18", LAYOUTS),
             motion=_choice(options, "motion", "free", (*MOTIONS, ASKED)),
             service=options.get("service", DEFAULT_SERVICE),
+            hand=_choice(options, "hand", "right", ("right", "left")),
             wearing=_number(options, "wearing", 0, int, 0, 2**32),
             rate_hz=_number(options, "rate_hz", 120.0, float, 1.0, FASTEST_HZ),
             reference=None if reference is None else Path(reference),
@@ -97,13 +101,13 @@ class SimulatedDevice:
     simulated = True
     option_help = OPTION_HELP
     context: tuple[str, ...] = ()
-    hand = "right"
 
     def __init__(self, options: SimulationOptions | None = None) -> None:
         """Raises BadOption if the reference file exists already or cannot be written there."""
         self._options = options or SimulationOptions()
         self._glove = self._new_glove()
         self.name = f"simulated:{self._options.motion}"
+        self.hand = self._options.hand
         self.layout = self._glove.layout.name
         self.sensors = self._glove.sensors
         self.rate_hz = self._options.rate_hz

@@ -1,13 +1,11 @@
 """Effects on a page: one sentence, a small picture of what each does to a reading, and what was learned.
 
-No effect is known here by name. The picture comes from the effect's own columns over a motion that rises,
-holds and falls; of an effect without columns from the simulation of the same name.
+No effect is known here by name.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -19,31 +17,17 @@ from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.diagnosis.hold_drift import HAND
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.interval_effect import IntervalEffect
-from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.base.signature_effect import SignatureEffect
 from glovecal_models.effects.catalogue import effect, effect_of_declaration
 from glovecal_models.errors import BadInput
-from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES, forms
-from glovecal_models.simulation.causes.form import Cause
-from glovecal_models.simulation.session import record_session
-from glovecal_models.simulation.session_plan import SessionPlan
 from glovecal_service.report.drawing import FLOOR, MEASURED, MODEL, figure_svg, legend_above
+from glovecal_service.report.effect_schematic import Schematic, schematic
 from glovecal_service.report.form_pictures import form_pictures
 from glovecal_service.report.html import effect_part, folded, table
 
-RATE_HZ = 50
-LOW_DEG, HIGH_DEG = 10.0, 70.0
-SHOWN_DEG = 15.0
-"""How far the schematic effect moves the reading."""
-KNOTS_S = (0, 2, 4, 9, 10, 13, 15, 20, 22, 24)
-KNOTS_SHARE = (0, 0, 1, 1, 0.5, 0.5, 1, 1, 0, 0)
 MOST_WEIGHTS = 200
 NO_EFFECTS = {HAND: "The hand itself gives way while a pose is held; the glove is right."}
 """What else a diagnosis may name."""
-SIMULATED = SessionPlan(
-    seed=4, sensors=("I_MCP", "I_PIP"), wearings=1, takes_per_wearing=1, take_s=12, bits=14,
-    nuisance="white", reference_white_deg=0, reference_lasting_deg=0, sensor_noise_deg=0,
-)  # fmt: skip
 
 
 def effect_card(
@@ -142,37 +126,20 @@ def _number(value: Any) -> str:
 
 def _picture_of(known: Effect) -> str | None:
     """None where neither columns nor a simulation show it."""
-    return _cached(known.name) if _known(known.name, None) is not None else _drawn(known)
+    shown = schematic(known)
+    return None if shown is None else _drawn(shown)
 
 
-@cache
-def _cached(name: str) -> str | None:
-    return _drawn(effect(name))
-
-
-def _drawn(known: Effect) -> str | None:
-    shown = _by_columns(known) if known.has_columns else None
-    if shown is None and known.name in KNOWN_CAUSES:
-        shown = _by_simulation(known.name)
-    if shown is None:
-        return None
-    time, without, with_it, label = shown
-
+def _drawn(shown: Schematic) -> str:
     def draw(figure: Figure) -> None:
         left, right = figure.subplots(1, 2, width_ratios=(2, 1))
-        left.plot(time, without, color=MEASURED, linewidth=1, linestyle="--", label="without")
-        left.plot(time, with_it, color=MODEL, linewidth=1.4, label="with the effect")
-        left.set(xlabel=_time_label(known), ylabel=label, xticks=(), yticks=())
+        left.plot(shown.time_s, shown.without, color=MEASURED, linewidth=1, linestyle="--", label="without")
+        left.plot(shown.time_s, shown.with_it, color=MODEL, linewidth=1.4, label="with the effect")
+        left.set(xlabel=shown.time_label, ylabel=shown.label, xticks=(), yticks=())
         legend_above(left)
-        _against(right, without, with_it)
+        _against(right, shown.without, shown.with_it)
 
     return figure_svg(draw, 5, 2)
-
-
-def _time_label(known: Effect) -> str:
-    if known.context:
-        return f"time; c.{known.context[0]} rises"
-    return "time; glove put on again half-way" if known.changes_between_takes else "time"
 
 
 def _against(axes: Axes, without: np.ndarray, with_it: np.ndarray) -> None:
@@ -180,62 +147,6 @@ def _against(axes: Axes, without: np.ndarray, with_it: np.ndarray) -> None:
     axes.plot((low, high), (low, high), color=MEASURED, linewidth=1, linestyle="--")
     axes.plot(without, with_it, color=FLOOR, linewidth=1)
     axes.set(xlabel="without", ylabel="with", xticks=(), yticks=())
-
-
-def _by_columns(known: Effect) -> tuple[np.ndarray, np.ndarray, np.ndarray, str] | None:
-    """Two takes, the second in another wearing and context; the column that does most is the effect."""
-    takes = [_ramp_and_hold(known, number) for number in range(2)]
-    try:
-        settings = known.fit_constants(takes)
-        grid = known.grid(takes, settings)
-        shape = grid[len(grid) // 2]
-        columns = [known.columns(take, settings, shape)[:, 0] for take in takes]
-        prior = known.prior_sd(settings)
-    except (BadInput, KeyError, ValueError):
-        return None
-    if not known.context and not known.changes_between_takes:
-        columns, takes = columns[:1], takes[:1]
-    joined, own = np.concatenate(columns), np.concatenate([take.own[:, 0] for take in takes])
-    if not joined.shape[1]:
-        return None
-    sizes = np.std(joined, axis=0) * prior
-    column = joined[:, int(np.flatnonzero(sizes >= 0.999 * sizes.max())[-1])]
-    largest = float(np.max(np.abs(column)))
-    if not np.isfinite(largest) or largest == 0:
-        return None
-    weight = SHOWN_DEG / largest
-    if known.has_memory and not known.context:
-        # In degrees of the joint: more than all of it makes no sense, and a sensor comes late, never early.
-        late = -float(np.sign(np.sum(column[1:] * np.diff(own))) or -1.0)
-        weight = late * min(weight, 1.0)
-    time = np.arange(len(own)) / RATE_HZ
-    return time, own, own + weight * column, "reading"
-
-
-def _ramp_and_hold(known: Effect, number: int) -> Signals:
-    time = np.arange(0, KNOTS_S[-1], 1 / RATE_HZ)
-    motion = LOW_DEG + (HIGH_DEG - LOW_DEG) * np.interp(time, KNOTS_S, KNOTS_SHARE)
-    neighbour = 1.5 * np.sin(2 * np.pi * time / 7.0)
-    rising = 1.0 + number + time / KNOTS_S[-1]
-    context = dict.fromkeys(known.context, rising)
-    return Signals(
-        time, motion[:, None], {"neighbour": neighbour}, context, f"wearing {number + 1}",
-        f"take {number + 1}", np.zeros(1),
-    )  # fmt: skip
-
-
-def _by_simulation(name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, str] | None:
-    """A simulated glove with and without the cause, where it does most."""
-    session = record_session(SIMULATED, [Cause(name, forms(name)[0].name, strength_deg=6.0)])
-    take, clean = session.takes[0], session.clean[0]
-    label, pair = "reading", (clean.readings, take.readings)
-    if np.array_equal(*pair) and take.reference is not None and clean.reference is not None:
-        label, pair = "measured angle", (clean.reference, take.reference)
-    if np.array_equal(*pair):
-        return None
-    channel = int(np.argmax(np.nanmax(np.abs(pair[1] - pair[0]), axis=0)))
-    without, with_it = (np.asarray(part[:, channel], dtype=float) for part in pair)
-    return np.arange(len(without)) / SIMULATED.rate_hz, without, with_it, label
 
 
 def declarations_in(documents: Sequence[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:

@@ -10,7 +10,8 @@ from markupsafe import Markup
 from glovecal_service.report.caption import Caption
 from glovecal_service.report.diagnosis_page import hold_table, next_take_note
 from glovecal_service.report.effects import effect_card
-from glovecal_service.report.error_fall import Fall, FloorBand, error_fall
+from glovecal_service.report.error_fall import error_fall
+from glovecal_service.report.fall_steps import Fall, FloorBand
 from glovecal_service.report.html import Fact, Section, counted, degrees, figure, folded, listed, page, table
 from glovecal_service.views.renamed_keys import current
 

@@ -10,7 +10,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from glovecal_models.comparison.dependence import Dependence
 from glovecal_models.comparison.error_spectrum import SLOW_HZ, ErrorSpectrum
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
-from glovecal_models.comparison.text import wearings_sentence
+from glovecal_models.comparison.text import dependence_sentence, wearings_sentence
 from glovecal_models.comparison.wearings import WearingErrors
 from glovecal_models.comparison.where_it_fails import RotationFindings, windows
 from glovecal_service.report.drawing import (
@@ -71,20 +71,8 @@ def error_against(item: RotationFindings, one: Dependence) -> tuple[str, str]:
         legend_above(axes)
         axes.set(xlabel=f"{one.covariate}{unit}", ylabel=f"mean error of {item.rotation}, degrees")
 
-    sentence = (
-        f"Against {one.phrase} the mean error of {item.rotation} goes from {np.min(one.mean_deg):+.1f} to "
-        f"{np.max(one.mean_deg):+.1f} degrees; RMS contribution {one.explained_deg:.1f} degrees, "
-        f"p = {one.p_value:.3f}: {_verdict(item, one)}."
-    )
+    sentence = dependence_sentence(item.rotation, item.rmse_deg, one, item.limits)
     return svg(draw, WIDTH, HEIGHT), sentence
-
-
-def _verdict(item: RotationFindings, one: Dependence) -> str:
-    if item.is_structure(one):
-        return "significant"
-    if one.p_value <= item.limits.structure_p_value:
-        return f"significant, but a small part of {item.rmse_deg:.1f} degrees"
-    return "not significant"
 
 
 def _worst_window(found: Residuals, column: int) -> tuple[TakeResiduals, np.ndarray]:

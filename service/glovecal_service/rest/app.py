@@ -11,7 +11,15 @@ from starlette.concurrency import run_in_threadpool
 
 from glovecal_models.threads import pin_blas_to_one_thread
 from glovecal_service.jobs.dispatcher import Dispatcher
-from glovecal_service.rest.effect import catalogue, changes, detectability, diagnosis, improvement
+from glovecal_service.rest.effect import (
+    catalogue,
+    changes,
+    detectability,
+    diagnosis,
+    improvement,
+    picture,
+    trial,
+)
 from glovecal_service.rest.glove import layouts, recordings
 from glovecal_service.rest.http import front, health
 from glovecal_service.rest.http.answers import install_openapi
@@ -27,9 +35,13 @@ from glovecal_service.rest.model import (
     ceiling,
     comparison,
     explanation,
+    fall,
     models,
     predictions,
     quick_check,
+    replay,
+    residual_column,
+    series,
     training,
     where,
 )
@@ -46,7 +58,18 @@ ROUTERS = (
     *(subjects, usual_hand, layouts, recordings, samplings),
     *(clocks, holds, examination, table_import, takes, reference, uploads),
     *(training, models, predictions, comparison, where, ceiling, diagnosis, changes, catalogue, improvement),
-    *(detectability, explanation, quick_check, next_steps),
+    *(
+        detectability,
+        explanation,
+        quick_check,
+        next_steps,
+        series,
+        residual_column,
+        replay,
+        picture,
+        fall,
+        trial,
+    ),
     *(jobs, health),
 )
 

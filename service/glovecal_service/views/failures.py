@@ -61,6 +61,7 @@ class RotationView(BaseModel):
 
 class StretchView(BaseModel):
     take: str
+    number: int = Field(description="Of the take among those given, from 0: two may have one name.")
     start_s: float
     end_s: float
     rmse_deg: float | None

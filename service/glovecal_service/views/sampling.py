@@ -9,9 +9,12 @@ from typing import Any
 
 from pydantic import BaseModel, Field
 
+from glovecal_models.hand.skeleton import Skeleton
+from glovecal_models.sampling.engine import SHOWN_S, TIMER_S
 from glovecal_models.sampling.limits import SAMPLING_LIMITS
 from glovecal_models.sampling.protocol import COUNTDOWN_S, SETTLE_S, Kind, Motion
 from glovecal_models.sampling.repeatability import repeatability
+from glovecal_models.sampling.shown_hands import shown_hands
 from glovecal_models.sampling.state import Phase, SamplingState, Trigger
 from glovecal_service.store.records import SamplingRecord
 
@@ -127,6 +130,21 @@ def sampling_view(record: SamplingRecord) -> SamplingView:
     )
 
 
+class TargetView(BaseModel):
+    step: str = Field(description="Its name, empty when no step is at hand.")
+    hands: list[dict[str, float]] = Field(
+        description="Degrees by rotation, for viewers: one hand of a pose that is held, two between which a "
+        "motion goes to and fro. Only the step's own `angles` are exact; the rest is a usual hand's, and "
+        "what is not named (the wrist, last joints) is free."
+    )
+
+
+def target_view(record: SamplingRecord, skeleton: Skeleton) -> TargetView:
+    """What the step at hand looks like on the hand of ``skeleton``."""
+    state = SamplingState.from_document(record.document)
+    return TargetView(step=state.step, hands=shown_hands(state.now(), skeleton) if state.step else [])
+
+
 def _repeatability(state: SamplingState) -> RepeatabilityView | None:
     found = repeatability(state)
     return None if found is None else RepeatabilityView.model_validate(asdict(found))
@@ -136,7 +154,17 @@ def _length(state: SamplingState) -> float | None:
     if not state.step:
         return None
     lengths = {"countdown": COUNTDOWN_S, "settling": SETTLE_S, "recording": state.now().seconds}
+    if state.trigger == "timer":
+        lengths["waiting"] = TIMER_S
+    if state.phase == "judged":
+        return _shown_s(state)
     return lengths.get(state.phase)
+
+
+def _shown_s(state: SamplingState) -> float | None:
+    if state.attempts[-1].counts:
+        return SHOWN_S
+    return None if state.trigger == "key" else TIMER_S
 
 
 def _now(state: SamplingState) -> StepNow | None:

@@ -13,6 +13,7 @@ from glovecal_models.effects.base.facts import Kind
 from glovecal_models.effects.catalogue import GROUP, catalogue, effect
 from glovecal_models.errors import BadInput
 from glovecal_service.plain import plain
+from glovecal_service.report.effect_schematic import schematic
 from glovecal_service.rest.http.answers import problems
 from glovecal_service.rest.http.request_types import ONE_LINE
 from glovecal_service.store.errors import NotFound
@@ -20,6 +21,7 @@ from glovecal_service.store.errors import NotFound
 router = APIRouter(prefix="/effects", tags=["effects"])
 
 OURS = "glovecal-models"
+MOST_MOMENTS = 400
 EffectInPath = Annotated[str, Path(max_length=64, pattern=ONE_LINE, description="As in the catalogue.")]
 
 
@@ -51,6 +53,16 @@ class CatalogueEffect(BaseModel):
     package: str
 
 
+class SchematicView(BaseModel):
+    """Sizes are for show; the shapes are the effect's own."""
+
+    time_s: list[float]
+    without: list[float | None] = Field(description="The reading, or the measured angle, without the effect.")
+    with_effect: list[float | None]
+    label: str = Field(description="reading, or measured angle.")
+    time_label: str
+
+
 @router.get(
     "", response_model=list[CatalogueEffect], summary="The catalogue of effects", responses=problems()
 )
@@ -63,8 +75,33 @@ def list_effects() -> list[dict[str, Any]]:
 
 @router.get("/{name}", response_model=CatalogueEffect, summary="One effect", responses=problems())
 def get_effect(name: EffectInPath) -> dict[str, Any]:
+    return _row(_known(name), effect_packages().get(name, OURS))
+
+
+@router.get(
+    "/{name}/schematic",
+    response_model=SchematicView,
+    summary="What an effect does to a reading, schematically",
+    responses=problems(),
+)
+def get_schematic(name: EffectInPath) -> SchematicView:
+    """A reading without it and with it over a small motion. 404 also where nothing shows it."""
+    shown = schematic(_known(name))
+    if shown is None:
+        raise NotFound(f"effect {name!r} has no picture: it changes no reading")
+    step = max(1, -(-len(shown.time_s) // MOST_MOMENTS))
+    return SchematicView(
+        time_s=shown.time_s[::step].tolist(),
+        without=shown.without[::step].tolist(),
+        with_effect=shown.with_it[::step].tolist(),
+        label=shown.label,
+        time_label=shown.time_label,
+    )
+
+
+def _known(name: str) -> Effect:
     try:
-        return _row(effect(name), effect_packages().get(name, OURS))
+        return effect(name)
     except BadInput as error:
         raise NotFound(f"there is no effect {name!r}; there are {', '.join(sorted(catalogue()))}") from error
 

@@ -34,7 +34,7 @@ from glovecal_service.store.errors import Conflict
 from glovecal_service.store.records import GloveRecord, SamplingRecord
 from glovecal_service.store.sampling_reuse import reuse_takes
 from glovecal_service.store.store import Store
-from glovecal_service.views.sampling import SamplingView, sampling_view
+from glovecal_service.views.sampling import SamplingView, TargetView, sampling_view, target_view
 
 router = APIRouter(prefix="/sampling", tags=["sampling"])
 
@@ -143,6 +143,18 @@ def list_samplings(
 @router.get("/{id}", response_model=SamplingView, summary="One sampling", responses=problems())
 def get_sampling(id: IdInPath, store: StoreNeeded) -> SamplingView:
     return sampling_view(store.samplings.get(id))
+
+
+@router.get(
+    "/{id}/target",
+    response_model=TargetView,
+    summary="What the step at hand looks like, for viewers",
+    responses=problems(),
+)
+def get_target(id: IdInPath, store: StoreNeeded) -> TargetView:
+    """On the subject's own hand, so that fingertips which are to touch do so in the picture."""
+    record = store.samplings.get(id)
+    return target_view(record, store.subjects.get(record.subject).skeleton())
 
 
 @router.post(

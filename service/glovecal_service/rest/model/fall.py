@@ -1,0 +1,172 @@
+"""``models/{id}/fall``: how the error fell from simpler calibrations through each version to this one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from fastapi import APIRouter
+
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.training import train
+from glovecal_models.calibration.training_settings import Method, TrainingSettings
+from glovecal_models.comparison.noise_floor import takes_noise
+from glovecal_models.errors import NotTrainable
+from glovecal_models.takes.take import Take
+from glovecal_service.jobs.model_work import trained_ids
+from glovecal_service.report.fall_steps import (
+    Fall,
+    FloorBand,
+    fall_sentence,
+    lineage_falls,
+    version_label,
+    with_control,
+)
+from glovecal_service.rest.http.answers import problems
+from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
+from glovecal_service.rest.http.request_types import ModelInPath
+from glovecal_service.store.records import ModelRecord, TakeRecord
+from glovecal_service.views.diagnosis import TakeNamed
+from glovecal_service.views.fall import FallStepView, FallView, FloorBandView
+
+router = APIRouter(prefix="/models", tags=["models"])
+
+SIMPLER: tuple[Method, ...] = ("raw", "linear")
+FOLDS = 2
+"""Of simpler calibrations, where no take is held out."""
+
+
+@router.get(
+    "/{id}/fall",
+    response_model=FallView,
+    summary="How the error fell down to this version",
+    responses=problems(409),
+)
+def error_fall(id: ModelInPath, parts: PartsNeeded) -> FallView:
+    """On the subject's takes that no version was trained on; where there is none, on those held out of each
+    training in turn. Simpler calibrations are trained anew for it, on the first version's takes.
+
+    422 where neither is there.
+    """
+    line = parts.store.models.lineage(id)[::-1]
+    models = [parts.predictors.get(record.id)[0] for record in line]
+    trained = [parts.store.takes.get(id) for id in trained_ids(parts.store, line[0])]
+    held_out = _held_out(parts, line, models)
+    shown = held_out or [take for take in trained if take.has_reference]
+    takes = [parts.store.takes.load(take.id) for take in shown]
+    learned = [parts.store.takes.load(take.id) for take in trained]
+    methods: list[Method] = [method for method in SIMPLER if method != models[0].method]
+    if held_out:
+        falls = lineage_falls(models, _simpler(models[0], line[0], learned, methods, 0), takes)
+    else:
+        line, falls = _held_out_in_training(line, models, learned, methods)
+    return _view(falls, _floor(takes, models[-1]), line, shown, is_held_out=bool(held_out))
+
+
+def _held_out(parts: Parts, line: list[ModelRecord], models: list[CalibrationModel]) -> list[TakeRecord]:
+    """Measured takes of the subject and layout that no version has seen."""
+    seen = {artifact for model in models for artifact in model.takes}
+    named = {id for record in line for id in trained_ids(parts.store, record)}
+    return [
+        take
+        for take in parts.store.takes.list(subject=line[0].subject)
+        if take.layout == line[0].layout
+        and take.has_reference
+        and take.artifact not in seen
+        and take.id not in named
+    ]
+
+
+def _simpler(
+    first: CalibrationModel, record: ModelRecord, takes: list[Take], methods: Sequence[Method], folds: int
+) -> dict[str, CalibrationModel]:
+    return {
+        method: train(takes, first.layout, record.subject, TrainingSettings(method=method, folds=folds))
+        for method in methods
+    }
+
+
+def _held_out_in_training(
+    line: list[ModelRecord], models: list[CalibrationModel], takes: list[Take], methods: Sequence[Method]
+) -> tuple[list[ModelRecord], list[Fall]]:
+    """Of versions whose training held takes out in turn; the others are left out.
+
+    Raises NotTrainable when there is none.
+    """
+    own = [
+        (record, model)
+        for record, model in zip(line, models, strict=True)
+        if record.facts.get("held_out_rmse_deg") is not None
+    ]
+    if not own:
+        raise NotTrainable(
+            f"no error of model {line[-1].id[:12]} is known: it was trained without holding takes out, and "
+            "every measured take was trained on; record one more"
+        )
+    simpler = _simpler(models[0], line[0], takes, methods, FOLDS)
+    falls = [
+        Fall(name, float(error), is_scale=True)
+        for name, model in simpler.items()
+        if (error := model.error_estimate.get("rmse_deg")) is not None
+    ]
+    falls.sort(key=lambda item: -item.rmse_deg)
+    before: CalibrationModel | None = None
+    errors: dict[str, float] = {}
+    for record, model in own:
+        control = None
+        if before is not None and errors:
+            square = np.square([list(errors.values())])
+            control = with_control(model, before, square, tuple(errors))
+        falls.append(Fall(version_label(model, before), float(record.facts["held_out_rmse_deg"]), control))
+        kept = record.facts.get("per_rotation") or {}
+        before, errors = model, {name: error for name, error in kept.items() if error is not None}
+    return [record for record, _ in own], falls
+
+
+def _floor(takes: list[Take], model: CalibrationModel) -> FloorBand | None:
+    """Over all rotations that the model has; None when that of one is unknown."""
+    names = [item.rotation for item in model.rotations]
+    measured = [name for name in names if any(name in take.rotations for take in takes)]
+    floors = takes_noise(takes, measured)
+    if any(name not in floors for name in measured):
+        return None
+    known = {name: (floors[name].floor_deg, floors[name].low_deg, floors[name].high_deg) for name in measured}
+    return FloorBand.of(known)
+
+
+def _view(
+    falls: Sequence[Fall],
+    band: FloorBand | None,
+    line: Sequence[ModelRecord],
+    takes: Sequence[TakeRecord],
+    *,
+    is_held_out: bool,
+) -> FallView:
+    """``line``: the versions that ``falls`` end with, oldest first."""
+    ids: list[ModelRecord | None] = [None] * (len(falls) - len(line))
+    named = ", ".join(take.name for take in takes)
+    how = (
+        f"On takes that no version was trained on: {named}."
+        if is_held_out
+        else "On whole takes held out of each training in turn."
+    )
+    return FallView(
+        model=line[-1].id,
+        steps=[
+            FallStepView(
+                label=" ".join(fall.label.split()),
+                model=None if record is None else record.id,
+                effects=[] if record is None else list(record.facts.get("effects", ())),
+                rmse_deg=fall.rmse_deg,
+                control_rmse_deg=fall.control_rmse_deg,
+            )
+            for fall, record in zip(falls, [*ids, *line], strict=True)
+        ],
+        floor=None
+        if band is None
+        else FloorBandView(floor_deg=band.floor_deg, low_deg=band.low_deg, high_deg=band.high_deg),
+        takes=[TakeNamed(id=take.id, name=take.name) for take in takes],
+        is_held_out=is_held_out,
+        how=how,
+        sentence=fall_sentence(falls, band),
+    )
