@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -33,23 +35,53 @@ class GloveState:
     """From the service's receipt of the frame to the pose."""
     skipped: int
     """Frames of this run that the service left out for newer ones."""
+    lost: int | None
+    """Frames that were sent and never reached the service since it started; None: it has not said."""
+    refused: int
+    """Frames that reached it and could not be used."""
+    model: str | None
+    """Of the newest pose, 64 hexadecimal digits; None: uncalibrated."""
 
 
-def glove_state(status: dict[str, Any], is_silent: bool, pose: Pose | None, is_stale: bool) -> GloveState:
-    """From the capture daemon's ``status``, whether that is old, and the newest pose of a watched glove."""
-    word = _word(status, is_silent, pose, is_stale)
-    told = str(status.get("sentence") or "") if word == "lost" and not is_silent else ""
+def glove_state(
+    status: Mapping[str, Any],
+    is_silent: bool,
+    pose: Pose | None,
+    is_stale: bool,
+    account: Mapping[str, Any] | None = None,
+) -> GloveState:
+    """From the capture daemon's ``status``, whether that is old, the newest pose of a watched glove, and the
+    service's own ``account`` of the glove."""
+    word, account = _word(status, is_silent, pose, is_stale), account or {}
+    told = {"lost": "" if is_silent else status.get("sentence"), "uncalibrated": account.get("sentence")}
+    is_here = word not in ("lost", "stale")
+    refused = account.get("refused")
     return GloveState(
         word=word,
-        sentence=told or SENTENCES[word],
-        rate_hz=None if word == "lost" else status.get("rate_hz"),
+        sentence=_as_sentence(str(told.get(word) or "")) or SENTENCES[word],
+        rate_hz=None if word == "lost" else _number(status.get("rate_hz")),
         is_simulated=pose is not None and pose.simulated,
-        age_ms=None if pose is None or word in ("lost", "stale") else pose.age_us / 1000.0,
+        age_ms=pose.age_us / 1000.0 if pose is not None and is_here else None,
         skipped=0 if pose is None else pose.skipped,
+        lost=None if (lost := _number(account.get("missing"))) is None else int(lost),
+        refused=int(sum(_number(each) or 0 for each in refused.values())) if isinstance(refused, dict) else 0,
+        model=None if pose is None else pose.model_sha256,
     )
 
 
-def _word(status: dict[str, Any], is_silent: bool, pose: Pose | None, is_stale: bool) -> Word:
+def _number(value: Any) -> float | None:
+    """What came over the network may be anything."""
+    is_number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    return float(value) if is_number else None
+
+
+def _as_sentence(text: str) -> str:
+    """The service's reasons are clauses."""
+    text = text.strip()
+    return f"{text[0].upper()}{text[1:]}{'' if text[-1] in '.!?' else '.'}" if text else ""
+
+
+def _word(status: Mapping[str, Any], is_silent: bool, pose: Pose | None, is_stale: bool) -> Word:
     if is_silent or status.get("state") != "streaming":
         return "lost"
     if pose is None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
+from urllib.parse import quote
 
 from nicegui import ui
 
@@ -12,6 +14,23 @@ from glovecal_service.studio.studio import Studio
 
 EVERY_S = 1.0
 SHOWN = 12
+WITH_REPORTS = ("improve", "detectability")
+PAGES = {"diagnose": ("diagnose?model=", "What it found"), "ceiling": ("compare?models=", "Compare")}
+"""Where a job's model is shown with its result; of other kinds its errors are."""
+
+
+def result_link(job: Mapping[str, Any]) -> tuple[str, str] | None:
+    """Name and address of the page that shows what a finished job found; None where there is none."""
+    result = job["result"]
+    if not result:
+        return None
+    if job["kind"] in WITH_REPORTS:
+        return "Report", f"../v1/jobs/{job['id']}/report"
+    model = result.get("model")
+    if not model:
+        return None
+    page, name = PAGES.get(job["kind"], ("fall?model=", "Its errors"))
+    return name, f"/{page}{quote(str(model))}"
 
 
 class JobsDrawer:
@@ -68,6 +87,10 @@ class JobsDrawer:
                     "studio-target"
                 )
             ui.label(job["sentence"]).classes("job-sentence")
+            found = result_link(job)
+            if found is not None:
+                name, address = found
+                ui.link(name, address).classes("studio-link")
 
     async def _cancel(self, job: str) -> None:
         try:

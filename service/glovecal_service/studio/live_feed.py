@@ -7,16 +7,18 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
 from typing import Any
 
 import numpy as np
 import zenoh
 
-from glovecal_client.errors import NoAnswer, WireError
-from glovecal_client.keys import GloveKeys, all_gloves, parse_glove_key
+from glovecal_client.errors import BadName, NoAnswer, QueryRefused, WireError
+from glovecal_client.keys import GloveKeys, all_gloves, all_services, parse_glove_key
+from glovecal_client.names import check_channel_name
 from glovecal_client.pose_subscriber import PoseSubscriber
-from glovecal_client.queries import ask, ask_json, json_object
+from glovecal_client.queries import ask_json, json_object
 from glovecal_client.session import open_client
 from glovecal_client.wire.frame import decode_frame
 from glovecal_client.wire.pose import Pose
@@ -26,6 +28,9 @@ from glovecal_service.studio.glove_state import GloveState, glove_state
 LOST_AFTER_S = 3.0
 """Capture says once a second what it does; silence for so long means that it is gone."""
 ROUTER_WITHIN_S = 2.0
+ANSWER_WITHIN_S = 1.0
+FIRST_LOOK_S = 0.3
+MOST_GLOVES = 256
 
 
 class GloveFeed:
@@ -42,8 +47,8 @@ class GloveFeed:
             session.declare_subscriber(keys.raw, hear(self._hear_raw, indirect=False)),
             session.declare_subscriber(keys.meta, hear(self._hear_meta, indirect=False)),
         ]
-        with suppress(NoAnswer):
-            self._meta = ask_json(session, keys.meta, timeout_s=1.0)
+        # Nobody waits for the answer: a capture daemon may be gone.
+        session.get(keys.meta, hear(self._hear_meta_reply, indirect=False), timeout=ANSWER_WITHIN_S)
 
     @property
     def pose(self) -> Pose | None:
@@ -56,16 +61,16 @@ class GloveFeed:
 
     @property
     def sensors(self) -> list[str]:
-        return list(self._meta.get("sensors", []))
+        names = self._meta.get("sensors")
+        return [str(name) for name in names] if isinstance(names, list) else []
 
-    def names(self) -> dict[str, Any]:
-        """What the numbers of ``array`` are: rotations and sensors, in their order."""
-        pose = self.pose
+    def names(self, pose: Pose) -> dict[str, Any]:
+        """What the numbers of ``array`` are: rotations and sensors, in their order, and by which model."""
         rotations: tuple[str, ...] = ()
-        if pose is not None and not pose.uncalibrated:
+        if not pose.uncalibrated:
             with suppress(NoAnswer):
                 rotations = self._poses.rotations(pose)
-        return {"rotations": list(rotations), "sensors": self.sensors}
+        return {"rotations": list(rotations), "sensors": self.sensors, "model": pose.model_sha256}
 
     def array(self, pose: Pose) -> bytes:
         """Float32: R, S, R angles and R standard deviations (degrees), S readings (counts)."""
@@ -88,27 +93,38 @@ class GloveFeed:
     def _hear_raw(self, sample: zenoh.Sample) -> None:
         self._raw = sample.payload.to_bytes()
 
+    def _hear_meta_reply(self, reply: zenoh.Reply) -> None:
+        if reply.ok is not None and not self._meta:
+            self._hear_meta(reply.ok)
+
     def _hear_meta(self, sample: zenoh.Sample) -> None:
         self._meta = json_object(sample.payload.to_bytes()) or self._meta
 
 
 class LiveFeeds:
-    """Feeds of all gloves that pages watch, and what capture daemons say of theirs."""
+    """Feeds of all gloves that pages watch, and what capture daemons and the service say of them.
+
+    Only one thing is waited for: the router, by those who ask while there is none.
+    """
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         self._lock = threading.Lock()
+        """Of the feeds; nobody waits for an answer while holding it."""
+        self._connecting = threading.Lock()
         self._kept = ExitStack()
         self._session: zenoh.Session | None = None
         self._feeds: dict[str, tuple[GloveFeed, int]] = {}
         self._statuses: dict[str, tuple[float, dict[str, Any]]] = {}
+        self._accounts: tuple[float, Mapping[str, Any]] = (-LOST_AFTER_S, {})
 
     def open(self, glove: str) -> GloveFeed:
         """The feed of ``glove``; ``release`` it. Waits for the router. Raises NoAnswer, BadName."""
+        session = self._connected()
         with self._lock:
             feed, users = self._feeds.get(glove, (None, 0))
             if feed is None:
-                feed = GloveFeed(self._connected(), self._settings.site, glove)
+                feed = GloveFeed(session, self._settings.site, glove)
             self._feeds[glove] = feed, users + 1
             return feed
 
@@ -124,19 +140,32 @@ class LiveFeeds:
 
     def states(self) -> dict[str, GloveState]:
         """Each glove that a capture daemon was heard of, by name. Raises NoAnswer without a router."""
-        with self._lock:
-            self._connected()
+        self._connected()
         now, states = time.monotonic(), {}
+        said, accounts = self._accounts
         for glove, (heard, status) in sorted(self._statuses.copy().items()):
             feed = self._feeds.get(glove, (None, 0))[0]
+            account = accounts.get(glove) if now - said < LOST_AFTER_S else None
             states[glove] = glove_state(
                 status, now - heard > LOST_AFTER_S, None if feed is None else feed.pose,
-                feed is not None and feed.is_stale,
+                feed is not None and feed.is_stale, account if isinstance(account, dict) else None,
             )  # fmt: skip
         return states
 
+    def explain(self, glove: str, rotation: str) -> dict[str, Any]:
+        """What one angle of the glove's next pose is made of, as ``pose/explain`` answers.
+
+        Raises QueryRefused with a sentence for a user, NoAnswer, BadName.
+        """
+        key = GloveKeys(self._settings.site, glove).pose_explain
+        name = check_channel_name(rotation, "rotation")
+        try:
+            return ask_json(self._connected(), f"{key}?rotations={name}", timeout_s=ANSWER_WITHIN_S)
+        except QueryRefused as refused:
+            raise QueryRefused(str(refused).partition(": ")[2]) from refused
+
     def close(self) -> None:
-        with self._lock:
+        with self._connecting, self._lock:
             for feed, _ in self._feeds.values():
                 feed.close()
             self._feeds.clear()
@@ -145,19 +174,41 @@ class LiveFeeds:
 
     def _connected(self) -> zenoh.Session:
         """The session, opened with the first page that needs it."""
-        if self._session is None:
-            self._session = self._kept.enter_context(
-                open_client((self._settings.zenoh,), wait_s=ROUTER_WITHIN_S)
-            )
-            key = all_gloves(self._settings.site, "status")
-            hear = zenoh.handlers.Callback(self._hear_status, indirect=False)
-            self._kept.callback(self._session.declare_subscriber(key, hear).undeclare)
-            with suppress(NoAnswer):
-                for sample in ask(self._session, key, timeout_s=1.0):
-                    self._hear_status(sample)
-        return self._session
+        if self._session is not None:
+            return self._session
+        with self._connecting:
+            if self._session is None:
+                self._session = self._connect()
+            return self._session
+
+    def _connect(self) -> zenoh.Session:
+        session = self._kept.enter_context(open_client((self._settings.zenoh,), wait_s=ROUTER_WITHIN_S))
+        site, hear = self._settings.site, zenoh.handlers.Callback
+        service = all_services(site).removesuffix("alive") + "status"
+        answered: list[threading.Event] = []
+        for key, listen in ((all_gloves(site, "status"), self._hear_status), (service, self._hear_account)):
+            self._kept.callback(session.declare_subscriber(key, hear(listen, indirect=False)).undeclare)
+
+            def reply(answer: zenoh.Reply, listen: Callable[[zenoh.Sample], None] = listen) -> None:
+                if answer.ok is not None:
+                    listen(answer.ok)
+
+            answered.append(threading.Event())
+            session.get(key, hear(reply, answered[-1].set, indirect=False), timeout=ANSWER_WITHIN_S)
+        for each in answered:  # so that a page does not begin with no glove where there is one
+            each.wait(FIRST_LOOK_S)
+        return session
 
     def _hear_status(self, sample: zenoh.Sample) -> None:
         status = json_object(sample.payload.to_bytes())
-        if status is not None:
-            self._statuses[parse_glove_key(str(sample.key_expr))[0].glove] = time.monotonic(), status
+        if status is None:
+            return
+        with suppress(BadName):
+            glove = parse_glove_key(str(sample.key_expr))[0].glove
+            if glove in self._statuses or len(self._statuses) < MOST_GLOVES:
+                self._statuses[glove] = time.monotonic(), status
+
+    def _hear_account(self, sample: zenoh.Sample) -> None:
+        gloves = (json_object(sample.payload.to_bytes()) or {}).get("gloves")
+        if isinstance(gloves, dict):
+            self._accounts = time.monotonic(), gloves

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from functools import partial
@@ -24,13 +25,15 @@ from glovecal_client.errors import ClientError
 from glovecal_service.settings import Settings
 from glovecal_service.studio.live_feed import GloveFeed, LiveFeeds
 from glovecal_service.studio.page_policy import PagePolicy
-from glovecal_service.studio.pages import diagnose, effects, fall, live, models
+from glovecal_service.studio.pages import capture, compare, diagnose, effects, fall, live, models
 from glovecal_service.studio.service import Service
 from glovecal_service.studio.studio import Studio
 
+_log = logging.getLogger("glovecal.studio")
+
 PATH = "/studio"
 FRAME_S = 1.0 / 30.0
-PAGES = (live, diagnose, fall, models, effects)
+PAGES = (live, capture, compare, diagnose, fall, models, effects)
 
 
 def mount_studio(app: FastAPI, settings: Settings) -> None:
@@ -76,7 +79,9 @@ async def _feed(feeds: LiveFeeds, socket: WebSocket, glove: str) -> None:
     finally:
         for task in both:
             task.cancel()
-        await asyncio.gather(*both, return_exceptions=True)
+        for ended in await asyncio.gather(*both, return_exceptions=True):
+            if isinstance(ended, Exception) and not isinstance(ended, WebSocketDisconnect):
+                _log.warning("the feed of glove %s ended: %r", feed.glove, ended)
         await run_in_threadpool(feeds.release, feed)
 
 
@@ -94,7 +99,7 @@ async def _follow(feed: GloveFeed, socket: WebSocket) -> None:
         if pose is not None and pose is not shown:
             names = (pose.model_sha256, len(pose.degrees), tuple(feed.sensors))
             if names != told:
-                given = await run_in_threadpool(feed.names)
+                given = await run_in_threadpool(feed.names, pose)
                 await socket.send_text(json.dumps(given))
                 # The service may not have said yet what a new model's rotations are: then it is asked again.
                 told = names if len(given["rotations"]) == len(pose.degrees) else None

@@ -42,6 +42,9 @@ class Service:
     async def put(self, path: str, body: Mapping[str, Any], **query: Any) -> Any:
         return await self._ask("PUT", path, query, body)
 
+    async def put_file(self, path: str, content: bytes, media_type: str, **query: Any) -> Any:
+        return await self._ask("PUT", path, query, None, content, media_type)
+
     async def delete(self, path: str, **query: Any) -> Any:
         return await self._ask("DELETE", path, query, None)
 
@@ -49,10 +52,19 @@ class Service:
         await self._http.aclose()
 
     async def _ask(
-        self, method: str, path: str, query: Mapping[str, Any], body: Mapping[str, Any] | None
+        self,
+        method: str,
+        path: str,
+        query: Mapping[str, Any],
+        body: Mapping[str, Any] | None,
+        content: bytes | None = None,
+        media_type: str = "",
     ) -> Any:
         given = {name: value for name, value in query.items() if value is not None}
-        answer = await self._http.request(method, path, params=given, json=body)
+        headers = {"Content-Type": media_type} if media_type else {}
+        answer = await self._http.request(
+            method, path, params=given, json=body, content=content, headers=headers
+        )
         if answer.is_success:
             return answer.json() if answer.content else None
         try:

@@ -13,6 +13,8 @@ from glovecal_service.studio.studio import Studio
 
 NAVIGATION = (
     ("live", "Live"),
+    ("capture", "Capture"),
+    ("compare", "Compare"),
     ("diagnose", "Diagnose"),
     ("fall", "Error fall"),
     ("models", "Models"),

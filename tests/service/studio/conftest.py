@@ -12,23 +12,18 @@ from typing import Any, NoReturn
 
 import httpx
 import pytest
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 from realtime_support import free_endpoint, part_of_service, store_model
-from studio_support import Open, Opened
+from studio_support import Open, Opened, running_browser
 
 from glovecal_service.serve import real_time, web
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 
 STORED = Path(__file__).parents[1] / "stored_example" / "data-2026-11-22.tar.xz"
-FLAGS = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--enable-unsafe-swiftshader",
-)  # fmt: skip
 HARMLESS = "GPU stall due to ReadPixels"
 
 
@@ -64,21 +59,18 @@ def address(settings: Settings, model: str) -> Iterator[str]:
 
 @pytest.fixture(scope="package")
 def browser(not_here: Callable[[str], NoReturn]) -> Iterator[Browser]:
-    chromium = shutil.which("chromium")
-    if chromium is None:
+    if shutil.which("chromium") is None:
         not_here("Chromium is not installed (Debian: apt-get install chromium)")
-    with sync_playwright() as running:
-        browser = running.chromium.launch(executable_path=chromium, args=list(FLAGS))
+    with running_browser() as browser:
         yield browser
-        browser.close()
 
 
 @pytest.fixture
 def opened(browser: Browser, address: str) -> Iterator[Open]:
-    """``opened("live")``: the page once its heading is there."""
+    """``opened("live")``: the page once its heading is there; ``at`` is another service's address."""
     contexts = []
 
-    def open_page(name: str) -> Opened:
+    def open_page(name: str, at: str = address) -> Opened:
         context = browser.new_context(viewport={"width": 1280, "height": 800}, color_scheme="light")
         contexts.append(context)
         seen = Opened(context.new_page())
@@ -90,7 +82,7 @@ def opened(browser: Browser, address: str) -> Iterator[Open]:
         seen.page.on("console", complain)
         seen.page.on("pageerror", lambda error: seen.complaints.append(str(error)))
         seen.page.on("request", lambda request: seen.asked.append(request.url))
-        seen.page.goto(f"{address}/studio/{name}")
+        seen.page.goto(f"{at}/studio/{name}")
         seen.page.wait_for_selector("h1", timeout=60_000)
         return seen
 

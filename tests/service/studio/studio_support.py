@@ -1,11 +1,48 @@
-"""A page of the studio as tests open it."""
+"""Pages of the studio as tests, the bench and the picture of README open them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+import shutil
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
-from playwright.sync_api import Page
+import numpy as np
+import zenoh
+from playwright.sync_api import Browser, Page, sync_playwright
+from realtime_support import WireGlove
+
+from glovecal_client.rest import RestClient
+from glovecal_models.calibration.training import train
+from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_service.demo.hidden_session import HiddenSession
+from glovecal_service.jobs.child_record import artifact_array, keep_child
+from glovecal_service.settings import Settings
+from glovecal_service.store import Store
+
+FLAGS = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--enable-unsafe-swiftshader",
+)  # fmt: skip
+
+STREAMING = {"state": "streaming", "sentence": "", "rate_hz": 60.0}
+
+
+@contextmanager
+def running_browser() -> Iterator[Browser]:
+    """The Chromium of this computer, headless; WebGL is drawn by the processor."""
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        raise FileNotFoundError("Chromium is not installed (Debian: apt-get install chromium)")
+    with sync_playwright() as running:
+        browser = running.chromium.launch(executable_path=chromium, args=list(FLAGS))
+        yield browser
+        browser.close()
 
 
 @dataclass
@@ -20,3 +57,67 @@ class Opened:
 
 
 Open = Callable[..., Opened]
+
+
+def with_calibration(
+    settings: Settings, client: RestClient, hidden: HiddenSession, folder: Path, subject: str
+) -> tuple[str, str]:
+    """Import a session; layout, and id of an LMC-GPR model trained here: no worker needs to start for it.
+
+    A linear model and readings scaled to angles are there for comparison.
+    """
+    training, test = hidden.write(folder)
+    client.post("/subjects", {"name": subject})
+    learned = client.upload_takes(training, subject=subject)
+    client.upload_takes(test, subject=subject, layout=learned["layout"])
+    made = ""
+    with Store.open(settings) as store:
+        records = [store.takes.get(take["id"]) for take in learned["takes"]]
+        takes, layout = (
+            [store.takes.load(record.id) for record in records],
+            store.layouts.get(learned["layout"]),
+        )
+        for method in ("raw", "linear", "lmc_gpr"):
+            chosen = TrainingSettings(method=method, samples=300, folds=2)
+            hashes = [record.artifact for record in records]
+            model = train(takes, layout, subject, chosen, take_hashes=hashes)
+            made = keep_child(
+                store, artifact_array(model), learned["layout"], records, chosen, {}, activate=True
+            ).id
+    return learned["layout"], made
+
+
+@contextmanager
+def moving(
+    session: zenoh.Session,
+    settings: Settings,
+    name: str,
+    subject: str | None,
+    acts: set[str] | None = None,
+    **meta: Any,
+) -> Iterator[WireGlove]:
+    """A glove that bends and stretches, 60 frames a second, and says once a second that it streams.
+
+    ``acts`` changes what it does: ``dropped`` a sensor that reads zero, ``silent`` no frames.
+    """
+    glove = WireGlove(session, settings, name, subject=subject)
+    stopped, acts = threading.Event(), acts if acts is not None else set()
+
+    def send() -> None:
+        at = 0
+        while not stopped.wait(1 / 60):
+            if at % 30 == 0:
+                glove.say_meta(**meta)
+                session.put(glove.keys.status, json.dumps(STREAMING))
+            bend = 140.0 + 60.0 * np.sin(at / 20.0)
+            if "silent" not in acts:
+                glove.send((0.0 if "dropped" in acts else bend, bend, bend))
+            at += 1
+
+    thread = threading.Thread(target=send)
+    thread.start()
+    try:
+        yield glove
+    finally:
+        stopped.set()
+        thread.join()

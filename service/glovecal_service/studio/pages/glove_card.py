@@ -2,23 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
 from typing import Any
 from urllib.parse import quote
 
 from nicegui import ui
+from nicegui.elements.mixins.text_element import TextElement
 
 from glovecal_service.studio.amounts import version_name
 from glovecal_service.studio.glove_state import GloveState
 from glovecal_service.studio.hand.hand_view import HandView, Side
 from glovecal_service.studio.heading import heading
+from glovecal_service.studio.pages.explained_joint import ExplainedJoint
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.strips.live_values import AngleList, SensorStrips
 from glovecal_service.studio.studio import Studio
 
 SIDES: tuple[tuple[Side, str], ...] = (("back", "Back"), ("palm", "Palm"), ("side", "Side"))
+LOOK_AGAIN_S = 3.0
+"""Models and wearers change elsewhere too."""
+LEAST_SHARE = 0.1
+"""Of a sensor's counts it has to have gone through before the raw hand follows it."""
+LEAST_COUNTS = 20.0
+"""Where the layout does not say what its sensors count."""
+RAW_IS = (
+    "Raw (violet) is no calibration: each sensor alone, drawn linearly from its least to its greatest "
+    "reading since this page was opened, over the joint's usual range. Open and close the hand once; what "
+    "has not moved rests. The wrist is that of the calibrated hand."
+)
+FACTS = {
+    "Rate": "Frames a second, measured by the capture daemon",
+    "Age": "From the service's receipt of a frame to its pose",
+    "Skipped": "Frames of this run that the service left out for newer ones",
+    "Lost": "Frames that were sent and never reached the service since it started",
+    "Refused": "Frames that reached the service and could not be used",
+}
 
 
 class GloveCard:
@@ -27,55 +48,120 @@ class GloveCard:
     def __init__(self, studio: Studio, glove: str) -> None:
         self._studio = studio
         self._glove = glove
+        self._worn: tuple[Any, ...] = ()
+        self._models: dict[str, str] = {}
+        self._active: str | None = None
+        self._served: str | None = None
+        self._looked_at = 0.0
+        self._joint: ExplainedJoint | None = None
+
+    @property
+    def place(self) -> tuple[str, int, str]:
+        """Sorts gloves: those of a wearer together, the left hand first, as one sees one's own."""
+        subject, _, hand, _ = self._worn
+        return subject or "\U0010ffff", {"left": 0, "right": 1}.get(hand, 2), self._glove
 
     async def build(self) -> None:
-        feed = f"/studio/feed/{quote(self._glove)}"
+        self.section = ui.element("section").classes("glove")
+        self.section.props["aria-label"] = f"Glove {self._glove}"
+        await self._fill(await self._seen())
+
+    def move_to(self, place: int) -> None:
+        """Among the cards of the page."""
+        self.section.move(target_index=place)
+
+    async def look(self, state: GloveState) -> None:
+        """Show ``state``, and what was changed elsewhere: the wearer, the models and which one is active."""
+        is_late = time.monotonic() - self._looked_at > LOOK_AGAIN_S
+        if is_late or state.model != self._served:
+            self._served = state.model
+            with suppress(Refusal):  # the database may be away for a moment; the state is shown all the same
+                await self._follow()
+        self._show(state)
+
+    async def _follow(self) -> None:
         glove = await self._seen()
-        with ui.element("section").classes("glove") as section:
-            section.props["aria-label"] = f"Glove {self._glove}"
+        if _worn(glove) == self._worn:
+            await self._offer_models(glove)
+        else:
+            await self._fill(glove)
+
+    def _show(self, state: GloveState) -> None:
+        self._word.set_text(state.word + (", simulated" if state.is_simulated else ""))
+        if self._word.props.get("data-word") != state.word:
+            for element in (self._word, self.section):
+                element.props["data-word"] = state.word
+                element.update()
+        self._sentence.set_text(state.sentence)
+        facts = {
+            "Rate": "–" if state.rate_hz is None else f"{state.rate_hz:.0f} frames/s",
+            "Age": "–" if state.age_ms is None else f"{state.age_ms:.1f} ms",
+            "Skipped": f"{state.skipped}",
+            "Lost": "–" if state.lost is None else f"{state.lost}",
+            "Refused": f"{state.refused}",
+        }
+        for name, text in facts.items():
+            self._facts[name].set_text(text)
+
+    async def _fill(self, glove: Mapping[str, Any]) -> None:
+        feed = f"/studio/feed/{quote(self._glove)}"
+        skeleton = await self._skeleton(glove)
+        reads, least = await self._raw_reading(glove)
+        self._worn, self._models, self._active = _worn(glove), {}, None
+        if self._joint is not None:
+            self._joint.end()
+        self.section.clear()
+        with self.section:
             with ui.row().classes("glove-head"):
                 heading(2, self._glove)
                 self._word = ui.label("").classes("state-word").props('role="status"')
-                self._sentence = ui.label("")
-            self._numbers = ui.label("").classes("glove-numbers")
-            self._models = ui.element("div").classes("glove-models")
+                subject, _, hand, _ = self._worn
+                ui.label(", ".join(filter(None, (subject, f"{hand} hand" if hand in _HANDS else ""))))
+            self._sentence = ui.label("").classes("glove-sentence")
+            self._facts = _facts()
+            self._choice = ui.element("div").classes("glove-models")
             with ui.element("div").classes("glove-parts"):
-                with ui.element("div"):
+                with ui.element("div").classes("glove-seen"):
                     view = HandView(
-                        await self._skeleton(glove),
-                        label=f"Hand of glove {self._glove}, live",
-                        feed=feed,
+                        skeleton, label=f"Hand of glove {self._glove}, live", feed=feed,
                         empty="No calibrated pose",
-                    ).classes("glove-hand")
-                    with ui.row().classes("glove-sides"):
-                        for side, name in SIDES:
-                            ui.button(name, on_click=partial(view.look, side)).props(
-                                "outline no-caps"
-                            ).classes("studio-target")
+                    ).classes("glove-hand")  # fmt: skip
+                    self._view_acts(view, reads, least)
+                    self._joint = ExplainedJoint(self._studio, self._glove, view)
                 with ui.element("div").classes("glove-values"):
-                    angles = AngleList(feed, label="Angles and their standard deviations")
+                    self._joint.choose_in(AngleList(feed, label="Angles and their standard deviations"))
+                    heading(3, "Readings, last 6 s")
                     SensorStrips(feed, label=f"Readings of glove {self._glove}, last seconds")
-            angles.on_rotation(view.choose)
-            view.on_rotation(view.choose)
         await self._offer_models(glove)
 
-    def show(self, state: GloveState) -> None:
-        self._word.set_text(state.word + (", simulated" if state.is_simulated else ""))
-        if self._word.props.get("data-word") != state.word:
-            self._word.props["data-word"] = state.word
-            self._word.update()
-        self._sentence.set_text(state.sentence)
-        rate = "–" if state.rate_hz is None else f"{state.rate_hz:.0f} frames/s"
-        age = "" if state.age_ms is None else f", pose {state.age_ms:.0f} ms after the frame"
-        self._numbers.set_text(f"{rate}{age}, {state.skipped} frames skipped")
+    def _view_acts(self, view: HandView, reads: Mapping[str, str], least: float) -> None:
+        with ui.row().classes("glove-acts"):
+            with ui.element("div").classes("glove-sides").props('role="group" aria-label="Seen from"'):
+                for side, name in SIDES:
+                    _act(name, partial(view.look, side))
+            with ui.element("div").classes("glove-sides").props('role="group" aria-label="Hands shown"'):
+                _switch("Calibrated", True, view.calibrated)
+                _switch("Raw", False, lambda shown: self._show_raw(view, reads, least, shown))
+        self._raw_is = ui.label(RAW_IS).classes("glove-raw-is")
+        self._raw_is.set_visibility(False)
+        view.raw(reads, least=least, shown=False)
+        with ui.element("div").classes("sd-scale").props('role="note"'):
+            ui.label("Colour and size of a joint: standard deviation of its angle, 0°")
+            ui.element("span").classes("sd-scale-bar")
+            ui.label("8° and more")
+
+    def _show_raw(self, view: HandView, reads: Mapping[str, str], least: float, shown: bool) -> None:
+        view.raw(reads, least=least, shown=shown)
+        self._raw_is.set_visibility(shown)
 
     async def _seen(self) -> Mapping[str, Any]:
+        self._looked_at = time.monotonic()
         seen = (await self._studio.service.get("/gloves"))["seen"]
         return next((each for each in seen if each["name"] == self._glove), {})
 
     async def _skeleton(self, glove: Mapping[str, Any]) -> dict[str, Any]:
         """Of the wearer, else of a hand of usual size."""
-        hand = glove.get("hand") if glove.get("hand") in ("left", "right") else None
+        hand = glove.get("hand") if glove.get("hand") in _HANDS else None
         if glove.get("subject"):
             with suppress(Refusal):
                 return await self._studio.service.get(
@@ -83,21 +169,88 @@ class GloveCard:
                 )
         return await self._studio.service.get("/skeleton", hand=hand)
 
+    async def _raw_reading(self, glove: Mapping[str, Any]) -> tuple[dict[str, str], float]:
+        """The sensor that each rotation of the raw hand is read from, and how far it has to have moved."""
+        if not glove.get("layout"):
+            return {}, LEAST_COUNTS
+        try:
+            layout = (await self._studio.service.get(f"/gloves/{quote(glove['layout'])}"))["document"]
+        except Refusal:
+            return {}, LEAST_COUNTS
+        reads = {
+            rotation: rotation if rotation in sensors else sensors[0]
+            for rotation, sensors in layout["rotations"].items()
+            if sensors
+        }
+        counts = layout.get("counts")
+        return reads, LEAST_SHARE * (counts[1] - counts[0]) if counts else LEAST_COUNTS
+
     async def _offer_models(self, glove: Mapping[str, Any]) -> None:
-        if not glove.get("subject"):
+        """The models of the wearer; what is active elsewhere is chosen here."""
+        if not glove.get("subject") or not glove.get("layout"):
             return
-        models = await self._studio.service.get("/models", subject=glove["subject"], layout=glove["layout"])
-        if not models:
+        found = await self._studio.service.get("/models", subject=glove["subject"], layout=glove["layout"])
+        names = {each["id"]: version_name(each) for each in found}
+        active = next((each["id"] for each in found if each["active"]), None)
+        if names == self._models and active == self._active:
             return
-        names = {each["id"]: version_name(each) for each in models}
-        active = next((each["id"] for each in models if each["active"]), None)
-        with self._models:
-            ui.select(
-                names, value=active, label=f"Model of {glove['subject']}", on_change=self._activate
-            ).classes("choice")
+        is_first = not self._models
+        self._models, self._active = names, active
+        if is_first:
+            self._choice.clear()
+            with self._choice:
+                self._select = ui.select(
+                    names, value=active, label=f"Model of {glove['subject']}", on_change=self._activate
+                ).classes("choice")
+        else:
+            self._select.set_options(names, value=active)
 
     async def _activate(self, event: Any) -> None:
+        if event.value in (None, self._active):  # this page follows a change made elsewhere
+            return
         try:
             await self._studio.service.post(f"/models/{event.value}/activate")
         except Refusal as refusal:
             ui.notify(str(refusal), type="warning")
+            self._select.set_value(self._active)
+            return
+        self._active = event.value
+
+
+_HANDS = ("left", "right")
+
+
+def _worn(glove: Mapping[str, Any]) -> tuple[Any, ...]:
+    """What a card is built for: subject, layout, hand, sensors."""
+    sensors = (glove.get("meta") or {}).get("sensors")
+    return glove.get("subject"), glove.get("layout"), glove.get("hand"), str(sensors)
+
+
+def _facts() -> dict[str, ui.label]:
+    """Name and number of each; a title tells what it is."""
+    labels = {}
+    with ui.element("ul").classes("glove-facts"):
+        for name, what in FACTS.items():
+            with ui.element("li") as item:
+                item.props["title"] = what
+                ui.label(name).classes("glove-fact")
+                labels[name] = ui.label("–").classes("glove-number")
+    return labels
+
+
+def _act(name: str, act: Callable[[], Any]) -> TextElement:
+    """A plain button: the library's has one look, pressed or not."""
+    button = TextElement(tag="button", text=name).classes("glove-act").props('type="button"')
+    button.on("click", act)
+    return button
+
+
+def _switch(name: str, shown: bool, show: Callable[[bool], Any]) -> None:
+    def turn() -> None:
+        now = button.props["aria-pressed"] != "true"
+        button.props["aria-pressed"] = "true" if now else "false"
+        button.update()
+        show(now)
+
+    button = _act(name, turn)
+    button.props["aria-pressed"] = "true" if shown else "false"

@@ -43,9 +43,17 @@ class LivePage:
             self._notice.set_text(f"The real-time process does not answer: {error}")
             return
         self._notice.set_text("" if states else "No glove is connected: glovecal capture starts one.")
+        new = [glove for glove in states if glove not in self._cards]
+        for glove in new:
+            with self._gloves:
+                card = self._cards[glove] = GloveCard(self._studio, glove)
+                await card.build()
+        if new:
+            self._sort()
         for glove, state in states.items():
-            if glove not in self._cards:
-                with self._gloves:
-                    card = self._cards[glove] = GloveCard(self._studio, glove)
-                    await card.build()
-            self._cards[glove].show(state)
+            await self._cards[glove].look(state)
+
+    def _sort(self) -> None:
+        """Hands of one wearer side by side, the left one first."""
+        for place, card in enumerate(sorted(self._cards.values(), key=lambda each: each.place)):
+            card.move_to(place)

@@ -23,6 +23,8 @@ async def model_select(service: Service, wanted: str, chosen: Callable[[str], Aw
     names = {each["id"]: f"{each['subject']}: {version_name(each)}" for each in reversed(models)}
     active = next((each["id"] for each in reversed(models) if each["active"]), models[-1]["id"])
     first = wanted if wanted in names else active
+    if wanted and first != wanted:
+        ui.label(f"There is no model {wanted[:12]}.").classes("studio-notice").props('role="status"')
 
     async def change(event: ValueChangeEventArguments) -> None:
         await chosen(str(event.value))

@@ -8,6 +8,7 @@ from typing import Any
 from nicegui import ui
 
 from glovecal_service.studio.amounts import degrees, made_of
+from glovecal_service.studio.hand.dimensions_form import DimensionsForm
 from glovecal_service.studio.heading import heading
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.shell import shell
@@ -22,7 +23,9 @@ def add(studio: Studio) -> None:
     @ui.page("/models")
     async def models() -> None:
         with shell(studio, "models", "Models and subjects"):
+            ui.add_head_html('<link rel="stylesheet" href="/studio/static/findings.css">')
             await ModelsPage(studio).build()
+            await DimensionsForm(studio.service).build()
 
 
 class ModelsPage:

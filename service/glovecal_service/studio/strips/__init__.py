@@ -1,1 +1,1 @@
-"""What a glove sends now, beside its hand: angles as a list, readings as strips over the last seconds."""
+"""What a glove sends now, beside its hand: angles as a list, one of them term by term, readings as strips."""

@@ -8,6 +8,9 @@ const RADIANS = Math.PI / 180;
 const BONE_MM = 5.5;
 const JOINT_MM = 7.5;
 const FIELD_DEG = 28;
+const GAP = 0xdc2626;
+const GAP_MM = 2;
+const LEAST_GAP_MM = 0.05; // shorter, it has no direction
 
 /** Angles of every rotation of the hand: what is given, else its rule, else its rest. */
 export function completed(skeleton, given) {
@@ -31,16 +34,17 @@ export function completed(skeleton, given) {
   return angles;
 }
 
-/** One hand. */
+/** One hand, made of `material`, so many times as thick as usual. */
 export class Hand {
-  constructor(skeleton) {
+  constructor(skeleton, material, thickness = 1) {
+    this.thickness = thickness;
     this.skeleton = skeleton;
     this.root = new THREE.Group();
     this.joints = new Map();
     this.balls = new Map();
     this.tips = new Map();
-    this.material = new THREE.MeshStandardMaterial({ color: 0x9aa7b5, roughness: 0.75 });
-    const ball = new THREE.SphereGeometry(JOINT_MM, 20, 14);
+    this.material = new THREE.MeshStandardMaterial({ color: 0x9aa7b5, roughness: 0.75, ...material });
+    const ball = new THREE.SphereGeometry(thickness * JOINT_MM, 20, 14);
     this.geometries = [ball];
     for (const joint of skeleton.joints) {
       const object = new THREE.Group();
@@ -78,7 +82,8 @@ export class Hand {
   _bone(parent, to) {
     const length = to.length();
     if (length < 1) return;
-    const geometry = new THREE.CylinderGeometry(BONE_MM, BONE_MM, length, 14);
+    const radius = this.thickness * BONE_MM;
+    const geometry = new THREE.CylinderGeometry(radius, radius, length, 14);
     this.geometries.push(geometry);
     const bone = new THREE.Mesh(geometry, this.material);
     bone.position.copy(to).multiplyScalar(0.5);
@@ -116,9 +121,53 @@ export class Hand {
     }
   }
 
+  /** Let light through: `share` 1 is solid. */
+  fade(share) {
+    for (const material of [this.material, ...[...this.balls.values()].flat().map((mesh) => mesh.material)]) {
+      material.opacity = share;
+    }
+  }
+
   dispose() {
     for (const geometry of this.geometries) geometry.dispose();
     for (const meshes of this.balls.values()) for (const mesh of meshes) mesh.material.dispose();
+    this.material.dispose();
+  }
+}
+
+/** A rod from each fingertip of one hand to the same one of another. */
+export class TipGaps {
+  constructor() {
+    this.root = new THREE.Group();
+    this.geometry = new THREE.CylinderGeometry(GAP_MM, GAP_MM, 1, 10);
+    // Seen through both hands: most distances are shorter than a fingertip is thick.
+    this.material = new THREE.MeshBasicMaterial({ color: GAP, depthTest: false, transparent: true });
+    this.rods = new Map();
+  }
+
+  draw(hand, other) {
+    const from = hand.places().tips, to = other.places().tips;
+    const up = new THREE.Vector3(0, 1, 0);
+    for (const finger of Object.keys(from)) {
+      if (!this.rods.has(finger)) {
+        const made = new THREE.Mesh(this.geometry, this.material);
+        made.renderOrder = 1;
+        this.rods.set(finger, made);
+        this.root.add(made);
+      }
+      const rod = this.rods.get(finger);
+      const start = new THREE.Vector3(...from[finger]), way = new THREE.Vector3(...to[finger]).sub(start);
+      const length = way.length();
+      rod.visible = length > LEAST_GAP_MM;
+      if (!rod.visible) continue;
+      rod.position.copy(start).addScaledVector(way, 0.5);
+      rod.scale.set(1, length, 1);
+      rod.quaternion.setFromUnitVectors(up, way.normalize());
+    }
+  }
+
+  dispose() {
+    this.geometry.dispose();
     this.material.dispose();
   }
 }
@@ -141,16 +190,17 @@ export class Stage {
     this.raycaster = new THREE.Raycaster();
     this.dirty = true;
     this.drawn = 0;
-    this.look("back");
     this.resizer = new ResizeObserver(() => this.resize());
     this.resizer.observe(canvas.parentElement);
     this.resize();
   }
 
-  /** "back" (of the hand), "palm" or "side" (thumb's side). */
-  look(from) {
-    const away = { back: [0, 0, 520], palm: [0, 0, -520], side: [0, 520, 60] }[from];
-    this.camera.position.set(85 + away[0], away[1], away[2]);
+  /** "back" (of the hand), "palm", "side" (thumb's side) or "corner" (between back and side) of a `hand`. */
+  look(from, hand = "right") {
+    const corner = [30, 310, 385];
+    const away = { back: [0, 0, 520], palm: [0, 0, -520], side: [0, 520, 60], corner }[from];
+    const thumb = hand === "left" ? -1 : 1; // a left hand is the right one's mirror image
+    this.camera.position.set(85 + away[0], thumb * away[1], away[2]);
     this.controls.update();
     this.dirty = true;
   }
@@ -176,15 +226,24 @@ export class Stage {
     this.dirty = true;
   }
 
-  /** The rotation of `hand` under a pointer event, or null. */
+  /** Where a joint is seen, in px from the canvas' upper left corner. */
+  seenAt(object) {
+    const { clientWidth, clientHeight } = this.canvas;
+    const at = object.getWorldPosition(new THREE.Vector3()).project(this.camera);
+    return { x: ((at.x + 1) / 2) * clientWidth, y: ((1 - at.y) / 2) * clientHeight };
+  }
+
+  /** The rotations of `hand` whose joints are in one place under a pointer event: bending first, then spreading. */
   picked(event, hand) {
     const box = this.canvas.getBoundingClientRect();
     const at = new THREE.Vector2(
       ((event.clientX - box.left) / box.width) * 2 - 1, 1 - ((event.clientY - box.top) / box.height) * 2,
     );
     this.raycaster.setFromCamera(at, this.camera);
-    const [hit] = this.raycaster.intersectObjects([...hand.balls.values()].flat(), false);
-    return hit ? hit.object.userData.rotation : null;
+    const hits = this.raycaster.intersectObjects([...hand.balls.values()].flat(), false);
+    const near = hits.filter(({ distance }) => distance - hits[0].distance < JOINT_MM);
+    const names = [...new Set(near.map(({ object }) => object.userData.rotation))];
+    return names.sort((one, other) => one.endsWith("_ABD") - other.endsWith("_ABD"));
   }
 
   draw() {

@@ -1,0 +1,62 @@
+"""Held-out errors with each effect beside those with its control, as a table with bars."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from nicegui import ui
+from nicegui.elements.mixins.text_element import TextElement
+
+from glovecal_service.studio.amounts import degrees
+
+HEADS = ("Effect", "Error reduced by", "Held-out error", "With its control", "Significant on")
+
+
+def candidate_table(candidates: Sequence[Mapping[str, Any]]) -> None:
+    """``candidates``: of a diagnosis, the best first."""
+    largest = max([0.01, *(_saved(item, "rmse_after_deg") for item in candidates)])
+    with ui.element("div").classes("table-box") as box:
+        box.props('tabindex="0" role="region" aria-label="Held-out error with each effect"')
+        with ui.element("table").classes("candidate-table"):
+            with ui.element("thead"), ui.element("tr"):
+                for text in HEADS:
+                    TextElement(tag="th", text=text).props('scope="col"')
+            with ui.element("tbody"):
+                for item in candidates:
+                    _row(item, largest)
+
+
+def bar_key() -> None:
+    """What the bars are."""
+    with ui.element("div").classes("bar-key"):
+        for kind, text in (
+            ("saved-by-effect", "effect, significant"),
+            ("saved-by-chance", "effect, not significant"),
+            ("saved-by-control", "its control: as free, and cannot be right"),
+        ):
+            with ui.element("span"):
+                ui.element("i").classes(f"saved-bar {kind}")
+                ui.label(text)
+
+
+def _row(item: Mapping[str, Any], largest: float) -> None:
+    saved, control = (_saved(item, name) for name in ("rmse_after_deg", "rmse_control_deg"))
+    with ui.element("tr"):
+        TextElement(tag="th", text=item["effect"]).props('scope="row"')
+        with ui.element("td").classes("saved-cell"):
+            _bar(saved, largest, "saved-by-effect" if item["passes"] else "saved-by-chance")
+            _bar(control, largest, "saved-by-control")
+        TextElement(tag="td", text=f"{degrees(item['rmse_before_deg'])} → {degrees(item['rmse_after_deg'])}")
+        TextElement(tag="td", text=degrees(item["rmse_control_deg"]))
+        TextElement(tag="td", text=", ".join(item["where"]) or "no rotation").classes("candidate-where")
+
+
+def _bar(saved: float, largest: float, kind: str) -> None:
+    share = 100.0 * min(1.0, max(0.0, saved) / largest)
+    ui.element("div").classes(f"saved-bar {kind}").style(f"--share: {share:.1f}%")
+
+
+def _saved(item: Mapping[str, Any], name: str) -> float:
+    before, after = item["rmse_before_deg"], item[name]
+    return 0.0 if before is None or after is None else before - after

@@ -1,0 +1,97 @@
+"""Capture: guided sampling, free recording and the check of a new wearing, for hands that wear a glove."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from nicegui import ui
+
+from glovecal_service.studio.pages.capture_recording import RecordingPage
+from glovecal_service.studio.pages.capture_sampling import SamplingPage
+from glovecal_service.studio.pages.capture_start import SamplingForm, WearingForm
+from glovecal_service.studio.service import Refusal
+from glovecal_service.studio.shell import shell
+from glovecal_service.studio.studio import Studio
+
+MODES = {"sampling": "Guided sampling", "recording": "Free recording", "wearing": "New wearing"}
+AGAIN_EVERY_S = 2.0
+PATIENCE_S = 30.0
+"""A busy computer takes longer than the library's three seconds to ask for all that stands on the page."""
+
+
+def add(studio: Studio) -> None:
+    """``/studio/capture``: ``sampling`` follows that one, ``proposal`` is a diagnosis that wants a take."""
+
+    @ui.page("/capture", response_timeout=PATIENCE_S)
+    async def capture(mode: str = "", sampling: str = "", proposal: str = "") -> None:
+        wanted = mode if mode in MODES else "recording" if proposal else "sampling"
+        with shell(studio, "capture", "Capture"):
+            await CapturePage(studio, wanted).build(sampling, proposal)
+
+
+class CapturePage:
+    """One open page: a sampling or recording that goes on comes before the form for a new one."""
+
+    def __init__(self, studio: Studio, mode: str) -> None:
+        self._studio = studio
+        self._mode = mode
+
+    async def build(self, sampling: str, proposal: str) -> None:
+        with ui.element("nav").props('aria-label="Ways to capture"').classes("studio-nav capture-modes"):
+            for mode, name in MODES.items():
+                link = ui.link(name, f"/capture?mode={mode}").classes("studio-tab")
+                if mode == self._mode:
+                    link.props('aria-current="true"')
+        self._main = ui.element("div").classes("capture")
+        gloves = (await self._studio.service.get("/gloves"))["seen"]
+        if not gloves:
+            ui.label("No glove was seen yet: glovecal capture starts one.").classes("studio-notice")
+            ui.timer(AGAIN_EVERY_S, self._again)
+            return
+        with self._main:
+            if self._mode == "recording":
+                await RecordingPage(self._studio, gloves).build(await self._proposed(proposal))
+                return
+            view = await self._open_sampling(sampling)
+            if view is not None:
+                await SamplingPage(self._studio, view).build()
+                return
+            form = WearingForm if self._mode == "wearing" else SamplingForm
+            await form(self._studio, gloves, self._started).build()
+
+    async def _started(self, view: dict[str, Any]) -> None:
+        ui.navigate.history.replace(f"?mode={self._mode}&sampling={view['id']}")
+        self._main.clear()
+        with self._main:
+            await SamplingPage(self._studio, view).build()
+
+    async def _open_sampling(self, wanted: str) -> dict[str, Any] | None:
+        """``wanted``, else the newest that goes on."""
+        if wanted:
+            try:
+                return await self._studio.service.get(f"/sampling/{wanted}")
+            except Refusal as refusal:
+                ui.notify(str(refusal), type="warning")
+        found = await self._studio.service.get("/sampling", only_open=True)
+        for other in found[1:]:
+            ui.link(
+                f"Also going on: {other['subject']} with {other['glove']}",
+                f"/capture?sampling={other['id']}",
+            ).classes("studio-link")
+        return found[0] if found else None
+
+    async def _proposed(self, job: str) -> dict[str, Any] | None:
+        """What a diagnosis wants to be recorded next, with its subject."""
+        if not job:
+            return None
+        try:
+            found = await self._studio.service.get(f"/jobs/{job}")
+        except Refusal as refusal:
+            ui.notify(str(refusal), type="warning")
+            return None
+        take = (found["result"] or {}).get("next_take")
+        return None if take is None else {**take, "subject": found["subject"]}
+
+    async def _again(self) -> None:
+        if (await self._studio.service.get("/gloves"))["seen"]:
+            ui.navigate.reload()

@@ -1,0 +1,270 @@
+"""Free recording with its pre-roll, by key or mouse, and the reference of a take and its clock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import PurePosixPath
+from typing import Any
+
+from nicegui import events, ui
+
+from glovecal_service.studio.guide.board import MAIN_KEYS, Board, Shown, Tone
+from glovecal_service.studio.heading import heading
+from glovecal_service.studio.pages.capture_start import WornGlove
+from glovecal_service.studio.service import Refusal
+from glovecal_service.studio.studio import Studio
+
+EVERY_S = 0.2
+PRE_ROLL_S = 60
+LONGEST_PRE_ROLL_S = 600
+LONGEST_S = 3600
+LARGEST_FILE = 512 * 2**20
+SHOWN_TAKES = 100
+FREE = "free-"
+OF_A_SAMPLING = "sampling-"
+"""Recordings of this name belong to a guided sampling."""
+MEDIA_TYPES = {".parquet": "application/vnd.apache.parquet"}
+READY = "Ready to record"
+WAITING = Shown("waiting", "Press Space to start.", ask=READY)
+OPEN = ("requested", "recording", "stopping")
+
+
+class RecordingPage:
+    """One open page. A recording that goes on is taken up again after a reload."""
+
+    def __init__(self, studio: Studio, gloves: Sequence[Mapping[str, Any]]) -> None:
+        self._studio = studio
+        self._worn = WornGlove(studio, gloves)
+        self._recording: dict[str, Any] | None = None
+        self._proposed: Mapping[str, Any] = {}
+
+    async def build(self, proposed: Mapping[str, Any] | None) -> None:
+        self._proposed = proposed or {}
+        with ui.element("section").classes("card capture-form").props('aria-label="Recording"'):
+            if proposed:
+                with ui.element("div").classes("capture-proposal"):
+                    heading(2, f"What the diagnosis wants to be recorded: {proposed['seconds']} s")
+                    ui.label(proposed["what"])
+                    if proposed["separates"]:
+                        ui.label(f"It decides between {', '.join(proposed['separates'])}.")
+            else:
+                heading(2, "Record a take")
+            await self._worn.build((proposed or {}).get("subject"))
+            with ui.element("div").classes("capture-fields"):
+                self._name = ui.input(
+                    "Name of the take", value="deciding" if proposed else _free_name()
+                ).classes("choice")
+                self._seconds = ui.number(
+                    "Stop after, s (empty: by key)", value=self._proposed.get("seconds"), min=1, max=LONGEST_S
+                ).classes("capture-number")
+                self._pre_roll = ui.number(
+                    "Pre-roll, s", value=PRE_ROLL_S, min=0, max=LONGEST_PRE_ROLL_S
+                ).classes("capture-number")
+        self._board = Board(WAITING, keys={"main": MAIN_KEYS}, label="What happens now")
+        self._board.on_act(self._act)
+        with ui.element("div").classes("capture-acts"):
+            self._main = (
+                ui.button("Start recording", on_click=partial(self._act, "main"))
+                .props("unelevated no-caps color=indigo-8 size=lg")
+                .classes("studio-main-act")
+            )
+        self._account = ui.element("div").classes("findings").props('aria-live="polite"')
+        self._reference = ReferenceSection(self._studio)
+        await self._reference.build()
+        self._recording = await self._going_on()
+        self._timer = ui.timer(EVERY_S, self._look)
+        self._show()
+
+    async def _going_on(self) -> dict[str, Any] | None:
+        found = await self._studio.service.get("/recordings", only_open=True)
+        return next((each for each in found if not each["name"].startswith(OF_A_SAMPLING)), None)
+
+    async def _act(self, act: str) -> None:
+        try:
+            if self._recording is None or self._recording["state"] not in OPEN:
+                await self._start()
+            elif self._recording["state"] != "stopping":
+                stopped = f"/recordings/{self._recording['id']}/stop"
+                self._recording = await self._studio.service.post(stopped)
+        except Refusal as refusal:
+            ui.notify(str(refusal), type="warning", timeout=10_000)
+        self._show()
+
+    async def _start(self) -> None:
+        await self._worn.put_on()
+        self._account.clear()
+        body = {
+            "glove": self._worn.glove,
+            "name": str(self._name.value).strip(),
+            "subject": self._worn.subject,
+        }
+        self._recording = await self._studio.service.post(
+            "/recordings", body | {"lead_s": self._pre_roll.value or 0}
+        )
+
+    async def _look(self) -> None:
+        """Nothing is asked while nothing is recorded."""
+        before = self._recording
+        if before is None or before["state"] not in (*OPEN, "repairing"):
+            return
+        try:
+            now = await self._studio.service.get(f"/recordings/{before['id']}")
+            limit = self._seconds.value
+            if now["state"] == "recording" and limit and _seconds(now) >= limit:
+                now = await self._studio.service.post(f"/recordings/{now['id']}/stop")
+        except Refusal as refusal:
+            ui.notify(str(refusal), type="warning")
+            return
+        self._recording = now
+        self._show()
+        if (now["state"], now["facts"]) != (before["state"], before["facts"]):
+            await self._tell(now)
+
+    def _show(self) -> None:
+        recording = self._recording
+        state = recording["state"] if recording else ""
+        self._main.set_text("Stop" if state in ("requested", "recording") else "Start recording")
+        self._main.set_enabled(state != "stopping")
+        if recording is None or state not in OPEN:
+            tone: Tone = "done" if recording else ""
+            shown = Shown(
+                "waiting",
+                "Press Space to start.",
+                ask=self._proposed.get("what") or READY,
+                number=2 if recording else 0,
+                tone=tone,
+            )
+            self._board.show(shown)
+            return
+        seconds, limit = _seconds(recording), self._seconds.value
+        frames = recording["facts"].get("recorded")
+        line = {"requested": "Beginning.", "stopping": "Ending."}.get(
+            state, "Recording. Press Space to stop."
+        )
+        is_on = state == "recording"
+        shown = Shown(
+            phase=state, line=line, ask=self._proposed.get("what") or f"{seconds:.0f} s",
+            note="" if frames is None else f"{frames} frames", number=1 if is_on else 0,
+            tone="begin" if is_on else "", of_s=limit or None,
+            left_s=max(0.0, limit - seconds) if limit else None,
+        )  # fmt: skip
+        self._board.show(shown)
+
+    async def _tell(self, recording: Mapping[str, Any]) -> None:
+        """What became of the frames, once the recording is over."""
+        facts = recording["facts"]
+        if recording["state"] in OPEN:
+            return
+        self._account.clear()
+        if str(self._name.value).startswith(FREE):
+            self._name.set_value(_free_name())
+        with self._account, ui.element("section").classes("finding"):
+            heading(2, f"{recording['name']}: {recording['state']}")
+            if "recorded" in facts:
+                pre_roll = facts.get("pre_roll") or {}
+                ui.label(f"Pre-roll: {pre_roll.get('seconds', 0):.0f} s before the start.")
+            if facts.get("sentence"):
+                ui.label(facts["sentence"])
+            if facts.get("take"):
+                ui.label(f"Take {facts['take']}.").classes("version-id")
+                await self._reference.choose(facts["take"])
+
+
+def _free_name() -> str:
+    return f"{FREE}{datetime.now():%H%M%S}"
+
+
+def _seconds(recording: Mapping[str, Any]) -> float:
+    """Since it was asked for."""
+    return max(0.0, (datetime.now(UTC) - datetime.fromisoformat(recording["requested_at"])).total_seconds())
+
+
+class ReferenceSection:
+    """Angles measured elsewhere, attached to a take; and whether their clock is the glove's."""
+
+    def __init__(self, studio: Studio) -> None:
+        self._studio = studio
+
+    async def build(self) -> None:
+        with ui.element("section").classes("card capture-form").props('aria-label="Reference"'):
+            heading(2, "Reference of a take")
+            ui.label("A table with time_s and r. columns, CSV or Parquet, from another measuring system.")
+            with ui.element("div").classes("capture-fields"):
+                self._take = ui.select({}, label="Take").classes("choice")
+                self._clock = ui.select(
+                    {"take": "seconds as in the take", "wall": "Unix seconds"}, value="take",
+                    label="Its time_s counts",
+                ).classes("choice")  # fmt: skip
+            # The library's own field has no name for those who hear the page; a button opens it.
+            with ui.element("div").classes("capture-upload"):
+                self._upload = ui.upload(
+                    on_upload=self._attach, auto_upload=True, max_file_size=LARGEST_FILE
+                ).props('accept=".csv,.parquet"')
+            with ui.element("div").classes("capture-acts"):
+                ui.button("Attach a file").props("unelevated no-caps color=indigo-8").classes(
+                    "studio-main-act"
+                ).on("click", js_handler=f"() => runMethod({self._upload.id}, 'pickFiles', [])")
+                for name, repair in (("Check its clock", False), ("Check and move the reference", True)):
+                    ui.button(name, on_click=partial(self._check, repair)).props("outline no-caps").classes(
+                        "studio-target"
+                    )
+                ui.button("Undo the move", on_click=self._undo).props("flat no-caps").classes("studio-target")
+            self._told = ui.label("").classes("studio-notice").props('role="status"')
+        await self._list()
+
+    async def choose(self, take: str) -> None:
+        await self._list()
+        self._take.set_value(take)
+
+    async def _list(self) -> None:
+        takes = (await self._studio.service.get("/takes"))[-SHOWN_TAKES:]
+        names = {
+            each["id"]: f"{each['subject']}: {each['name']}"
+            + (", with reference" if each["rotations"] else "")
+            for each in reversed(takes)
+        }
+        self._take.set_options(names, value=self._take.value if self._take.value in names else None)
+
+    async def _attach(self, event: events.UploadEventArguments) -> None:
+        name = PurePosixPath(event.file.name).name
+        kind = MEDIA_TYPES.get(PurePosixPath(name).suffix.lower(), "text/csv")
+        self._upload.reset()
+        if not self._take.value:
+            self._told.set_text("Choose a take first.")
+            return
+        try:
+            take = await self._studio.service.put_file(
+                f"/takes/{self._take.value}/reference", await event.file.read(), kind,
+                clock=self._clock.value, filename=name,
+            )  # fmt: skip
+        except Refusal as refusal:
+            self._told.set_text(str(refusal))
+            return
+        await self._list()
+        self._told.set_text(
+            f"{take['name']} has {len(take['rotations'])} measured rotations. Check its clock next."
+        )
+
+    async def _check(self, repair: bool) -> None:
+        await self._ask_clock("/takes/clocks", {"repair": repair})
+
+    async def _undo(self) -> None:
+        await self._ask_clock("/takes/clocks/undo", {})
+
+    async def _ask_clock(self, path: str, body: Mapping[str, Any]) -> None:
+        if not self._take.value:
+            self._told.set_text("Choose a take first.")
+            return
+        try:
+            found = await self._studio.service.post(path, {"takes": [self._take.value], **body})
+        except Refusal as refusal:
+            self._told.set_text(str(refusal))
+            return
+        said = [
+            each["sentence"] + (" Moved." if each["repaired"] else "")
+            for each in found
+            if isinstance(each, dict)
+        ]
+        self._told.set_text(" ".join(said) or ("Moved back." if found else "Nothing was moved."))

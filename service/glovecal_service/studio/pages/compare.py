@@ -1,0 +1,426 @@
+"""Compare: models against measurements, where they fail, and what an angle is made of there."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+from urllib.parse import urlencode
+
+from nicegui import ui
+from nicegui.events import ValueChangeEventArguments
+
+from glovecal_service.studio.amounts import degrees
+from glovecal_service.studio.comparison.angle_terms import angle_terms
+from glovecal_service.studio.comparison.choices import (
+    MOST_MODELS,
+    Choice,
+    are_comparable,
+    first_choice,
+    model_options,
+    short_names,
+    take_options,
+    usual_takes,
+)
+from glovecal_service.studio.comparison.error_against_column import ErrorAgainstColumn
+from glovecal_service.studio.comparison.error_table import SCALE, error_table, worst_rotation
+from glovecal_service.studio.comparison.replayed_hand import ReplayedHand
+from glovecal_service.studio.comparison.time_chart import TimeChart, worst_moment
+from glovecal_service.studio.heading import heading
+from glovecal_service.studio.job_watch import JobWatch
+from glovecal_service.studio.service import Refusal
+from glovecal_service.studio.shell import shell
+from glovecal_service.studio.studio import Studio
+
+POINTS = 4000
+"""Of one model; takes of a minute in all are drawn frame by frame."""
+
+
+def add(studio: Studio) -> None:
+    """``/studio/compare``."""
+
+    @ui.page("/compare")
+    async def compare(models: str = "", takes: str = "", rotation: str = "", column: str = "") -> None:
+        with shell(studio, "compare", "Compare"):
+            ui.add_head_html('<link rel="stylesheet" href="/studio/static/compare.css">')
+            await ComparePage(studio, rotation, column).build(models, takes)
+
+
+class ComparePage:
+    """One open page. The first model is the one whose stretches, hand and columns are shown."""
+
+    def __init__(self, studio: Studio, rotation: str, column: str) -> None:
+        self._service = studio.service
+        self._studio = studio
+        self._rotation = rotation
+        self._column = column
+        self._comparisons: list[Mapping[str, Any]] = []
+        self._series: list[Mapping[str, Any]] = []
+        self._client = ui.context.client
+        self._moment = ("", 0.0)
+        """Where cursor A is: a take's id, and seconds by its clock."""
+
+    async def build(self, wanted: str, on: str) -> None:
+        self._all_models = await self._service.get("/models")
+        self._all_takes = await self._service.get("/takes")
+        choice = first_choice(self._all_models, self._all_takes, wanted, on)
+        self._notice = ui.label("").classes("studio-notice compare-notice").props('role="status"')
+        if choice is None:
+            self._notice.set_text(
+                "Nothing to compare yet: train a model, and record takes with measured angles."
+            )
+            return
+        self._choice = choice
+        self._notice.set_text(" ".join(choice.notices))
+        with ui.row().classes("choices"):
+            self._model_select = ui.select(
+                model_options(self._all_models),
+                multiple=True, label="Models", value=[each["id"] for each in choice.models],
+                on_change=self._choose_models,
+            ).props("use-chips").classes("choice")  # fmt: skip
+            self._take_select = (
+                ui.select(
+                    take_options(choice.models, self._all_takes),
+                    multiple=True,
+                    label="Takes",
+                    value=self._offered(choice.takes),
+                    on_change=self._choose_takes,
+                )
+                .props("use-chips")
+                .classes("choice")
+            )
+        await self._sections()
+        ui.timer(0.0, self._begin, once=True)
+
+    async def _sections(self) -> None:
+        self._busy = ui.label("Comparing …").classes("compare-busy").props('role="status"')
+        with ui.element("div").classes("compare-parts"):
+            with ui.element("section").classes("finding"):
+                heading(2, "Error of each rotation")
+                self._told = ui.element("div").classes("compare-told")
+                self._errors = ui.element("div")
+                self._watch = JobWatch(self._studio, self._ceiling_found)
+            with ui.element("section").classes("finding"):
+                heading(2, "Measured and predicted")
+                self._chart_title = ui.label("")
+                self._chart = TimeChart(label="Measured, predicted and error over linked time")
+                self._chart.on_moment(self._choose_moment)
+                self._chart.on_window(self._zoom)
+            with ui.element("section").classes("finding"):
+                heading(2, "Where it fails")
+                self._onward = ui.row().classes("choices")
+                with ui.element("div").classes("compare-pair"):
+                    with ui.element("div"):
+                        self._stretch_title = ui.label("")
+                        self._stretches = ui.element("ol").classes("stretches")
+                    with ui.element("div"):
+                        self._hand = ReplayedHand(self._service)
+                        await self._hand.build(self._choice.models[0]["subject"])
+            with ui.element("div").classes("compare-pair"):
+                with ui.element("section").classes("finding"):
+                    heading(2, "The angle at cursor A, term by term")
+                    self._terms = ui.element("div").classes("terms").props('aria-live="polite"')
+                with ui.element("section").classes("finding"):
+                    heading(2, "Error against a recorded column")
+                    self._against = ErrorAgainstColumn(self._service, self._column, self._link)
+
+    # What is chosen
+
+    async def _begin(self) -> None:
+        if await self._show(self._choice):
+            return
+        takes = usual_takes(self._choice.models, self._all_takes)
+        if takes != self._choice.takes:
+            told = (*self._choice.notices, self._notice.text)
+            await self._show(Choice(self._choice.models, takes, told))
+
+    async def _choose_models(self, event: ValueChangeEventArguments) -> None:
+        if set(event.value) == {each["id"] for each in self._choice.models}:
+            return
+        chosen = [each for each in self._all_models if each["id"] in event.value]
+        if not chosen:
+            self._restore("One model at least is compared.")
+            return
+        before = {each["id"] for each in self._choice.models}
+        newest = next((each for each in chosen if each["id"] not in before), chosen[0])
+        own = [each for each in self._choice.models if each in chosen and are_comparable(newest, each)]
+        own += [each for each in chosen if each not in own and are_comparable(newest, each)]
+        if len(own) > MOST_MODELS:
+            self._restore(f"{MOST_MODELS} models at most are compared at once.")
+            return
+        same = are_comparable(newest, self._choice.models[0])
+        takes = self._choice.takes if same else usual_takes(own, self._all_takes)
+        await self._try(Choice(tuple(own), takes))
+
+    async def _choose_takes(self, event: ValueChangeEventArguments) -> None:
+        if set(event.value) == set(self._choice.takes):
+            return
+        takes = tuple(each["id"] for each in self._all_takes if each["id"] in event.value)
+        if not takes:
+            self._restore("One take at least is compared.")
+            return
+        await self._try(Choice(self._choice.models, takes))
+
+    async def _try(self, choice: Choice) -> None:
+        """What is refused changes nothing."""
+        if not await self._show(choice):
+            self._restore()
+
+    def _restore(self, notice: str = "") -> None:
+        """The choices as they were."""
+        if notice:
+            self._notice.set_text(notice)
+        self._take_select.set_options(
+            take_options(self._choice.models, self._all_takes), value=self._offered(self._choice.takes)
+        )
+        self._model_select.set_value([each["id"] for each in self._choice.models])
+
+    def _offered(self, takes: Sequence[str]) -> list[str]:
+        options = take_options(self._choice.models, self._all_takes)
+        return [take for take in takes if take in options]
+
+    # What is shown
+
+    async def _show(self, choice: Choice) -> bool:
+        """Errors, then everything of the rotation; False, with a sentence, for what the service refuses."""
+        if not choice.takes:
+            self._notice.set_text(
+                f"No take of {choice.models[0]['subject']} with layout {choice.models[0]['layout']} has "
+                "measured angles."
+            )
+            self._busy.set_text("")
+            return False
+        self._busy.set_text("Comparing …")
+        body = {"takes": list(choice.takes)}
+        rotation = self._rotation
+        try:
+            comparisons = await self._of_models(choice, "compare", body)
+            if rotation not in comparisons[0]["rotations"]:
+                rotation = worst_rotation(comparisons[0])
+            series = await self._of_models(choice, "series", body | {"rotation": rotation, "points": POINTS})
+        except Refusal as refusal:
+            self._notice.set_text(str(refusal))
+            self._busy.set_text("")
+            return False
+        self._notice.set_text(" ".join(choice.notices))
+        self._choice, self._comparisons, self._rotation = choice, comparisons, rotation
+        self._restore()
+        await self._hand.of(choice.models[0]["subject"])
+        self._show_series(series)
+        self._show_errors()
+        self._busy.set_text("")
+        await asyncio.gather(
+            self._show_stretches(), self._against.show(self._first_id, self._body), self._explain()
+        )
+        return True
+
+    async def _of_models(
+        self, choice: Choice, route: str, body: Mapping[str, Any]
+    ) -> list[Mapping[str, Any]]:
+        """One answer a model, in their order."""
+        asked = (self._service.post(f"/models/{each['id']}/{route}", body) for each in choice.models)
+        return list(await asyncio.gather(*asked))
+
+    @property
+    def _names(self) -> list[str]:
+        return short_names(self._choice.models)
+
+    @property
+    def _first_id(self) -> str:
+        return self._choice.models[0]["id"]
+
+    @property
+    def _body(self) -> dict[str, Any]:
+        return {"takes": list(self._choice.takes), "rotation": self._rotation}
+
+    @property
+    def _key(self) -> str:
+        """As long as it is the same, the chart stays where it was zoomed to."""
+        return "|".join(self._choice.takes)
+
+    @property
+    def _linked_moment(self) -> float:
+        """Of cursor A, on the linked axis."""
+        id, at_s = self._moment
+        take = next(each for each in self._series[0]["takes"] if each["take"] == id)
+        return at_s - take["start_s"] + take["linked_s"]
+
+    def _link(self) -> None:
+        """The page's address, for others to open."""
+        chosen = {
+            "models": ",".join(each["id"][:12] for each in self._choice.models),
+            "takes": ",".join(self._choice.takes),
+            "rotation": self._rotation,
+            "column": self._against.column,
+        }
+        given = {name: value for name, value in chosen.items() if value}
+        query = json.dumps("?" + urlencode(given, safe=","))
+        self._client.run_javascript(f"history.replaceState({{}}, '', {query})")
+
+    def _show_errors(self) -> None:
+        first = self._comparisons[0]
+        seen = len(first["trained_on"])
+        self._told.clear()
+        with self._told:
+            for sentence in first["sentences"]:
+                ui.label(sentence)
+            if seen:
+                ui.label(
+                    f"Trained on {seen} of these {len(self._choice.takes)} takes: there the error is smaller "
+                    "than on takes it has not seen."
+                ).classes("compare-warning")
+        self._errors.clear()
+        with self._errors:
+            error_table(
+                list(zip(self._names, self._comparisons, strict=True)), self._rotation, self._choose_rotation
+            )
+            ui.label(SCALE).classes("compare-scale")
+            if first["ceiling"] is not None:
+                ui.label(first["ceiling"]["sentence"])
+            else:
+                with ui.row().classes("choices"):
+                    ui.label("Ceiling: not computed for this model yet.")
+                    ui.button("Find the ceiling", on_click=self._find_ceiling).props(
+                        "outline no-caps"
+                    ).classes("studio-target")
+
+    def _show_series(self, series: list[Mapping[str, Any]]) -> None:
+        self._series = series
+        if self._moment[0] not in self._choice.takes:
+            self._moment = worst_moment(series[0])
+        self._chart_title.set_text(
+            f"{self._rotation}: dashed measured, solid predicted, band ± 1 claimed standard deviation; below "
+            "the error (predicted minus measured). Takes stand after one another, on one axis of seconds."
+        )
+        self._chart.show(list(zip(self._names, series, strict=True)), key=self._key, at_s=self._linked_moment)
+        self._link()
+
+    async def _choose_rotation(self, rotation: str) -> None:
+        if rotation != self._rotation and await self._turn_to(rotation):
+            await asyncio.gather(self._against.show(self._first_id, self._body), self._explain())
+
+    async def _turn_to(self, rotation: str) -> bool:
+        """Its series and its row; False, with a sentence, for what the service refuses."""
+        try:
+            series = await self._of_models(
+                self._choice, "series", self._body | {"rotation": rotation, "points": POINTS}
+            )
+        except Refusal as refusal:
+            self._notice.set_text(str(refusal))
+            return False
+        self._rotation = rotation
+        self._show_series(series)
+        self._show_errors()
+        return True
+
+    async def _zoom(self, from_s: float, to_s: float) -> None:
+        """Finer points of what is shown, where some were left out."""
+        if all(take["frames"] == len(take["time_s"]) for each in self._series for take in each["takes"]):
+            return
+        key = (self._choice, self._rotation)
+        window = {"from_s": from_s, "to_s": to_s, "points": POINTS}
+        finer = await self._of_models(self._choice, "series", self._body | window)
+        if key == (self._choice, self._rotation):
+            self._chart.show(
+                list(zip(self._names, finer, strict=True)), key=self._key, at_s=self._linked_moment
+            )
+
+    # Where it fails
+
+    async def _show_stretches(self) -> None:
+        choice = self._choice
+        path = f"/models/{choice.models[0]['id']}/where"
+        try:
+            found = await self._service.post(path, {"takes": list(choice.takes)})
+        except Refusal as refusal:
+            self._stretch_title.set_text(str(refusal))
+            return
+        if choice != self._choice:
+            return
+        self._stretch_title.set_text(f"Worst seconds of {self._names[0]}; a click replays one on the hand.")
+        self._onward.clear()
+        with self._onward:
+            ui.label("Which physical effect is missing?")
+            ui.link("Diagnose", f"/diagnose?model={choice.models[0]['id']}").classes("studio-link")
+        self._stretches.clear()
+        with self._stretches:
+            for stretch in found["stretches"]:
+                self._stretch(stretch)
+
+    def _stretch(self, stretch: Mapping[str, Any]) -> None:
+        take = self._series[0]["takes"][stretch["number"]]
+        begin, end = (stretch[name] - take["start_s"] for name in ("start_s", "end_s"))
+        pose = f", {stretch['pose']}" if stretch["pose"] else ""
+        with (
+            ui.element("li"),
+            ui.element("button").classes("stretch").props('type="button"') as button,
+        ):
+            ui.label(f"{take['name']}, {begin:.1f} to {end:.1f} s{pose}").classes("stretch-where")
+            ui.label(
+                f"{degrees(stretch['rmse_deg'])} over all rotations, {stretch['rotation']} "
+                f"{degrees(stretch['rotation_rmse_deg'])}"
+            )
+        button.on("click", partial(self._replay_stretch, stretch))
+
+    async def _replay_stretch(self, stretch: Mapping[str, Any]) -> None:
+        take = self._series[0]["takes"][stretch["number"]]
+        begin, end = stretch["start_s"], stretch["end_s"]
+        self._moment = (take["take"], begin)
+
+        async def point_at_it() -> None:
+            turned = stretch["rotation"] != self._rotation and await self._turn_to(stretch["rotation"])
+            to_linked = take["linked_s"] - take["start_s"]
+            self._chart.show_stretch(begin + to_linked, end + to_linked)
+            await self._show_terms()
+            if turned:
+                await self._against.show(self._first_id, self._body)
+
+        await asyncio.gather(self._hand.play(self._first_id, take, begin, end), point_at_it())
+
+    # A moment
+
+    async def _choose_moment(self, take: str, at_s: float) -> None:
+        if take in self._choice.takes:
+            self._moment = (take, at_s)
+            await self._explain()
+
+    async def _explain(self) -> None:
+        """The hand and the angle's terms where cursor A is."""
+        id, at_s = self._moment
+        take = next(each for each in self._series[0]["takes"] if each["take"] == id)
+        await asyncio.gather(self._hand.play(self._first_id, take, at_s, at_s), self._show_terms())
+
+    async def _show_terms(self) -> None:
+        choice, names = self._choice, self._names
+        take, at_s = self._moment
+        body = {"take": take, "at_s": at_s, "rotations": [self._rotation]}
+        try:
+            answers = await self._of_models(choice, "explain", body)
+        except Refusal as refusal:
+            self._notice.set_text(str(refusal))
+            return
+        if choice != self._choice:
+            return
+        self._terms.clear()
+        with self._terms:
+            start = next(each["start_s"] for each in self._series[0]["takes"] if each["take"] == take)
+            first = answers[0]
+            ui.label(f"{self._rotation} in {first['name']} at {first['time_s'] - start:.3f} s")
+            for name, answer in zip(names, answers, strict=True):
+                angle_terms(name, answer)
+
+    # The ceiling
+
+    async def _find_ceiling(self) -> None:
+        try:
+            job = await self._service.post(f"/models/{self._first_id}/ceiling", {})
+        except Refusal as refusal:
+            ui.notify(str(refusal), type="warning")
+            return
+        self._watch.follow(job["id"])
+
+    async def _ceiling_found(self, job: Mapping[str, Any]) -> None:
+        if job["state"] == "done":
+            await self._show(self._choice)

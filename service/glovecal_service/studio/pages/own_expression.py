@@ -1,0 +1,147 @@
+"""An effect of the user's own as a line of text, with what it would save while it is being written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from nicegui import ui
+
+from glovecal_service.studio.findings.candidate_table import bar_key, candidate_table
+from glovecal_service.studio.findings.effect_view import EffectView
+from glovecal_service.studio.job_watch import JobWatch
+from glovecal_service.studio.pages.model_select import model_select
+from glovecal_service.studio.service import Refusal
+from glovecal_service.studio.studio import Studio
+
+WAIT_MS = 700
+"""After the last key, before it is tried."""
+FIRST = "name = mine; unit = deg; columns = lowpass(own_deg, 0.2) - own_deg"
+MAY_BE_WRITTEN = (
+    "own_deg, own: the joint's angle in degrees, or in its standard deviations; t: seconds in the take; "
+    "numbers, + - * / ^ ( ), exp log sqrt abs tanh sin cos, min(a, b), max(a, b), clip(x, low, high), "
+    "lowpass(x, seconds), previous(x); parameter tau s 0.1 5 = 1 declares a number to be searched for."
+)
+
+
+class OwnExpression:
+    """One section of a page. Nothing is stored before the effect is added."""
+
+    def __init__(self, studio: Studio, model: str) -> None:
+        """``model``: the id to begin with; "": the newest active one."""
+        self._studio = studio
+        self._service = studio.service
+        self._model = model
+        self._tried = ""
+        self._busy = False
+
+    async def build(self) -> None:
+        model = await model_select(self._service, self._model, self._choose)
+        if model is None:
+            return
+        self._model = model
+        self._text = (
+            ui.input("Expression", value=FIRST)
+            .props(f"debounce={WAIT_MS} autocomplete=off spellcheck=false maxlength=2000")
+            .classes("expression")
+        )
+        self._text.on_value_change(self._try)
+        self._names = ui.label("").classes("fall-how")
+        ui.label(MAY_BE_WRITTEN).classes("fall-how")
+        self._problem = ui.label("").classes("expression-problem").props('role="alert"')
+        self._verdict = ui.label("").classes("effect-sentence").props('role="status"')
+        self._result = ui.element("div")
+        self._watch = JobWatch(self._studio, self._finished)
+        ui.timer(0.0, self._begin, once=True)
+
+    async def _begin(self) -> None:
+        await self._show_names()
+        await self._try()
+
+    async def _choose(self, model: str) -> None:
+        self._model, self._tried = model, ""
+        await self._begin()
+
+    async def _show_names(self) -> None:
+        """Sensors and context columns of the model's takes."""
+        model = await self._service.get(f"/models/{self._model}")
+        takes = await self._service.get("/takes", subject=model["subject"])
+        context = {
+            f"c.{name}" for take in takes if take["layout"] == model["layout"] for name in take["context"]
+        }
+        sensors = dict.fromkeys(sensor for each in model["rotations"] for sensor in each["sensors"])
+        self._names.set_text(f"Recorded here: {', '.join([*sensors, *sorted(context)])}.")
+
+    async def _try(self) -> None:
+        """The newest text, one at a time."""
+        if self._busy:
+            return
+        self._busy = True
+        try:
+            while self._tried != str(self._text.value):
+                self._tried = text = str(self._text.value)
+                await self._show(text)
+        finally:
+            self._busy = False
+
+    async def _show(self, text: str) -> None:
+        if not text.strip():
+            self._say("Write an expression.", "")
+            return
+        self._say("", "Trying it on left-out takes …")
+        body = {"effect": {"declaration": text}}
+        try:
+            found = await self._service.post(f"/models/{self._model}/try-effect", body)
+        except Refusal as refusal:
+            self._say(str(refusal), "")
+            return
+        judged = found["judged"]
+        if judged is None:
+            self._say(f"These takes cannot show it: {found['not_identifiable']}.", "")
+            return
+        self._say("", _verdict(judged))
+        with self._result:
+            candidate_table([judged])
+            bar_key()
+            view = EffectView(
+                self._service, {"declaration": text}, found["takes"], before=self._model, after=None
+            )
+            where = judged["where"]
+            if where:
+                ui.button(f"Add {found['effect']}", on_click=lambda: self._add(text, where)).props(
+                    "unelevated no-caps color=indigo-8"
+                ).classes("studio-main-act")
+        shares = judged["saved_share"]
+        await view.show(max(shares, key=lambda name: shares[name] or 0.0) if shares else None)
+
+    def _say(self, problem: str, verdict: str) -> None:
+        self._problem.set_text(problem)
+        self._verdict.set_text(verdict)
+        self._result.clear()
+
+    async def _add(self, text: str, where: list[str]) -> None:
+        body = {"effect": {"declaration": text}, "rotations": where, "activate": False}
+        try:
+            job = await self._service.post(f"/models/{self._model}/effects", body)
+        except Refusal as refusal:
+            self._problem.set_text(str(refusal))
+            return
+        self._watch.follow(job["id"])
+
+    async def _finished(self, job: Mapping[str, Any]) -> None:
+        if job["state"] == "done":
+            self._verdict.set_text(job["result"]["sentence"])
+            if job["result"]["model"]:
+                with self._result:
+                    ui.link("See the error fall", f"/fall?model={job['result']['model']}").classes(
+                        "studio-link"
+                    )
+
+
+def _verdict(judged: Mapping[str, Any]) -> str:
+    before, after, control = (judged[f"rmse_{name}_deg"] for name in ("before", "after", "control"))
+    beside = "" if control is None else f" (control: {control:.2f})"
+    change = f"On left-out takes the error goes from {before:.2f} to {after:.2f} degrees{beside}"
+    if judged["passes"]:
+        return f"{change}: significant on {', '.join(judged['where'])}."
+    return f"{change}: not significant on any rotation."
