@@ -12,6 +12,7 @@
     python3 do.py study     the blind study of the diagnosis: figures, confusion matrix, a page (hours;
                             --quick, --minutes N; --page docs/study.md writes what was found);
                             study active: active sampling against the fixed protocol (half an hour)
+    python3 do.py picture   README's picture of the studio, from the running page (needs Chromium)
 
 uv is installed into .tools and the locked packages into .venv; nothing outside this folder is touched.
 Any verb with --smoke tries itself in seconds, with what is installed: nothing is fetched.
@@ -28,7 +29,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent
 TOOLS = ROOT / ".tools"
 SMOKE = "--smoke"
-SIMULATED = "tests/simulated"
+SIMULATED = ("tests/simulated",)
+STUDIO = ("tests/service/studio", "tests/service")
 SMOKE_TESTS = ("tests/models/test_training_choices.py", "tests/models/test_layout.py")
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
@@ -42,10 +44,10 @@ def uv() -> list[str]:
     return [str(TOOLS / "bin" / "uv")]
 
 
-def run(*command: str, groups: tuple[str, ...] = (), dev: bool = False, beside: str = "") -> int:
+def run(*command: str, groups: tuple[str, ...] = (), dev: bool = False, beside: tuple[str, ...] = ()) -> int:
     """Run a command in the locked environment; with --smoke in the one that is there, as it is.
 
-    ``beside``: a folder whose modules a script may import beside its own.
+    ``beside``: folders whose modules a script may import beside its own.
     """
     options = ["run", "--frozen", "--all-packages", "--no-default-groups"]
     for group in (*groups, *(("dev",) if dev else ())):
@@ -58,7 +60,7 @@ def run(*command: str, groups: tuple[str, ...] = (), dev: bool = False, beside: 
     quiet = ["--quiet"] if (ROOT / ".venv").is_dir() else []
     environment = {**os.environ, **ONE_THREAD, "UV_PYTHON_PREFERENCE": "only-system"}
     if beside:
-        environment["PYTHONPATH"] = str(ROOT / beside)
+        environment["PYTHONPATH"] = os.pathsep.join(str(ROOT / folder) for folder in beside)
     environment.pop("PYTHONDONTWRITEBYTECODE", None)  # every process would compile all packages anew
     return subprocess.run([*uv(), *quiet, *options, *command], cwd=ROOT, env=environment).returncode
 
@@ -95,9 +97,11 @@ def check(arguments: list[str]) -> int:
 def bench(arguments: list[str]) -> int:
     if arguments[:1] == ["streaming"]:  # it needs none of the peers
         return run("python", "tests/bench/bench.py", *arguments)
+    if arguments[:1] == ["studio"]:
+        return run("python", "tests/bench/bench.py", *arguments, dev=True, beside=STUDIO)
     if SMOKE not in arguments:
         install_gpytorch()
-    return run("python", "tests/bench/bench.py", *arguments, groups=("bench",))
+    return run("python", "tests/bench/bench.py", *arguments, groups=("bench",), dev=True, beside=STUDIO)
 
 
 def paper(arguments: list[str]) -> int:
@@ -110,10 +114,15 @@ def study(arguments: list[str]) -> int:
     return run("python", "tests/study/study.py", *arguments)
 
 
+def picture(arguments: list[str]) -> int:
+    return run("python", "tests/bench/studio_picture.py", *arguments, dev=True, beside=STUDIO)
+
+
 def docs(arguments: list[str]) -> int:
-    """A warning is an error: a link that leads nowhere must not get into the site."""
+    """A warning is an error: a link that leads nowhere must not get into the site. docs FOLDER: elsewhere."""
     with tempfile.TemporaryDirectory() as temporary:
-        site = Path(temporary, "site") if SMOKE in arguments else ROOT / "site"
+        usual = Path(temporary, "site") if SMOKE in arguments else ROOT / "site"
+        site = next((Path(folder).resolve() for folder in arguments if folder != SMOKE), usual)
         strict = ("--fail-on-warning", "--fresh-env", "--quiet", "--doctree-dir", f"{temporary}/doctrees")
         if SMOKE not in arguments:
             run("python", "docs/thresholds_page.py", groups=("docs",))
@@ -148,6 +157,7 @@ VERBS = {
     "bench": bench,
     "paper": paper,
     "study": study,
+    "picture": picture,
     "docs": docs,
 }
 

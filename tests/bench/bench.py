@@ -1,7 +1,8 @@
 """``python3 do.py bench``: Glovecal beside its peers, in one run, as ratios.
 
-Three parts: Gaussian-process training and prediction against scikit-learn, GPy, GPyTorch and GPBoost, capture
-to pose through real zenoh, and inverse kinematics against mink. Figures and the picture go to a folder.
+Four parts: Gaussian-process training and prediction against scikit-learn, GPy, GPyTorch and GPBoost, capture
+to pose through real zenoh, inverse kinematics against mink, and the studio's Live page in a browser. Figures
+and the picture go to a folder.
 """
 
 from __future__ import annotations
@@ -18,17 +19,21 @@ PARTS = {
     "gaussian-process": "gaussian_process_bench.py",
     "streaming": "streaming_bench.py",
     "inverse-kinematics": "inverse_kinematics_bench.py",
+    "studio": "studio_bench.py",
 }
+USUAL = tuple(name for name in PARTS if name != "studio")
+"""The studio wants a browser and a quiet computer."""
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"{' or '.join(PARTS)}; default: all")
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"{' or '.join(PARTS)}; default: not studio")
     parser.add_argument("--quick", action="store_true", help="fewer frames, shorter runs")
     parser.add_argument("--smoke", action="store_true", help="tiny runs, in a temporary folder unless named")
     parser.add_argument("--gloves", help="of streaming: only so many gloves with effects, such as 16,32,64")
     parser.add_argument("--seconds", help="of streaming with --gloves: length of a run")
+    parser.add_argument("--minutes", help="of studio: how long the growth of a page is watched")
     parser.add_argument("--folder", type=Path, help="for figures and picture; default .bench")
     options = parser.parse_args()
     unknown = sorted(set(options.parts) - set(PARTS))
@@ -37,7 +42,7 @@ def main() -> int:
     with TemporaryDirectory(prefix="glovecal-bench-") as temporary:
         folder = options.folder or Path(temporary if options.smoke else ".bench")
         folder.mkdir(parents=True, exist_ok=True)
-        return max(_run(part, folder, options) for part in options.parts or PARTS)
+        return max(_run(part, folder, options) for part in options.parts or USUAL)
 
 
 def _run(part: str, folder: Path, options: argparse.Namespace) -> int:
@@ -48,6 +53,8 @@ def _run(part: str, folder: Path, options: argparse.Namespace) -> int:
         command += ["--picture", str(folder / f"{part}.png")]
     if part == "streaming":
         command += [f"--{name}={value}" for name in ("gloves", "seconds") if (value := vars(options)[name])]
+    if part == "studio" and options.minutes:
+        command += [f"--minutes={options.minutes}"]
     return subprocess.run(command, env={**os.environ, **ONE_THREAD}).returncode
 
 

@@ -1,6 +1,6 @@
-"""Every verb of ``do.py`` with ``--smoke``: its work in small, with what is installed and no network.
+"""Verbs of ``do.py`` with ``--smoke``: their work in small, with what is installed and no network.
 
-Two verbs at a time: most of them wait for a process to start.
+Two verbs at a time: most of them wait for a process to start. ``docs`` is tried where its site is read.
 """
 
 from __future__ import annotations
@@ -29,7 +29,6 @@ VERBS = (
     "paper",
     "study",
     "study active",
-    "docs",
 )
 
 
@@ -134,11 +133,6 @@ def test_study_of_active_sampling_compares_two_ways(smoke) -> None:
     said = smoke["study active"].result()
     errors = [said.number(rf"\| {way} \| \d+ \| \d+ \| ([\d.]+) ") for way in ("any step", "active")]
     assert all(0 < error < 90 for error in errors)
-
-
-def test_docs_builds_every_page_strictly(smoke) -> None:
-    assert smoke["docs"].result().number(r"(\d+) pages built") > 15
-    assert "WARNING" not in smoke["docs"].result().text
 
 
 def test_smoke_refuses_where_nothing_is_installed(tmp_path: Path) -> None:

@@ -16,8 +16,9 @@ from glovecal_service.demo.hidden_session import HiddenSession
 SUBJECT = "demo-hidden"
 BASES = ("raw", "linear", "lmc_gpr")
 DIAGNOSED = "lmc_gpr"
-TRAINING = {"samples": 600, "folds": 0}
-"""Five joints with one sensor each need no more; the test takes will show the error."""
+TRAINING = {"samples": 600, "folds": 2}
+"""Five joints with one sensor each need no more. The folds give each version the error that the studio shows;
+what the demo prints is measured on the test takes."""
 Say = Callable[[str], None]
 
 
