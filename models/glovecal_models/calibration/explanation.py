@@ -203,7 +203,7 @@ def explain(model: CalibrationModel, take: Take, at_s: float) -> Explanation:
     began_s = float(time_s[gaps[-1] + 1]) if len(gaps) else first
     known = [name for name, column in context.items() if np.isfinite(column[-1])]
     last = PredictedFrame(
-        float(time_s[-1]), readings[-1], _last(base), _last(angles), found.degrees[-1:], parts,
+        float(time_s[-1]), readings[-1], base.row(-1), angles.row(-1), found.degrees[-1:], parts,
         float(time_s[-1]) - began_s, effects.settling_s, effects.silent(known, take.wearing),
     )  # fmt: skip
     frame = explained(model, predictor, last)
@@ -218,10 +218,6 @@ def chosen_rotations(model: CalibrationModel, wanted: Sequence[str]) -> tuple[st
     if unknown:
         raise BadInput(f"no rotation {unknown[0]!r} in this model; there are {', '.join(there)}")
     return tuple(name for name in there if name in wanted) if wanted else there
-
-
-def _last(angles: GloveAngles) -> GloveAngles:
-    return GloveAngles(angles.mean[-1:], angles.sd[-1:], angles.flags[-1:])
 
 
 def explained(model: CalibrationModel, predictor: GlovePredictor, frame: PredictedFrame) -> FrameExplanation:

@@ -37,6 +37,10 @@ class GloveAngles:
     flags: np.ndarray
     """uint8, shape (N, R): 1 extrapolating, 2 too uncertain to use, 4 by rule, 8 faulty sensor."""
 
+    def row(self, number: int) -> GloveAngles:
+        """Of one frame, shape (1, R); negative numbers count from the end."""
+        return GloveAngles(self.mean[number][None], self.sd[number][None], self.flags[number][None])
+
 
 class GlovePredictor:
     """Predicts one frame or many with a calibration model.

@@ -17,7 +17,7 @@ from glovecal_models.calibration.correction_parts import CorrectionParts
 from glovecal_models.calibration.effect_correction import EffectCorrection, usable_correction
 from glovecal_models.calibration.interval_inflation import VarianceInflation
 from glovecal_models.calibration.predictor import GloveAngles
-from glovecal_service.realtime.frame_record import Effects, angles_of
+from glovecal_service.realtime.frame_record import Effects
 from glovecal_service.realtime.glove_lane import GloveLane
 from glovecal_service.realtime.lane_effects import LaneEffects
 from glovecal_service.realtime.served_model import ServedModel
@@ -43,7 +43,7 @@ def corrected(
         for lane, _, _ in opened:
             lane.effects = None
         for row in recorded:
-            _write_down(model, opened[row], readings[row], angles_of(angles, row), None)
+            _write_down(model, opened[row], readings[row], angles.row(row), None)
         return angles, flags
     turn = _Turn(angles.mean, frozenset(recorded))
     # What is no number gets no pose, and must not get into a state either.
@@ -59,7 +59,7 @@ def corrected(
         for row in np.flatnonzero(turn.inflation.is_faulty.any(axis=1)).tolist():
             flags[row] |= _FAULTY_SENSOR
     for row, effects in turn.recorded.items():
-        _write_down(model, opened[row], readings[row], angles_of(angles, row), effects)
+        _write_down(model, opened[row], readings[row], angles.row(row), effects)
     return model.predictor.corrected(angles, turn.correction, turn.undefined, turn.inflation), flags
 
 

@@ -83,9 +83,3 @@ class FrameRecord:
         return explained(
             model.model, model.predictor, PredictedFrame(time_s, self._readings, base, angles, *told)
         )
-
-
-def angles_of(angles: GloveAngles, row: int) -> GloveAngles:
-    """One row."""
-    at = slice(row, row + 1)
-    return GloveAngles(angles.mean[at], angles.sd[at], angles.flags[at])

@@ -28,7 +28,6 @@ from glovecal_client.wire.pose import (
 from glovecal_models.calibration.predictor import GloveAngles
 from glovecal_service.realtime.arrivals import Arrival, Arrivals
 from glovecal_service.realtime.corrected_frames import corrected
-from glovecal_service.realtime.frame_record import angles_of
 from glovecal_service.realtime.glove_lane import GloveLane
 from glovecal_service.realtime.glove_lanes import GloveLanes
 from glovecal_service.realtime.refusal import Refusal, Refused
@@ -181,7 +180,7 @@ class PoseLoop:
             lane.note_pose(message, received_ns, model.model_id)
             record = lane.record  # another thread takes it away when it waited too long
             if record is not None and record.is_of(frame):
-                record.served(angles_of(angles, row))
+                record.served(angles.row(row))
                 lane.record = None
 
     def _serve_uncalibrated(self, lane: GloveLane) -> None:

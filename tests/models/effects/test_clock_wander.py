@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from glovecal_models.effects.delay.clock_offset import ClockOffsetEffect
-from glovecal_models.effects.delay.clock_wander import ClockWander, clock_wander
+from glovecal_models.effects.delay.clock_wander import ClockWander, clock_wander, without_wander
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 from glovecal_models.takes.take import Take
@@ -69,3 +69,14 @@ def test_takes_are_repaired_by_what_their_readings_say(takes):
             left = np.abs(mended.reference_time_s - take.reference_time_s)
             assert np.sqrt(np.mean(left**2)) < most_s
             assert follows or np.allclose(left, shift(take.reference_time_s))
+
+
+def test_takes_whose_sensors_stand_in_another_order_are_repaired_alike(takes):
+    wrong = [moved(take, SHIFTS["pulled in"]) for take in takes]
+    order = wrong[0].sensors[::-1]
+    turned = replace(wrong[0], sensors=order, readings=wrong[0].readings[:, ::-1])
+    fewer = replace(wrong[1], sensors=wrong[1].sensors[:1], readings=wrong[1].readings[:, :1])
+    for plain, other in zip(without_wander(wrong), without_wander([turned, *wrong[1:]]), strict=True):
+        assert np.allclose(plain.reference_time_s, other.reference_time_s, atol=1e-9)
+    assert len(without_wander([wrong[0], fewer])) == 2
+    assert without_wander([]) == ()

@@ -39,7 +39,7 @@ def test_the_picture_of_the_named_effect_has_the_points_of_rest(
         expect(page.locator(".reasons", has_text=item["why"]).first).to_be_visible()
     sentence = page.locator(".effect-sentence")
     expect(sentence).not_to_have_text("Drawing …", timeout=PATIENCE_MS)
-    shown = document(page, ".effect-chart")["before"]
+    shown = document(page, ".effect-view div:has(> .effect-plot)")["before"]
     body = {"effect": named["effect"], "takes": [take["id"] for take in diagnosis["takes"]]}
     asked = httpx.post(
         f"{address}/v1/models/{diagnosis['model']}/effect-picture", timeout=60,
@@ -80,10 +80,10 @@ def test_the_next_version_grows_where_it_will_stand(opened: Open, address: str) 
     page = opened(f"fall?model={child['id']}").page
     page.locator(".fall canvas").wait_for(timeout=PATIENCE_MS)
     page.get_by_role("button", name="Take").click()
-    expect(page.locator(".effect-legend", has_text="being made")).to_be_visible(timeout=PATIENCE_MS)
+    expect(page.locator(".legend", has_text="being made")).to_be_visible(timeout=PATIENCE_MS)
     job = page.locator("section.job", has=page.get_by_role("button", name="Cancel")).first
     job.get_by_role("button", name="Cancel").click()
-    expect(page.locator(".effect-legend", has_text="being made")).to_have_count(0, timeout=60_000)
+    expect(page.locator(".legend", has_text="being made")).to_have_count(0, timeout=60_000)
 
 
 def test_every_effect_has_the_picture_of_rest_and_an_expression_is_tried(

@@ -24,8 +24,7 @@ ROUNDS = 4
 STEPS_S2 = np.geomspace(1e-7, 1e-2, 21)
 """Variance of the offset's change in a second, seconds squared."""
 LIKELIER_NATS = 20.0
-"""Of the log likelihood, over that of a constant offset. Of 72 healthy simulated takes 13 reach that, and are
-moved by some 5 ms then."""
+"""Of the log likelihood, over that of a constant offset. Of 72 healthy simulated takes 13 reach that."""
 ANYWHERE_S2 = 1.0
 """Variance of the offset at the start: not known."""
 RIDGE = 1e-3
@@ -77,9 +76,17 @@ def clock_wander(take: Take, rotations: Sequence[str], predicted: np.ndarray) ->
 
 
 def without_wander(takes: Sequence[Take]) -> tuple[Take, ...]:
-    """Takes whose offsets are constant otherwise, predicted by one map of readings and their squares."""
+    """Takes whose offsets are constant otherwise, predicted by one map of readings and their squares.
+
+    The map reads the sensors that all takes have; without any the takes stay as they are.
+    """
     rotations = sorted({name for take in takes for name in take.rotations})
-    features = _features([take.readings for take in takes])
+    sensors = (
+        [name for name in takes[0].sensors if all(name in take.sensors for take in takes)] if takes else []
+    )
+    if not sensors:
+        return tuple(takes)
+    features = _features([take.readings[:, [take.sensors.index(name) for name in sensors]] for take in takes])
     predicted = [np.full((len(take.time_s), len(rotations)), np.nan) for take in takes]
     for place, name in enumerate(rotations):
         known = [_at_frames(take, name) for take in takes]

@@ -6,17 +6,22 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
-from pydantic import Field, StringConstraints
+from pydantic import Field
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.model_recipe import declaration_of, trained_rotations
 from glovecal_models.effects.catalogue import effect as known_effect
 from glovecal_models.errors import BadInput
 from glovecal_service.rest.effect.catalogue import EffectInPath, can_be_added
-from glovecal_service.rest.effect.declarations import Declared, checked_declaration, declaration_document
+from glovecal_service.rest.effect.declarations import (
+    AskedEffect,
+    Declared,
+    checked_declaration,
+    declaration_document,
+)
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import PartsNeeded
-from glovecal_service.rest.http.request_types import ONE_LINE, Channel, ModelInPath, StrictBody
+from glovecal_service.rest.http.request_types import Channel, ModelInPath, StrictBody
 from glovecal_service.rest.job.jobs import Job, JobFacts, new_job
 from glovecal_service.rest.model.model_takes import TakesNamed, model_takes
 from glovecal_service.store.errors import Conflict, NotFound
@@ -31,7 +36,6 @@ WHY_NOT = {
     "repair": "it is a fault of the measurement that has no repair",
     "nothing": "it is the null hypothesis",
 }
-EffectName = Annotated[str, StringConstraints(min_length=1, max_length=64, pattern=ONE_LINE)]
 
 
 class AdditionJob(JobFacts):
@@ -39,9 +43,7 @@ class AdditionJob(JobFacts):
 
 
 class AdditionRequest(StrictBody):
-    effect: EffectName | Declared = Field(
-        description="A name of the catalogue, or your own effect as a text."
-    )
+    effect: AskedEffect
     rotations: Annotated[list[Channel], Field(min_length=1, max_length=MOST_ROTATIONS)] | None = Field(
         None, description="Null: all that the model has learned."
     )

@@ -2,34 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import numpy as np
 from fastapi import APIRouter
-from pydantic import Field, StringConstraints
+from pydantic import Field
 
-from glovecal_models.calibration.model_recipe import declaration_of
 from glovecal_models.comparison.effect_picture import effect_picture
 from glovecal_models.comparison.noise_floor import noise_floors
-from glovecal_models.effects.catalogue import effect as known_effect
-from glovecal_models.effects.catalogue import effect_of_declaration
-from glovecal_service.rest.effect.declarations import Declared, checked_declaration
+from glovecal_service.rest.effect.declarations import AskedEffect, asked_effect
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import PartsNeeded
-from glovecal_service.rest.http.request_types import ONE_LINE, Channel, ModelInPath, StrictBody
+from glovecal_service.rest.http.request_types import Channel, ModelInPath, StrictBody
 from glovecal_service.rest.model.compared_takes import compared_takes
 from glovecal_service.rest.model.model_takes import TakesNamed
 from glovecal_service.views.effect_picture import EffectPictureView, effect_picture_view
 
 router = APIRouter(prefix="/models", tags=["models"])
 
-EffectName = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=ONE_LINE)]
-
 
 class PictureRequest(StrictBody):
-    effect: EffectName | Declared = Field(
-        description="A name of the catalogue, or your own effect as a text."
-    )
+    effect: AskedEffect
     takes: TakesNamed
     rotation: Channel | None = Field(None, description="Null: the one with the largest error.")
 
@@ -48,11 +39,7 @@ def picture_of_effect(id: ModelInPath, body: PictureRequest, parts: PartsNeeded)
     """
     on = compared_takes(id, body.takes, body.rotation, parts)
     model, _ = parts.predictors.get(on.model.id)
-    if isinstance(body.effect, Declared):
-        effect = checked_declaration(body.effect.declaration, on.takes, model.layout.sensors)
-    else:
-        own = declaration_of(model, body.effect)
-        effect = known_effect(body.effect) if own is None else effect_of_declaration(own)
+    effect = asked_effect(body.effect, model, on.takes)
     measured = on.found.measured_rotations
     errors = np.sqrt(np.nanmean(on.found.stacked("error") ** 2, axis=0))
     rotation = body.rotation or max(measured, key=lambda name: errors[on.found.column(name)])

@@ -6,18 +6,15 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from glovecal_models.calibration.model_recipe import (
-    declaration_of,
     declared_effects,
     repaired_takes,
     requested_effects,
 )
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.known_effect import known_effects
-from glovecal_models.effects.catalogue import effect as known_effect
-from glovecal_models.effects.catalogue import effect_of_declaration, known_by_name
+from glovecal_models.effects.catalogue import known_by_name
 from glovecal_models.errors import BadInput
-from glovecal_service.rest.effect.changes import EffectName
-from glovecal_service.rest.effect.declarations import Declared, checked_declaration
+from glovecal_service.rest.effect.declarations import AskedEffect, asked_effect
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import PartsNeeded
 from glovecal_service.rest.http.request_types import ModelInPath, StrictBody
@@ -31,9 +28,7 @@ MOST_FRAMES = 200_000
 
 
 class TrialRequest(StrictBody):
-    effect: EffectName | Declared = Field(
-        description="A name of the catalogue, or your own effect as a text."
-    )
+    effect: AskedEffect
     takes: TakesNamed | None = Field(None, description="Ids or names; null: those it was trained on.")
 
 
@@ -59,11 +54,7 @@ def try_effect(id: ModelInPath, body: TrialRequest, parts: PartsNeeded) -> Trial
     record = parts.store.models.get(id)
     model, _ = parts.predictors.get(record.id)
     rows = model_takes(parts.store, record, body.takes)
-    if isinstance(body.effect, Declared):
-        effect = checked_declaration(body.effect.declaration, rows, model.layout.sensors)
-    else:
-        own = declaration_of(model, body.effect)
-        effect = known_effect(body.effect) if own is None else effect_of_declaration(own)
+    effect = asked_effect(body.effect, model, rows)
     takes = [parts.store.takes.load(row.id) for row in rows]
     if sum(len(take.time_s) * len(take.rotations) for take in takes) > MOST_FRAMES:
         raise BadInput("so many frames take too long for an answer; name fewer takes, or diagnose in a job")

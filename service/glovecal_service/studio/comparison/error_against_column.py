@@ -8,7 +8,7 @@ from typing import Any
 from nicegui import ui
 from nicegui.events import ValueChangeEventArguments
 
-from glovecal_service.studio.comparison.column_chart import ColumnChart
+from glovecal_service.studio.charts.column_chart import ColumnChart
 from glovecal_service.studio.service import Refusal, Service
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from nicegui import ui
 from nicegui.events import ValueChangeEventArguments
 
-from glovecal_service.studio.findings.effect_chart import EffectChart
+from glovecal_service.studio.charts.effect_chart import EffectChart
 from glovecal_service.studio.service import Refusal, Service
 
 

@@ -12,7 +12,7 @@ from nicegui import events, ui
 
 from glovecal_service.studio.guide.board import MAIN_KEYS, Board, Shown, Tone
 from glovecal_service.studio.heading import heading
-from glovecal_service.studio.pages.capture_start import WornGlove
+from glovecal_service.studio.pages.glove_and_wearer import GloveAndWearer
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.studio import Studio
 
@@ -36,7 +36,7 @@ class RecordingPage:
 
     def __init__(self, studio: Studio, gloves: Sequence[Mapping[str, Any]]) -> None:
         self._studio = studio
-        self._worn = WornGlove(studio, gloves)
+        self._worn = GloveAndWearer(studio, gloves)
         self._recording: dict[str, Any] | None = None
         self._proposed: Mapping[str, Any] = {}
 

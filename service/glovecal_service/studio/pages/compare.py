@@ -4,36 +4,28 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 from urllib.parse import urlencode
 
 from nicegui import ui
-from nicegui.events import ValueChangeEventArguments
 
 from glovecal_service.studio.amounts import degrees
+from glovecal_service.studio.charts.time_chart import TimeChart, worst_moment
 from glovecal_service.studio.comparison.angle_terms import angle_terms
-from glovecal_service.studio.comparison.choices import (
-    MOST_MODELS,
-    Choice,
-    are_comparable,
-    first_choice,
-    model_options,
-    short_names,
-    take_options,
-    usual_takes,
-)
+from glovecal_service.studio.comparison.choice_bar import ChoiceBar
+from glovecal_service.studio.comparison.choices import Choice, first_choice, short_names, usual_takes
 from glovecal_service.studio.comparison.error_against_column import ErrorAgainstColumn
-from glovecal_service.studio.comparison.error_table import SCALE, error_table, worst_rotation
+from glovecal_service.studio.comparison.error_table import worst_rotation
 from glovecal_service.studio.comparison.replayed_hand import ReplayedHand
-from glovecal_service.studio.comparison.time_chart import TimeChart, worst_moment
+from glovecal_service.studio.comparison.rotation_errors import RotationErrors
 from glovecal_service.studio.heading import heading
-from glovecal_service.studio.job_watch import JobWatch
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.shell import shell
 from glovecal_service.studio.studio import Studio
 
+NOTHING = "Nothing to compare yet: train a model, and record takes with measured angles."
 POINTS = 4000
 """Of one model; takes of a minute in all are drawn frame by frame."""
 
@@ -63,34 +55,12 @@ class ComparePage:
         """Where cursor A is: a take's id, and seconds by its clock."""
 
     async def build(self, wanted: str, on: str) -> None:
-        self._all_models = await self._service.get("/models")
-        self._all_takes = await self._service.get("/takes")
-        choice = first_choice(self._all_models, self._all_takes, wanted, on)
-        self._notice = ui.label("").classes("studio-notice compare-notice").props('role="status"')
+        models, takes = await self._service.get("/models"), await self._service.get("/takes")
+        choice = first_choice(models, takes, wanted, on)
         if choice is None:
-            self._notice.set_text(
-                "Nothing to compare yet: train a model, and record takes with measured angles."
-            )
+            ui.label(NOTHING).classes("studio-notice compare-notice").props('role="status"')
             return
-        self._choice = choice
-        self._notice.set_text(" ".join(choice.notices))
-        with ui.row().classes("choices"):
-            self._model_select = ui.select(
-                model_options(self._all_models),
-                multiple=True, label="Models", value=[each["id"] for each in choice.models],
-                on_change=self._choose_models,
-            ).props("use-chips").classes("choice")  # fmt: skip
-            self._take_select = (
-                ui.select(
-                    take_options(choice.models, self._all_takes),
-                    multiple=True,
-                    label="Takes",
-                    value=self._offered(choice.takes),
-                    on_change=self._choose_takes,
-                )
-                .props("use-chips")
-                .classes("choice")
-            )
+        self._bar = ChoiceBar(models, takes, choice, self._show)
         await self._sections()
         ui.timer(0.0, self._begin, once=True)
 
@@ -99,9 +69,7 @@ class ComparePage:
         with ui.element("div").classes("compare-parts"):
             with ui.element("section").classes("finding"):
                 heading(2, "Error of each rotation")
-                self._told = ui.element("div").classes("compare-told")
-                self._errors = ui.element("div")
-                self._watch = JobWatch(self._studio, self._ceiling_found)
+                self._errors = RotationErrors(self._studio, self._choose_rotation, self._again)
             with ui.element("section").classes("finding"):
                 heading(2, "Measured and predicted")
                 self._chart_title = ui.label("")
@@ -117,7 +85,7 @@ class ComparePage:
                         self._stretches = ui.element("ol").classes("stretches")
                     with ui.element("div"):
                         self._hand = ReplayedHand(self._service)
-                        await self._hand.build(self._choice.models[0]["subject"])
+                        await self._hand.build(self._bar.choice.models[0]["subject"])
             with ui.element("div").classes("compare-pair"):
                 with ui.element("section").classes("finding"):
                     heading(2, "The angle at cursor A, term by term")
@@ -126,67 +94,24 @@ class ComparePage:
                     heading(2, "Error against a recorded column")
                     self._against = ErrorAgainstColumn(self._service, self._column, self._link)
 
-    # What is chosen
-
     async def _begin(self) -> None:
-        if await self._show(self._choice):
+        choice = self._bar.choice
+        if await self._show(choice):
             return
-        takes = usual_takes(self._choice.models, self._all_takes)
-        if takes != self._choice.takes:
-            told = (*self._choice.notices, self._notice.text)
-            await self._show(Choice(self._choice.models, takes, told))
+        takes = usual_takes(choice.models, self._bar.takes)
+        if takes != choice.takes:
+            told = (*choice.notices, self._bar.told)
+            await self._show(Choice(choice.models, takes, told))
 
-    async def _choose_models(self, event: ValueChangeEventArguments) -> None:
-        if set(event.value) == {each["id"] for each in self._choice.models}:
-            return
-        chosen = [each for each in self._all_models if each["id"] in event.value]
-        if not chosen:
-            self._restore("One model at least is compared.")
-            return
-        before = {each["id"] for each in self._choice.models}
-        newest = next((each for each in chosen if each["id"] not in before), chosen[0])
-        own = [each for each in self._choice.models if each in chosen and are_comparable(newest, each)]
-        own += [each for each in chosen if each not in own and are_comparable(newest, each)]
-        if len(own) > MOST_MODELS:
-            self._restore(f"{MOST_MODELS} models at most are compared at once.")
-            return
-        same = are_comparable(newest, self._choice.models[0])
-        takes = self._choice.takes if same else usual_takes(own, self._all_takes)
-        await self._try(Choice(tuple(own), takes))
-
-    async def _choose_takes(self, event: ValueChangeEventArguments) -> None:
-        if set(event.value) == set(self._choice.takes):
-            return
-        takes = tuple(each["id"] for each in self._all_takes if each["id"] in event.value)
-        if not takes:
-            self._restore("One take at least is compared.")
-            return
-        await self._try(Choice(self._choice.models, takes))
-
-    async def _try(self, choice: Choice) -> None:
-        """What is refused changes nothing."""
-        if not await self._show(choice):
-            self._restore()
-
-    def _restore(self, notice: str = "") -> None:
-        """The choices as they were."""
-        if notice:
-            self._notice.set_text(notice)
-        self._take_select.set_options(
-            take_options(self._choice.models, self._all_takes), value=self._offered(self._choice.takes)
-        )
-        self._model_select.set_value([each["id"] for each in self._choice.models])
-
-    def _offered(self, takes: Sequence[str]) -> list[str]:
-        options = take_options(self._choice.models, self._all_takes)
-        return [take for take in takes if take in options]
+    async def _again(self) -> None:
+        await self._show(self._bar.choice)
 
     # What is shown
 
     async def _show(self, choice: Choice) -> bool:
         """Errors, then everything of the rotation; False, with a sentence, for what the service refuses."""
         if not choice.takes:
-            self._notice.set_text(
+            self._bar.tell(
                 f"No take of {choice.models[0]['subject']} with layout {choice.models[0]['layout']} has "
                 "measured angles."
             )
@@ -201,12 +126,11 @@ class ComparePage:
                 rotation = worst_rotation(comparisons[0])
             series = await self._of_models(choice, "series", body | {"rotation": rotation, "points": POINTS})
         except Refusal as refusal:
-            self._notice.set_text(str(refusal))
+            self._bar.tell(str(refusal))
             self._busy.set_text("")
             return False
-        self._notice.set_text(" ".join(choice.notices))
-        self._choice, self._comparisons, self._rotation = choice, comparisons, rotation
-        self._restore()
+        self._bar.choose(choice)
+        self._comparisons, self._rotation = comparisons, rotation
         await self._hand.of(choice.models[0]["subject"])
         self._show_series(series)
         self._show_errors()
@@ -225,20 +149,20 @@ class ComparePage:
 
     @property
     def _names(self) -> list[str]:
-        return short_names(self._choice.models)
+        return short_names(self._bar.choice.models)
 
     @property
     def _first_id(self) -> str:
-        return self._choice.models[0]["id"]
+        return self._bar.choice.models[0]["id"]
 
     @property
     def _body(self) -> dict[str, Any]:
-        return {"takes": list(self._choice.takes), "rotation": self._rotation}
+        return {"takes": list(self._bar.choice.takes), "rotation": self._rotation}
 
     @property
     def _key(self) -> str:
         """As long as it is the same, the chart stays where it was zoomed to."""
-        return "|".join(self._choice.takes)
+        return "|".join(self._bar.choice.takes)
 
     @property
     def _linked_moment(self) -> float:
@@ -250,8 +174,8 @@ class ComparePage:
     def _link(self) -> None:
         """The page's address, for others to open."""
         chosen = {
-            "models": ",".join(each["id"][:12] for each in self._choice.models),
-            "takes": ",".join(self._choice.takes),
+            "models": ",".join(each["id"][:12] for each in self._bar.choice.models),
+            "takes": ",".join(self._bar.choice.takes),
             "rotation": self._rotation,
             "column": self._against.column,
         }
@@ -260,35 +184,12 @@ class ComparePage:
         self._client.run_javascript(f"history.replaceState({{}}, '', {query})")
 
     def _show_errors(self) -> None:
-        first = self._comparisons[0]
-        seen = len(first["trained_on"])
-        self._told.clear()
-        with self._told:
-            for sentence in first["sentences"]:
-                ui.label(sentence)
-            if seen:
-                ui.label(
-                    f"Trained on {seen} of these {len(self._choice.takes)} takes: there the error is smaller "
-                    "than on takes it has not seen."
-                ).classes("compare-warning")
-        self._errors.clear()
-        with self._errors:
-            error_table(
-                list(zip(self._names, self._comparisons, strict=True)), self._rotation, self._choose_rotation
-            )
-            ui.label(SCALE).classes("compare-scale")
-            if first["ceiling"] is not None:
-                ui.label(first["ceiling"]["sentence"])
-            else:
-                with ui.row().classes("choices"):
-                    ui.label("Ceiling: not computed for this model yet.")
-                    ui.button("Find the ceiling", on_click=self._find_ceiling).props(
-                        "outline no-caps"
-                    ).classes("studio-target")
+        found = list(zip(self._names, self._comparisons, strict=True))
+        self._errors.show(self._first_id, found, self._rotation)
 
     def _show_series(self, series: list[Mapping[str, Any]]) -> None:
         self._series = series
-        if self._moment[0] not in self._choice.takes:
+        if self._moment[0] not in self._bar.choice.takes:
             self._moment = worst_moment(series[0])
         self._chart_title.set_text(
             f"{self._rotation}: dashed measured, solid predicted, band ± 1 claimed standard deviation; below "
@@ -305,10 +206,10 @@ class ComparePage:
         """Its series and its row; False, with a sentence, for what the service refuses."""
         try:
             series = await self._of_models(
-                self._choice, "series", self._body | {"rotation": rotation, "points": POINTS}
+                self._bar.choice, "series", self._body | {"rotation": rotation, "points": POINTS}
             )
         except Refusal as refusal:
-            self._notice.set_text(str(refusal))
+            self._bar.tell(str(refusal))
             return False
         self._rotation = rotation
         self._show_series(series)
@@ -319,10 +220,10 @@ class ComparePage:
         """Finer points of what is shown, where some were left out."""
         if all(take["frames"] == len(take["time_s"]) for each in self._series for take in each["takes"]):
             return
-        key = (self._choice, self._rotation)
+        key = (self._bar.choice, self._rotation)
         window = {"from_s": from_s, "to_s": to_s, "points": POINTS}
-        finer = await self._of_models(self._choice, "series", self._body | window)
-        if key == (self._choice, self._rotation):
+        finer = await self._of_models(self._bar.choice, "series", self._body | window)
+        if key == (self._bar.choice, self._rotation):
             self._chart.show(
                 list(zip(self._names, finer, strict=True)), key=self._key, at_s=self._linked_moment
             )
@@ -330,14 +231,14 @@ class ComparePage:
     # Where it fails
 
     async def _show_stretches(self) -> None:
-        choice = self._choice
+        choice = self._bar.choice
         path = f"/models/{choice.models[0]['id']}/where"
         try:
             found = await self._service.post(path, {"takes": list(choice.takes)})
         except Refusal as refusal:
             self._stretch_title.set_text(str(refusal))
             return
-        if choice != self._choice:
+        if choice != self._bar.choice:
             return
         self._stretch_title.set_text(f"Worst seconds of {self._names[0]}; a click replays one on the hand.")
         self._onward.clear()
@@ -382,7 +283,7 @@ class ComparePage:
     # A moment
 
     async def _choose_moment(self, take: str, at_s: float) -> None:
-        if take in self._choice.takes:
+        if take in self._bar.choice.takes:
             self._moment = (take, at_s)
             await self._explain()
 
@@ -393,15 +294,15 @@ class ComparePage:
         await asyncio.gather(self._hand.play(self._first_id, take, at_s, at_s), self._show_terms())
 
     async def _show_terms(self) -> None:
-        choice, names = self._choice, self._names
+        choice, names = self._bar.choice, self._names
         take, at_s = self._moment
         body = {"take": take, "at_s": at_s, "rotations": [self._rotation]}
         try:
             answers = await self._of_models(choice, "explain", body)
         except Refusal as refusal:
-            self._notice.set_text(str(refusal))
+            self._bar.tell(str(refusal))
             return
-        if choice != self._choice:
+        if choice != self._bar.choice:
             return
         self._terms.clear()
         with self._terms:
@@ -410,17 +311,3 @@ class ComparePage:
             ui.label(f"{self._rotation} in {first['name']} at {first['time_s'] - start:.3f} s")
             for name, answer in zip(names, answers, strict=True):
                 angle_terms(name, answer)
-
-    # The ceiling
-
-    async def _find_ceiling(self) -> None:
-        try:
-            job = await self._service.post(f"/models/{self._first_id}/ceiling", {})
-        except Refusal as refusal:
-            ui.notify(str(refusal), type="warning")
-            return
-        self._watch.follow(job["id"])
-
-    async def _ceiling_found(self, job: Mapping[str, Any]) -> None:
-        if job["state"] == "done":
-            await self._show(self._choice)

@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from glovecal_service.studio.findings.fall_chart import FallChart
+from glovecal_service.studio.charts.fall_chart import FallChart
 from glovecal_service.studio.hand.hand_view import HandView, Side
 from glovecal_service.studio.hand.replay import Replay
 from glovecal_service.studio.heading import heading

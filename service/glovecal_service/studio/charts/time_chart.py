@@ -1,25 +1,17 @@
-"""Measured, predicted and error over linked time, with cursors; drawn by the page."""
+"""Measured, predicted and error over linked time, with cursors."""
 
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Any
 
-from nicegui.element import Element
-
-# Registers ECharts under the name that our module imports it by.
-from nicegui.elements.echart import echart as _echart  # noqa: F401
 from nicegui.events import GenericEventArguments
 
+from glovecal_service.studio.charts.chart import Chart
 
-class TimeChart(Element, component="time_chart.js", esm={"glovecal-comparison": "esm"}):
-    """One rotation of one or several models; empty until ``show``."""
 
-    def __init__(self, *, label: str) -> None:
-        """``label``: for screen readers."""
-        super().__init__()
-        self._props["label"] = label
-        self._props["document"] = None
+class TimeChart(Chart, component="time_chart.js"):
+    """One rotation of one or several models."""
 
     def show(self, models: Sequence[tuple[str, Mapping[str, Any]]], *, key: str, at_s: float) -> None:
         """``models``: label and answer of ``POST /v1/models/{id}/series``, of the same takes and rotation.
@@ -27,13 +19,8 @@ class TimeChart(Element, component="time_chart.js", esm={"glovecal-comparison": 
         Cursor A stands at ``at_s`` of linked time at first, B a little later. Zoom and cursors stay where
         they are as long as ``key`` is the same.
         """
-        self._props["document"] = {
-            "key": key,
-            "at_s": at_s,
-            "rotation": models[0][1]["rotation"],
-            "models": [{"label": label, "series": _rounded(series)} for label, series in models],
-        }
-        self.update()
+        lines = [{"label": label, "series": _rounded(series)} for label, series in models]
+        self._draw({"key": key, "at_s": at_s, "rotation": models[0][1]["rotation"], "models": lines})
 
     def show_stretch(self, from_s: float, to_s: float) -> None:
         """Zoom to a stretch of linked time, with a cursor at either end."""

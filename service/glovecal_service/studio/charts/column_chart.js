@@ -1,23 +1,9 @@
 // The error of a rotation against one recorded column: frames, means of bins, and how far chance takes a mean.
-import { echarts } from "nicegui-echart";
-import { axis, colours, degrees, whenThemeChanges } from "glovecal-comparison";
+import { axis, chart, colours, degrees, tooltip } from "glovecal-charts";
 
 export default {
-  template: `<div class="column-plot" role="img" :aria-label="label"></div>`,
-  props: { document: Object, label: String },
-  mounted() {
-    this.chart = echarts.init(this.$el, null, { renderer: "canvas" });
-    this.sizes = new ResizeObserver(() => this.chart.resize());
-    this.sizes.observe(this.$el);
-    this.endTheme = whenThemeChanges(() => this.draw());
-    this.draw();
-  },
-  beforeUnmount() {
-    this.sizes.disconnect();
-    this.endTheme();
-    this.chart.dispose();
-  },
-  watch: { document() { this.draw(); } },
+  mixins: [chart],
+  template: `<div ref="plot" class="column-plot" role="img" :aria-label="label"></div>`,
   methods: {
     draw() {
       if (!this.document) return;
@@ -51,13 +37,11 @@ export default {
         animation: false,
         textStyle: { color: shades.ink },
         legend: { textStyle: { color: shades.ink }, top: 0, selectedMode: false },
-        tooltip: {
-          trigger: "item", renderMode: "richText", confine: true, backgroundColor: shades.card,
-          borderColor: shades.line, textStyle: { color: shades.ink },
+        tooltip: tooltip(shades, {
           formatter: ({ dataIndex }) => bins
             ? `${bins.edges[dataIndex].toPrecision(4)} to ${bins.edges[dataIndex + 1].toPrecision(4)}${unit}\n`
               + `mean error ${degrees(bins.mean_deg[dataIndex], true)}, ${bins.count[dataIndex]} frames` : "",
-        },
+        }),
         grid: { left: 64, right: 18, top: 58, bottom: 48 },
         xAxis: axis(shades, { scale: true, name: `${given.column.name}${unit}`, nameLocation: "middle", nameGap: 28, splitLine: { show: false } }),
         yAxis: axis(shades, { name: "error, degrees", nameLocation: "middle", nameGap: 44 }),

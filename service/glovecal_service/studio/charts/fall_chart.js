@@ -1,39 +1,16 @@
 // The held-out error step by step: what is left, what each step took away, its control's line, the noise floor.
-import { echarts } from "nicegui-echart";
-import { axis, colours, degrees, whenThemeChanges } from "glovecal-comparison";
+import { axis, colours, degrees, withLegend } from "glovecal-charts";
 
 export default {
-  template: `
-    <div class="effect-chart">
-      <div ref="plot" class="fall-plot" role="img" :aria-label="label"></div>
-      <ul class="effect-legend">
-        <li v-for="one in legend" :key="one.name">
-          <span class="effect-swatch" :class="'is-' + one.kind" :style="{ '--swatch': one.colour }" aria-hidden="true"></span>{{ one.name }}
-        </li>
-      </ul>
-    </div>`,
-  props: { document: Object, pending: Object, label: String },
-  data: () => ({ legend: [] }),
-  mounted() {
-    this.chart = echarts.init(this.$refs.plot, null, { renderer: "canvas" });
-    this.sizes = new ResizeObserver(() => { this.chart.resize(); this.draw(); });
-    this.sizes.observe(this.$refs.plot);
-    this.endTheme = whenThemeChanges(() => this.draw());
-    this.draw();
-  },
-  beforeUnmount() {
-    this.sizes.disconnect();
-    this.endTheme();
-    this.chart.dispose();
-  },
-  watch: { document() { this.draw(); }, pending() { this.draw(); } },
+  mixins: [withLegend("fall-plot")],
+  props: { pending: Object },
+  watch: { pending() { this.draw(); } },
   methods: {
+    resized() { this.draw(); },
     draw() {
       if (!this.document) return;
       const { steps, floor } = JSON.parse(JSON.stringify(this.document)), shades = colours();
-      const isDark = document.body.classList.contains("body--dark");
-      const green = isDark ? "#4ade80" : "#15803d", amber = isDark ? "#fbbf24" : "#b45309", blue = shades.model(0);
-      const grey = isDark ? "#8b9bb0" : "#64748b", next = this.pending;
+      const { amber, green, grey } = shades, blue = shades.model(0), next = this.pending;
       const names = [...steps.map((one) => one.label), ...(next ? [next.label] : [])];
       const last = steps.at(-1)?.rmse_deg ?? 0;
       const most = 1.16 * Math.max(...steps.flatMap((one) => [one.rmse_deg, one.control_rmse_deg ?? 0]));
@@ -50,7 +27,7 @@ export default {
             ...(next ? [{ value: last, itemStyle: { color: "transparent", borderColor: blue, borderType: "dashed", borderWidth: 2 } }] : []),
           ],
           label: {
-            show: true, position: "insideTop", fontWeight: 650, color: isDark ? "#0b1220" : "#ffffff",
+            show: true, position: "insideTop", fontWeight: 650, color: shades.onBar,
             formatter: ({ dataIndex }) => (isTall(dataIndex) ? degrees(steps[dataIndex].rmse_deg) : ""),
           },
         },

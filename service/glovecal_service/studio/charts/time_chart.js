@@ -2,17 +2,15 @@
 //
 // Two plots, one axis: they zoom and move together. The canvas is a picture to who hears the page; series,
 // cursors and zoom are plain buttons around it, for mouse and keyboard alike.
-import { echarts } from "nicegui-echart";
-import { axis, colours, degrees, whenThemeChanges } from "glovecal-comparison";
+import { chart, colours, degrees } from "glovecal-charts";
+import { LEAST_S, LEFT, overTime, RIGHT, seriesOf } from "glovecal-charts/over_time.js";
 
-const LEFT = 64, RIGHT = 18; // of both plots, px
-const TOP = { top: 50, height: 190 }, BELOW = { top: 276, height: 96 };
 const WAIT_MS = 300; // after the last change, before more is asked for
-const LEAST_S = 0.2; // nothing shorter is shown
 const CURSORS = ["A", "B"];
 const FIRST_APART_S = 1;
 
 export default {
+  mixins: [chart],
   template: `
     <div class="time-chart">
       <div class="chart-legend" role="group" aria-label="Series; one click shows one alone, another all of them">
@@ -66,37 +64,30 @@ export default {
         </table>
       </div>
     </div>`,
-  props: { document: Object, label: String },
   data: () => ({
     series: [], models: [], readings: [], cursors: CURSORS, alone: null, placing: "A", length: 0, held: null,
     at: { A: null, B: null }, place: { A: 0, B: 0 }, isInside: { A: false, B: false },
   }),
-  mounted() {
-    this.chart = echarts.init(this.$refs.plot, null, { renderer: "canvas" });
+  created() {
     this.shown = [0, 1];
     this.known = null;
+  },
+  mounted() {
     this.chart.on("datazoom", () => { this.readZoom(); this.tellWindow(); });
     this.chart.getZr().on("click", (event) => {
       const point = [event.offsetX, event.offsetY];
       if (![0, 1].some((grid) => this.chart.containPixel({ gridIndex: grid }, point))) return;
       this.set(this.placing, this.chart.convertFromPixel({ xAxisIndex: 0 }, event.offsetX));
     });
-    this.sizes = new ResizeObserver(() => { this.chart.resize(); this.putCursors(); });
-    this.sizes.observe(this.$refs.plot);
-    this.endTheme = whenThemeChanges(() => this.draw());
-    this.take(this.document);
   },
   beforeUnmount() {
     clearTimeout(this.windowWaits);
     clearTimeout(this.momentWaits);
-    this.sizes.disconnect();
-    this.endTheme();
-    this.chart.dispose();
   },
-  watch: { document(given) { this.take(given); } },
   methods: {
     /** Answers of REST: {key, rotation, models: [{label, series}]}. The same key keeps zoom and cursors. */
-    take(given) {
+    show() {
+      const given = this.document;
       if (!given) return;
       const models = JSON.parse(JSON.stringify(given.models));
       const [first] = models;
@@ -123,126 +114,14 @@ export default {
       this.draw();
       this.read();
     },
-    keyed() {
-      const shades = colours(), several = this.lines.length > 1;
-      const of = (what, line) => (several ? `${what}, ${line.label}` : what);
-      return [
-        { key: "measured", label: "Measured", colour: shades.ink },
-        ...this.lines.map((line, i) => ({
-          key: `predicted ${i}`, label: `${of("Predicted", line)} ± 1 SD`, colour: shades.model(i),
-        })),
-        ...this.lines.map((line, i) => ({ key: `error ${i}`, label: of("Error", line), colour: shades.model(i) })),
-      ];
-    },
+    resized() { this.putCursors(); },
     draw() {
       if (!this.lines) return;
       const shades = colours();
-      this.series = this.keyed();
-      const shows = (key) => this.alone === null || this.alone === key;
-      const drawn = [];
-      const line = (key, grid, colour, value, more) => drawn.push({
-        type: "line", name: key, xAxisIndex: grid, yAxisIndex: grid, showSymbol: false, silent: true,
-        animation: false, z: 3, lineStyle: { color: colour, width: 1.6 }, itemStyle: { color: colour },
-        data: shows(key) ? value : [], ...more,
-      });
-      const joined = (takes, name) => takes.flatMap((take) => [
-        ...take.linked.map((time, i) => [time, take[name][i]]), [take.linked[take.linked.length - 1] ?? 0, null],
-      ]);
-      this.lines.forEach(({ takes }, i) => {
-        const colour = shades.model(i);
-        if (shows(`predicted ${i}`)) drawn.push(this.band(takes, 0, colour, (take, k) => take.predicted_deg[k]));
-        if (shows(`error ${i}`)) drawn.push(this.band(takes, 1, colour, () => 0));
-        line(`predicted ${i}`, 0, colour, joined(takes, "predicted_deg"));
-        line(`error ${i}`, 1, colour, joined(takes, "error_deg"));
-      });
-      line("measured", 0, shades.ink, joined(this.lines[0].takes, "measured_deg"), {
-        z: 4, lineStyle: { color: shades.ink, width: 1.6, type: [5, 3] },
-      });
-      drawn.push(this.bounds(shades, 0), this.bounds(shades, 1));
-      this.chart.setOption({
-        animation: false,
-        textStyle: { color: shades.ink },
-        grid: [{ left: LEFT, right: RIGHT, ...TOP }, { left: LEFT, right: RIGHT, ...BELOW }],
-        axisPointer: { link: [{ xAxisIndex: "all" }], lineStyle: { color: shades.quiet } },
-        tooltip: {
-          trigger: "axis", renderMode: "richText", backgroundColor: shades.card, borderColor: shades.line,
-          textStyle: { color: shades.ink }, confine: true, formatter: (points) => this.tip(points),
-        },
-        xAxis: [0, 1].map((grid) => axis(shades, {
-          gridIndex: grid, min: 0, max: this.length, splitLine: { show: false },
-          axisLabel: {
-            show: grid === 1, color: shades.ink, showMinLabel: false, showMaxLabel: false, hideOverlap: true,
-            formatter: "{value} s",
-          },
-        })),
-        yAxis: [
-          axis(shades, { gridIndex: 0, scale: true, name: `${this.rotation}, degrees`, nameLocation: "middle", nameGap: 44 }),
-          axis(shades, { gridIndex: 1, name: "error, degrees", nameLocation: "middle", nameGap: 44, splitNumber: 3 }),
-        ],
-        dataZoom: [
-          {
-            type: "inside", xAxisIndex: [0, 1], filterMode: "none", startValue: this.shown[0], endValue: this.shown[1],
-            minValueSpan: LEAST_S, zoomOnMouseWheel: "ctrl", preventDefaultMouseMove: false,
-          },
-          {
-            type: "slider", xAxisIndex: [0, 1], filterMode: "none", bottom: 6, height: 26, left: LEFT, right: RIGHT,
-            startValue: this.shown[0], endValue: this.shown[1], minValueSpan: LEAST_S, brushSelect: false,
-            showDetail: false, borderColor: shades.line, textStyle: { color: shades.ink },
-          },
-        ],
-        series: drawn,
-      }, { replaceMerge: ["series"] });
+      this.series = seriesOf(this.lines, shades);
+      const option = overTime(this, shades, (points) => this.tip(points));
+      this.chart.setOption(option, { replaceMerge: ["series"] });
       this.$nextTick(() => this.putCursors());
-    },
-    /** One standard deviation on either side of `middle`, as one shape a take and run without a gap. */
-    band(takes, grid, colour, middle) {
-      const shapes = [];
-      for (const take of takes) {
-        let run = [];
-        take.linked.forEach((time, k) => {
-          const centre = middle(take, k), sd = take.sd_deg[k];
-          if (centre === null || sd === null) {
-            if (run.length > 1) shapes.push(run);
-            run = [];
-          } else run.push([time, centre, sd]);
-        });
-        if (run.length > 1) shapes.push(run);
-      }
-      return {
-        type: "custom", xAxisIndex: grid, yAxisIndex: grid, silent: true, animation: false, clip: true, z: 1,
-        tooltip: { show: false }, encode: { x: [0, 1], y: [2, 3] },
-        data: shapes.map((run) => [
-          run[0][0], run[run.length - 1][0],
-          Math.min(...run.map(([, centre, sd]) => centre - sd)), Math.max(...run.map(([, centre, sd]) => centre + sd)),
-        ]),
-        renderItem: (params, api) => {
-          const run = shapes[params.dataIndex];
-          const up = run.map(([time, centre, sd]) => api.coord([time, centre + sd]));
-          const down = run.map(([time, centre, sd]) => api.coord([time, centre - sd])).reverse();
-          return { type: "polygon", shape: { points: [...up, ...down] }, style: { fill: colour, opacity: 0.2 } };
-        },
-      };
-    },
-    /** Where takes begin and end, with their names. */
-    bounds(shades, grid) {
-      return {
-        type: "line", xAxisIndex: grid, yAxisIndex: grid, data: [], silent: true,
-        markArea: {
-          silent: true,
-          label: { show: grid === 0, color: shades.ink, position: "insideTop", fontSize: 12 },
-          data: this.takes.map((take, i) => [
-            {
-              name: take.name + (take.trained_on ? " (trained on)" : ""), xAxis: take.linked_s,
-              itemStyle: { color: shades.quiet, opacity: i % 2 ? 0.12 : 0.05 },
-            },
-            { xAxis: take.linked_s + take.end_s - take.start_s },
-          ]),
-        },
-        markLine: grid ? {
-          silent: true, symbol: "none", label: { show: false }, data: [{ yAxis: 0 }],
-          lineStyle: { color: shades.quiet, type: "solid" },
-        } : undefined,
-      };
     },
     tip(points) {
       if (!points.length) return "";

@@ -1,40 +1,15 @@
 // The error of a rotation over what shows an effect: frames, means, how far chance takes a mean, the noise floor.
 // What a model with the effect leaves stands beside it, dashed.
-import { echarts } from "nicegui-echart";
-import { axis, colours, whenThemeChanges } from "glovecal-comparison";
+import { axis, colours, tooltip, withLegend } from "glovecal-charts";
 
 const MOST_ROOM = 1.25; // of the largest mean: single frames beyond that are cut off
 
 export default {
-  template: `
-    <div class="effect-chart">
-      <div ref="plot" class="effect-plot" role="img" :aria-label="label"></div>
-      <ul class="effect-legend">
-        <li v-for="one in legend" :key="one.name">
-          <span class="effect-swatch" :class="'is-' + one.kind" :style="{ '--swatch': one.colour }" aria-hidden="true"></span>{{ one.name }}
-        </li>
-      </ul>
-    </div>`,
-  props: { document: Object, label: String },
-  data: () => ({ legend: [] }),
-  mounted() {
-    this.chart = echarts.init(this.$refs.plot, null, { renderer: "canvas" });
-    this.sizes = new ResizeObserver(() => this.chart.resize());
-    this.sizes.observe(this.$refs.plot);
-    this.endTheme = whenThemeChanges(() => this.draw());
-    this.draw();
-  },
-  beforeUnmount() {
-    this.sizes.disconnect();
-    this.endTheme();
-    this.chart.dispose();
-  },
-  watch: { document() { this.draw(); } },
+  mixins: [withLegend("effect-plot")],
   methods: {
     draw() {
       if (!this.document) return;
       const { before, after } = JSON.parse(JSON.stringify(this.document)), shades = colours();
-      const isDark = document.body.classList.contains("body--dark"), floorColour = isDark ? "#4ade80" : "#15803d";
       const hasPlaces = before.categories.length > 0, isSize = before.value.includes("RMSE");
       const series = [], legend = [];
       const dense = before.series.some((one) => one.at.length > 30);
@@ -82,10 +57,10 @@ export default {
       const floor = before.floor?.floor_deg ?? null;
       if (floor !== null) {
         const name = `noise floor ${isSize ? "" : "± "}${floor.toFixed(2)}°`;
-        legend.push({ name, kind: "band", colour: floorColour });
+        legend.push({ name, kind: "band", colour: shades.green });
         series.push({
           type: "line", data: [], silent: true, z: 0,
-          markArea: { silent: true, itemStyle: { color: floorColour, opacity: 0.22 }, data: [[{ yAxis: isSize ? 0 : -floor }, { yAxis: floor }]] },
+          markArea: { silent: true, itemStyle: { color: shades.green, opacity: 0.22 }, data: [[{ yAxis: isSize ? 0 : -floor }, { yAxis: floor }]] },
         });
       }
       this.legend = legend;
@@ -100,11 +75,9 @@ export default {
         : axis(shades, { scale: true, name: `${before.axis}${unit ? `, ${unit}` : ""}`, splitLine: { show: false } });
       this.chart.setOption({
         animation: false, textStyle: { color: shades.ink },
-        tooltip: {
-          trigger: "item", renderMode: "richText", confine: true, backgroundColor: shades.card,
-          borderColor: shades.line, textStyle: { color: shades.ink },
+        tooltip: tooltip(shades, {
           formatter: ({ seriesName, value }) => `${seriesName}\n${hasPlaces ? before.categories[value[0]] : `${Number(value[0]).toPrecision(3)} ${unit}`}: ${Number(value[1]).toFixed(2)}°`,
-        },
+        }),
         grid: { left: 58, right: 16, top: 14, bottom: 46 },
         xAxis: { ...across, nameLocation: "middle", nameGap: 28 },
         yAxis: axis(shades, { name: `${before.value}, degrees`, nameLocation: "middle", nameGap: 38, min: isSize ? 0 : -nice, max: nice }),
