@@ -38,8 +38,8 @@ class RotationErrors:
                     ui.label(sentence)
                 if seen:
                     ui.label(
-                        f"Trained on {seen} of these takes: there the error is smaller than on takes it has not "
-                        "seen."
+                        f"Trained on {seen} of these takes: there the error is smaller than on takes it "
+                        "has not seen."
                     ).classes("compare-warning")
             error_table(comparisons, rotation, self._choose)
             ui.label(SCALE).classes("compare-scale")
