@@ -62,14 +62,14 @@ def register_effect(effect: type[Effect] | Effect) -> type[Effect] | Effect:
     is known, so install it as an entry point before you hand the model on. Running the cell again replaces
     the effect. Raises BadInput when the name belongs to another effect.
     """
-    from glovecal_models.effects.catalogue import catalogue
+    from glovecal_models.effects.catalogue import registered_effects
 
     instance = effect() if isinstance(effect, type) else effect
     if not isinstance(instance, Effect):
         raise BadInput(
             f"{effect!r} is no Effect; derive it from InstantEffect, HistoryEffect or another base"
         )
-    known = catalogue()
+    known = registered_effects()
     before = known.get(instance.name)
     if before is not None and _home(before) != _home(instance):
         raise BadInput(f"there is an effect {instance.name!r} already; give yours another name")

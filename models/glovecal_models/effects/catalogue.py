@@ -5,11 +5,12 @@ A package of one's own adds an effect by an entry point that names its class; no
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from importlib.metadata import entry_points
+from types import MappingProxyType
 from typing import Any
 
 from glovecal_models.effects.base.effect import Effect
@@ -24,14 +25,20 @@ from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
 
 GROUP = "glovecal.effects"
-_ONE_CALL = threading.RLock()
+_DECLARED: ContextVar[Mapping[str, Effect]] = ContextVar("declared effects", default=MappingProxyType({}))
 DeclaredEffect = ExpressionEffect
 """A user's own effect, declared in one line of text."""
 
 
-@cache
 def catalogue() -> dict[str, Effect]:
-    """Every effect by its name. Raises BadInput for an entry point that is none."""
+    """Every effect by its name, with those of ``known_by_name``. Raises BadInput for an entry point that is
+    none."""
+    return {**registered_effects(), **_DECLARED.get()}
+
+
+@cache
+def registered_effects() -> dict[str, Effect]:
+    """Those that packages bring, to which a process may add."""
     found: dict[str, Effect] = {}
     for point in sorted(entry_points(group=GROUP), key=lambda item: item.name):
         effect = point.load()()
@@ -108,19 +115,12 @@ def stored_effect(name: str, settings: Settings) -> Effect:
 
 @contextmanager
 def known_by_name(effects: Sequence[Effect]) -> Iterator[None]:
-    """Within the block ``effects`` answer to their names; for one caller of this process at a time.
+    """Within the block ``effects`` answer to their names; other threads do not see them.
 
     A declared effect belongs to the models that hold it: two models may each have a ``strap`` of their own.
     """
-    with _ONE_CALL:
-        known = catalogue()
-        before = {item.name: known.get(item.name) for item in effects}
-        known.update({item.name: item for item in effects})
-        try:
-            yield
-        finally:
-            for name, earlier in before.items():
-                if earlier is None:
-                    del known[name]
-                else:
-                    known[name] = earlier
+    before = _DECLARED.set({**_DECLARED.get(), **{item.name: item for item in effects}})
+    try:
+        yield
+    finally:
+        _DECLARED.reset(before)

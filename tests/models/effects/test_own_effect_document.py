@@ -27,13 +27,13 @@ PLAIN = [text for language, text in BLOCKS if language == ""]
 def announce(monkeypatch: pytest.MonkeyPatch, *points: metadata.EntryPoint) -> None:
     real = tuple(metadata.entry_points(group=catalogue_module.GROUP))
     monkeypatch.setattr(catalogue_module, "entry_points", lambda group: (*real, *points))
-    catalogue_module.catalogue.cache_clear()
+    catalogue_module.registered_effects.cache_clear()
 
 
 @pytest.fixture(autouse=True)
 def forgotten_afterwards() -> Iterator[None]:
     yield
-    catalogue_module.catalogue.cache_clear()
+    catalogue_module.registered_effects.cache_clear()
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ OWN = "name = stiffness; columns = lowpass(own, 0.5)"
 @pytest.fixture(autouse=True)
 def forgotten_afterwards() -> Iterator[None]:
     yield
-    catalogue_module.catalogue.cache_clear()
+    catalogue_module.registered_effects.cache_clear()
 
 
 class Bend(glovecal.InstantEffect):

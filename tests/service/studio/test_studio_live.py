@@ -19,6 +19,7 @@ from studio_support import Open, moving
 
 from glovecal_client.session import open_client
 from glovecal_models.calibration.artifact import dump
+from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
 from glovecal_models.hand.forward_kinematics import forward_kinematics
 from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS
 from glovecal_models.hand.skeleton import hand_skeleton
@@ -173,6 +174,7 @@ def test_a_glove_goes_through_all_its_states_and_its_angle_is_explained(
         acts.add("silent")
         in_state(card, "stale")
         expect(terms).to_contain_text("No frame of glove explained arrives", timeout=10_000)
+        time.sleep(LONGEST_GAP_S)  # after shorter gaps what is remembered still holds
         acts.remove("silent")
         in_state(card, "settling")
         expect(terms).to_contain_text("Transient: ", timeout=10_000)

@@ -84,8 +84,9 @@ def test_a_glove_that_does_not_answer_holds_up_nobody() -> None:
         assert [state.word for state in states.values()] == ["unwatched", "unwatched"]
         assert opened[1] is opened[2]
         eventually(lambda: len(unanswered) == 2, "both were asked")
-        unanswered[0].reply(mute[0].meta, json.dumps({"sensors": ["A", 5]}))
-        unanswered[0].drop()
+        query = next(query for query in unanswered if str(query.key_expr) == mute[0].meta)
+        query.reply(mute[0].meta, json.dumps({"sensors": ["A", 5]}))
+        query.drop()
         eventually(lambda: opened[0].sensors == ["A", "5"], "the answer arrives later")
         with pytest.raises(NoAnswer) as told:
             feeds.explain("mute-1", "I_PIP")

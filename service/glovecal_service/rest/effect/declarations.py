@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any
 
-from glovecal_models.calibration.calibration_model import CalibrationModel
 from pydantic import Field, StringConstraints
 
+from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.model_recipe import declaration_of
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.catalogue import DeclaredEffect, declared_effect, effect_of_declaration
