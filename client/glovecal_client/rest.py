@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 FINISHED = ("done", "failed", "cancelled")
 _WARNING = re.compile(r'^299 \S+ "(.*)"$', re.DOTALL)
-CSV, PARQUET = "text/csv", "application/vnd.apache.parquet"
+CSV, PARQUET, ARTIFACT = "text/csv", "application/vnd.apache.parquet", "application/octet-stream"
 
 
 class NoService(ServiceError):
@@ -138,6 +138,15 @@ class RestClient:
         query = {"clock": clock, "filename": file.name}
         return self._send_file("PUT", f"/takes/{quote(take, safe='')}/reference", file, query)
 
+    def import_model(
+        self, file: Path, *, subject: str | None = None, create_subject: bool = False
+    ) -> dict[str, Any]:
+        """Give the service a model that ``models/{id}/export`` of another one wrote."""
+        query: dict[str, str | bool] = {"create_subject": create_subject}
+        if subject is not None:
+            query["subject"] = subject
+        return self._send_file("POST", "/models/import", file, query, ARTIFACT)
+
     def predict(
         self,
         model: str,
@@ -198,9 +207,15 @@ class RestClient:
         return document
 
     def _send_file(
-        self, method: str, path: str, file: Path, query: Mapping[str, str | bool] | None = None
+        self,
+        method: str,
+        path: str,
+        file: Path,
+        query: Mapping[str, str | bool] | None = None,
+        media_type: str | None = None,
     ) -> dict[str, Any]:
-        kind = PARQUET if file.suffix.lower() == ".parquet" else CSV
+        """``media_type`` None: that of a table, by its name."""
+        kind = media_type or (PARQUET if file.suffix.lower() == ".parquet" else CSV)
         with file.open("rb") as stream:
             return self._json(method, path, params=query, content=stream, headers={"Content-Type": kind})
 

@@ -36,6 +36,7 @@ from glovecal_service.rest.model import (
     comparison,
     explanation,
     fall,
+    model_import,
     models,
     predictions,
     quick_check,
@@ -57,7 +58,19 @@ BODY_PATIENCE_S = 30.0
 ROUTERS = (
     *(subjects, usual_hand, layouts, recordings, samplings),
     *(clocks, holds, examination, table_import, takes, reference, uploads),
-    *(training, models, predictions, comparison, where, ceiling, diagnosis, changes, catalogue, improvement),
+    *(
+        training,
+        model_import,
+        models,
+        predictions,
+        comparison,
+        where,
+        ceiling,
+        diagnosis,
+        changes,
+        catalogue,
+        improvement,
+    ),
     *(
         detectability,
         explanation,
@@ -132,6 +145,6 @@ def _guard(app: FastAPI, settings: Settings, metrics: Metrics, body_patience_s: 
 
 
 def _takes_files(path: str) -> bool:
-    return path in ("/v1/takes", "/v1/uploads") or (
+    return path in ("/v1/takes", "/v1/uploads", "/v1/models/import") or (
         path.startswith("/v1/takes/") and path.endswith("/reference")
     )

@@ -9,7 +9,14 @@ import typer
 
 from glovecal_service.cli.model.rows import EFFECT_COLUMNS, KERNEL_COLUMNS, effect_rows, kernel_rows
 from glovecal_service.cli.terminal.connection import connect
-from glovecal_service.cli.terminal.options import AsJson, Model, OnlyLayout, OnlySubject, Subject
+from glovecal_service.cli.terminal.options import (
+    AsJson,
+    Model,
+    OnlyLayout,
+    OnlySubject,
+    Subject,
+    subject_named,
+)
 from glovecal_service.cli.terminal.printing import (
     err,
     moment,
@@ -25,7 +32,11 @@ from glovecal_service.cli.terminal.writing import Overwrite, require_place, writ
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
 
-app = typer.Typer(help="Calibration models: versions, activation, export.", no_args_is_help=True)
+WhoseModel = typer.Option(
+    "--subject", "-s", help="Whose model it is; else whom it names.", callback=subject_named
+)
+
+app = typer.Typer(help="Calibration models: versions, activation, export, import.", no_args_is_help=True)
 
 
 @app.command("list")
@@ -164,6 +175,36 @@ def export(
     with connect() as service:
         write_whole({file: service.download(f"/models/{model}/export")})
     err.print(f"In Python: glovecal_models.calibration.artifact.load(open({str(file)!r}, 'rb').read())")
+
+
+@app.command("import")
+def import_model(
+    file: Annotated[Path, typer.Argument(help="What `model export` wrote.", exists=True, dir_okay=False)],
+    subject: Annotated[
+        str | None,
+        typer.Option(
+            "--subject", "-s", help="Whose model it is; else whom it names.", callback=subject_named
+        ),
+    ] = None,
+    create_subject: Annotated[
+        bool, typer.Option("--create-subject", help="Add the subject if it is not there.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Take over a model that another service exported; it is tried first, and not activated."""
+    with connect() as service:
+        found = service.import_model(file, subject=subject, create_subject=create_subject)
+    if as_json:
+        print_json(found)
+        return
+    model, short = found["model"], found["model"]["id"][:12]
+    if not found["is_new"]:
+        out.print(f"Model {short} of {model['subject']} was here already.")
+        return
+    out.print(
+        f"Model {short} of {model['subject']}, layout {model['layout']}, was imported. To predict live:"
+    )
+    out.print(f"  glovecal model activate {short}")
 
 
 def active_model(service: RestClient, subject: str | None, layout: str | None) -> str:

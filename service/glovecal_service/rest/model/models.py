@@ -9,7 +9,7 @@ import numpy as np
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field
 
-from glovecal_models.calibration.model import RotationModel
+from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.errors import DamagedArtifact
 from glovecal_service.plain import plain
 from glovecal_service.rest.http.answers import change_problems, problems
@@ -103,7 +103,7 @@ def list_models(
         if found is not None:
             active.add(found.id)
     return [
-        _row(record, record.id in active, store.models.damage(record) if record.id in active else "")
+        model_row(record, record.id in active, store.models.damage(record) if record.id in active else "")
         for record in records
     ]
 
@@ -127,15 +127,7 @@ def get_model(id: ModelInPath, parts: PartsNeeded) -> dict[str, Any]:
     if damage := parts.store.models.damage(record):
         raise DamagedArtifact(damage)
     model, _ = parts.predictors.get(record.id)
-    return _row(record, active is not None and active.id == record.id) | {
-        "rotations": [_rotation(item) for item in model.rotations],
-        "effects": [item.name for item in model.effects],
-        "effect_details": [effect_view(item) for item in model.effects],
-        "simulated": model.simulated,
-        "error_estimate": plain(model.error_estimate),
-        "held_out_rmse_deg": plain(model.error_estimate.get("rmse_deg")),
-        "unseen_wearing": unseen_wearing_view(model),
-    }
+    return model_row(record, active is not None and active.id == record.id) | model_details(model)
 
 
 @router.get(
@@ -147,7 +139,7 @@ def get_model(id: ModelInPath, parts: PartsNeeded) -> dict[str, Any]:
 def get_lineage(id: ModelInPath, store: StoreNeeded) -> list[dict[str, Any]]:
     line = store.models.lineage(id)
     active = store.models.active(line[0].subject, line[0].layout)
-    return [_row(record, active is not None and active.id == record.id) for record in line]
+    return [model_row(record, active is not None and active.id == record.id) for record in line]
 
 
 @router.post(
@@ -183,12 +175,26 @@ def export_model(id: ModelInPath, store: StoreNeeded) -> Response:
     )
 
 
-def _row(record: ModelRecord, active: bool, damage: str = "") -> dict[str, Any]:
+def model_row(record: ModelRecord, active: bool, damage: str = "") -> dict[str, Any]:
+    """As ``Model`` shows it."""
     effects = list(record.facts.get("effects", ()))
     row = {**record.__dict__, "active": active, "effects": effects, "facts": plain(record.facts)}
     row["damage"] = damage or None
     return row | {
         name: plain(record.facts.get(name)) for name in ("held_out_rmse_deg", "rmse_unseen_wearing_deg")
+    }
+
+
+def model_details(model: CalibrationModel) -> dict[str, Any]:
+    """What ``ModelInFull`` shows of the artifact itself."""
+    return {
+        "rotations": [_rotation(item) for item in model.rotations],
+        "effects": [item.name for item in model.effects],
+        "effect_details": [effect_view(item) for item in model.effects],
+        "simulated": model.simulated,
+        "error_estimate": plain(model.error_estimate),
+        "held_out_rmse_deg": plain(model.error_estimate.get("rmse_deg")),
+        "unseen_wearing": unseen_wearing_view(model),
     }
 
 

@@ -1,0 +1,167 @@
+"""``models/import``: a model's artifact from another service, tried before it is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import anyio.to_thread
+import numpy as np
+from fastapi import APIRouter, Query, Request, Response
+from pydantic import BaseModel, Field, ValidationError
+
+from glovecal_models.calibration.artifact import load, model_id
+from glovecal_models.calibration.explanation import FrameExplainer
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.predictor import GlovePredictor
+from glovecal_models.errors import BadInput, DamagedArtifact
+from glovecal_service.rest.http.answers import change_problems
+from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
+from glovecal_service.rest.http.problem import Problem
+from glovecal_service.rest.http.request_types import SubjectName
+from glovecal_service.rest.model.models import Model, ModelInFull, model_details, model_row
+from glovecal_service.store.clock import now
+from glovecal_service.store.errors import Conflict, NotFound
+from glovecal_service.store.records import ModelRecord, TakeRecord
+
+router = APIRouter(prefix="/models", tags=["models"])
+
+MEDIA_TYPE = "application/octet-stream"
+
+
+class ImportedModel(BaseModel):
+    model: Model
+    is_new: bool = Field(description="False: the very same model was here before.")
+    layout_is_new: bool
+    subject_created: bool
+
+
+class ModelImport(BaseModel):
+    """Query parameters of an import."""
+
+    subject: SubjectName | None = Field(None, description="Null: the subject that the model names.")
+    create_subject: bool = Field(False, description="Add the subject if it is not there; else 404.")
+
+
+@router.post(
+    "/import",
+    status_code=201,
+    response_model=ImportedModel,
+    summary="Import a model's artifact",
+    responses=change_problems(409, 415)
+    | {200: {"model": ImportedModel, "description": "This very model was here already."}},
+    openapi_extra={
+        "requestBody": {
+            "required": True,
+            "content": {MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}}},
+        }
+    },
+)
+async def import_model(
+    request: Request, response: Response, parts: PartsNeeded, options: Annotated[ModelImport, Query()]
+) -> dict[str, Any]:
+    """The body is what `models/{id}/export` gave. Nothing in it is executed; a file that does not predict a
+    frame is refused and changes nothing. The model is not activated.
+
+    409: its layout's name belongs to another layout here, or another subject has this very model.
+    """
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if kind != MEDIA_TYPE:
+        raise Problem(415, "media-type", f"a model is sent as {MEDIA_TYPE}, not {kind or 'nothing'!r}")
+    upload = await parts.uploads.receive(request.stream())
+    found = await anyio.to_thread.run_sync(_import, parts, upload.path, options, limiter=parts.import_slots)
+    response.status_code = 201 if found["is_new"] else 200
+    return found
+
+
+def _import(parts: Parts, path: Path, options: ModelImport) -> dict[str, Any]:
+    artifact = path.read_bytes()
+    model = _tried(artifact)
+    subject = options.subject or model.subject
+    layout_is_new = _layout_is_new(parts, model)
+    subject_created = options.create_subject and all(
+        each.name != subject for each in parts.store.subjects.list()
+    )
+    if subject_created:
+        parts.store.subjects.create(subject)
+    else:
+        parts.store.subjects.get(subject)
+    if layout_is_new:
+        parts.store.layouts.put(model.layout)
+    known = {record.id for record in parts.store.models.list()}
+    record = parts.store.models.add(
+        artifact,
+        subject=subject,
+        layout=model.layout.name,
+        method=model.method,
+        parent=model.parent if model.parent in known else None,
+        facts=_facts(model, parts.store.takes.list(subject)),
+    )
+    return {
+        "model": model_row(record, _is_active(parts, record)),
+        "is_new": record.id not in known,
+        "layout_is_new": layout_is_new,
+        "subject_created": subject_created,
+    }
+
+
+def _tried(artifact: bytes) -> CalibrationModel:
+    """Read, shown and made to predict a frame: what does not fit is refused here, not found on stage."""
+    try:
+        model = load(artifact)
+        readings = np.zeros(len(model.layout.sensors))
+        if model.sensor_centre is not None:
+            readings = np.asarray(model.sensor_centre, float)
+        if not model.rotations or readings.shape != (len(model.layout.sensors),):
+            raise BadInput("it has no rotation, or statistics of other sensors than its layout's")
+        record = ModelRecord(
+            model_id(artifact), model.subject, model.layout.name, model.method, model.parent,
+            _facts(model, ()), now(),
+        )  # fmt: skip
+        ModelInFull.model_validate(model_row(record, False) | model_details(model))
+        GlovePredictor(model).predict(readings[None])
+        FrameExplainer(model).frame(0.0, readings, {}, "")
+    except (DamagedArtifact, BadInput) as error:
+        raise BadInput(f"no model was imported: {error}") from error
+    except ValidationError as error:
+        place = ".".join(map(str, error.errors()[0]["loc"]))
+        raise BadInput(f"no model was imported: {place} is not what it should be") from error
+    except (ValueError, IndexError, KeyError, TypeError, AttributeError, np.linalg.LinAlgError) as error:
+        raise BadInput(f"no model was imported: it does not predict a frame ({error})") from error
+    return model
+
+
+def _layout_is_new(parts: Parts, model: CalibrationModel) -> bool:
+    """Raises Conflict for another layout of the same name."""
+    try:
+        here = parts.store.layouts.get(model.layout.name)
+    except NotFound:
+        return True
+    if here.sensors != model.layout.sensors or set(here.rotations) < set(model.rotation_names):
+        raise Conflict(
+            f"layout {model.layout.name!r} has other sensors or rotations here than in the model; "
+            "one of the two needs another name"
+        )
+    return False
+
+
+def _facts(model: CalibrationModel, takes: Sequence[TakeRecord]) -> dict[str, Any]:
+    """What lists of models show. ``takes``: the subject's; those it was trained on are known by hash."""
+    estimate = model.error_estimate
+    own = [record for record in takes if record.artifact in model.takes]
+    here = f"{len(own)} of them are here" if own else "none of them is here"
+    return {
+        "takes": [{"id": record.id, "name": record.name, "artifact": record.artifact} for record in own],
+        "held_out_rmse_deg": estimate.get("rmse_deg"),
+        "rmse_unseen_wearing_deg": estimate.get("rmse_unseen_wearing_deg"),
+        "held_out_how": estimate.get("how"),
+        "per_rotation": {item.rotation: item.held_out_rmse_deg for item in model.rotations},
+        "sentences": [f"Imported. It was trained on {len(model.takes)} takes; {here}."],
+        "simulated": model.simulated,
+    }
+
+
+def _is_active(parts: Parts, record: ModelRecord) -> bool:
+    active = parts.store.models.active(record.subject, record.layout)
+    return active is not None and active.id == record.id
