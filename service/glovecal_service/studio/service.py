@@ -45,6 +45,9 @@ class Service:
     async def put_file(self, path: str, content: bytes, media_type: str, **query: Any) -> Any:
         return await self._ask("PUT", path, query, None, content, media_type)
 
+    async def post_file(self, path: str, content: bytes, media_type: str, **query: Any) -> Any:
+        return await self._ask("POST", path, query, None, content, media_type)
+
     async def delete(self, path: str, **query: Any) -> Any:
         return await self._ask("DELETE", path, query, None)
 

@@ -7,9 +7,9 @@ from functools import partial
 from typing import Any
 
 from nicegui import ui
-from nicegui.elements.mixins.text_element import TextElement
 
 from glovecal_service.studio.amounts import degrees
+from glovecal_service.studio.table import cell, table
 
 OVERALL = "all rotations"
 COOL_TIMES, HOT_TIMES = 1.0, 5.0
@@ -33,18 +33,12 @@ def error_table(
     _, first = comparisons[0]
     ceiling = (first["ceiling"] or {}).get("rotations", {})
     overall = (first["ceiling"] or {}).get("overall")
-    with ui.element("div").classes("table-box") as box:
-        box.props('tabindex="0" role="region" aria-label="Error of each rotation"')
-        with ui.element("table").classes("error-table"):
-            with ui.element("thead"), ui.element("tr"):
-                errors = [f"Error, {name}" for name, _ in comparisons]
-                for text in ("Rotation", *errors, "Noise floor", "Ceiling", "Baseline"):
-                    _cell("th", text).props('scope="col"')
-            with ui.element("tbody"):
-                _row(OVERALL, [one["overall"] for _, one in comparisons], overall, None, choose)
-                for name in sorted(first["rotations"], key=lambda name: -(_rmse(first, name) or 0.0)):
-                    errors = [one["rotations"].get(name) for _, one in comparisons]
-                    _row(name, errors, ceiling.get(name), chosen == name, choose)
+    heads = ("Rotation", *(f"Error, {name}" for name, _ in comparisons), "Noise floor", "Ceiling", "Baseline")
+    with table("Error of each rotation", heads, "error-table"):
+        _row(OVERALL, [one["overall"] for _, one in comparisons], overall, None, choose)
+        for name in sorted(first["rotations"], key=lambda name: -(_rmse(first, name) or 0.0)):
+            errors = [one["rotations"].get(name) for _, one in comparisons]
+            _row(name, errors, ceiling.get(name), chosen == name, choose)
     floors = [one["floor"] for one in first["rotations"].values() if one["floor"] is not None]
     doubted = [floor for floor in floors if not floor["is_reliable"]]
     if doubted:
@@ -86,21 +80,21 @@ def _row(
             _error_cell(one)
         known = next((one for one in errors if one is not None), None)
         floor = None if known is None else known["floor"]
-        _cell("td", _floor(floor))
-        _cell("td", "–" if ceiling is None else degrees(ceiling["ceiling_deg"]))
-        _cell("td", "–" if known is None else degrees(known["baseline_deg"]))
+        cell(_floor(floor))
+        cell("–" if ceiling is None else degrees(ceiling["ceiling_deg"]))
+        cell("–" if known is None else degrees(known["baseline_deg"]))
 
 
 def _error_cell(one: Mapping[str, Any] | None) -> None:
     if one is None:
-        _cell("td", "–")
+        cell("–")
         return
     floor = one["floor"]
     times = None if floor is None or not floor["floor_deg"] else one["rmse_deg"] / floor["floor_deg"]
-    with ui.element("td").classes("error-cell") as cell:
+    with ui.element("td").classes("error-cell") as heat:
         if times is not None:
             share = min(1.0, max(0.0, (times - COOL_TIMES) / (HOT_TIMES - COOL_TIMES)))
-            cell.style(f"--heat: {HOTTEST_PERCENT * share:.0f}%")
+            heat.style(f"--heat: {HOTTEST_PERCENT * share:.0f}%")
         ui.label(degrees(one["rmse_deg"])).classes("error-value")
         if times is not None:
             ui.label(f"{times:.1f} × floor").classes("error-times")
@@ -112,7 +106,3 @@ def _floor(floor: Mapping[str, Any] | None) -> str:
     least = "at least " if floor["is_lower_bound"] else ""
     doubt = "" if floor["is_reliable"] else " *"
     return f"{least}{degrees(floor['floor_deg'])}{doubt}"
-
-
-def _cell(tag: str, text: str) -> TextElement:
-    return TextElement(tag=tag, text=text)

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from nicegui import ui
-from nicegui.elements.mixins.text_element import TextElement
 
 from glovecal_service.studio.amounts import degrees
+from glovecal_service.studio.table import cell, row_head, table
 
 HEADS = ("Effect", "Error reduced by", "Held-out error", "With its control", "Significant on")
 
@@ -16,15 +16,9 @@ HEADS = ("Effect", "Error reduced by", "Held-out error", "With its control", "Si
 def candidate_table(candidates: Sequence[Mapping[str, Any]]) -> None:
     """``candidates``: of a diagnosis, the best first."""
     largest = max([0.01, *(_saved(item, "rmse_after_deg") for item in candidates)])
-    with ui.element("div").classes("table-box") as box:
-        box.props('tabindex="0" role="region" aria-label="Held-out error with each effect"')
-        with ui.element("table").classes("candidate-table"):
-            with ui.element("thead"), ui.element("tr"):
-                for text in HEADS:
-                    TextElement(tag="th", text=text).props('scope="col"')
-            with ui.element("tbody"):
-                for item in candidates:
-                    _row(item, largest)
+    with table("Held-out error with each effect", HEADS, "candidate-table"):
+        for item in candidates:
+            _row(item, largest)
 
 
 def bar_key() -> None:
@@ -43,13 +37,13 @@ def bar_key() -> None:
 def _row(item: Mapping[str, Any], largest: float) -> None:
     saved, control = (_saved(item, name) for name in ("rmse_after_deg", "rmse_control_deg"))
     with ui.element("tr"):
-        TextElement(tag="th", text=item["effect"]).props('scope="row"')
+        row_head(item["effect"])
         with ui.element("td").classes("saved-cell"):
             _bar(saved, largest, "saved-by-effect" if item["passes"] else "saved-by-chance")
             _bar(control, largest, "saved-by-control")
-        TextElement(tag="td", text=f"{degrees(item['rmse_before_deg'])} → {degrees(item['rmse_after_deg'])}")
-        TextElement(tag="td", text=degrees(item["rmse_control_deg"]))
-        TextElement(tag="td", text=", ".join(item["where"]) or "no rotation").classes("candidate-where")
+        cell(f"{degrees(item['rmse_before_deg'])} → {degrees(item['rmse_after_deg'])}")
+        cell(degrees(item["rmse_control_deg"]))
+        cell(", ".join(item["where"]) or "no rotation").classes("candidate-where")
 
 
 def _bar(saved: float, largest: float, kind: str) -> None:

@@ -1,20 +1,25 @@
-"""Models and subjects: versions as a tree of descent, with their errors; activate, roll back, export."""
+"""Models and subjects: versions as a tree of descent, what they are made of; takes, hands and gloves."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from nicegui import ui
+from nicegui import events, ui
 
 from glovecal_service.studio.amounts import degrees, made_of
 from glovecal_service.studio.hand.dimensions_form import DimensionsForm
 from glovecal_service.studio.heading import heading
+from glovecal_service.studio.pages.gloves_table import gloves_table
+from glovecal_service.studio.pages.model_parts import ModelParts
+from glovecal_service.studio.pages.takes_table import TakesTable
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.shell import shell
 from glovecal_service.studio.studio import Studio
 
 EVERY_S = 2.0
+LARGEST_MODEL = 256 * 2**20
+"""Bytes."""
 
 
 def add(studio: Studio) -> None:
@@ -25,7 +30,9 @@ def add(studio: Studio) -> None:
         with shell(studio, "models", "Models and subjects"):
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/findings.css">')
             await ModelsPage(studio).build()
+            await TakesTable(studio.service).build()
             await DimensionsForm(studio.service).build()
+            await gloves_table(studio.service)
 
 
 class ModelsPage:
@@ -38,6 +45,14 @@ class ModelsPage:
     async def build(self) -> None:
         self._notice = ui.label("").classes("studio-notice").props('role="status"')
         self._trees = ui.element("div").classes("trees")
+        with ui.element("div").classes("capture-upload"):
+            # The library's own field has no name for those who hear the page; a button opens it.
+            self._upload = ui.upload(
+                on_upload=self._import, auto_upload=True, max_file_size=LARGEST_MODEL
+            ).props('accept=".safetensors"')
+        ui.button("Import a model").props("outline no-caps").classes("studio-target").on(
+            "click", js_handler=f"() => runMethod({self._upload.id}, 'pickFiles', [])"
+        )
         await self._look()
         ui.timer(EVERY_S, self._look)
 
@@ -92,12 +107,28 @@ class ModelsPage:
                         "outline no-caps"
                     ).classes("studio-target")
                 ui.link("Diagnose", f"/diagnose?model={model['id']}").classes("studio-link")
+                ui.link("Error fall", f"/fall?model={model['id']}").classes("studio-link")
                 ui.link("Export", f"../v1/models/{model['id']}/export").classes("studio-link").props(
                     "download"
                 )
+            ModelParts(self._studio.service, model["id"])
 
     async def _activate(self, model: str) -> None:
         await self._do(f"/models/{model}/activate", {}, "Live poses come from this model now.")
+
+    async def _import(self, event: events.UploadEventArguments) -> None:
+        self._upload.reset()
+        try:
+            found = await self._studio.service.post_file(
+                "/models/import", await event.file.read(), "application/octet-stream", create_subject=True
+            )
+        except Refusal as refusal:
+            self._notice.set_text(str(refusal))
+            return
+        model = found["model"]
+        here = "was imported" if found["is_new"] else "was here already"
+        await self._look()
+        self._notice.set_text(f"Model {model['id'][:12]} of {model['subject']} {here}; it is not active.")
 
     async def _roll_back(self, subject: str, layout: str) -> None:
         body = {"subject": subject, "layout": layout}

@@ -1,0 +1,99 @@
+"""Models in the browser: taken apart, imported; takes with their quality, gloves, layouts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import httpx
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from effect_models import CREEP, HYSTERESIS, model_with
+from playwright.sync_api import expect
+from realtime_support import LAYOUT
+from studio_support import Open
+
+from glovecal_models.calibration.artifact import dump, model_id
+from glovecal_service.settings import Settings
+from glovecal_service.store import Store
+
+pytestmark = pytest.mark.needs_chromium
+PATIENCE_MS = 30_000
+ARTIFACT = dump(replace(model_with(HYSTERESIS, CREEP), layout=replace(LAYOUT, name="three-bends-elsewhere")))
+
+
+@pytest.fixture(scope="module")
+def remembering(settings: Settings, address: str) -> str:
+    """The id of a model with two effects."""
+    with Store.open(settings) as store:
+        store.subjects.create("taken-apart")
+        return store.models.add(
+            dump(model_with(CREEP)), subject="taken-apart", layout=LAYOUT.name, method="linear",
+            parent=None, facts={},
+        ).id  # fmt: skip
+
+
+def test_a_model_is_taken_apart_by_keyboard(opened: Open, address: str, remembering: str) -> None:
+    found = httpx.get(f"{address}/v1/models/{remembering}").json()
+    seen = opened("models")
+    version = seen.page.locator(f'[data-model="{remembering}"]')
+    version.get_by_role("button", name="Take apart").press("Enter")
+    expect(version.get_by_role("heading", name="Effect 1: creep")).to_be_visible(timeout=PATIENCE_MS)
+    [effect] = found["effect_details"]
+    learned = version.get_by_role("region", name="What creep learned").locator("tbody tr")
+    assert learned.locator("th").all_inner_texts() == list(effect["parameters"])
+    numbers = next(iter(effect["parameters"].values()))
+    assert learned.first.locator("td").first.inner_text() == f"{next(iter(numbers.values())):.4g}"
+    rotations = version.get_by_role("region", name="Rotations of the model").locator("tbody th")
+    assert rotations.all_inner_texts() == [one["rotation"] for one in found["rotations"]]
+    seen.page.wait_for_timeout(300)
+    problems = Axe().run(seen.page).response["violations"]
+    assert [each["id"] for each in problems if each["impact"] in ("serious", "critical")] == []
+    assert version.get_by_role("button", name="Take creep out").is_enabled()
+    assert seen.complaints == []
+
+
+def test_a_model_is_imported_and_a_file_that_is_none_refused(
+    opened: Open, address: str, tmp_path: Path
+) -> None:
+    seen = opened("models")
+    page, notice = seen.page, seen.page.locator(".studio-notice").first
+    before = httpx.get(f"{address}/v1/models").json()
+    for name, content, said in (
+        ("broken.safetensors", ARTIFACT[:-100], "no model was imported"),
+        ("good.safetensors", ARTIFACT, f"Model {model_id(ARTIFACT)[:12]} of anna was imported"),
+        ("good.safetensors", ARTIFACT, "was here already"),
+    ):
+        file = tmp_path / name
+        file.write_bytes(content)
+        with page.expect_file_chooser() as chooser:
+            page.get_by_role("button", name="Import a model").press("Enter")
+        chooser.value.set_files(file)
+        expect(notice).to_contain_text(said, timeout=PATIENCE_MS)
+    added = [each for each in httpx.get(f"{address}/v1/models").json() if each not in before]
+    assert [(each["id"], each["active"]) for each in added] == [(model_id(ARTIFACT), False)]
+    expect(page.locator(f'[data-model="{model_id(ARTIFACT)}"]')).to_be_visible()
+    assert seen.complaints == []
+
+
+def test_takes_have_their_quality_and_gloves_their_layouts(opened: Open, address: str) -> None:
+    page = opened("models").page
+    takes = httpx.get(f"{address}/v1/takes").json()
+    rows = page.get_by_role("region", name="Takes and their quality").locator("tbody tr")
+    assert rows.count() == len(takes)
+    for take in takes[:2]:
+        check = httpx.get(f"{address}/v1/takes/{take['id']}/check").json()
+        row = page.locator(f'[data-take="{take["id"]}"]')
+        expect(row.locator(".take-quality")).to_contain_text(
+            f"{check['rate_hz']:.1f} Hz", timeout=PATIENCE_MS
+        )
+        for sentence in check["sentences"][:2]:
+            expect(row).to_contain_text(sentence)
+    layouts = page.get_by_role("region", name="Layouts").last.locator("tbody th").all_inner_texts()
+    gloves = httpx.get(f"{address}/v1/gloves").json()
+    assert layouts == [each["name"] for each in gloves["layouts"]]
+    if gloves["seen"]:
+        seen = page.get_by_role("region", name="Gloves seen").last.locator("tbody th").all_inner_texts()
+        assert [text.removesuffix(" (simulated)") for text in seen] == [
+            each["name"] for each in gloves["seen"]
+        ]
