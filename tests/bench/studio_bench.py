@@ -50,6 +50,7 @@ TARGETS = (
     ("page_core_percent", "<=", 15.0, "% of one core of the service for an open page"),
     ("age_effect_ms", "<=", 2.0, f"ms more at the 99th percentile of poses' age with {PAGES} pages open"),
     ("growth_mb", "<=", 20.0, "MB growth of a page with two gloves"),
+    ("first_s", "<=", 2.0, "s until a page shows its hands"),
 )
 COMPARED: dict[str, Callable[[float, float], bool]] = {"<=": operator.le, ">=": operator.ge}
 
@@ -65,6 +66,8 @@ class Run:
     updates_hz: float
     """Of the slowest hand of all pages; NaN without a page."""
     growth_mb: float
+    first_s: float
+    """Until the slowest page had its gloves' hands; NaN without a page."""
 
 
 class Bench:
@@ -80,7 +83,11 @@ class Bench:
         load = Load(self._settings.zenoh, self._settings.site, GLOVES, PEOPLE, RATE_HZ, seconds)
         with ExitStack() as kept:
             driver = kept.enter_context(_driver(load))
-            opened = [kept.enter_context(self._page()) for _ in range(pages)]
+            opened, firsts = [], []
+            for _ in range(pages):
+                began = time.monotonic()
+                opened.append(kept.enter_context(self._page()))
+                firsts.append(time.monotonic() - began)
             driver.send("start")
             time.sleep(SETTLES_S)
             heaps, counts = [_heap_mb(page) for page in opened], [page.evaluate(UPDATES) for page in opened]
@@ -103,11 +110,12 @@ class Bench:
             spent_s / passed,
             min(rates, default=nothing),
             max(grown, default=nothing),
+            max(firsts, default=nothing),
         )
         print(
             f"{pages} pages, {seconds:.0f} s: poses' age p99 {run.age_p99_ms:.2f} ms, web process "
             f"{100 * run.web_core:.1f} % of a core, slowest hand {run.updates_hz:.1f} updates/s, "
-            f"growth {run.growth_mb:.1f} MB",
+            f"growth {run.growth_mb:.1f} MB, opened in {run.first_s:.1f} s",
             flush=True,
         )
         return run
@@ -173,6 +181,7 @@ def measure(settings: Settings, seconds: float, watched_s: float) -> dict[str, A
         * max((run.web_core - without.web_core) / run.pages for run in (one, several)),
         "age_effect_ms": several.age_p99_ms - without.age_p99_ms,
         "growth_mb": watched.growth_mb,
+        "first_s": watched.first_s,
         "load": os.getloadavg()[0],
         "cores": len(cores),
     }

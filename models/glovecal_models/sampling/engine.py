@@ -143,9 +143,10 @@ class Sampling(UserEvents):
             moving = self.limits.moving_times_still * self.limits.still_percent
             self._recent.moved = percent is not None and percent > moving
         step, trigger = self.state.now(), self.state.trigger
-        if trigger == "timer" and waited >= TIMER_S:
-            self._enter("countdown", now_s, speech.COUNTDOWN)
+        # A motion is not still, and a hand that waits for its widget is.
         by_hand = trigger == "still" and step.motion == "hold" and not step.needs
+        if trigger != "key" and not by_hand and waited >= TIMER_S:
+            self._enter("countdown", now_s, speech.COUNTDOWN)
         if by_hand and self._recent.moved and self.recording is not None:
             still = self._recent.percent(GESTURE_STILL_S, self._ranges)
             if still is not None and still <= self.limits.still_percent:

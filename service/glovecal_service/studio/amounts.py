@@ -11,8 +11,8 @@ def degrees(value: float | None) -> str:
 
 
 def made_of(model: Mapping[str, Any]) -> str:
-    """The method and the effects on top of it."""
-    return " + ".join([model["method"], *model["effects"]])
+    """The method and the effects on top of it; an effect that was added twice is named once."""
+    return " + ".join(dict.fromkeys([model["method"], *model["effects"]]))
 
 
 def version_name(model: Mapping[str, Any]) -> str:

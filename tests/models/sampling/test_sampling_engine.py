@@ -151,7 +151,7 @@ def test_on_the_timer_all_goes_by_itself(bench) -> None:
 
 def test_a_still_hand_triggers_only_after_it_has_moved(bench) -> None:
     it = bench(trigger="still")
-    it.event("go")
+    assert it.pass_time(3.1, moving) == "countdown", "stillness cannot begin a motion"
     it.pass_time(5.9, moving)
     assert it.state.step == "flat"
     it.pass_time(1.0, moving)

@@ -229,6 +229,65 @@ def test_a_new_wearing_needs_a_model(opened: Open) -> None:
     page.get_by_text(f"No model is active for {SUBJECT}").wait_for(timeout=PATIENCE_MS)
 
 
+def choose(page: Page, label: str, option: str) -> None:
+    page.get_by_label(label).click()
+    page.get_by_role("option", name=option).click()
+
+
+@pytest.mark.slow
+def test_the_active_protocol_goes_on_by_a_still_hand(opened: Open, address: str) -> None:
+    seen = opened("capture")
+    page = seen.page
+    page.emulate_media(reduced_motion="reduce")
+    page.get_by_role("button", name="Start sampling").wait_for()
+    choose(page, "Protocol", "Active")
+    choose(page, "A step starts", "By holding the hand still")
+    page.get_by_role("button", name="Start sampling").click()
+    in_phase(page, "waiting", "ready", "now")
+    assert (sampling(address)["protocol"], sampling(address)["trigger"]) == ("active", "still")
+    eventually(lambda: list(outcomes(address).values()).count("good") >= 4, "four good steps", 180.0)
+    page.get_by_role("button", name="Stop").first.click()
+    page.get_by_role("dialog").get_by_role("button", name="Stop").click()
+    page.get_by_role("heading", name="Stopped").wait_for(timeout=PATIENCE_MS)
+    assert seen.complaints == []
+
+
+@pytest.mark.slow
+def test_from_a_first_sampling_by_timer_to_a_checked_wearing_by_pedal(opened: Open, address: str) -> None:
+    seen = opened("capture")
+    page = seen.page
+    page.emulate_media(reduced_motion="reduce")
+    page.get_by_role("button", name="Start sampling").wait_for()
+    choose(page, "Protocol", "Poses and widgets only")
+    choose(page, "A step starts", "By timer: steps")
+    page.get_by_text("I have widgets").click()
+    page.get_by_role("button", name="Start sampling").click()
+    in_phase(page, "waiting", "ready", "now")
+    page.get_by_role("heading", name="Done").wait_for(timeout=600_000)
+    page.get_by_role("button", name="Train a model").click()
+    page.get_by_text("Trained, and served from the next frame on.").wait_for(timeout=300_000)
+    assert [each["active"] for each in asked(address, "models", subject=SUBJECT)] == [True]
+
+    page = opened("capture?mode=wearing").page
+    page.emulate_media(reduced_motion="reduce")
+    page.get_by_label("Name of this wearing").fill("in the afternoon")
+    began = time.monotonic()
+    page.get_by_role("button", name="Start the check").click()
+    in_phase(page, "waiting")
+    while (now := sampling(address))["open"]:
+        if now["phase"] in ("waiting", "judged"):
+            page.keyboard.press("PageDown")
+            page.wait_for_timeout(200)
+    page.get_by_role("heading", name="Wearing in the afternoon is checked").wait_for(timeout=PATIENCE_MS)
+    print(f"checked {time.monotonic() - began:.0f} s after the button, {now['capture_s']:.0f} s of capture")
+    first, *_, last = asked(address, "models", subject=SUBJECT)
+    assert (last["parent"], last["facts"]["quick_check"]["takes"]) == (
+        first["id"],
+        sampling(address)["takes"],
+    )
+    assert seen.complaints == []
+
+
 def test_a_lost_glove_is_told(opened: Open, address: str, worn: subprocess.Popen[bytes]) -> None:
     body = {"glove": GLOVE, "subject": SUBJECT, "protocol": "fk_only"}
     id = httpx.post(f"{address}/v1/sampling", json=body).raise_for_status().json()["id"]

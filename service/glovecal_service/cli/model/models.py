@@ -118,7 +118,8 @@ def _errors(row: dict[str, Any]) -> str | float | None:
 
 def _method(row: dict[str, Any]) -> str:
     """The regressors and the effects on top of them."""
-    return " + ".join([row["method"], *([", ".join(row["effects"])] if row["effects"] else [])])
+    effects = ", ".join(dict.fromkeys(row["effects"]))
+    return f"{row['method']} + {effects}" if effects else row["method"]
 
 
 def _facts(document: dict[str, Any], lineage: list[dict[str, Any]]) -> dict[str, Any]:

@@ -52,7 +52,10 @@ class NewSampling(StrictBody):
     subject: SubjectName
     wearing: WearingName | None = Field(None, description="None: the glove's wearing.")
     protocol: ProtocolName = "new_subject"
-    trigger: Trigger = Field("key", description="What begins a step: a key or pedal, a timer, a still hand.")
+    trigger: Trigger = Field(
+        "key",
+        description="What begins a step: a key or pedal, a timer, a still hand (motions, widgets: a timer).",
+    )
     widget_deg: Annotated[dict[Channel, Angles], Field(max_length=100)] = Field(
         default_factory=dict, description="Widgets by the rotation that they hold, instead of the usual."
     )

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from glovecal_service.studio.amounts import version_name
+from glovecal_service.studio.amounts import made_of, version_name
 
 MOST_MODELS = 4
 MOST_TAKES_AT_FIRST = 6
@@ -93,7 +93,7 @@ def not_comparable(model: Row, other: Row) -> str:
 
 def short_names(models: Sequence[Row]) -> list[str]:
     """Method and effects, with the id's first digits: short enough for a legend."""
-    return [" + ".join([each["method"], *each["effects"]]) + f" {each['id'][:6]}" for each in models]
+    return [f"{made_of(each)} {each['id'][:6]}" for each in models]
 
 
 def model_options(models: Sequence[Row]) -> dict[str, str]:

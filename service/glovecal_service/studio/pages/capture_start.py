@@ -23,7 +23,7 @@ PROTOCOLS = {
 TRIGGERS = {
     "key": "By key or foot pedal",
     "timer": "By timer: steps proceed by themselves",
-    "still": "By holding the hand still",
+    "still": "By holding the hand still; motions and widgets by timer",
 }
 KEYS_TOLD = (
     ("Space, Enter, Page Down", "start the step, repeat a bad one, go on after a pause"),

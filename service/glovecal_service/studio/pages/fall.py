@@ -10,6 +10,7 @@ from urllib.parse import quote
 
 from nicegui import ui
 
+from glovecal_service.studio.amounts import made_of
 from glovecal_service.studio.charts.fall_chart import FallChart
 from glovecal_service.studio.hand.hand_view import HandView, Side
 from glovecal_service.studio.hand.replay import Replay
@@ -133,7 +134,7 @@ class FallPage:
             with ui.element("div").classes("compare-pair"):
                 for name, model in (("Before", line[-2]), ("After", line[-1])):
                     with ui.element("div"):
-                        heading(3, f"{name}: {_made_of(model)}")
+                        heading(3, f"{name}: {made_of(model)}")
                         views.append(
                             HandView(
                                 skeleton,
@@ -237,10 +238,6 @@ def _last_model(result: Mapping[str, Any]) -> str | None:
     """Of an improvement."""
     steps = result.get("steps") or []
     return steps[-1]["model"] if steps else None
-
-
-def _made_of(model: Mapping[str, Any]) -> str:
-    return " + ".join([model["method"], *model["effects"]])
 
 
 def _compared(line: Sequence[Mapping[str, Any]]) -> str:

@@ -12,7 +12,7 @@ from glovecal_service.studio.service import Service
 
 
 async def model_select(service: Service, wanted: str, chosen: Callable[[str], Awaitable[None]]) -> str | None:
-    """The id to begin with: ``wanted`` if it is there, else the newest active one; None without any model.
+    """The id to begin with: ``wanted``, also its first digits, else the newest active one; None without any.
 
     ``chosen`` is called with each other one.
     """
@@ -22,8 +22,11 @@ async def model_select(service: Service, wanted: str, chosen: Callable[[str], Aw
         return None
     names = {each["id"]: f"{each['subject']}: {version_name(each)}" for each in reversed(models)}
     active = next((each["id"] for each in reversed(models) if each["active"]), models[-1]["id"])
-    first = wanted if wanted in names else active
-    if wanted and first != wanted:
+    own = [name for name in names if wanted and name.startswith(wanted)]
+    first = own[0] if len(own) == 1 else active
+    if len(own) > 1:
+        ui.label(f"Several models begin with {wanted[:12]}.").classes("studio-notice").props('role="status"')
+    elif wanted and not own:
         ui.label(f"There is no model {wanted[:12]}.").classes("studio-notice").props('role="status"')
 
     async def change(event: ValueChangeEventArguments) -> None:

@@ -30,9 +30,10 @@ def add(studio: Studio) -> None:
         with shell(studio, "models", "Models and subjects"):
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/findings.css">')
             await ModelsPage(studio).build()
-            await TakesTable(studio.service).build()
-            await DimensionsForm(studio.service).build()
-            await gloves_table(studio.service)
+            with ui.element("div").classes("trees"):
+                await TakesTable(studio.service).build()
+                await DimensionsForm(studio.service).build()
+                await gloves_table(studio.service)
 
 
 class ModelsPage:
@@ -50,7 +51,7 @@ class ModelsPage:
             self._upload = ui.upload(
                 on_upload=self._import, auto_upload=True, max_file_size=LARGEST_MODEL
             ).props('accept=".safetensors"')
-        ui.button("Import a model").props("outline no-caps").classes("studio-target").on(
+        ui.button("Import a model").props("outline no-caps").classes("studio-target page-acts").on(
             "click", js_handler=f"() => runMethod({self._upload.id}, 'pickFiles', [])"
         )
         await self._look()
