@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import zenoh
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page, sync_playwright
 from realtime_support import WireGlove
 
@@ -57,6 +58,16 @@ class Opened:
 
 
 Open = Callable[..., Opened]
+
+
+def serious(page: Page) -> list[str]:
+    """What axe-core finds that keeps somebody from using the page: findings of serious or critical impact."""
+    found = Axe().run(page).response["violations"]
+    return [
+        f"{item['id']}: {item['nodes'][0]['html'][:200]}"
+        for item in found
+        if item["impact"] in ("serious", "critical")
+    ]
 
 
 def with_calibration(

@@ -11,10 +11,9 @@ from typing import Any
 
 import httpx
 import pytest
-from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, expect
 from realtime_support import eventually, part_of_service
-from studio_support import Open
+from studio_support import Open, serious
 
 from glovecal_service.demo.processes import DemoPlace, running_capture
 from glovecal_service.serve import recorder
@@ -121,15 +120,6 @@ def heard(page: Page) -> list[str]:
     return page.evaluate("getElement(document.querySelector('.board').id.slice(1)).played()")
 
 
-def serious(page: Page) -> list[str]:
-    found = Axe().run(page).response["violations"]
-    return [
-        f"{item['id']}: {item['nodes'][0]['html'][:200]}"
-        for item in found
-        if item["impact"] in ("serious", "critical")
-    ]
-
-
 def test_a_sampling_by_keyboard_alone_through_a_redo_a_reload_and_another_tab(
     opened: Open, address: str
 ) -> None:
@@ -173,6 +163,14 @@ def test_a_sampling_by_keyboard_alone_through_a_redo_a_reload_and_another_tab(
     assert serious(page) == []
     page.set_viewport_size({"width": 390, "height": 844})
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+    page.get_by_role("button", name="Stop").first.press("Enter")
+    page.get_by_role("dialog").get_by_role("button", name="Go on sampling").wait_for()
+    page.wait_for_timeout(400)
+    assert serious(page) == []
+    page.keyboard.press("Escape")
+    page.get_by_role("dialog").wait_for(state="hidden")
+    page.evaluate("document.activeElement.blur()")
 
     press(page, "p", address, lambda now: now["phase"] == "paused")
     in_phase(page, "paused")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import httpx
 import pytest
-from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, expect
-from studio_support import Open
+from studio_support import Open, serious
 
 pytestmark = pytest.mark.needs_chromium
 PATIENCE_MS = 30_000
@@ -48,12 +47,7 @@ def test_the_picture_of_the_named_effect_has_the_points_of_rest(
     assert shown == asked
     assert shown["rotation"] in named["where"]
     assert sentence.inner_text() == asked["sentence"]
-    grave = [
-        item["id"]
-        for item in Axe().run(page).response["violations"]
-        if item["impact"] in ("serious", "critical")
-    ]
-    assert grave == []
+    assert serious(page) == []
 
 
 def test_the_fall_goes_over_simpler_calibrations_and_both_hands_are_replayed(

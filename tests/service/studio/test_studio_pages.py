@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import httpx
 import pytest
-from axe_playwright_python.sync_playwright import Axe
-from studio_support import Open
+from studio_support import Open, serious
 
 pytestmark = pytest.mark.needs_chromium
 PAGES = {
@@ -20,15 +19,6 @@ PAGES = {
 LAST_THERE = {"compare": ".stretch"}
 """What a page shows when all of it is there, where that takes a moment."""
 LEAST_TARGET_PX = 44
-
-
-def serious(page) -> list[str]:
-    found = Axe().run(page).response["violations"]
-    return [
-        f"{item['id']}: {item['nodes'][0]['html'][:200]}"
-        for item in found
-        if item["impact"] in ("serious", "critical")
-    ]
 
 
 @pytest.mark.parametrize("name", PAGES)

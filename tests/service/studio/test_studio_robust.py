@@ -11,7 +11,7 @@ import pytest
 import zenoh
 from playwright.sync_api import Page, expect
 from realtime_support import free_endpoint, part_of_service, store_model
-from studio_support import Open, moving
+from studio_support import Open, moving, serious
 
 from glovecal_client.session import open_client
 from glovecal_service.serve import web
@@ -109,6 +109,11 @@ def test_a_job_is_cancelled_from_the_drawer_and_every_open_page_is_told(opened: 
     job = httpx.post(f"{address}/v1/models/train", json=body).raise_for_status().json()
     drawer = other.get_by_role("button", name="Jobs (1 running)")
     drawer.click(timeout=PATIENCE_MS)
+    other.get_by_role("dialog").get_by_role("button", name="Cancel").wait_for()
+    for scheme in ("dark", "light"):
+        other.emulate_media(color_scheme=scheme)
+        other.wait_for_timeout(500)
+        assert serious(other) == []
     other.get_by_role("dialog").get_by_role("button", name="Cancel").click()
     for page in (one, other):
         expect(page.get_by_text("train: cancelled").first).to_be_visible(timeout=PATIENCE_MS)
