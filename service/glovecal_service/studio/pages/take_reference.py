@@ -1,0 +1,108 @@
+"""The reference of a take: angles measured elsewhere, attached to it, and whether their clocks agree."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import PurePosixPath
+from typing import Any
+
+from nicegui import events, ui
+
+from glovecal_service.studio.heading import heading
+from glovecal_service.studio.service import Refusal
+from glovecal_service.studio.studio import Studio
+
+LARGEST_FILE = 512 * 2**20
+"""Bytes."""
+SHOWN_TAKES = 100
+MEDIA_TYPES = {".parquet": "application/vnd.apache.parquet"}
+
+
+class TakeReference:
+    """Angles measured elsewhere, attached to a take; and whether their clock is the glove's."""
+
+    def __init__(self, studio: Studio) -> None:
+        self._studio = studio
+
+    async def build(self) -> None:
+        with ui.element("section").classes("card capture-form").props('aria-label="Reference"'):
+            heading(2, "Reference of a take")
+            ui.label("A table with time_s and r. columns, CSV or Parquet, from another measuring system.")
+            with ui.element("div").classes("capture-fields"):
+                self._take = ui.select({}, label="Take").classes("choice")
+                self._clock = ui.select(
+                    {"take": "seconds as in the take", "wall": "Unix seconds"}, value="take",
+                    label="Its time_s counts",
+                ).classes("choice")  # fmt: skip
+            # The library's own field has no name for those who hear the page; a button opens it.
+            with ui.element("div").classes("capture-upload"):
+                self._upload = ui.upload(
+                    on_upload=self._attach, auto_upload=True, max_file_size=LARGEST_FILE
+                ).props('accept=".csv,.parquet"')
+            with ui.element("div").classes("capture-acts"):
+                ui.button("Attach a file").props("unelevated no-caps color=indigo-8").classes(
+                    "studio-main-act"
+                ).on("click", js_handler=f"() => runMethod({self._upload.id}, 'pickFiles', [])")
+                for name, repair in (("Check its clock", False), ("Check and move the reference", True)):
+                    ui.button(name, on_click=partial(self._check, repair)).props("outline no-caps").classes(
+                        "studio-target"
+                    )
+                ui.button("Undo the move", on_click=self._undo).props("flat no-caps").classes("studio-target")
+            self._told = ui.label("").classes("studio-notice").props('role="status"')
+        await self._list()
+
+    async def choose(self, take: str) -> None:
+        await self._list()
+        self._take.set_value(take)
+
+    async def _list(self) -> None:
+        takes = (await self._studio.service.get("/takes"))[-SHOWN_TAKES:]
+        names = {
+            each["id"]: f"{each['subject']}: {each['name']}"
+            + (", with reference" if each["rotations"] else "")
+            for each in reversed(takes)
+        }
+        self._take.set_options(names, value=self._take.value if self._take.value in names else None)
+
+    async def _attach(self, event: events.UploadEventArguments) -> None:
+        name = PurePosixPath(event.file.name).name
+        kind = MEDIA_TYPES.get(PurePosixPath(name).suffix.lower(), "text/csv")
+        self._upload.reset()
+        if not self._take.value:
+            self._told.set_text("Choose a take first.")
+            return
+        try:
+            take = await self._studio.service.put_file(
+                f"/takes/{self._take.value}/reference", await event.file.read(), kind,
+                clock=self._clock.value, filename=name,
+            )  # fmt: skip
+        except Refusal as refusal:
+            self._told.set_text(str(refusal))
+            return
+        await self._list()
+        self._told.set_text(
+            f"{take['name']} has {len(take['rotations'])} measured rotations. Check its clock next."
+        )
+
+    async def _check(self, repair: bool) -> None:
+        await self._ask_clock("/takes/clocks", {"repair": repair})
+
+    async def _undo(self) -> None:
+        await self._ask_clock("/takes/clocks/undo", {})
+
+    async def _ask_clock(self, path: str, body: Mapping[str, Any]) -> None:
+        if not self._take.value:
+            self._told.set_text("Choose a take first.")
+            return
+        try:
+            found = await self._studio.service.post(path, {"takes": [self._take.value], **body})
+        except Refusal as refusal:
+            self._told.set_text(str(refusal))
+            return
+        said = [
+            each["sentence"] + (" Moved." if each["repaired"] else "")
+            for each in found
+            if isinstance(each, dict)
+        ]
+        self._told.set_text(" ".join(said) or ("Moved back." if found else "Nothing was moved."))
