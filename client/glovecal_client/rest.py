@@ -104,6 +104,10 @@ class RestClient:
         """The bytes of an export."""
         return self._send("GET", path, params=query).content
 
+    def made(self, path: str, body: Any) -> bytes:
+        """The bytes of a file that the service makes from what is asked."""
+        return self._send("POST", path, json=body).content
+
     def add_layout(self, file: Path) -> str:
         """Store the layout in a TOML or .json file, return its name; a file without one gives its own."""
         content = file.read_bytes()

@@ -42,6 +42,11 @@ def write_takes(takes: Sequence[Take], path: Path) -> list[Path]:
     return [frames, reference]
 
 
+def write_columns(columns: dict[str, np.ndarray], path: Path) -> None:
+    """A table (.csv or .parquet) of columns of any name; NaN is empty. Replaced whole or not at all."""
+    _replaced(_writer(path), dict(columns), path)
+
+
 def _require_one_table(takes: Sequence[Take]) -> None:
     if not takes:
         raise BadInput("there is no take to write")
@@ -138,6 +143,12 @@ def _write_whole(
     write: Callable[[dict[str, TableColumn], Path], None], columns: dict[str, TableColumn], path: Path
 ) -> None:
     _check_columns(columns, path)
+    _replaced(write, columns, path)
+
+
+def _replaced(
+    write: Callable[[dict[str, TableColumn], Path], None], columns: dict[str, TableColumn], path: Path
+) -> None:
     part = path.with_name(f"{path.name}.part")
     try:
         write(columns, part)

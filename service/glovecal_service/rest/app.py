@@ -48,7 +48,16 @@ from glovecal_service.rest.model import (
 )
 from glovecal_service.rest.sampling import next_steps, samplings
 from glovecal_service.rest.subject import subjects, usual_hand
-from glovecal_service.rest.take import clocks, examination, holds, reference, table_import, takes, uploads
+from glovecal_service.rest.take import (
+    clocks,
+    examination,
+    holds,
+    motion,
+    reference,
+    table_import,
+    takes,
+    uploads,
+)
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
 
@@ -57,7 +66,7 @@ JSON_LIMIT_BYTES = 8_000_000
 BODY_PATIENCE_S = 30.0
 ROUTERS = (
     *(subjects, usual_hand, layouts, recordings, samplings),
-    *(clocks, holds, examination, table_import, takes, reference, uploads),
+    *(clocks, holds, examination, table_import, takes, reference, uploads, motion),
     *(
         training,
         model_import,

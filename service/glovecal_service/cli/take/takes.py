@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from glovecal_client.errors import ServiceError
-from glovecal_service.cli.take import clocks, examination, holds, latency, table_import
+from glovecal_service.cli.take import clocks, examination, holds, latency, motion, table_import
 from glovecal_service.cli.take.rows import find_take, find_takes, print_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, OnlySubject, Take, identifier
@@ -24,6 +24,7 @@ app.command("clocks")(clocks.clocks)
 app.command("latency")(latency.latency)
 app.command("examine")(examination.examine)
 app.command("holds")(holds.holds)
+app.command("motion")(motion.motion)
 
 CONFLICT = 409
 """The service's answer when a take is two tables."""

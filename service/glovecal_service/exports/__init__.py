@@ -1,0 +1,1 @@
+"""Hands in motion, written for other tools: a format is one file, registered in ``formats``."""

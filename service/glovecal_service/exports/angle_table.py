@@ -1,0 +1,48 @@
+"""Tables of calibrated motion, CSV and Parquet: a row a frame.
+
+Predicted angles are named ``p.``, not ``r.`` as a take's measured ones are: they are no reference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from glovecal_models.takes.write_table import write_columns
+from glovecal_service.exports.export_format import ExportFormat
+from glovecal_service.exports.hand_motion import Content, HandMotion
+from glovecal_service.exports.markers import markers
+
+
+def write_table(motions: Sequence[HandMotion], content: Content, path: Path) -> None:
+    """``p.`` and ``sd.`` in degrees, ``j.JOINT.x`` in mm, or raw ``s.``; of two hands each with its label."""
+    time_s = motions[0].time_s
+    columns: dict[str, np.ndarray] = {"time_s": time_s - time_s[0]}
+    for motion in motions:
+        hand = f"{motion.label}." if len(motions) > 1 else ""
+        columns |= {f"{hand}{name}": values for name, values in _columns(motion, content).items()}
+    if any(motion.simulated for motion in motions):
+        columns["simulated"] = np.ones(len(time_s))
+    write_columns(columns, path)
+
+
+def _columns(motion: HandMotion, content: Content) -> dict[str, np.ndarray]:
+    if content == "raw":
+        return {f"s.{name}": column for name, column in zip(motion.sensors, motion.readings.T, strict=True)}
+    found = markers(motion, content)  # refuses a take without a model
+    if content == "joints":
+        return {
+            f"j.{name.removeprefix(f'{motion.label}_')}.{axis}": place[:, number]
+            for name, place in found.items()
+            for number, axis in enumerate("xyz")
+        }
+    angles = zip(motion.rotations, motion.degrees.T, motion.sd_deg.T, strict=True)
+    return {
+        key: values for name, mean, sd in angles for key, values in ((f"p.{name}", mean), (f"sd.{name}", sd))
+    }
+
+
+CSV = ExportFormat(".csv", "text/csv", "CSV, for any table", write_table)
+PARQUET = ExportFormat(".parquet", "application/vnd.apache.parquet", "Parquet, for data frames", write_table)

@@ -1,0 +1,79 @@
+"""One hand's motion as an export writes it, and two hands on one time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+
+from glovecal_models.errors import BadInput
+from glovecal_models.hand.skeleton import Skeleton
+
+Content = Literal["joints", "angles", "raw"]
+"""Places of joints in mm, calibrated rotations in degrees, or readings as the glove sent them."""
+CONTENTS: tuple[Content, ...] = get_args(Content)
+BRIDGED_S = 0.1
+"""Across longer gaps nothing is interpolated."""
+
+
+@dataclass(frozen=True)
+class HandMotion:
+    """N frames of one hand, of S sensors and R calibrated rotations."""
+
+    label: str
+    """Begins the names of what is written: "R", "L"."""
+    time_s: np.ndarray
+    """(N,), seconds of the recording's clock, increasing."""
+    sensors: tuple[str, ...]
+    readings: np.ndarray
+    """(N, S), raw."""
+    rotations: tuple[str, ...]
+    """Empty for a take without a model: then only readings can be written."""
+    degrees: np.ndarray
+    """(N, R); NaN where a rotation is not known."""
+    sd_deg: np.ndarray
+    """(N, R)."""
+    skeleton: Skeleton
+    simulated: bool = False
+
+
+def on_one_time(motions: Sequence[HandMotion], shifts_s: Sequence[float] = ()) -> tuple[HandMotion, ...]:
+    """All hands at the frames of the first, where every one was recorded.
+
+    ``shifts_s``: added to the times of each; takes of one capture computer have one clock and need none.
+    Readings are those of the nearest frame, never a mean of two; angles are interpolated. Raises BadInput
+    when there is no moment that all have.
+    """
+    shifts_s = shifts_s or [0.0] * len(motions)
+    moved = [replace(one, time_s=one.time_s + by) for one, by in zip(motions, shifts_s, strict=True)]
+    begin, end = max(one.time_s[0] for one in moved), min(one.time_s[-1] for one in moved)
+    first = moved[0].time_s
+    at = first[(first >= begin) & (first <= end)]
+    if not len(at):
+        spans = ", ".join(f"{one.label} {one.time_s[0]:.1f} to {one.time_s[-1]:.1f} s" for one in moved)
+        raise BadInput(
+            f"the takes have no moment in common ({spans}); shift one of them onto the other's clock"
+        )
+    return tuple(_at(one, at) for one in moved)
+
+
+def _at(motion: HandMotion, at: np.ndarray) -> HandMotion:
+    time = motion.time_s
+    after = np.clip(np.searchsorted(time, at), 1, len(time) - 1) if len(time) > 1 else np.zeros(len(at), int)
+    before = np.maximum(after - 1, 0)
+    nearest = np.where(np.abs(at - time[before]) <= np.abs(time[after] - at), before, after)
+    gap = time[after] - time[before] > BRIDGED_S
+    gap &= np.minimum(np.abs(at - time[before]), np.abs(time[after] - at)) > 0
+
+    def between(values: np.ndarray) -> np.ndarray:
+        found = [np.interp(at, time, column) for column in values.T]
+        columns = np.column_stack(found) if found else np.empty((len(at), 0))
+        columns[gap] = np.nan
+        return columns
+
+    return replace(
+        motion, time_s=at, readings=np.where(gap[:, None], np.nan, motion.readings[nearest]),
+        degrees=between(motion.degrees), sd_deg=between(motion.sd_deg),
+    )  # fmt: skip

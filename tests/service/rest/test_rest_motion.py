@@ -1,0 +1,88 @@
+"""Takes as motion files over REST and the command line: the active model, two hands, what is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trc
+
+from glovecal_client.rest import Refused, RestClient
+
+Write = Callable[..., Path]
+
+
+@pytest.fixture
+def client(client: RestClient, write_table: Write) -> RestClient:
+    for subject, hand, seed in (("anna", "right", 0), ("ben", "left", 1)):
+        client.post("/subjects", {"name": subject, "hand": hand})
+        client.upload_takes(write_table(f"{subject}.csv", (subject,), seed=seed), subject=subject)
+    return client
+
+
+def takes(client: RestClient) -> list[str]:
+    return [take["id"] for take in client.get("/takes")]
+
+
+def read(content: bytes, folder: Path) -> trc.TRCData:
+    path = folder / "read.trc"
+    path.write_bytes(content)
+    data = trc.TRCData()
+    data.load(str(path))
+    return data
+
+
+def test_raw_readings_of_both_hands(client: RestClient, tmp_path: Path) -> None:
+    data = read(client.made("/motion", {"takes": takes(client), "content": "raw"}), tmp_path)
+    assert data["Markers"] == ["R_index", "L_index"]
+    assert data["NumFrames"] == 120
+    exported = client.download(f"/takes/{takes(client)[0]}/export").decode().splitlines()
+    names = exported[0].split(",")
+    first = dict(zip(names, exported[1].split(","), strict=True))
+    assert data["R_index"][0][1:] == [float(first["s.I_MCP"]), float(first["s.I_PIP"])]
+
+
+def test_angles_are_those_of_the_active_model(client: RestClient, tmp_path: Path) -> None:
+    right, left = takes(client)
+    with pytest.raises(Refused, match=r"no model of anna .* is active") as refused:
+        client.made("/motion", {"takes": [right]})
+    assert refused.value.status == 409
+    job = client.post("/models/train", {"subject": "anna", "method": "linear"})
+    model = client.wait_for_job(job["id"], patience_s=300)["result"]["model"]
+    series = client.post(f"/models/{model}/series", {"takes": [right], "rotation": "I_MCP", "points": 4000})[
+        "takes"
+    ][0]
+    body = {"takes": [right], "content": "angles"}
+    for named in ([], [None], [model[:10]]):
+        data = read(client.made("/motion", {**body, "models": named}), tmp_path)
+        written = np.array(data["R_index"])[:, 1]
+        np.testing.assert_allclose(written, series["predicted_deg"], atol=1e-9)
+    joints = read(client.made("/motion", {"takes": [right]}), tmp_path)
+    assert len(joints["Markers"]) == 21
+    with pytest.raises(Refused, match="no model of ben"):
+        client.made("/motion", {"takes": [right, left]})
+
+
+@pytest.mark.parametrize(
+    ("changed", "status", "why"),
+    [
+        ({"takes": ["nothing"]}, 404, "no take"),
+        ({"takes": []}, 422, "takes"),
+        ({"models": ["0123456789"]}, 422, "1 models for 2 takes"),
+        ({"shifts_s": [0.0, 1e6]}, 422, "no moment in common"),
+        ({"format": "bvh"}, 422, "format"),
+        ({"content": "wrist"}, 422, "content"),
+    ],
+)
+def test_what_cannot_be_written_is_said(client: RestClient, changed: dict, status: int, why: str) -> None:
+    with pytest.raises(Refused, match=why) as refused:
+        client.made("/motion", {"takes": takes(client), "content": "raw", **changed})
+    assert refused.value.status == status
+
+
+def test_two_takes_of_one_hand_are_no_pair(client: RestClient) -> None:
+    take = takes(client)[0]
+    with pytest.raises(Refused, match="of the same hand"):
+        client.made("/motion", {"takes": [take, take], "content": "raw"})
