@@ -16,6 +16,7 @@ Content = Literal["joints", "angles", "raw"]
 CONTENTS: tuple[Content, ...] = get_args(Content)
 BRIDGED_S = 0.1
 """Across longer gaps nothing is interpolated."""
+SAME_S = 1e-6
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ def _at(motion: HandMotion, at: np.ndarray) -> HandMotion:
     before = np.maximum(after - 1, 0)
     nearest = np.where(np.abs(at - time[before]) <= np.abs(time[after] - at), before, after)
     gap = time[after] - time[before] > BRIDGED_S
-    gap &= np.minimum(np.abs(at - time[before]), np.abs(time[after] - at)) > 0
+    gap &= np.minimum(np.abs(at - time[before]), np.abs(time[after] - at)) > SAME_S
 
     def between(values: np.ndarray) -> np.ndarray:
         found = [np.interp(at, time, column) for column in values.T]
