@@ -306,3 +306,15 @@ def test_units_that_look_wrong_are_told_once_for_all_files_by_every_import(run: 
     assert improved.code == 0, improved.err
     assert f"{files[0]}: Take 't0': no reference angle spans more than" in improved.err
     assert "The same in 2 more files.\n" in improved.err
+
+
+def test_a_take_becomes_a_motion_file(anna: Run, tmp_path: Path) -> None:
+    take = anna("take", "list", "--json").json[0]["name"]
+    file = tmp_path / "hand.trc"
+    made = anna("take", "motion", file, take, "--content", "raw")
+    assert made.code == 0, made.err
+    assert made.out.strip() == f"Wrote {file}."
+    assert file.read_text().startswith("PathFileType\t4\t(X/Y/Z)\tmotion.trc (simulated)\n")
+    assert "--overwrite" in anna("take", "motion", file, take).said
+    assert "no model of anna" in anna("take", "motion", tmp_path / "a.trc", take).said
+    assert "must end in .trc" in anna("take", "motion", tmp_path / "a.bvh", take).said

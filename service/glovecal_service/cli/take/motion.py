@@ -10,7 +10,6 @@ import typer
 from glovecal_service.cli.take.rows import find_take
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import model_id
-from glovecal_service.cli.terminal.printing import out
 from glovecal_service.cli.terminal.writing import Overwrite, require_place, write_whole
 
 MOST_HANDS = 2
@@ -56,4 +55,3 @@ def motion(
             "shifts_s": shift or [],
         }
         write_whole({file: service.made("/motion", body)})
-    out.print(f"Wrote {content} of {' and '.join(take)} to {file}.")
