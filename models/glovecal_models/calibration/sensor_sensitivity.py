@@ -49,7 +49,7 @@ def sensor_sensitivity(model: CalibrationModel) -> SensorSensitivity:
     """From the model alone: the same for whatever is then predicted."""
     trained = [item for item in model.rotations if not isinstance(item.regressor, RuleRegressor)]
     sensors = model.layout.sensors
-    low, high = _trained_ranges(trained, sensors)
+    low, high = trained_ranges(trained, sensors)
     found = [_of_rotation(item, sensors, low, high) for item in trained]
     return SensorSensitivity(
         tuple(item.rotation for item in trained),
@@ -62,9 +62,8 @@ def sensor_sensitivity(model: CalibrationModel) -> SensorSensitivity:
     )
 
 
-def _trained_ranges(
-    trained: Sequence[RotationModel], sensors: Sequence[str]
-) -> tuple[np.ndarray, np.ndarray]:
+def trained_ranges(trained: Sequence[RotationModel], sensors: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest reading (S,) of each sensor in training; NaN for one that nothing is read from."""
     ranges: Mapping[str, list[tuple[float, float]]] = {name: [] for name in sensors}
     for item in trained:
         for name, low, high in zip(item.correspondence.inputs, item.input_low, item.input_high, strict=True):

@@ -17,7 +17,7 @@ import typer
 
 from glovecal_service.cli import demo, serve
 from glovecal_service.cli.effect import catalogue, changes, detectability, diagnosis, improvement
-from glovecal_service.cli.glove import capture, find_port, layouts, recordings, watch
+from glovecal_service.cli.glove import capture, doctor, find_port, layouts, recordings, watch
 from glovecal_service.cli.job import jobs
 from glovecal_service.cli.model import ceiling, comparison, explain, models, quick_check, training, where
 from glovecal_service.cli.sampling import samplings
@@ -40,6 +40,7 @@ app.command("serve")(serve.serve)
 app.command("capture", cls=capture.WithDeviceOptions)(capture.capture)
 app.command("find-port")(find_port.find_port)
 app.command("watch")(watch.watch)
+app.command("doctor")(doctor.doctor)
 app.command("record")(recordings.record)
 app.add_typer(samplings.app, name="sample")
 app.add_typer(subjects.app, name="subject")

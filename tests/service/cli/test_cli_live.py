@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import os
@@ -16,8 +17,10 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from cli_running import glovecal, start
+from cli_running import glovecal, simulated, start
 from realtime_support import eventually, free_endpoint
+
+from glovecal_models.takes.write_table import write_takes
 
 GLOVE = "right-hand"
 LIVE_PAGE = Path(__file__).parents[3] / "docs" / "live.md"
@@ -255,3 +258,31 @@ def _session(leader: int) -> list[int]:
         except OSError:
             continue
     return found
+
+
+def test_a_worn_glove_is_examined(live, tmp_path):
+    """A stuck sensor and a missing model are told, each with what to do, and the exit code is for scripts."""
+    run = partial(glovecal, live)
+    nobody = run("doctor", "nobody")
+    assert nobody.code == 4
+    assert nobody.out.startswith("capture: Nothing is heard of glove nobody at site lab.")
+    take = simulated("evaluation", "worn")
+    readings = take.readings.copy()
+    readings[:, take.sensors.index("R_PIP")] = 97
+    file = tmp_path / "worn.csv"
+    write_takes([dataclasses.replace(take, readings=readings)], file)
+    capture = ["capture", "--device", f"replay:{file}", "--glove", "examined", "--option", "loop=yes"]
+    process = start(live, *capture, "--subject", "dora")
+    try:
+        eventually(lambda: run("watch", "examined", "--seconds", 1).code == 0, "poses come")
+        answer = run("doctor", "examined", "--json")
+        told = run("doctor", "examined")
+    finally:
+        _end(process)
+    assert (answer.code, told.code) == (4, 4)
+    document = json.loads(answer.out)
+    assert document["frames"] > 50
+    assert [one["part"] for one in document["findings"]] == ["sensor", "model"]
+    first = " ".join(told.out.split())
+    assert first.startswith("sensor: R_PIP is always 97 while other sensors move. Look at its strip")
+    assert "model: dora, who wears examined, is no subject yet." in told.out

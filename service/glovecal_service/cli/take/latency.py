@@ -10,6 +10,7 @@ import numpy as np
 import typer
 
 from glovecal_client.errors import NoAnswer
+from glovecal_service.cli.glove.heard_frames import heard_frames, times_and_readings
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.keyboard import single_keys
 from glovecal_service.cli.terminal.options import DEFAULT_ZENOH, AsJson, Glove, Site, Zenoh
@@ -117,39 +118,22 @@ def _is_number(text: str) -> bool:
 
 def _live(glove: str, taps: int, endpoint: str, site: str) -> Times:
     """Raises Refusal, NobodyThere."""
-    import zenoh
-
-    from glovecal_client.errors import WireError
     from glovecal_client.keys import GloveKeys
     from glovecal_client.queries import ask_json
     from glovecal_client.session import open_client
-    from glovecal_client.wire.frame import Frame, decode_frame
-
-    heard: list[Frame] = []
-
-    def hear(sample: zenoh.Sample) -> None:
-        try:
-            heard.append(decode_frame(sample.payload.to_bytes()))
-        except WireError:
-            return
 
     wire = GloveKeys(site, glove)
     try:
         with open_client([endpoint], wait_s=WAIT_S) as session:
             meta = ask_json(session, wire.meta, timeout_s=WAIT_S)
-            subscriber = session.declare_subscriber(wire.raw, zenoh.handlers.Callback(hear, indirect=True))
-            _require_here(glove, heard)
-            pressed = _pressed(taps)
-            time.sleep(AFTERWARDS_S)
-            subscriber.undeclare()
+            with heard_frames(session, wire.raw) as heard:
+                _require_here(glove, heard)
+                pressed = _pressed(taps)
+                time.sleep(AFTERWARDS_S)
     except NoAnswer as error:
         raise NobodyThere(str(error)) from error
-    frames = [frame for frame in heard if frame.run_id == heard[-1].run_id]
-    frames.sort(key=lambda frame: frame.monotonic_ns)
-    times = np.array([frame.monotonic_ns for frame in frames]) / 1e9
-    later = np.diff(times, prepend=-np.inf) > 0
-    readings = np.array([frame.readings for frame in frames], dtype=float)[later]
-    return times[later], readings, tuple(map(str, meta.get("sensors", ()))), np.array(pressed)
+    times, readings = times_and_readings(heard)
+    return times, readings, tuple(map(str, meta.get("sensors", ()))), np.array(pressed)
 
 
 def _require_here(glove: str, heard: list) -> None:

@@ -1,0 +1,164 @@
+"""What a few seconds of a worn glove say: is it a sensor, the cable, the supply, the wearing?
+
+No reference is needed. A stuck sensor only shows while the hand moves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.sensor_sensitivity import trained_ranges
+from glovecal_models.effects.sensor_fault.reading_faults import dropouts, spikes
+from glovecal_models.takes.dead_sensor import dead_sensors
+from glovecal_models.takes.take import Take
+from glovecal_models.takes.take_check import check_take
+
+Part = Literal["capture", "cable", "sensor", "supply", "motion", "wearing", "model"]
+
+SLOW_SHARE = 0.8
+"""Of the nominal rate: fewer frames a second are too few."""
+FEW_GAPS = 2
+"""In some seconds: a busy computer has as many."""
+MOVED_COUNTS = 6.0
+MOVED_SHARE = 0.08
+"""Of the range learned: a sensor that went through less did not move."""
+FEW_MOVED = 0.5
+"""Share of sensors: with fewer in motion nothing is said of those that stand still."""
+FEW_JUMPS = 3
+OUTSIDE_SHARE = 0.1
+"""Of the range learned, beyond its ends."""
+OUTSIDE_FRAMES = 0.25
+ALL_AT_ONCE = 0.6
+"""Share of sensors beyond the same end: what they have in common is the supply."""
+FEWEST_TOGETHER = 3
+
+
+@dataclass(frozen=True)
+class GloveFinding:
+    """One thing that is wrong, and what to do."""
+
+    part: Part
+    sentence: str
+    advice: str
+
+
+def worn_glove_findings(
+    take: Take, nominal_hz: float | None, model: CalibrationModel | None
+) -> tuple[GloveFinding, ...]:
+    """Of some seconds of frames, the hand in motion; ``model``: the one that is served, None without any."""
+    low, high = _ranges(take, model)
+    moved = np.ptp(take.readings, axis=0) >= np.fmax(MOVED_COUNTS, MOVED_SHARE * np.nan_to_num(high - low))
+    return (
+        *_rhythm(take, nominal_hz),
+        *_sensors(take, moved),
+        *_jumps(take, low, high),
+        *_place(take, low, high),
+    )
+
+
+def _ranges(take: Take, model: CalibrationModel | None) -> tuple[np.ndarray, np.ndarray]:
+    if model is None:
+        nothing = np.full(len(take.sensors), np.nan)
+        return nothing, nothing
+    return trained_ranges(model.rotations, take.sensors)
+
+
+def _rhythm(take: Take, nominal_hz: float | None) -> Sequence[GloveFinding]:
+    check = check_take(take)
+    count, length = len(take.time_s), float(take.time_s[-1] - take.time_s[0])
+    rate = (count - 1) / length if length > 0 else 0.0
+    is_slow = nominal_hz is not None and rate < SLOW_SHARE * nominal_hz
+    if not is_slow and check.gaps <= FEW_GAPS:
+        return ()
+    of = "" if nominal_hz is None else f" of {nominal_hz:.0f}"
+    longest = (
+        f", the longest {check.longest_interval_s:.2f} s" if check.gaps and check.longest_interval_s else ""
+    )
+    return (
+        GloveFinding(
+            "cable",
+            f"{rate:.0f}{of} frames a second arrive, with {check.gaps} gaps{longest}.",
+            "Plug the glove in directly, without a hub; charge it; bring the receiver nearer.",
+        ),
+    )
+
+
+def _sensors(take: Take, moved: np.ndarray) -> Sequence[GloveFinding]:
+    if moved.mean() < FEW_MOVED:
+        return (
+            GloveFinding(
+                "motion",
+                f"{int(moved.sum())} of {len(moved)} sensors moved: nothing can be said of the others.",
+                "Run it again while you bend, spread and turn the whole hand.",
+            ),
+        )
+    return [
+        GloveFinding(
+            "sensor",
+            f"{dead.sensor} is {dead.why} while other sensors move.",
+            "Look at its strip and its connector; until it is repaired, train without it (it is left out).",
+        )
+        for dead in dead_sensors([take], take.sensors)
+    ]
+
+
+def _jumps(take: Take, low: np.ndarray, high: np.ndarray) -> Sequence[GloveFinding]:
+    found = []
+    for name, readings, begin, end in zip(take.sensors, take.readings.T, low, high, strict=True):
+        span = float(end - begin) if np.isfinite(end - begin) and end > begin else float(np.ptp(readings))
+        jumps = int((np.diff((spikes(readings, span) | dropouts(readings, span)).astype(int)) > 0).sum())
+        if jumps >= FEW_JUMPS:
+            found.append((name, jumps))
+    if not found:
+        return ()
+    names = ", ".join(f"{name} ({jumps})" for name, jumps in found)
+    if len(found) >= max(FEWEST_TOGETHER, ALL_AT_ONCE * len(take.sensors)):
+        return (
+            GloveFinding(
+                "cable", f"Most sensors jump for single frames: {names}.",
+                "They share the cable and the connector at the cuff: press it home, or exchange the cable.",
+            ),
+        )  # fmt: skip
+    return (
+        GloveFinding(
+            "sensor", f"Readings jump for single frames: {names}.",
+            "A loose contact of the strip: bend the cuff a little and see whether it changes.",
+        ),
+    )  # fmt: skip
+
+
+def _place(take: Take, low: np.ndarray, high: np.ndarray) -> Sequence[GloveFinding]:
+    """Readings beyond what the model has learned: of most sensors on one side, or of a few."""
+    span = high - low
+    known = np.isfinite(span) & (span > 0)
+    if not known.any():
+        return ()
+    margin = OUTSIDE_SHARE * np.where(known, span, 1.0)
+    below = known & ((take.readings < low - margin).mean(axis=0) > OUTSIDE_FRAMES)
+    above = known & ((take.readings > high + margin).mean(axis=0) > OUTSIDE_FRAMES)
+    together = max(FEWEST_TOGETHER, ALL_AT_ONCE * known.sum())
+    for outside, word in ((below, "below"), (above, "above")):
+        if outside.sum() >= together:
+            return (
+                GloveFinding(
+                    "supply",
+                    f"{int(outside.sum())} of {int(known.sum())} sensors read {word} all that the model "
+                    "learned.",
+                    "That is no hand: check battery and supply, and that this is the glove of the model.",
+                ),
+            )
+    names = [name for name, is_out in zip(take.sensors, below | above, strict=True) if is_out]
+    if not names:
+        return ()
+    return (
+        GloveFinding(
+            "wearing",
+            f"{', '.join(names)} read outside what the model learned.",
+            "The glove sits differently: put it on again, or let a quick check learn the difference.",
+        ),
+    )
