@@ -1,7 +1,7 @@
 """Low passes and moving averages of a finely sampled signal, worked out only at the rows that are read.
 
-A first-order filter remembers one number: from one row to the next it is a weighted sum of the samples between
-them, the same weights for all rows, and a recursion over rows. Times are in samples throughout.
+A first-order filter remembers one number: from one row to the next it is a weighted sum of the samples
+between them, the same weights for all rows, and a recursion over rows. Times are in samples throughout.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 def low_passed(signals: Sequence[np.ndarray], rows: Sequence[np.ndarray], tau: np.ndarray) -> np.ndarray:
     """(K, rows of all signals): first-order filters with time constants ``tau`` (K,).
 
-    ``signals`` (F,) each with its own ``rows`` (N,), rising or falling. Exact for straight lines between every
-    second sample, where all rows lie on such, and at rest before the first.
+    ``signals`` (F,) each with its own ``rows`` (N,), rising or falling. Exact for straight lines between
+    every second sample, where all rows lie on such, and at rest before the first.
     """
     from scipy.signal import lfilter  # takes a second to load, which a model that only predicts does not have
 
