@@ -15,7 +15,14 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from glovecal_models.calibration.held_out import ALIKE_ROWS, LEAST_VARIANCE_DEG2, Rows
-from glovecal_models.effects.base.learned_form import MOST_INPUTS, MOST_SINES, OWN, FormTerm, LearnedForm, sines
+from glovecal_models.effects.base.learned_form import (
+    MOST_INPUTS,
+    MOST_SINES,
+    OWN,
+    FormTerm,
+    LearnedForm,
+    sines,
+)
 
 EVERY = 3
 """Of the fitted rows: a form is chosen on a third of them."""

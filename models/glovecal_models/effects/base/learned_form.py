@@ -154,7 +154,9 @@ class LearnedForm:
     def columns(self, inputs: Mapping[str, np.ndarray]) -> np.ndarray:
         """(N, L, C) in degrees for a weight of one, from the values (N, L) of every input."""
         every = {
-            name: sines(self.place(name, inputs[name]), max(t.most_sines for t in self.terms if name in t.inputs))
+            name: sines(
+                self.place(name, inputs[name]), max(t.most_sines for t in self.terms if name in t.inputs)
+            )
             for name in self.low
         }
         found = [term.of_sines([every[name] for name in term.inputs]) for term in self.terms]
