@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.calibration.held_out import HeldOut, held_out
+from glovecal_models.calibration.held_out import FittedColumns, HeldOut, held_out
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.not_identifiable import NotIdentifiable, undecidable
 from glovecal_models.diagnosis.permutation_test import session_p_value
@@ -142,10 +142,11 @@ def _screen(
     tiled = tuple(replace(take, own=np.tile(take.own, (1, shapes))) for take in signals)
     flat = grid.reshape(shapes * lanes, numbers)
     prior = effect.prior_sd(settings)
+    units = [list(design.units(joint)) for joint in joints]
 
     def held_out_of(columns: Sequence[np.ndarray]) -> list[HeldOut]:
         """Of each joint; ``columns`` (N, G L, C) of each take."""
-        by_lane = _FittedColumns.of(design, joints, columns, lanes)
+        by_lane = FittedColumns.of(columns, units)
         return [
             held_out(design.products[joint], by_lane.units(lane), prior) for lane, joint in enumerate(joints)
         ]
@@ -157,51 +158,3 @@ def _screen(
         Evidence(right, wrong, grid[right.shape, lane], settings)
         for lane, (right, wrong) in enumerate(zip(true, middle, strict=True))
     )
-
-
-@dataclass(frozen=True)
-class _FittedColumns:
-    """Columns of an effect on some joints of a design, its lanes: put in the order of fits in memory once, and
-    only where some joint is fitted."""
-
-    columns: tuple[np.ndarray, ...]
-    """For each take (L, M, G, C), at the M rows that some of the joints are fitted on."""
-    places: tuple[tuple[tuple[int, slice | np.ndarray], ...], ...]
-    """For each lane and unit its take, and the unit's rows among those."""
-
-    @classmethod
-    def of(
-        cls, design: ForwardDesign, joints: Sequence[int], columns: Sequence[np.ndarray], lanes: int
-    ) -> _FittedColumns:
-        """``columns``: for each take (N, G L, C), lane by lane within each of the G shapes."""
-        units = [list(design.units(joint)) for joint in joints]
-        fitted = []
-        for number, part in enumerate(columns):
-            is_fitted = np.zeros(len(part), dtype=bool)
-            for take, index in (unit for of_joint in units for unit in of_joint):
-                if take == number:
-                    is_fitted[index] = True
-            fitted.append(np.flatnonzero(is_fitted))
-        return cls(
-            tuple(_by_lane(part, rows, lanes) for part, rows in zip(columns, fitted, strict=True)),
-            tuple(
-                tuple((take, _place(index, fitted[take])) for take, index in of_joint) for of_joint in units
-            ),
-        )
-
-    def units(self, lane: int) -> list[np.ndarray]:
-        """(N, G, C) of each unit of one lane."""
-        return [self.columns[take][lane, rows] for take, rows in self.places[lane]]
-
-
-def _by_lane(columns: np.ndarray, rows: np.ndarray, lanes: int) -> np.ndarray:
-    """(L, M, G, C) of (N, G L, C), at ``rows`` (M,)."""
-    some = columns[rows]
-    apart = some.reshape(len(rows), some.shape[1] // lanes, lanes, some.shape[2])
-    return np.ascontiguousarray(apart.transpose(2, 0, 1, 3))
-
-
-def _place(index: np.ndarray, fitted: np.ndarray) -> slice | np.ndarray:
-    """Where rows ``index`` stand among ``fitted``: as a slice where they follow one another there."""
-    at = np.searchsorted(fitted, index)
-    return slice(int(at[0]), int(at[-1]) + 1) if len(at) and at[-1] - at[0] + 1 == len(at) else at

@@ -125,8 +125,13 @@ class ArrayStateEffect(HistoryEffect):
         for first in range(0, len(strips[0].own), block):
             going = [strip for strip in strips if len(strip.own) > first]
             rows = slice(first, min(first + block, len(strips[0].own)))
-            own = np.stack([_held(strip.own[rows], rows) for strip in going], axis=1)
-            elapsed = np.stack([_padded(strip.elapsed_s[rows], rows) for strip in going], axis=1)
+            own = np.empty((rows.stop - first, len(going), strips[0].own.shape[1]))
+            elapsed = np.zeros((rows.stop - first, len(going)))
+            for number, strip in enumerate(going):
+                here = strip.own[rows]
+                # Behind its end a strip is held, and no time passes.
+                own[: len(here), number], own[len(here) :, number] = here, here[-1]
+                elapsed[: len(here), number] = strip.elapsed_s[rows]
             columns = self.run_takes(states[: len(going)], elapsed, own, settings, shape)
             for number, strip in enumerate(going):
                 mine = strip.columns[rows]
@@ -143,16 +148,6 @@ class _Strip:
     """(N,)."""
     columns: np.ndarray
     """(N, L, C)."""
-
-
-def _held(own: np.ndarray, rows: slice) -> np.ndarray:
-    """``own`` (N, L) of what is left of a strip in ``rows``, held at its end."""
-    return np.pad(own, ((0, rows.stop - rows.start - len(own)), (0, 0)), mode="edge")
-
-
-def _padded(elapsed_s: np.ndarray, rows: slice) -> np.ndarray:
-    """The same of ``elapsed_s`` (N,): behind the end no time passes."""
-    return np.pad(elapsed_s, (0, rows.stop - rows.start - len(elapsed_s)))
 
 
 def elapsed_s(time_s: np.ndarray) -> np.ndarray:
