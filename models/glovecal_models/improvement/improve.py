@@ -190,7 +190,7 @@ class _Loop:
         )  # fmt: skip
 
     def _known_floors(self, takes: Sequence[Take]) -> Mapping[str, NoiseFloor] | None:
-        """Those of the last diagnosis, where it was of the same takes: they belong to takes, not to models."""
+        """Those of the last diagnosis, where it was of the same takes: a model has no part in them."""
         if self.diagnosis is None or [id(take) for take in takes] != [id(take) for take in self.diagnosed]:
             return None
         return self.diagnosis.noise_floors

@@ -41,7 +41,8 @@ def sines(place: np.ndarray, count: int) -> np.ndarray:
     Powers of one complex number: a sine costs ten times a product.
     """
     once = np.exp((0.5j * np.pi / BOX) * (place + BOX))
-    return np.multiply.accumulate(np.broadcast_to(once, (count, *place.shape)), axis=0).imag / np.sqrt(BOX)
+    powers = np.multiply.accumulate(np.broadcast_to(once, (count, *place.shape)), axis=0)
+    return np.imag(powers) / np.sqrt(BOX)
 
 
 @dataclass(frozen=True)
