@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.calibration.effect_request import EffectRequest
-from glovecal_models.calibration.held_out import BaseProducts, Rows, held_out
+from glovecal_models.calibration.held_out import BaseProducts, FittedColumns, Rows, held_out
 from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.signals import Signals
 
@@ -49,18 +49,15 @@ def best_shape(
         for name in group.lanes
     }
     prior = effect.prior_sd(settings)
+    units = [list(enumerate(rows[name])) for name in group.lanes]
     best = np.zeros((len(group.lanes), grid.shape[2]))
     for _ in range(1 + refinements):
         shapes, lanes, numbers = grid.shape
         flat = grid.reshape(shapes * lanes, numbers)
         tiled = [_tiled(take, shapes) for take in group.signals]
-        found = [
-            part.reshape(len(part), shapes, lanes, -1)
-            for part in effect.columns_of_takes(tiled, settings, flat)
-        ]
+        found = FittedColumns.of(effect.columns_of_takes(tiled, settings, flat), units)
         for lane, name in enumerate(group.lanes):
-            mine = [part[index, :, lane] for part, index in zip(found, rows[name], strict=True)]
-            best[lane] = grid[held_out(products[name], mine, prior).shape, lane]
+            best[lane] = grid[held_out(products[name], found.units(lane), prior).shape, lane]
         grid = _finer(grid, best)
     return best
 

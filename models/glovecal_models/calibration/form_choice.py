@@ -15,7 +15,14 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from glovecal_models.calibration.held_out import ALIKE_ROWS, LEAST_VARIANCE_DEG2, Rows
-from glovecal_models.effects.base.learned_form import MOST_INPUTS, OWN, FormTerm, LearnedForm
+from glovecal_models.effects.base.learned_form import (
+    MOST_INPUTS,
+    MOST_SINES,
+    OWN,
+    FormTerm,
+    LearnedForm,
+    sines,
+)
 
 EVERY = 3
 """Of the fitted rows: a form is chosen on a third of them."""
@@ -167,9 +174,10 @@ class _Lane:
     def __init__(self, rows: FormRows) -> None:
         self._free = np.linalg.qr(rows.free)[0]
         ranges = LearnedForm.over([FormTerm((name,), 1.0, 1.0) for name in rows.inputs], [rows.inputs])
-        self._place = {name: ranges.place(name, values) for name, values in rows.inputs.items()}
-        self._target = self._without_base(rows.target[:, None])[:, 0]
-        self._plain = self._without_base(rows.plain * rows.plain_sd)
+        self._place = {name: ranges.place(name, values)[:, 0] for name, values in rows.inputs.items()}
+        self._sines: dict[str, np.ndarray] = {}
+        self._target = self._without_base(rows.target)
+        self._plain = self._without_base((rows.plain * rows.plain_sd).T)
         self._columns: dict[Key, np.ndarray] = {None: self._plain}
         self._gram: dict[tuple[Key, Key], np.ndarray] = {}
         self._right: dict[Key, np.ndarray] = {}
@@ -203,31 +211,37 @@ class _Lane:
     def _parts(self, terms: Sequence[FormTerm]) -> tuple[np.ndarray, np.ndarray]:
         """Gram matrix and right side of own columns and ``terms``, for weights expected of size 1."""
         keys: list[Key] = [None, *((term.inputs, term.lengthscale) for term in terms)]
-        scale = np.concatenate([np.ones(self._plain.shape[1]), *(np.full(t.count, t.sd_deg) for t in terms)])
+        scale = np.concatenate([np.ones(len(self._plain)), *(np.full(t.count, t.sd_deg) for t in terms)])
         gram = np.block([[self._product(one, other) for other in keys] for one in keys])
         right = np.concatenate([self._with_target(key) for key in keys])
         return gram * scale[:, None] * scale[None, :], right * scale
 
     def _product(self, one: Key, other: Key) -> np.ndarray:
         if (one, other) not in self._gram:
-            found = self._of(one).T @ self._of(other)
+            found = self._of(one) @ self._of(other).T
             self._gram[one, other], self._gram[other, one] = found, found.T
         return self._gram[one, other]
 
     def _with_target(self, key: Key) -> np.ndarray:
         if key not in self._right:
-            self._right[key] = self._of(key).T @ self._target
+            self._right[key] = self._of(key) @ self._target
         return self._right[key]
 
     def _of(self, key: Key) -> np.ndarray:
-        """(N, K): columns of a term of 1 degree, without what the base's columns can say."""
+        """(K, N): columns of a term of 1 degree, without what the base's columns can say."""
         if key not in self._columns:
             assert key is not None
             inputs, lengthscale = key
-            place = [self._place[name] for name in inputs]
-            columns = FormTerm(inputs, lengthscale, 1.0).columns(place)[:, 0, :]
+            columns = FormTerm(inputs, lengthscale, 1.0).of_sines([self._sines_of(name) for name in inputs])
             self._columns[key] = self._without_base(columns)
         return self._columns[key]
 
+    def _sines_of(self, name: str) -> np.ndarray:
+        """(``MOST_SINES``, N) of an input, for terms of every lengthscale."""
+        if name not in self._sines:
+            self._sines[name] = sines(self._place[name], MOST_SINES)
+        return self._sines[name]
+
     def _without_base(self, columns: np.ndarray) -> np.ndarray:
-        return columns - self._free @ (self._free.T @ columns)
+        """``columns`` (..., N)."""
+        return columns - (columns @ self._free) @ self._free.T

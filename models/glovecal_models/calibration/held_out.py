@@ -105,6 +105,52 @@ class BaseProducts:
         return base @ self.whole
 
 
+@dataclass(frozen=True)
+class FittedColumns:
+    """Columns of an effect on several joints, its lanes: put in the order of fits in memory once, and only
+    where some joint is fitted."""
+
+    columns: tuple[np.ndarray, ...]
+    """For each take (L, M, G, C), at the M rows that some of the joints are fitted on."""
+    places: tuple[tuple[tuple[int, slice | np.ndarray], ...], ...]
+    """For each lane and unit its take, and the unit's rows among those."""
+
+    @classmethod
+    def of(
+        cls, columns: Sequence[np.ndarray], units: Sequence[Sequence[tuple[int, np.ndarray]]]
+    ) -> FittedColumns:
+        """``columns``: for each take (N, G L, C), lane by lane within each of the G shapes; ``units``: for
+        each lane the take and the rows of each of its units."""
+        fitted = []
+        for number, part in enumerate(columns):
+            is_fitted = np.zeros(len(part), dtype=bool)
+            for take, index in (unit for of_lane in units for unit in of_lane):
+                if take == number:
+                    is_fitted[index] = True
+            fitted.append(np.flatnonzero(is_fitted))
+        return cls(
+            tuple(_by_lane(part, rows, len(units)) for part, rows in zip(columns, fitted, strict=True)),
+            tuple(tuple((take, _place(index, fitted[take])) for take, index in of_lane) for of_lane in units),
+        )
+
+    def units(self, lane: int) -> list[np.ndarray]:
+        """(N, G, C) of each unit of one lane."""
+        return [self.columns[take][lane, rows] for take, rows in self.places[lane]]
+
+
+def _by_lane(columns: np.ndarray, rows: np.ndarray, lanes: int) -> np.ndarray:
+    """(L, M, G, C) of (N, G L, C), at ``rows`` (M,)."""
+    some = columns[rows]
+    apart = some.reshape(len(rows), some.shape[1] // lanes, lanes, some.shape[2])
+    return np.ascontiguousarray(apart.transpose(2, 0, 1, 3))
+
+
+def _place(index: np.ndarray, fitted: np.ndarray) -> slice | np.ndarray:
+    """Where rows ``index`` stand among ``fitted``: as a slice where they follow one another there."""
+    at = np.searchsorted(fitted, index)
+    return slice(int(at[0]), int(at[-1]) + 1) if len(at) and at[-1] - at[0] + 1 == len(at) else at
+
+
 def held_out(
     products: BaseProducts,
     columns: Sequence[np.ndarray],

@@ -57,12 +57,14 @@ def held_out_errors(
     settings: TrainingSettings,
     *,
     optima: Optima = (),
+    most_square: float = np.inf,
     cancelled: Cancel | None = None,
     report: Report | None = None,
 ) -> HeldOutErrors:
     """Leave out whole takes, in ``settings.folds`` folds, at least two. Raises NotTrainable, Cancelled.
 
-    ``optima`` of the fit on all takes, where it is known (``fit_with_effects``).
+    ``optima`` of the fit on all takes, where it is known (``fit_with_effects``). Once squared errors exceed
+    ``most_square``, degrees squared over all rotations, the other folds are not fitted.
 
     A single take, and short takes of one motion each, are left out in pieces (``left_out``).
     """
@@ -92,6 +94,8 @@ def held_out_errors(
         for name, errors in errors_of(fit, left, rotations, settings).items():
             square[name] += float(errors @ errors)
             count[name] += len(errors)
+        if sum(square.values()) > most_square:
+            break
     return HeldOutErrors(square, count)
 
 

@@ -40,8 +40,8 @@ def additive_fit(takes: Sequence[Take], reference: Sequence[np.ndarray]) -> list
         ])
         for take, part in zip(takes, readings, strict=True)
     ]  # fmt: skip
-    found = [_fitted(columns, target[:, column]) for column in range(target.shape[1])]
-    return [np.column_stack([each[number] for each in found]) for number in range(len(takes))]
+    weights, centre = _fitted(np.concatenate(columns), target)
+    return [centre + part @ weights for part in columns]
 
 
 def _curves(scaled: np.ndarray, degree: int) -> np.ndarray:
@@ -50,12 +50,18 @@ def _curves(scaled: np.ndarray, degree: int) -> np.ndarray:
     return powers.reshape(len(scaled), scaled.shape[1] * degree)
 
 
-def _fitted(columns: Sequence[np.ndarray], target: np.ndarray) -> list[np.ndarray]:
-    """For each take (N,): least squares, with a ridge that only holds what nothing else does."""
-    known = np.isfinite(target)
-    if not known.any():
-        return [np.zeros(len(part)) for part in columns]
-    design, centre = np.concatenate(columns)[known], float(target[known].mean())
-    gram = design.T @ design + RIDGE * len(design) * np.eye(design.shape[1])
-    weights = np.linalg.solve(gram, design.T @ (target[known] - centre))
-    return [centre + part @ weights for part in columns]
+def _fitted(design: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(P, R) and (R,): least squares, with a ridge that only holds what nothing else does; all 0 for a
+    rotation that was never measured. What was measured in the same rows is fitted together."""
+    weights, centre = np.zeros((design.shape[1], target.shape[1])), np.zeros(target.shape[1])
+    alike: dict[bytes, list[int]] = {}
+    for column, known in enumerate(np.isfinite(target).T):
+        if known.any():
+            alike.setdefault(known.tobytes(), []).append(column)
+    for together in alike.values():
+        known = np.isfinite(target[:, together[0]])
+        some, angles = (design, target) if known.all() else (design[known], target[known])
+        centre[together] = angles[:, together].mean(axis=0)
+        gram = some.T @ some + RIDGE * len(some) * np.eye(some.shape[1])
+        weights[:, together] = np.linalg.solve(gram, some.T @ (angles[:, together] - centre[together]))
+    return weights, centre

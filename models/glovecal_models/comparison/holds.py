@@ -11,7 +11,6 @@ independent and have the variance of one repeat; their squares add up to the spr
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,6 +21,9 @@ import numpy as np
 from glovecal_models.comparison.floor_estimate import NoiseFloor, pooled
 from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
 from glovecal_models.comparison.residuals import TakeResiduals
+
+STEP_S = 0.1
+"""Neighbouring frames whose mean angles are compared."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +61,11 @@ def holds(item: TakeResiduals, column: int, limits: ComparisonLimits = COMPARISO
     predicted, readings = item.predicted[frames, column], item.take.readings[frames]
     spread = readings.std(axis=0) if len(readings) else np.zeros(0)
     found = []
-    start, track = 0, _Track(time.tolist(), np.concatenate([[0.0], np.cumsum(angle)]).tolist())
+    start, track = 0, _Track.of(time, angle, limits)
     while start < len(time):
+        if track.moves_at_once[start]:
+            start += max(1, track.step[start] // 2)
+            continue
         end = track.end_of_hold(start, limits.still_deg_per_s)
         if time[end - 1] - time[start] >= limits.shortest_hold_s:
             settled = int(np.searchsorted(time, time[start] + limits.settled_s))
@@ -88,20 +93,35 @@ class _Track(NamedTuple):
     """Of N frames."""
     sums: list[float]
     """Of the angles of the first 0 to N frames, degrees."""
+    step: list[int]
+    """Of N frames: how many lie within the next ``STEP_S``."""
+    moves_at_once: list[bool]
+    """Whether the angle moves within the first two steps from a frame, too early for a hold."""
+
+    @classmethod
+    def of(cls, time_s: np.ndarray, angle: np.ndarray, limits: ComparisonLimits) -> _Track:
+        start, sums = np.arange(len(time_s)), np.concatenate([[0.0], np.cumsum(angle)])
+        step = np.maximum(1, np.searchsorted(time_s, time_s + STEP_S) - start)
+        end = np.minimum(start + step, len(time_s))
+        following = np.minimum(end + step, len(time_s))
+        before = (sums[end] - sums[start]) / (end - start)
+        after = (sums[following] - sums[end]) / np.maximum(following - end, 1)
+        moves = (following > end) & (np.abs(after - before) > limits.still_deg_per_s * STEP_S)
+        moves &= time_s[end - 1] - time_s < limits.shortest_hold_s
+        return cls(time_s.tolist(), sums.tolist(), step.tolist(), moves.tolist())
 
     def end_of_hold(self, start: int, still_deg_per_s: float) -> int:
         """One past the last frame up to which the angle stays on a slope too small for motion.
 
         Judged on means of neighbouring frames, so that the reference's own noise is not taken for motion.
         """
-        time, sums = self
-        step = max(1, bisect_left(time, time[start] + 0.1) - start)
+        time, sums, step = self.time_s, self.sums, self.step[start]
         end = min(start + step, len(time))
         before = (sums[end] - sums[start]) / (end - start)
         while end < len(time):
             following = min(end + step, len(time))
             after = (sums[following] - sums[end]) / (following - end)
-            if abs(after - before) > still_deg_per_s * 0.1 or time[following - 1] - time[end - 1] > 0.5:
+            if abs(after - before) > still_deg_per_s * STEP_S or time[following - 1] - time[end - 1] > 0.5:
                 break
             end, before = following, after
         return end

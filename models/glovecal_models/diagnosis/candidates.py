@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.calibration.held_out import HeldOut, held_out
+from glovecal_models.calibration.held_out import FittedColumns, HeldOut, held_out
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.not_identifiable import NotIdentifiable, undecidable
 from glovecal_models.diagnosis.permutation_test import session_p_value
@@ -87,15 +87,16 @@ def _assessed(
 
 
 def _screened(design: ForwardDesign, effect: Effect, generator: np.random.Generator) -> tuple[Evidence, ...]:
-    """With one control; of permuted wearings the median of several: one may nearly be the true partition."""
-    if effect.control != "permuted wearings":
-        return screen(design, effect, generator)
-    tried = [screen(design, effect, generator) for _ in range(PERMUTATIONS_TRIED)]
-    middle = [
-        sorted(items, key=lambda item: item.control.saved)[PERMUTATIONS_TRIED // 2]
-        for items in zip(*tried, strict=True)
-    ]
-    return tuple(middle)
+    """One for each joint of the design, with one control; of permuted wearings the median of several: one may
+    nearly be the true partition."""
+    controls = PERMUTATIONS_TRIED if effect.control == "permuted wearings" else 1
+    if effect.one_joint_at_a_time:
+        return tuple(
+            evidence
+            for joint in range(len(design.rotations))
+            for evidence in _screen(design, effect, design.of_joint(joint), (joint,), generator, controls)
+        )
+    return _screen(design, effect, design.signals, range(len(design.rotations)), generator, controls)
 
 
 def _joint_errors(evidence: Evidence, take: np.ndarray) -> JointErrors:
@@ -126,42 +127,34 @@ class Evidence:
         return self.true.saved - max(self.control.saved, 0.0)
 
 
-def screen(design: ForwardDesign, effect: Effect, generator: np.random.Generator) -> tuple[Evidence, ...]:
-    """One for each joint of the design."""
-    if effect.one_joint_at_a_time:
-        return tuple(_one_joint(design, effect, joint, generator) for joint in range(len(design.rotations)))
-    return _all_joints(design, effect, design.signals, generator)
-
-
-def _one_joint(design: ForwardDesign, effect: Effect, joint: int, generator: np.random.Generator) -> Evidence:
-    return _all_joints(design, effect, design.of_joint(joint), generator, joints=(joint,))[0]
-
-
-def _all_joints(
+def _screen(
     design: ForwardDesign,
     effect: Effect,
     signals: Sequence[Signals],
+    joints: Sequence[int],
     generator: np.random.Generator,
-    joints: Sequence[int] | None = None,
+    controls: int,
 ) -> tuple[Evidence, ...]:
-    joints = range(len(design.rotations)) if joints is None else joints
+    """One for each of ``joints``, the lanes of ``signals``; of so many controls the one in the middle."""
     settings = effect.fit_constants(signals)
     grid = effect.grid(signals, settings)
     shapes, lanes, numbers = grid.shape
     tiled = tuple(replace(take, own=np.tile(take.own, (1, shapes))) for take in signals)
     flat = grid.reshape(shapes * lanes, numbers)
-
-    def by_lane(columns: np.ndarray) -> np.ndarray:
-        """(L, N, G, C), in this order in memory, too: rows are taken lane by lane."""
-        return columns.reshape(len(columns), shapes, lanes, -1).transpose(2, 0, 1, 3).copy()
-
-    true = [by_lane(part) for part in effect.columns_of_takes(tiled, settings, flat)]
-    control = [by_lane(part) for part in control_columns(effect, tiled, settings, flat, generator)]
     prior = effect.prior_sd(settings)
-    found = []
-    for lane, joint in enumerate(joints):
-        products = design.products[joint]
-        right = held_out(products, design.rows(joint, [part[lane] for part in true]), prior)
-        wrong = held_out(products, design.rows(joint, [part[lane] for part in control]), prior)
-        found.append(Evidence(right, wrong, grid[right.shape, lane], settings))
-    return tuple(found)
+    units = [list(design.units(joint)) for joint in joints]
+
+    def held_out_of(columns: Sequence[np.ndarray]) -> list[HeldOut]:
+        """Of each joint; ``columns`` (N, G L, C) of each take."""
+        by_lane = FittedColumns.of(columns, units)
+        return [
+            held_out(design.products[joint], by_lane.units(lane), prior) for lane, joint in enumerate(joints)
+        ]
+
+    true = held_out_of(effect.columns_of_takes(tiled, settings, flat))
+    tried = [held_out_of(control_columns(effect, tiled, settings, flat, generator)) for _ in range(controls)]
+    middle = [sorted(items, key=lambda item: item.saved)[controls // 2] for items in zip(*tried, strict=True)]
+    return tuple(
+        Evidence(right, wrong, grid[right.shape, lane], settings)
+        for lane, (right, wrong) in enumerate(zip(true, middle, strict=True))
+    )

@@ -151,8 +151,13 @@ def _named(found: Sequence[PosedHold], same_pose: float) -> list[PosedHold]:
 
 def are_pose_labels(takes: Sequence[Take]) -> bool:
     """Whether all reference values of all takes are 0 or 1, both occur, and each lasts."""
-    values = [take.reference[np.isfinite(take.reference)] for take in takes if take.rotations]
-    return bool(values) and set(np.unique(np.concatenate(values)).tolist()) == set(LABELS)
+    found: set[float] = set()
+    for take in takes:
+        values = take.reference[np.isfinite(take.reference)]
+        if not np.isin(values, LABELS).all():
+            return False
+        found.update(label for label in LABELS if (values == label).any())
+    return found == set(LABELS)
 
 
 def labels_at_frames(take: Take) -> tuple[str, ...] | None:

@@ -78,11 +78,15 @@ class Creep(ArrayStateEffect):
         relax_once(state, elapsed_s, towards, _times(shape, settings))
         return state - _without(towards, settings)
 
-    def run(
+    def run_takes(
         self, state: np.ndarray, elapsed_s: np.ndarray, own: np.ndarray, settings: Settings, shape: np.ndarray
     ) -> np.ndarray:
-        towards = own[:, :, None] * _following(settings)
-        return relax(state, elapsed_s, towards, _times(shape, settings)) - _without(towards, settings)
+        following = _following(settings)
+        # One long axis: numpy is slow where it has to broadcast along a short last one.
+        towards = np.repeat(own, len(following), axis=-1) * np.tile(following, own.shape[-1])
+        towards = towards.reshape(*own.shape, len(following))
+        states = relax(state, elapsed_s, towards, _times(shape, settings))
+        return np.subtract(states, _without(towards, settings), out=states)
 
     def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
         return {name: columns[:, :, at] for at, name in enumerate(("fast", "middle", "slow"))}
@@ -115,13 +119,11 @@ def _following(settings: Settings) -> np.ndarray:
 
 def _without(towards: np.ndarray, settings: Settings) -> np.ndarray:
     """(..., L, C): what a state is told apart from: the joint now, or its usual posture where the state is so
-    slow that joint and regressor would change places."""
+    slow that joint and regressor would change places. Written over ``towards``."""
     slower = np.flatnonzero(np.array(_beside(settings)) > 1.0) + 6
-    if not len(slower):
-        return towards
-    result = towards.copy()
-    result[..., slower] = on_lanes(settings["own_centre_deg"], towards.shape[-2])[:, None]
-    return result
+    if len(slower):
+        towards[..., slower] = on_lanes(settings["own_centre_deg"], towards.shape[-2])[:, None]
+    return towards
 
 
 def _times(shape: np.ndarray, settings: Settings) -> np.ndarray:

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from glovecal_models.effects.base.facts import Parameter, Rival, Settings
-from glovecal_models.effects.base.history_effect import ArrayStateEffect, unbroken
+from glovecal_models.effects.base.history_effect import ArrayStateEffect
 from glovecal_models.effects.base.motions import RAMPS
 from glovecal_models.effects.base.signals import Signals
 
@@ -23,8 +23,6 @@ REPAIR_WIDTHS = (0.06, 0.13, 0.25, 0.4, 0.65, 1.0)
 """Loops of many small switches need more."""
 MOST_FORM_PLAYS = 3
 """A learned form is a function of so many plays."""
-MOST_VALUES = 4_000_000
-"""Of plays that are held at once."""
 WIDEST_SHARES = (0.12, 0.25, 0.5)
 """Half-width of the widest play, in standard deviations of the motion. Wider ones imitate creep."""
 
@@ -69,45 +67,22 @@ class Hysteresis(ArrayStateEffect):
         np.maximum(joint - width, state, out=state)
         return state - joint
 
-    def run(
+    def run_takes(
         self, state: np.ndarray, elapsed_s: np.ndarray, own: np.ndarray, settings: Settings, shape: np.ndarray
     ) -> np.ndarray:
         widths = _widths(settings)
         width = (shape * widths).ravel()
         # One long axis: numpy is slow where it has to broadcast along a short last one.
-        joint = np.repeat(own, len(widths), axis=1)
+        joint = np.repeat(own, len(widths), axis=-1)
         highest, lowest = joint + width, joint - width
         plays = np.empty_like(highest)
-        before = state.ravel()
+        before = state.reshape(joint.shape[1:])
         for high, low, play in zip(highest, lowest, plays, strict=True):
             np.minimum(high, before, out=play)
             np.maximum(low, play, out=play)
             before = play
         state[...] = before.reshape(state.shape)
         return np.subtract(plays, joint, out=plays).reshape(len(own), *state.shape)
-
-    def columns_of_takes(
-        self, takes: Sequence[Signals], settings: Settings, shape: np.ndarray
-    ) -> list[np.ndarray]:
-        """Plays know no time: takes are run side by side, as many as there is room for."""
-        parts = [(number, part) for number, take in enumerate(takes) for part in unbroken(take.time_s)]
-        lanes, plays = shape.shape[0], len(_widths(settings))
-        found = [np.empty((len(take), lanes, plays)) for take in takes]
-        longest = max((part.stop - part.start for _, part in parts), default=0)
-        most = max(MOST_VALUES // max(longest * lanes * plays, 1), 1)
-        for first in range(0, len(parts), most):
-            some = parts[first : first + most]
-            frames = max(part.stop - part.start for _, part in some)
-            if not frames:
-                continue
-            own = np.concatenate([_held(takes[number].own[part], frames) for number, part in some], axis=1)
-            shapes = np.tile(shape, (len(some), 1))
-            state = self.start(own[0], settings, shapes)
-            columns = self.run(state, np.zeros(frames), own, settings, shapes)
-            for place, (number, part) in enumerate(some):
-                mine = slice(place * lanes, (place + 1) * lanes)
-                found[number][part] = columns[: part.stop - part.start, mine]
-        return found
 
     def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
         widths = list(enumerate(_widths(settings)))
@@ -116,15 +91,6 @@ class Hysteresis(ArrayStateEffect):
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         return tuple(f"play_{width:g}_of_widest_deg_per_deg" for width in _widths(settings))
-
-
-def _held(own: np.ndarray, frames: int) -> np.ndarray:
-    """(frames, L): ``own`` (N, L), held at its end."""
-    return (
-        np.pad(own, ((0, frames - len(own)), (0, 0)), mode="edge")
-        if len(own)
-        else np.zeros((frames, own.shape[1]))
-    )
 
 
 def _widths(settings: Settings) -> Sequence[float]:

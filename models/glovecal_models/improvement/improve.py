@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -114,6 +114,8 @@ class _Loop:
         """Effects and rotations that a residual's association asked for."""
         self.stopped: Stop = "nothing_named"
         self.diagnosis: Diagnosis | None = None
+        self.diagnosed: list[Take] = []
+        """The takes of the diagnosis."""
         self.errors = HeldOutErrors({}, {})
         self.has_looked = False
 
@@ -142,8 +144,10 @@ class _Loop:
         takes = self._repaired()
         self.diagnosis = diagnose(
             takes, self.layout, linear=self.settings.method in ("raw", "linear"), known=known_effects(model),
-            seed=self.seed, limits=self.limits.diagnosis, cancelled=self.cancelled,
+            noise_floors=self._known_floors(takes), seed=self.seed, limits=self.limits.diagnosis,
+            cancelled=self.cancelled,
         )  # fmt: skip
+        self.diagnosed = takes
         tried = self._tried
         for item in self.diagnosis.naming.ranked:
             if item.effect in tried:
@@ -184,6 +188,12 @@ class _Loop:
             self.steps[-1].model, self.takes, self.settings, seed=self.seed,
             cancelled=self.cancelled, report=part(self.report, 0.9, 1.0, "ceiling"),
         )  # fmt: skip
+
+    def _known_floors(self, takes: Sequence[Take]) -> Mapping[str, NoiseFloor] | None:
+        """Those of the last diagnosis, where it was of the same takes: a model has no part in them."""
+        if self.diagnosis is None or [id(take) for take in takes] != [id(take) for take in self.diagnosed]:
+            return None
+        return self.diagnosis.noise_floors
 
     def _floors(self) -> dict[str, NoiseFloor]:
         """Of the takes on which errors are measured, repaired as the last model repairs them.

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from glovecal_models.calibration.child_model import child_model, columnless_effects
 from glovecal_models.calibration.effect_fit import fit_with_effects
 from glovecal_models.calibration.held_out_check import HeldOutErrors, held_out_errors
@@ -36,8 +38,17 @@ def errors_if_redundant(
     settings = settings_of(model, settings)
     wanted = [item for item in requested_effects(model) if item.name != name]
     prepared = PreparedTakes.of(repaired_takes(takes, wanted), model.layout)
-    without = held_out_errors(prepared, tuple(now.square), wanted, settings, cancelled=cancelled)
-    return without if without.overall_deg <= limits.needless_times * now.overall_deg else None
+    most_deg = limits.needless_times * now.overall_deg
+    # However many frames the folds measure, they are not more than there are.
+    frames = sum(
+        int(np.isfinite(part).sum()) for rotation in now.square for part in prepared.target(rotation)
+    )
+    most_square = frames * most_deg**2
+    without = held_out_errors(
+        prepared, tuple(now.square), wanted, settings, most_square=most_square, cancelled=cancelled
+    )
+    is_redundant = sum(without.square.values()) <= most_square and without.overall_deg <= most_deg
+    return without if is_redundant else None
 
 
 def remove_effect(

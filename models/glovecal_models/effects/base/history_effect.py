@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from abc import abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,6 +18,10 @@ LONGEST_GAP_S = 1.0
 """After a longer pause the state is forgotten: the hand may have done anything meanwhile."""
 BLOCK_FRAMES = 256
 """So many frames are prepared at once: enough to be quick, few enough to stay in the processor's cache."""
+BLOCK_VALUES = 100_000
+"""Of several takes side by side so many values at once, likewise."""
+FRAME_VALUES = 1_500
+"""So many values of a frame are worth more takes beside: a frame costs mostly the call."""
 
 
 class HistoryEffect(Effect):
@@ -79,6 +84,70 @@ class ArrayStateEffect(HistoryEffect):
         shape: np.ndarray,
     ) -> np.ndarray:
         """As for one glove; also for G gloves: state (G, L, ...), elapsed_s (G, 1, 1), own (G, L)."""
+
+    def run(
+        self, state: np.ndarray, elapsed_s: np.ndarray, own: np.ndarray, settings: Settings, shape: np.ndarray
+    ) -> np.ndarray:
+        return self.run_takes(state[None], elapsed_s[:, None], own[:, None], settings, shape)[:, 0]
+
+    def run_takes(
+        self, state: np.ndarray, elapsed_s: np.ndarray, own: np.ndarray, settings: Settings, shape: np.ndarray
+    ) -> np.ndarray:
+        """Columns (B, T, L, C) of the next B frames of T takes: state (T, L, ...), ``elapsed_s`` (B, T), own
+        (B, T, L). The same as B calls of ``step``; an effect overrides it when it can be quicker about it."""
+        each = zip(elapsed_s[..., None, None], own, strict=True)
+        return np.stack([self.step(state, elapsed, joint, settings, shape) for elapsed, joint in each])
+
+    def columns_of_takes(
+        self, takes: Sequence[Signals], settings: Settings, shape: np.ndarray
+    ) -> list[np.ndarray]:
+        """Takes are run side by side, a few at a time where a frame of one has many values already."""
+        lanes, added = shape.shape[0], len(self.weight_names(settings))
+        found = [np.empty((len(take), lanes, added)) for take in takes]
+        strips = [
+            _Strip(take.own[part], elapsed[part], columns[part])
+            for take, columns in zip(takes, found, strict=True)
+            for elapsed in [elapsed_s(take.time_s)]
+            for part in unbroken(take.time_s)
+            if part.stop > part.start
+        ]
+        strips.sort(key=lambda strip: -len(strip.own))
+        most = max(FRAME_VALUES // max(lanes * added, 1), 1)
+        for first in range(0, len(strips), most):
+            self._run_strips(strips[first : first + most], settings, shape)
+        return found
+
+    def _run_strips(self, strips: Sequence[_Strip], settings: Settings, shape: np.ndarray) -> None:
+        """Write the columns of ``strips``, the longest first."""
+        states = np.array([self.start(strip.own[0], settings, shape) for strip in strips])
+        values = len(strips) * strips[0].columns[0].size
+        block = min(max(BLOCK_VALUES // max(values, 1), 1), BLOCK_FRAMES)
+        for first in range(0, len(strips[0].own), block):
+            going = [strip for strip in strips if len(strip.own) > first]
+            rows = slice(first, min(first + block, len(strips[0].own)))
+            own = np.empty((rows.stop - first, len(going), strips[0].own.shape[1]))
+            elapsed = np.zeros((rows.stop - first, len(going)))
+            for number, strip in enumerate(going):
+                here = strip.own[rows]
+                # Behind its end a strip is held, and no time passes.
+                own[: len(here), number], own[len(here) :, number] = here, here[-1]
+                elapsed[: len(here), number] = strip.elapsed_s[rows]
+            columns = self.run_takes(states[: len(going)], elapsed, own, settings, shape)
+            for number, strip in enumerate(going):
+                mine = strip.columns[rows]
+                mine[:] = columns[: len(mine), number]
+
+
+@dataclass(frozen=True)
+class _Strip:
+    """Frames without a gap, and where their columns are to be written."""
+
+    own: np.ndarray
+    """(N, L)."""
+    elapsed_s: np.ndarray
+    """(N,)."""
+    columns: np.ndarray
+    """(N, L, C)."""
 
 
 def elapsed_s(time_s: np.ndarray) -> np.ndarray:

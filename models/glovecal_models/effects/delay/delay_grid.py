@@ -9,7 +9,7 @@ slope. All cells are compared at once by projecting them off the base.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -18,6 +18,7 @@ import numpy as np
 from glovecal_models.effects.base.assessment import JointErrors, block_starts, squared_in_blocks
 from glovecal_models.effects.base.problem import Problem
 from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.delay.row_filters import low_passed, window_means
 
 STEP_S = 0.0025
 SHORT_S = 0.03
@@ -32,6 +33,8 @@ FIRST_POLE_SHARE = 0.65
 WINDOW_SHARE = 0.6
 """Length of a delayed window, of that of a moving average as late: a raised cosine has 0.63."""
 BEND_S = 0.05
+CELLS_AT_ONCE = 16
+"""Few enough for the processor's cache."""
 FAST_SHARE = 1.0
 """Per second: a joint is moved fast when its speed reaches so many of its own standard deviations."""
 
@@ -156,16 +159,20 @@ def _joint(problem: Problem, joint: int, form: np.ndarray, delay: np.ndarray) ->
     moved *= _slope(base, products.whole, own)
     bend = _bend(moved, form, delay)
     left = target - orthogonal @ (orthogonal.T @ target)
-    moved -= (moved @ orthogonal) @ orthogonal.T
-    np.subtract(left, moved, out=moved)
-    np.square(moved, out=moved)
     lengths = [len(rows) for _, rows in used]
     starts = block_starts(lengths)
     ends = np.cumsum(lengths)
+    blocks = np.empty((len(starts), len(moved)))
+    for first in range(0, len(moved), CELLS_AT_ONCE):
+        some = moved[first : first + CELLS_AT_ONCE]
+        some -= (some @ orthogonal) @ orthogonal.T
+        np.subtract(left, some, out=some)
+        np.square(some, out=some)
+        blocks[:, first : first + CELLS_AT_ONCE] = np.add.reduceat(some, starts, axis=1).T
     return DelayErrors(
         form,
         delay,
-        np.add.reduceat(moved, starts, axis=1).T,
+        blocks,
         np.add.reduceat(left * left, starts),
         np.array(problem.unit_take)[np.searchsorted(ends, starts, side="right")],
         np.add.reduceat(bend * bend, starts),
@@ -225,63 +232,29 @@ def _moved(tracks: Sequence[_Track], form: np.ndarray, delay: np.ndarray) -> np.
     )
     _filter(result, tracks, form, np.where(late, delay, 0.0))
     _filter(result, [track.backwards for track in tracks], form, np.where(early, -delay, 0.0))
-    result[pure | late | early] -= own
+    result[~(pure | late | early)] = own
+    result -= own
     return result
 
 
 def _filter(result: np.ndarray, tracks: Sequence[_Track], form: np.ndarray, late_s: np.ndarray) -> None:
     """Fill the rows of ``result`` (K, rows of all tracks) whose filters are late, by ``late_s`` (K,) in the
     mean."""
-    low_pass = _low_passes(tracks)
-    for cell in np.flatnonzero((form == DelayForm.ONE_POLE) & (late_s > 0)):
-        result[cell] = low_pass(late_s[cell])
-    for cell in np.flatnonzero((form == DelayForm.TWO_POLES) & (late_s > 0)):
-        # Two first-order filters in a row, in partial fractions.
-        first, second = FIRST_POLE_SHARE * late_s[cell], (1 - FIRST_POLE_SHARE) * late_s[cell]
-        result[cell] = (first * low_pass(first) - second * low_pass(second)) / (first - second)
+    one = np.flatnonzero((form == DelayForm.ONE_POLE) & (late_s > 0))
+    two = np.flatnonzero((form == DelayForm.TWO_POLES) & (late_s > 0))
+    first, second = FIRST_POLE_SHARE * late_s[two], (1 - FIRST_POLE_SHARE) * late_s[two]
+    passed = low_passed(
+        [track.fine for track in tracks],
+        [track.at for track in tracks],
+        np.concatenate([late_s[one], first, second]) / STEP_S,
+    )
+    result[one] = passed[: len(one)]
+    # Two first-order filters in a row, in partial fractions.
+    by_first, by_second = np.split(passed[len(one) :], 2)
+    apart = first - second
+    result[two] = (first / apart)[:, None] * by_first - (second / apart)[:, None] * by_second
     is_window = np.isin(form, (DelayForm.MOVING_AVERAGE, DelayForm.DELAYED_WINDOW)) & (late_s > 0)
     length = 2 * late_s * np.where(form == DelayForm.DELAYED_WINDOW, WINDOW_SHARE, 1.0)
     from_s, to_s = (late_s - length / 2)[is_window], (late_s + length / 2)[is_window]
-    result[is_window] = np.concatenate([_windows(track, from_s, to_s) for track in tracks], axis=1)
-
-
-def _low_passes(tracks: Sequence[_Track]) -> Callable[[float], np.ndarray]:
-    """The first-order filter of all tracks by its time constant: exact for straight lines between every
-    second fine time, where all rows lie on such, and at rest before the first."""
-    every = 2 if all(not (track.at % 2).any() for track in tracks) else 1
-    # Side by side, filled up behind their ends, where nothing is read.
-    from scipy.signal import lfilter  # takes a second to load, which a model that only predicts does not have
-
-    coarse = [track.fine[::every] for track in tracks]
-    together = np.zeros((len(coarse), max(map(len, coarse))))
-    for signal, part in zip(together, coarse, strict=True):
-        signal[: len(part)] = part - part[:1]
-    start = np.concatenate([np.full(len(track.at), track.fine[:1].sum()) for track in tracks])
-    signal = np.repeat(np.arange(len(tracks)), [len(track.at) for track in tracks])
-    row = np.concatenate([track.at // every for track in tracks])
-
-    def low_pass(tau: float) -> np.ndarray:
-        h = every * STEP_S / tau
-        e = np.exp(-h)
-        gain = (1 - e) / h
-        passed = np.asarray(lfilter([1 - gain, gain - e], [1, -e], together))
-        return passed[signal, row] + start
-
-    return low_pass
-
-
-def _windows(track: _Track, from_s: np.ndarray, to_s: np.ndarray) -> np.ndarray:
-    """(K, N): the means of what was between ``from_s`` and ``to_s`` (K,) ago."""
-    signal = track.fine
-    if len(signal) < 2:
-        return np.repeat(signal[track.at][None], len(from_s), axis=0)
-    sums = np.concatenate([[0.0], np.cumsum(0.5 * (signal[1:] + signal[:-1]))])
-
-    def sum_until(ago_s: np.ndarray) -> np.ndarray:
-        at = track.at - ago_s[:, None] / STEP_S
-        inside = np.clip(at, 0.0, len(signal) - 1.0)
-        below = np.minimum(inside.astype(int), len(signal) - 2)
-        between = sums[below] + (inside - below) * (sums[below + 1] - sums[below])
-        return between + signal[0] * np.minimum(at, 0.0)
-
-    return (sum_until(from_s) - sum_until(to_s)) / ((to_s - from_s) / STEP_S)[:, None]
+    means = [window_means(track.fine, track.at, from_s / STEP_S, to_s / STEP_S) for track in tracks]
+    result[is_window] = np.concatenate(means, axis=1)

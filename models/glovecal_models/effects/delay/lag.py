@@ -87,11 +87,11 @@ class Lag(ArrayStateEffect):
         relax_once(state, elapsed_s, own[..., None], shape * MULTIPLES)
         return own[..., None] - state
 
-    def run(
+    def run_takes(
         self, state: np.ndarray, elapsed_s: np.ndarray, own: np.ndarray, settings: Settings, shape: np.ndarray
     ) -> np.ndarray:
-        relaxed = relax(state, elapsed_s, own[:, :, None], shape * MULTIPLES)
-        return own[:, :, None] - relaxed
+        relaxed = relax(state, elapsed_s, own[..., None], shape * MULTIPLES)
+        return own[..., None] - relaxed
 
     def prior_sd(self, settings: Settings) -> np.ndarray:
         return np.full(len(MULTIPLES), PRIOR)

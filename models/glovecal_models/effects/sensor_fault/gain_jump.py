@@ -57,8 +57,9 @@ def gain_jump(
     spread = float(angle.std())
     x = (angle - angle.mean()) / spread
     base = np.column_stack([np.ones_like(x), x])
-    one = _left(base, y)
-    slope = abs(float(np.linalg.lstsq(base, y, rcond=None)[0][1])) / spread
+    line = np.linalg.lstsq(base, y, rcond=None)[0]
+    one = float(np.sum((y - base @ line) ** 2))
+    slope = abs(float(line[1])) / spread
     cut, two = _best_cut(time, base, y)
     if cut is None or slope <= 0 or two > BETTER_THAN_ONE * one:
         return None

@@ -24,9 +24,9 @@ def spikes(readings: np.ndarray, span: float) -> np.ndarray:
     """Excursions of one or two frames that come back; ``span`` is the sensor's range in readings."""
     if len(readings) < 5 or span <= 0:
         return np.zeros(len(readings), dtype=bool)
-    padded = np.pad(readings, 2, mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 5)
-    away = np.abs(readings - np.median(windows, axis=1))
+    from scipy.ndimage import median_filter  # slow to load, and every model with effects loads this file
+
+    away = np.abs(readings - median_filter(readings, 5, mode="nearest"))
     spread = 1.4826 * float(np.median(away))
     limit = max(SPIKE_SPREADS * spread, 3.0 * smallest_step(readings), SPIKE_SHARE * span)
     found = away > limit
@@ -37,12 +37,16 @@ def spikes(readings: np.ndarray, span: float) -> np.ndarray:
 def dropouts(readings: np.ndarray, span: float) -> np.ndarray:
     """Runs of two frames or more at one constant value, entered and left by a jump."""
     found = np.zeros(len(readings), dtype=bool)
-    for start, end in constant_runs(readings):
-        if end - start < 2 or start == 0 or end == len(readings) or span <= 0:
-            continue
-        entered = abs(readings[start] - readings[start - 1])
-        left = abs(readings[end] - readings[end - 1])
-        found[start:end] = min(entered, left) > JUMP_SHARE * span
+    start, end = constant_runs(readings)
+    if span <= 0:
+        return found
+    inside = (start > 0) & (end < len(readings))
+    start, end = start[inside], end[inside]
+    entered = np.abs(readings[start] - readings[start - 1])
+    left = np.abs(readings[end] - readings[end - 1])
+    jumps = np.minimum(entered, left) > JUMP_SHARE * span
+    for first, after in zip(start[jumps], end[jumps], strict=True):
+        found[first:after] = True
     return found
 
 
@@ -55,21 +59,22 @@ def stuck(time_s: np.ndarray, readings: np.ndarray, low: float, high: float, mov
     found = np.zeros(len(readings), dtype=bool)
     margin = GRADUAL_SHARE * (high - low)
     never_changes = high <= low
-    for start, end in constant_runs(readings):
-        lasts = time_s[end - 1] - time_s[start]
-        if end - start < STUCK_FRAMES or lasts < STUCK_S:
-            continue
-        within = low + margin < readings[start] < high - margin
-        inside = moved[start:end]
+    start, end = constant_runs(readings)
+    lasts = (end - start >= STUCK_FRAMES) & (time_s[end - 1] - time_s[start] >= STUCK_S)
+    within = (low + margin < readings[start]) & (readings[start] < high - margin)
+    possible = lasts & (within | never_changes)
+    for first, after in zip(start[possible], end[possible], strict=True):
+        inside = moved[first:after]
         inside = inside[np.isfinite(inside)]
-        found[start:end] = (within or never_changes) and len(inside) > 1 and np.ptp(inside) >= 1.0
+        found[first:after] = len(inside) > 1 and np.ptp(inside) >= 1.0
     return found
 
 
-def constant_runs(readings: np.ndarray) -> list[tuple[int, int]]:
+def constant_runs(readings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(R,) first frames of runs of two or more of one value, and (R,) the frames after them."""
     edges = np.concatenate([[0], np.flatnonzero(np.diff(readings) != 0) + 1, [len(readings)]])
     long = np.flatnonzero(np.diff(edges) >= 2)
-    return [(int(edges[run]), int(edges[run + 1])) for run in long]
+    return edges[long], edges[long + 1]
 
 
 def _longer_than(mask: np.ndarray, frames: int) -> np.ndarray:

@@ -9,7 +9,7 @@ now: that is left out.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -67,9 +67,10 @@ class SensorFault(SignatureEffect):
         rotation_of: dict[str, str] = {}
         for rotation, sensor in sensor_of.items():
             rotation_of.setdefault(sensor, rotation)
+        changes = [_Changes.of(take) for take in takes]
         found: list[Finding] = []
         for sensor, rotation in rotation_of.items():
-            found += _faults(takes, sensor, rotation, len(rotation_of))
+            found += _faults(takes, changes, sensor, rotation, len(rotation_of))
         return tuple(sorted(found, key=lambda item: (-len(item.stretches), item.where)))
 
     def find_between_levels(self, takes: Sequence[Take], sensor_of: Mapping[str, str]) -> tuple[Finding, ...]:
@@ -106,10 +107,12 @@ class SensorFault(SignatureEffect):
         return tuple(_without_faults(take, found) for take in takes)
 
 
-def _faults(takes: Sequence[Take], sensor: str, rotation: str, sensors: int) -> list[Finding]:
+def _faults(
+    takes: Sequence[Take], changes: Sequence[_Changes], sensor: str, rotation: str, sensors: int
+) -> list[Finding]:
     columns = [take.readings[:, take.sensors.index(sensor)] for take in takes]
     low, high = (float(v) for v in np.percentile(np.concatenate(columns), LEAST_OF_RANGE))
-    short = _short_faults(takes, sensor, rotation, low, high)
+    short = _short_faults(takes, changes, sensor, rotation, low, high)
     stretches: dict[str, list[Stretch]] = {kind: [] for kind in SensorFault.kinds}
     frames = dict.fromkeys(SensorFault.kinds, 0)
     jumps, sound_angles = [], []
@@ -165,7 +168,12 @@ def _finding_changed(sensor: str, rotation: str, change: GainChange, takes: Sequ
 
 
 def _short_faults(
-    takes: Sequence[Take], sensor: str, rotation: str, low: float, high: float
+    takes: Sequence[Take],
+    changes: Sequence[_Changes],
+    sensor: str,
+    rotation: str,
+    low: float,
+    high: float,
 ) -> list[dict[str, np.ndarray]]:
     """For each take a mask (N,) of each kind; empty where there are too few of that kind in all takes."""
     columns = [take.readings[:, take.sensors.index(sensor)] for take in takes]
@@ -173,8 +181,8 @@ def _short_faults(
     expected, gain = expected_readings(np.concatenate(columns), np.concatenate(angles))
     parts = np.split(expected, np.cumsum([len(column) for column in columns])[:-1])
     found = []
-    for take, column, part in zip(takes, columns, parts, strict=True):
-        moving = _others_move(take, sensor)
+    for take, change, column, part in zip(takes, changes, columns, parts, strict=True):
+        moving = change.of_others(take.sensors.index(sensor))
         held = shortly_stuck(take.time_s, column, low, high, part, gain, moving)
         away = small_dropouts(take.time_s, column, high - low, part, moving)
         found.append({"stuck": held, "dropouts": away})
@@ -186,13 +194,26 @@ def _short_faults(
     return found
 
 
-def _others_move(take: Take, sensor: str) -> np.ndarray:
-    """(N,) whether half of the other sensors or more changed since the frame before; never without others."""
-    others = np.delete(take.readings, take.sensors.index(sensor), axis=1)
-    if not others.shape[1]:
-        return np.zeros(len(others), dtype=bool)
-    changed = np.diff(others, axis=0, prepend=others[:1]) != 0
-    return changed.mean(axis=1) >= 0.5
+@dataclass(frozen=True)
+class _Changes:
+    """Which sensors of a take changed since the frame before."""
+
+    changed: np.ndarray
+    """(N, S)."""
+    count: np.ndarray
+    """(N,) sensors."""
+
+    @classmethod
+    def of(cls, take: Take) -> _Changes:
+        changed = np.diff(take.readings, axis=0, prepend=take.readings[:1]) != 0
+        return cls(changed, changed.sum(axis=1))
+
+    def of_others(self, sensor: int) -> np.ndarray:
+        """(N,) whether half of the sensors but this one, or more, changed; never without others."""
+        others = self.changed.shape[1] - 1
+        if not others:
+            return np.zeros(len(self.changed), dtype=bool)
+        return 2 * (self.count - self.changed[:, sensor]) >= others
 
 
 def _without_faults(take: Take, found: Sequence[Finding]) -> Take:

@@ -63,20 +63,16 @@ def shortly_stuck(
     smooth = uniform_filter1d(expected, SMOOTHED)
     margin = GRADUAL_SHARE * (high - low)
     least = max(STUCK_STEPS * smallest_step(readings), STUCK_DEG * gain)
-    for start, end in constant_runs(readings):
-        if (
-            end - start < SHORT_STUCK_FRAMES
-            or end == len(readings)
-            or time_s[end] - time_s[start] < SHORT_STUCK_S
-        ):
-            continue
-        asked = smooth[end] - smooth[start]
-        released = readings[end] - readings[end - 1]
-        found[start:end] = (
-            low + margin < readings[start] < high - margin
-            and others_move[start + 1 : end].mean() > 0.5
-            and abs(asked) > least
-            and released / asked > RELEASED_SHARE
+    start, end = constant_runs(readings)
+    start, end = start[end < len(readings)], end[end < len(readings)]
+    asked = smooth[end] - smooth[start]
+    long = (end - start >= SHORT_STUCK_FRAMES) & (time_s[end] - time_s[start] >= SHORT_STUCK_S)
+    within = (low + margin < readings[start]) & (readings[start] < high - margin)
+    possible = np.flatnonzero(long & within & (np.abs(asked) > least))
+    for first, after, missing in zip(start[possible], end[possible], asked[possible], strict=True):
+        released = readings[after] - readings[after - 1]
+        found[first:after] = (
+            others_move[first + 1 : after].mean() > 0.5 and released / missing > RELEASED_SHARE
         )
     return found
 
