@@ -13,8 +13,8 @@ import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.sensor_sensitivity import trained_ranges
-from glovecal_models.effects.sensor_fault.reading_faults import dropouts, spikes
 from glovecal_models.takes.dead_sensor import dead_sensors
+from glovecal_models.takes.reading_faults import dropouts, spikes
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.take_check import check_take
 

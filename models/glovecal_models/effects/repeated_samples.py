@@ -24,8 +24,8 @@ from glovecal_models.effects.base.signature_effect import (
     SignatureEffect,
     check_signature_input,
     named,
-    smallest_step,
 )
+from glovecal_models.takes.reading_faults import smallest_step
 from glovecal_models.takes.take import Take
 
 LEAST_REPEATED_SHARE = 0.02

@@ -45,9 +45,10 @@ _CONFIG = {
     "distributed.comm.timeouts.connect": "30s",
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],
-    # Dask has every array above 128 kB mapped anew, which costs a diagnosis as much as its arithmetic.
-    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 1 << 30,
-    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 1 << 30,
+    # Dask has every array above 128 kB mapped anew, which costs a diagnosis as much as its arithmetic. glibc
+    # takes no more than 32 MiB for the second.
+    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 256 << 20,
+    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 32 << 20,
 }
 _FORKED = {"distributed.worker.multiprocessing-method": "forkserver"}
 _LONGEST_FOLDER = 75

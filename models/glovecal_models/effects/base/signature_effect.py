@@ -241,10 +241,3 @@ def named(names: Sequence[str]) -> str:
     """Names in a row for a sentence, such as "A, B and 3 more"."""
     shown = ", ".join(names[:MOST_NAMED])
     return shown if len(names) <= MOST_NAMED else f"{shown} and {len(names) - MOST_NAMED} more"
-
-
-def smallest_step(values: np.ndarray) -> float:
-    """The quantum of (N,) values: their smallest change; 0 when they never change."""
-    steps = np.abs(np.diff(values))
-    steps = steps[np.isfinite(steps) & (steps > 0)]
-    return float(steps.min()) if len(steps) else 0.0

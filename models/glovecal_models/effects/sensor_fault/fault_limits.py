@@ -6,13 +6,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from glovecal_models.effects.base.signature_effect import Finding, frames_inside, smallest_step
+from glovecal_models.effects.base.signature_effect import Finding, frames_inside
 from glovecal_models.effects.sensor_fault.fault_watch import (
     LONGEST_JUMP_S,
     MOVING_SHARE,
     FaultLimits,
     ReadingTrack,
 )
+from glovecal_models.takes.reading_faults import smallest_step
 from glovecal_models.takes.take import Take
 
 LASTING = ("jump", "changed")

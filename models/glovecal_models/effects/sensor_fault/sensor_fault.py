@@ -31,7 +31,6 @@ from glovecal_models.effects.sensor_fault.fault_watch import FaultHold
 from glovecal_models.effects.sensor_fault.gain_change import GainChange, gain_change
 from glovecal_models.effects.sensor_fault.gain_jump import gain_jump
 from glovecal_models.effects.sensor_fault.live_check import live_check
-from glovecal_models.effects.sensor_fault.reading_faults import GRADUAL_SHARE, dropouts, spikes, stuck
 from glovecal_models.effects.sensor_fault.short_faults import (
     FEWEST,
     expected_readings,
@@ -39,6 +38,7 @@ from glovecal_models.effects.sensor_fault.short_faults import (
     small_dropouts,
 )
 from glovecal_models.progress import Cancel
+from glovecal_models.takes.reading_faults import GRADUAL_SHARE, dropouts, spikes, stuck
 from glovecal_models.takes.take import Take
 
 REFERENCE_MOVES_DEG = 10.0

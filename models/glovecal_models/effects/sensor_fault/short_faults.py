@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.effects.base.signature_effect import smallest_step
-from glovecal_models.effects.sensor_fault.reading_faults import GRADUAL_SHARE, constant_runs
+from glovecal_models.takes.reading_faults import GRADUAL_SHARE, constant_runs, smallest_step
 
 FEWEST = 3
 """Of either kind, in all takes together."""

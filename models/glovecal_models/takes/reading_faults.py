@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.effects.base.signature_effect import smallest_step
-
 SPIKE_SHARE = 0.08
 """Of the sensor's range: a smaller excursion may be a movement."""
 SPIKE_SPREADS = 8.0
@@ -84,3 +82,10 @@ def _longer_than(mask: np.ndarray, frames: int) -> np.ndarray:
     for start, end in zip(edges[::2], edges[1::2], strict=True):
         result[start:end] = end - start > frames
     return result
+
+
+def smallest_step(values: np.ndarray) -> float:
+    """The quantum of (N,) values: their smallest change; 0 when they never change."""
+    steps = np.abs(np.diff(values))
+    steps = steps[np.isfinite(steps) & (steps > 0)]
+    return float(steps.min()) if len(steps) else 0.0
