@@ -127,13 +127,14 @@ def test_a_layout_of_the_same_name_with_other_sensors_is_refused(elsewhere: Rest
     ],
 )  # fmt: skip
 def test_a_file_that_is_no_model_changes_nothing(
-    elsewhere: RestClient, kept, content: bytes, why: str
+    elsewhere: RestClient, tmp_path: Path, kept, content: bytes, why: str
 ) -> None:
     before = everything(elsewhere)
     with pytest.raises(Refused, match=why) as refused:
         elsewhere.import_model(kept(content), create_subject=True)
     assert refused.value.status == 422
     assert everything(elsewhere) == before
+    assert list((tmp_path / "elsewhere" / "uploads").iterdir()) == []
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

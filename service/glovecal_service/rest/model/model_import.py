@@ -28,6 +28,7 @@ from glovecal_service.store.records import ModelRecord, TakeRecord
 router = APIRouter(prefix="/models", tags=["models"])
 
 MEDIA_TYPE = "application/octet-stream"
+LARGEST_BYTES = 256 << 20
 
 
 class ImportedModel(BaseModel):
@@ -70,12 +71,20 @@ async def import_model(
     if kind != MEDIA_TYPE:
         raise Problem(415, "media-type", f"a model is sent as {MEDIA_TYPE}, not {kind or 'nothing'!r}")
     upload = await parts.uploads.receive(request.stream())
-    found = await anyio.to_thread.run_sync(_import, parts, upload.path, options, limiter=parts.import_slots)
+    try:
+        found = await anyio.to_thread.run_sync(
+            _import, parts, upload.path, options, limiter=parts.import_slots
+        )
+    finally:
+        if upload.is_new:  # what was good is an artifact now
+            upload.path.unlink(missing_ok=True)
     response.status_code = 201 if found["is_new"] else 200
     return found
 
 
 def _import(parts: Parts, path: Path, options: ModelImport) -> dict[str, Any]:
+    if (size := path.stat().st_size) > LARGEST_BYTES:
+        raise BadInput(f"{size >> 20} MB are no model: {LARGEST_BYTES >> 20} MB at most")
     artifact = path.read_bytes()
     model = _tried(artifact)
     subject = options.subject or model.subject
