@@ -3,7 +3,7 @@
 import pytest
 from emulated_cyberglove_box import EmulatedBox
 
-from glovecal_client.capture.cyberglove_order import SENSORS, hardware_order, layout_index
+from glovecal_client.capture.cyberglove.order import SENSORS, hardware_order, layout_index
 from glovecal_models.layout import Layout
 
 # bit, meaning in the sources, place among 22 sensors, place among 18 (None: not there), name in the layouts

@@ -8,7 +8,7 @@ from emulated_cyberglove_box import EmulatedBox
 from hypothesis import given
 from hypothesis import strategies as st
 
-from glovecal_client.capture.cyberglove_record import RecordFormat, RecordReader, decode_ticks
+from glovecal_client.capture.cyberglove.record import RecordFormat, RecordReader, decode_ticks
 
 FORMATS = [
     RecordFormat(sensors, timestamp, status)

@@ -6,9 +6,9 @@ import pytest
 from cyberglove_emulator import Persona
 from emulated_cyberglove_box import EmulatedBox
 
-from glovecal_client.capture.cyberglove import CyberGlove
-from glovecal_client.capture.cyberglove_options import CyberGloveOptions
-from glovecal_client.capture.cyberglove_verdict import Heard, explain
+from glovecal_client.capture.cyberglove.device import CyberGlove
+from glovecal_client.capture.cyberglove.options import CyberGloveOptions
+from glovecal_client.capture.cyberglove.verdict import Heard, explain
 from glovecal_client.errors import DeviceError, DeviceLost
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are a POSIX thing")

@@ -11,7 +11,7 @@ from cli_running import glovecal
 from typer.testing import CliRunner
 
 from glovecal_client.capture.command import main as capture_alone
-from glovecal_client.capture.cyberglove import CyberGlove
+from glovecal_client.capture.cyberglove.device import CyberGlove
 from glovecal_client.capture.replay import ReplayDevice
 from glovecal_client.session import DEFAULT_ENDPOINT
 from glovecal_models.calibration.training_settings import METHODS
