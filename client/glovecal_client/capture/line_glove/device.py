@@ -62,9 +62,9 @@ class LineGlove(StreamedGlove):
         told = self._description
         return None if told.time_column is None else DeviceClock(told.ticks_per_second, told.wraps_at)
 
-    def answer(self, link: Link, samples: int) -> None:
-        if self._description.answer:
-            link.write(self._description.answer.encode() * samples)
+    def answer(self, link: Link, data: bytes) -> None:
+        if self._description.answer and (lines := data.count(b"\n")):
+            link.write(self._description.answer.encode() * lines)
 
 
 class DescribedLine:

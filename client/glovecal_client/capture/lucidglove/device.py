@@ -6,6 +6,7 @@ Written from the public firmware and its reader; no hardware was at hand. Readin
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from typing import ClassVar
 
@@ -21,10 +22,12 @@ from glovecal_client.errors import BadOption
 _ANSWER = b"\n"
 """What the OpenGloves driver writes at least. Lines under five characters set no servo."""
 _LONGEST = 256
+_SILENCE_S = 0.1
+"""Ten lines of the usual rate."""
 
 
 class LucidGlove(StreamedGlove):
-    """Five flexion sensors; with ``sensors=splay`` or ``joints`` those that the firmware sends beside them."""
+    """Five flexion sensors; with ``sensors=splay`` or ``joints`` also those sent beside them."""
 
     name = "lucidglove"
     rate_hz = 100.0
@@ -74,9 +77,20 @@ class LucidGlove(StreamedGlove):
         return LineReader(self._parse, self.counters, longest=_LONGEST)
 
     def start(self, link: Link) -> None:
-        self.answer(link, 1)
+        self._answer(link, 1)
 
-    def answer(self, link: Link, samples: int) -> None:
-        """One line for each sample: the firmware's loop waits for it, by Arduino's default 1 s."""
+    def answer(self, link: Link, data: bytes) -> None:
+        """One line for each, damaged ones too: the firmware's loop waits for it, by Arduino's default 1 s.
+
+        Where a line feed was lost on the way the glove waits for an answer to a line nobody saw end; so
+        silence is answered too.
+        """
+        if lines := data.count(b"\n"):
+            self._answer(link, lines)
+        elif not data and time.monotonic() - self._answered_s > _SILENCE_S:
+            self._answer(link, 1)
+
+    def _answer(self, link: Link, lines: int) -> None:
+        self._answered_s = time.monotonic()
         if self._answers:
-            link.write(_ANSWER * samples)
+            link.write(_ANSWER * lines)

@@ -28,7 +28,7 @@ class OpenCyberGlove(StreamedGlove):
     counts = (0.0, float(LARGEST))
     rate_hz = 120.0
     option_help: ClassVar = {
-        "clock": f"{'|'.join(_TICKS_PER_SECOND)} (computer; the packet's stamp is said to be in microseconds)",
+        "clock": f"{'|'.join(_TICKS_PER_SECOND)} (computer; microseconds are documented)",
         "temperature": "no|yes (no; yes keeps the packet's temperature as temperature_c)",
         "baud": "BAUD (1000000)",
         **COMMON_HELP,

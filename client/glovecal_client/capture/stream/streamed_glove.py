@@ -68,8 +68,8 @@ class StreamedGlove:
     def start(self, link: Link) -> None:
         """Make the glove send. Raises DeviceLost when it does not answer."""
 
-    def answer(self, link: Link, samples: int) -> None:
-        """After ``samples`` records were read: what a glove that waits for an answer wants."""
+    def answer(self, link: Link, data: bytes) -> None:
+        """After each wait, with what came, perhaps nothing: what a glove that waits for an answer wants."""
 
     def stop(self, link: Link) -> None:
         """Make the glove stop sending, before the link is closed."""
@@ -105,8 +105,7 @@ class StreamedGlove:
             try:
                 data = link.read(max(0.0, min(_WAIT_S, deadline - begun)))
                 samples = self._parser.feed(data) if data else []
-                if samples:
-                    self.answer(link, len(samples))
+                self.answer(link, data)
                 self._watch(time.monotonic() - begun, bool(data), bool(samples))
             except DeviceLost:
                 self._let_go()
