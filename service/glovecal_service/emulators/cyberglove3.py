@@ -20,12 +20,12 @@ CARD_GAP = 28
 _END = b"\r\n\0"
 _WORDS = struct.Struct(">22H")
 _UNKNOWN = b" e?\r\n\0"
-_LENGTHS = {b"e": 3, b"d": 3, b"m": 3, b"s": 3, b"u": 3, b"w": 3, b"o": 3, b"E": 9}
-"""Of a command with the prefix 1, which is counted; the others are two bytes, or end with 0x01."""
+_LENGTHS = dict.fromkeys((b"e", b"d", b"m", b"s", b"u", b"w", b"o"), 3) | {b"E": 9}
+"""Of commands with the prefix 1, which counts too; the others have two bytes, or end with 0x01."""
 
 
 class EmulatedCyberGlove3:
-    """``dips``: False for a glove with 18 sensors, whose four DIP words hold 0 (inferred). ``link``: u or w."""
+    """``dips``: False for a glove with 18 sensors, its four DIP words 0 (inferred). ``link``: u or w."""
 
     def __init__(
         self,
