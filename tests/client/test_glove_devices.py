@@ -28,6 +28,8 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminal
 NEW = [name for name in PROTOCOLS if name != "cyberglove"]
 EACH = pytest.mark.parametrize("name", NEW)
 SEEN_WITHIN_S, BACK_WITHIN_S = 0.5, 2.0
+OFF_S = (0.05, 0.5, 1.3)
+"""How long a cable stays pulled, in turn: the pauses between tries have grown differently by then."""
 
 
 class Pair:
@@ -183,12 +185,14 @@ def plug_cycles(both: Pair, cycles: int) -> tuple[float, float]:
         return reading is not None
 
     eventually(next_reading, "a first reading", 10)
-    for _ in range(cycles):
+    for number in range(cycles):
         both.emulation.unplug()
         begun = time.monotonic()
         told_why_lost(device)
         slowest_seen = max(slowest_seen, time.monotonic() - begun)
-        time.sleep(0.15)
+        until = time.monotonic() + OFF_S[number % len(OFF_S)]
+        while time.monotonic() < until:
+            next_reading()
         both.emulation.replug()
         begun = time.monotonic()
         eventually(next_reading, "readings are back", 10)

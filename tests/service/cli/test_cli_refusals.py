@@ -26,7 +26,8 @@ HOSTILE = ["", "..", "../x", "a/b", "%2e%2e", "A/", "a b", "-", "x" * 65, "a\x00
 VERBS = [
     (), ("subject",), ("glove",), ("take",), ("model",), ("job",), ("demo",), ("serve",), ("capture",),
     ("find-port",), ("watch",), ("record",), ("train",), ("compare",), ("take", "import"), ("job", "wait"),
-    ("diagnose",), ("add-effect",), ("remove-effect",), ("improve",), ("effects",),
+    ("emulate",), ("read-card",), ("diagnose",),
+    ("add-effect",), ("remove-effect",), ("improve",), ("effects",),
 ]  # fmt: skip
 
 

@@ -51,18 +51,10 @@ def read_card(data: bytes, sensors: tuple[str, ...]) -> CardRecording:
     """The records of ``sensors`` in a file; one without any has it all as its header."""
     counters = Counters()
     reader = TimedRecordReader(counters, word_places(sensors))
-    records: list[TimedRecord] = []
-    first, end, step = len(data), 0, LENGTH
-    for begin in range(0, len(data), step):
-        came = reader.feed(data[begin : begin + step])
-        if came:
-            end = min(begin + step, len(data)) - len(reader.rest)
-            if not records:
-                first = end - LENGTH * len(came)
-            records += came
-    trailer = data[end:] if records else b""
-    between = end - first - LENGTH * len(records) if records else 0
-    return CardRecording(data[:first], tuple(records), counters.bad_frames, between, trailer)
+    records = tuple(reader.feed(data))
+    first, end = reader.span or (len(data), len(data))
+    between = end - first - LENGTH * len(records)
+    return CardRecording(data[:first], records, counters.bad_frames, between, data[end:])
 
 
 def card_to_table(

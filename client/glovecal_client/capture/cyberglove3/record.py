@@ -42,6 +42,10 @@ class TimedRecordReader:
         self._counters = counters
         self._used = used
         self._buffer = bytearray()
+        self._before = 0
+        """Bytes fed and let go of."""
+        self.span: tuple[int, int] | None = None
+        """Where the first sound record began and the last one ended, in bytes fed."""
 
     def feed(self, data: bytes) -> list[TimedRecord]:
         """The sound records completed by ``data``, oldest first."""
@@ -53,7 +57,9 @@ class TimedRecordReader:
             at = begins.start()
             if at + LENGTH <= len(self._buffer) and (record := self._record(at, begins)) is not None:
                 records.append(record)
+                first = self._before + at if self.span is None else self.span[0]
                 at += LENGTH
+                self.span = first, self._before + at
                 continue
             following = _TIME.search(self._buffer, at + _TIME_LENGTH)
             if following is None and at + LENGTH > len(self._buffer):
@@ -67,12 +73,8 @@ class TimedRecordReader:
             self._counters.skipped_bytes += kept - at
             at = kept
         del self._buffer[:at]
+        self._before += at
         return records
-
-    @property
-    def rest(self) -> bytes:
-        """What was fed and belongs to no record yet."""
-        return bytes(self._buffer)
 
     def _record(self, at: int, begins: re.Match[bytes]) -> TimedRecord | None:
         if self._buffer[at + LENGTH - len(_END) : at + LENGTH] != _END:
