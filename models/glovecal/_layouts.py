@@ -14,7 +14,7 @@ LayoutLike = Layout | str | PathLike[str] | None
 
 
 def read_layout(layout: str | PathLike[str]) -> Layout:
-    """A built-in layout by its name (``cyberglove18``, ``cyberglove22``, ``lucidglove``), or a TOML file.
+    """A built-in layout by its name (such as ``cyberglove18``, ``lucidglove``), or a TOML file.
 
     Raises BadInput when it is neither, or when the file is no layout.
     """

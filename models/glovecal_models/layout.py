@@ -23,7 +23,10 @@ from glovecal_models.expression import SensorExpression
 from glovecal_models.names import check_channel_name
 
 CorrespondenceKind = Literal["1S1R", "MS1R", "0S1R", "MSMR"]
-BUILT_IN = ("cyberglove18", "cyberglove22", "lucidglove")
+BUILT_IN = (
+    "cyberglove18", "cyberglove22", "cyberglove3-18", "cyberglove3-22",
+    "homunculus", "lucidglove", "opencyberglove",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -96,7 +99,7 @@ class Layout:
 
     @classmethod
     def built_in(cls, name: str) -> Layout:
-        """One of ``cyberglove18``, ``cyberglove22``, ``lucidglove``. Raises BadLayout."""
+        """One of ``BUILT_IN``. Raises BadLayout."""
         if name not in BUILT_IN:
             raise BadLayout(f"no built-in layout {name!r}; there are {', '.join(BUILT_IN)}")
         return cls.from_toml(built_in_toml(name), source=name)

@@ -6,12 +6,12 @@ import threading
 from pathlib import Path
 
 import zenoh
-from emulated_cyberglove_box import EmulatedBox
 from loopback import eventually, free_endpoint
 from test_cyberglove_driver import POSIX_ONLY, in_layout_order
 
 from glovecal_client import Frame, GloveKeys, Recording, decode_frame, open_router
 from glovecal_client.capture.command import run_capture
+from glovecal_service.emulators.cyberglove.box import EmulatedBox
 
 pytestmark = POSIX_ONLY
 KEYS = GloveKeys("lab", "right-hand")

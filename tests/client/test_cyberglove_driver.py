@@ -6,16 +6,16 @@ import time
 import numpy as np
 import pytest
 from cyberglove_emulator import CyberGloveEmulator
-from emulated_cyberglove_box import EmulatedBox
 from hypothesis import given
 from hypothesis import strategies as st
 from test_cyberglove_order import places
 
-from glovecal_client.capture.cyberglove import CyberGlove
-from glovecal_client.capture.cyberglove_order import SENSORS
-from glovecal_client.capture.cyberglove_rate import period_payload, period_words, rate_of
+from glovecal_client.capture.cyberglove.device import CyberGlove
+from glovecal_client.capture.cyberglove.order import SENSORS
+from glovecal_client.capture.cyberglove.rate import period_payload, period_words, rate_of
 from glovecal_client.capture.device import Device, Reading, build_device
 from glovecal_client.errors import BadOption, DeviceError, DeviceLost
+from glovecal_service.emulators.cyberglove.box import EmulatedBox
 
 POSIX_ONLY = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are a POSIX thing")
 pytestmark = POSIX_ONLY

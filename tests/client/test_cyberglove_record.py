@@ -4,11 +4,11 @@ import random
 
 import pytest
 from cyberglove_emulator import Damage
-from emulated_cyberglove_box import EmulatedBox
 from hypothesis import given
 from hypothesis import strategies as st
 
-from glovecal_client.capture.cyberglove_record import RecordFormat, RecordReader, decode_ticks
+from glovecal_client.capture.cyberglove.record import RecordFormat, RecordReader, decode_ticks
+from glovecal_service.emulators.cyberglove.box import EmulatedBox
 
 FORMATS = [
     RecordFormat(sensors, timestamp, status)

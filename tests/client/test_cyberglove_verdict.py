@@ -4,12 +4,12 @@ import sys
 
 import pytest
 from cyberglove_emulator import Persona
-from emulated_cyberglove_box import EmulatedBox
 
-from glovecal_client.capture.cyberglove import CyberGlove
-from glovecal_client.capture.cyberglove_options import CyberGloveOptions
-from glovecal_client.capture.cyberglove_verdict import Heard, explain
+from glovecal_client.capture.cyberglove.device import CyberGlove
+from glovecal_client.capture.cyberglove.options import CyberGloveOptions
+from glovecal_client.capture.cyberglove.verdict import Heard, explain
 from glovecal_client.errors import DeviceError, DeviceLost
+from glovecal_service.emulators.cyberglove.box import EmulatedBox
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are a POSIX thing")
 

@@ -6,12 +6,12 @@ import time
 from pathlib import Path
 
 import pytest
-from emulated_cyberglove_box import EmulatedBox
 
-from glovecal_client.capture import find_port
-from glovecal_client.capture.cyberglove import CyberGlove
-from glovecal_client.capture.find_port import find_ports, only_cyberglove, probe
+from glovecal_client.capture.cyberglove import find_port
+from glovecal_client.capture.cyberglove.device import CyberGlove
+from glovecal_client.capture.cyberglove.find_port import find_ports, only_cyberglove, probe
 from glovecal_client.errors import DeviceError, DeviceLost
+from glovecal_service.emulators.cyberglove.box import EmulatedBox
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are a POSIX thing")
 

@@ -1,4 +1,4 @@
-"""A serial port opened the way a CyberGlove wants it, its errors turned into sentences."""
+"""A serial port opened the way gloves want it, its errors turned into sentences."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ import typer
 
 from glovecal_service.cli import demo, serve
 from glovecal_service.cli.effect import catalogue, changes, detectability, diagnosis, improvement
-from glovecal_service.cli.glove import capture, doctor, find_port, layouts, recordings, watch
+from glovecal_service.cli.glove import capture, card, doctor, emulate, find_port, layouts, recordings, watch
 from glovecal_service.cli.job import jobs
 from glovecal_service.cli.model import ceiling, comparison, explain, models, quick_check, training, where
 from glovecal_service.cli.sampling import samplings
@@ -39,6 +39,8 @@ app.command("demo")(demo.demo)
 app.command("serve")(serve.serve)
 app.command("capture", cls=capture.WithDeviceOptions)(capture.capture)
 app.command("find-port")(find_port.find_port)
+app.command("emulate", cls=emulate.WithFaults)(emulate.emulate)
+app.command("read-card")(card.read_card)
 app.command("watch")(watch.watch)
 app.command("doctor")(doctor.doctor)
 app.command("record")(recordings.record)

@@ -11,7 +11,7 @@ from cli_running import glovecal
 from typer.testing import CliRunner
 
 from glovecal_client.capture.command import main as capture_alone
-from glovecal_client.capture.cyberglove import CyberGlove
+from glovecal_client.capture.cyberglove.device import CyberGlove
 from glovecal_client.capture.replay import ReplayDevice
 from glovecal_client.session import DEFAULT_ENDPOINT
 from glovecal_models.calibration.training_settings import METHODS
@@ -26,7 +26,8 @@ HOSTILE = ["", "..", "../x", "a/b", "%2e%2e", "A/", "a b", "-", "x" * 65, "a\x00
 VERBS = [
     (), ("subject",), ("glove",), ("take",), ("model",), ("job",), ("demo",), ("serve",), ("capture",),
     ("find-port",), ("watch",), ("record",), ("train",), ("compare",), ("take", "import"), ("job", "wait"),
-    ("diagnose",), ("add-effect",), ("remove-effect",), ("improve",), ("effects",),
+    ("emulate",), ("read-card",), ("diagnose",),
+    ("add-effect",), ("remove-effect",), ("improve",), ("effects",),
 ]  # fmt: skip
 
 

@@ -15,7 +15,7 @@ def find_port(
     as_json: AsJson = False,
 ) -> None:
     """Try every serial port and show what answers. Takes some seconds."""
-    from glovecal_client.capture.find_port import find_ports
+    from glovecal_client.capture.cyberglove.find_port import find_ports
 
     found = [item.to_json() for item in find_ports(port or [])]
     if as_json:

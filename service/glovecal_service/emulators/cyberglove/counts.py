@@ -9,6 +9,7 @@ the fingers lowers it.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 SIMULATED = True
@@ -62,3 +63,22 @@ def counts_at(time_s: float) -> dict[int, int]:
         degrees = span.low + (span.high - span.low) * (0.5 - 0.5 * math.cos(phase))
         counts[bit] = span.count(degrees)
     return counts
+
+
+ROTATION_OF_BIT = {
+    0: "T_TMC", 1: "T_MCP", 2: "T_IP", 3: "TI_ABD", 4: "I_MCP", 5: "I_PIP", 6: "I_DIP",
+    8: "M_MCP", 9: "M_PIP", 10: "M_DIP", 11: "IM_ABD", 12: "R_MCP", 13: "R_PIP", 14: "R_DIP", 15: "MR_ABD",
+    16: "P_MCP", 17: "P_PIP", 18: "P_DIP", 19: "RP_ABD", 20: "PALM_ARCH", 21: "W_FLEX", 22: "W_ABD",
+}  # fmt: skip
+"""The joint that moves each sensor; the order of the hardware, from the fact sheet's table."""
+
+
+def count_of_joint(bit: int, degrees: Mapping[str, float]) -> float:
+    """The unrounded 8-bit count of a sensor in a hand with these rotations."""
+    span = SPAN_OF_BIT[bit]
+    return span.zero + span.counts_per_degree * min(span.high, max(span.low, degrees[ROTATION_OF_BIT[bit]]))
+
+
+def counts_of_hand(degrees: Mapping[str, float]) -> dict[int, int]:
+    """The count of every sensor, by bit number."""
+    return {bit: max(1, min(255, round(count_of_joint(bit, degrees)))) for bit in SPAN_OF_BIT}

@@ -12,6 +12,8 @@ from collections import Counter
 from dataclasses import dataclass
 
 STREAM_HEAD = ord("S")
+TICKS_PER_SECOND = 115200
+"""Of a record's time stamp, which wraps at 2^32."""
 _ERROR_LETTERS = b"sg"
 _ALWAYS_SET = 0x80
 _PLUGGED = 0x01

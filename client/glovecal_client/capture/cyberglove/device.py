@@ -14,18 +14,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_client.capture import find_port
-from glovecal_client.capture.cyberglove_box import Unanswered
-from glovecal_client.capture.cyberglove_clock import BoxClock
-from glovecal_client.capture.cyberglove_connection import BAUD_RATES, connect
-from glovecal_client.capture.cyberglove_identity import Identity, identify
-from glovecal_client.capture.cyberglove_options import OPTION_HELP, CyberGloveOptions
-from glovecal_client.capture.cyberglove_order import SENSORS, layout_index
-from glovecal_client.capture.cyberglove_rate import DEFAULT_RATE_HZ
-from glovecal_client.capture.cyberglove_record import Record, RecordReader
-from glovecal_client.capture.cyberglove_setup import StreamSetup, set_up
-from glovecal_client.capture.cyberglove_watch import StreamWatch
+from glovecal_client.capture.cyberglove import find_port
+from glovecal_client.capture.cyberglove.box import Unanswered
+from glovecal_client.capture.cyberglove.connection import BAUD_RATES, connect
+from glovecal_client.capture.cyberglove.identity import Identity, identify
+from glovecal_client.capture.cyberglove.options import OPTION_HELP, CyberGloveOptions
+from glovecal_client.capture.cyberglove.order import SENSORS, layout_index
+from glovecal_client.capture.cyberglove.rate import DEFAULT_RATE_HZ
+from glovecal_client.capture.cyberglove.record import TICKS_PER_SECOND, Record, RecordReader
+from glovecal_client.capture.cyberglove.setup import StreamSetup, set_up
+from glovecal_client.capture.cyberglove.watch import StreamWatch
 from glovecal_client.capture.device import Reading
+from glovecal_client.capture.device_clock import DeviceClock
 from glovecal_client.capture.serial_link import SerialLink
 from glovecal_client.errors import DeviceError, DeviceLost
 
@@ -150,7 +150,7 @@ class CyberGlove:
             _logger.warning("%s: %s", self.port, self.notice)
         self._index = np.array(layout_index(identity.sensors))
         self._reader = RecordReader(setup.record_format)
-        self._clock = BoxClock() if setup.record_format.timestamp else None
+        self._clock = DeviceClock(TICKS_PER_SECOND) if setup.record_format.timestamp else None
         self._watch = StreamWatch(1 / self.rate_hz)
         if len(self._bauds) > 1:  # begin with what worked when it is opened again
             self._bauds = (baud, *(rate for rate in BAUD_RATES if rate != baud))

@@ -6,14 +6,16 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from glovecal_client.capture.cyberglove_clock import TICKS_PER_SECOND, BoxClock
+from glovecal_client.capture.device_clock import DeviceClock
+
+TICKS_PER_SECOND = 115200
 
 
 def walk(
     first_tick: int, delays_s: list[float], drift: float = 0.0
 ) -> tuple[list[int], list[int], list[int]]:
     """Times taken, arrivals and times given, in ns, of records 10 ms apart."""
-    clock, taken, arrived, given_back = BoxClock(), [], [], []
+    clock, taken, arrived, given_back = DeviceClock(TICKS_PER_SECOND), [], [], []
     for number, delay_s in enumerate(delays_s):
         time_s = 1000.0 + 0.01 * number
         ticks = int(first_tick + 0.01 * number * (1 + drift) * TICKS_PER_SECOND) % 2**32
@@ -51,7 +53,7 @@ def test_the_wrap_after_ten_hours_goes_unnoticed() -> None:
 
 
 def test_a_restarted_box_is_followed() -> None:
-    clock = BoxClock()
+    clock = DeviceClock(TICKS_PER_SECOND)
     clock.monotonic_ns(5_000_000, 10_000_000_000)
     clock.monotonic_ns(5_001_152, 10_010_000_000)
     assert clock.monotonic_ns(3, 12_000_000_000) == 12_000_000_000

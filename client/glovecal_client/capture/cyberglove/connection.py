@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from glovecal_client.capture.cyberglove_box import RESTART, STOP, ControlBox, Unanswered
-from glovecal_client.capture.cyberglove_order import LAYOUT_OF_COUNT
-from glovecal_client.capture.cyberglove_verdict import Heard, explain, kind_of
+from glovecal_client.capture.cyberglove.box import RESTART, STOP, ControlBox, Unanswered
+from glovecal_client.capture.cyberglove.order import LAYOUT_OF_COUNT
+from glovecal_client.capture.cyberglove.verdict import Heard, explain, kind_of
 from glovecal_client.capture.serial_link import SerialLink
 from glovecal_client.errors import DeviceError, DeviceLost
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from glovecal_client.capture.cyberglove_box import ControlBox, Unanswered
-from glovecal_client.capture.cyberglove_order import HARDWARE_MASK, LAYOUT_OF_COUNT
+from glovecal_client.capture.cyberglove.box import ControlBox, Unanswered
+from glovecal_client.capture.cyberglove.order import HARDWARE_MASK, LAYOUT_OF_COUNT
 from glovecal_client.errors import DeviceError
 
 Hand = Literal["left", "right", "unknown"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from glovecal_client.capture.cyberglove_record import RecordFormat
+from glovecal_client.capture.cyberglove.record import RecordFormat
 
 DEFAULT_RATE_HZ = 100.0
 SLOWEST_HZ = 0.5

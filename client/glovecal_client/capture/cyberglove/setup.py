@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from glovecal_client.capture.cyberglove_box import ControlBox, Unanswered
-from glovecal_client.capture.cyberglove_order import HARDWARE_MASK
-from glovecal_client.capture.cyberglove_rate import (
+from glovecal_client.capture.cyberglove.box import ControlBox, Unanswered
+from glovecal_client.capture.cyberglove.order import HARDWARE_MASK
+from glovecal_client.capture.cyberglove.rate import (
     DEFAULT_RATE_HZ,
     period_payload,
     period_words,
@@ -14,7 +14,7 @@ from glovecal_client.capture.cyberglove_rate import (
     too_fast_sentence,
     wire_ceiling_hz,
 )
-from glovecal_client.capture.cyberglove_record import RecordFormat
+from glovecal_client.capture.cyberglove.record import RecordFormat
 from glovecal_client.errors import BadOption
 
 

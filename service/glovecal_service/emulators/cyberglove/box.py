@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from emulated_cyberglove_hand import counts_at
+from glovecal_service.emulators.cyberglove.counts import counts_at
 
 TICKS_PER_SECOND = 115200
 HARDWARE_MASK = {18: 0x7BBB3F, 22: 0x7FFF7F}

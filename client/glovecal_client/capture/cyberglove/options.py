@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
-from glovecal_client.capture.cyberglove_connection import BAUD_RATES
-from glovecal_client.capture.cyberglove_order import SENSORS
-from glovecal_client.capture.cyberglove_rate import FASTEST_HZ, SLOWEST_HZ
+from glovecal_client.capture.cyberglove.connection import BAUD_RATES
+from glovecal_client.capture.cyberglove.order import SENSORS
+from glovecal_client.capture.cyberglove.rate import FASTEST_HZ, SLOWEST_HZ
 from glovecal_client.capture.device import check_options
 from glovecal_client.errors import BadOption
 

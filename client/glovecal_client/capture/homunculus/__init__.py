@@ -1,0 +1,1 @@
+"""LeRobot Homunculus: lines of sixteen numbers."""

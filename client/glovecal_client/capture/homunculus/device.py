@@ -1,0 +1,59 @@
+"""The capture device ``homunculus``: the exoskeleton glove of LeRobot, sixteen potentiometers.
+
+One line a sample, sixteen numbers with blanks between them. Source: huggingface/lerobot 7427f3180, as
+collected in the project's fact sheet; no hardware was at hand. There is no checksum, header or time. LeRobot
+inverts some joints of each side and clips to 0..100; here readings stay as they were sent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from glovecal_client.capture.stream.lines import LineReader, whole_number
+from glovecal_client.capture.stream.option_values import COMMON_HELP, OptionValues
+from glovecal_client.capture.stream.parser import Sample, StreamParser
+from glovecal_client.capture.stream.streamed_glove import StreamedGlove
+
+SENSORS = (
+    "T_CMC", "T_MCP", "T_PIP", "T_DIP",
+    *(f"{finger}_{joint}" for finger in "IMRP" for joint in ("ABD", "MCP", "DIP")),
+)  # fmt: skip
+"""As on the line: the thumb, then of each finger MCP abduction, MCP flexion and the joint called dip."""
+
+
+class Homunculus(StreamedGlove):
+    """Sixteen counts in the order of the line."""
+
+    name = "homunculus"
+    layout = "homunculus"
+    sensors = SENSORS
+    option_help: ClassVar = {
+        "largest": "the largest count of the converter (4095)",
+        "rate": "HZ, how often it sends (60); only for times of lines that come together",
+        "baud": "BAUD (115200)",
+        **COMMON_HELP,
+    }
+
+    def __init__(self, address: str, options: OptionValues) -> None:
+        """Raises BadOption."""
+        self.baud = options.whole("baud", 115200, 1200, 3_000_000)
+        super().__init__(address, options)
+        self.rate_hz = options.number("rate", 60.0, 0.5, 1000.0)
+        self._largest = options.whole("largest", 4095, 1, 65535)
+        self.counts = (0.0, float(self._largest))
+
+    @classmethod
+    def from_options(cls, argument: str | None, options: Mapping[str, str]) -> Homunculus:
+        """``homunculus:PORT``. Raises BadOption."""
+        return cls(argument or "", OptionValues(cls.name, options, cls.option_help))
+
+    def new_parser(self) -> StreamParser:
+        return LineReader(self.parse_line, self.counters)
+
+    def parse_line(self, line: bytes) -> Sample | None:
+        """The sample of a line, None if it is not sixteen counts."""
+        fields = line.split(b" ")
+        numbers = [whole_number(field, self._largest) for field in fields]
+        values = [number for number in numbers if number is not None]
+        return Sample(tuple(values)) if len(values) == len(fields) == len(SENSORS) else None

@@ -1,0 +1,1 @@
+"""Any glove that sends lines of text, described by a TOML file alone."""

@@ -1,0 +1,1 @@
+"""OpenCyberGlove: binary packets with a checksum."""

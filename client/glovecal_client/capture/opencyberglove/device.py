@@ -1,0 +1,54 @@
+"""The capture device ``opencyberglove``: an OpenCyberGlove on its USB serial port, 120 packets a second.
+
+Written from its public source; no hardware was at hand. It takes no commands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from glovecal_client.capture.device_clock import DeviceClock
+from glovecal_client.capture.opencyberglove.packet import LARGEST, SENSORS, PacketReader
+from glovecal_client.capture.stream.option_values import COMMON_HELP, OptionValues
+from glovecal_client.capture.stream.parser import StreamParser
+from glovecal_client.capture.stream.streamed_glove import StreamedGlove
+
+_TICKS_PER_SECOND = {"computer": None, "glove_us": 1_000_000, "glove_ms": 1_000}
+
+
+class OpenCyberGlove(StreamedGlove):
+    """Nineteen tensile sensors, named by their place in the packet: where each lies is published as a picture
+    only.
+    """
+
+    name = "opencyberglove"
+    layout = "opencyberglove"
+    sensors = tuple(f"TENSILE_{number}" for number in range(SENSORS))
+    counts = (0.0, float(LARGEST))
+    rate_hz = 120.0
+    option_help: ClassVar = {
+        "clock": f"{'|'.join(_TICKS_PER_SECOND)} (computer; microseconds are documented)",
+        "temperature": "no|yes (no; yes keeps the packet's temperature as temperature_c)",
+        "baud": "BAUD (1000000)",
+        **COMMON_HELP,
+    }
+
+    def __init__(self, address: str, options: OptionValues) -> None:
+        """Raises BadOption."""
+        self.baud = options.whole("baud", 1_000_000, 1200, 4_000_000)
+        super().__init__(address, options)
+        self._ticks_per_second = options.choice("clock", _TICKS_PER_SECOND)
+        self._temperature = options.choice("temperature", {"no": False, "yes": True})
+        self.context = ("temperature_c",) if self._temperature else ()
+
+    @classmethod
+    def from_options(cls, argument: str | None, options: Mapping[str, str]) -> OpenCyberGlove:
+        """``opencyberglove:PORT``. Raises BadOption."""
+        return cls(argument or "", OptionValues(cls.name, options, cls.option_help))
+
+    def new_parser(self) -> StreamParser:
+        return PacketReader(self.counters, temperature=self._temperature)
+
+    def new_clock(self) -> DeviceClock | None:
+        return None if self._ticks_per_second is None else DeviceClock(self._ticks_per_second)

@@ -1,0 +1,1 @@
+"""Gloves that send by themselves: links, lines, options, and the device around a parser."""

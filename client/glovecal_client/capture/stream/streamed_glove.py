@@ -1,0 +1,174 @@
+"""The device around a parser: opens the link, feeds the parser, gives readings their times, notices a loss.
+
+A driver is a subclass that says what its glove is and makes its parser; ``docs/own-glove.md`` builds one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import time
+from collections import deque
+from collections.abc import Sequence
+from pathlib import PurePath
+from typing import ClassVar
+
+import numpy as np
+
+from glovecal_client.capture.device import Reading
+from glovecal_client.capture.device_clock import DeviceClock
+from glovecal_client.capture.stream.links import Link, Place, place_of
+from glovecal_client.capture.stream.option_values import COMMON_HELP, OptionValues
+from glovecal_client.capture.stream.parser import Counters, Sample, StreamParser
+from glovecal_client.errors import DeviceError, DeviceLost
+
+EMULATED_PREFIX = "emulated-"
+"""A port of this name is an emulator's: its readings are marked as simulated whatever the options say."""
+_WAIT_S = 0.05
+_FIRST_S = 4.0
+"""Until the first record: a microcontroller restarts when its port is opened."""
+_GARBAGE_S = 2.0
+_logger = logging.getLogger(__name__)
+
+
+class StreamedGlove:
+    """Base of gloves that send by themselves: a subclass sets the attributes and overrides the hooks."""
+
+    name = "glove"
+    layout = ""
+    sensors: tuple[str, ...] = ()
+    context: tuple[str, ...] = ()
+    counts: tuple[float, float] | None = None
+    rate_hz = 60.0
+    baud = 115200
+    option_help: ClassVar[dict[str, str]] = dict(COMMON_HELP)
+
+    def __init__(self, address: str, options: OptionValues) -> None:
+        """Raises BadOption. A subclass reads its own options before or after this."""
+        self.hand = options.choice("hand", {name: name for name in ("unknown", "left", "right")})
+        self.simulated = options.choice("simulated", {"no": False, "yes": True}) or (
+            PurePath(address).name.startswith(EMULATED_PREFIX)
+        )
+        self.notice = ""
+        self.counters = Counters()
+        self._place: Place = place_of(address, self.baud, self.name)
+        self._link: Link | None = None
+        self._ready: deque[Reading] = deque()
+        self._last_ns = 0
+
+    # ------------------------------------------------------------------ hooks of a driver
+    def new_parser(self) -> StreamParser:
+        """A fresh parser that counts in ``self.counters``."""
+        raise NotImplementedError
+
+    def new_clock(self) -> DeviceClock | None:
+        """The clock behind the samples' ticks, None to go by the time of arrival."""
+        return None
+
+    def start(self, link: Link) -> None:
+        """Make the glove send. Raises DeviceLost when it does not answer."""
+
+    def answer(self, link: Link, data: bytes) -> None:
+        """After each wait, with what came, perhaps nothing: what a glove that waits for an answer wants."""
+
+    def stop(self, link: Link) -> None:
+        """Make the glove stop sending, before the link is closed."""
+
+    # ------------------------------------------------------------------ the device
+    def open(self) -> None:
+        """Open the link and start the glove. Raises DeviceLost, DeviceError."""
+        self.close()
+        link = self._place.open()
+        try:
+            self.start(link)
+        except BaseException:
+            link.close()
+            raise
+        self._parser = self.new_parser()
+        self._clock = self.new_clock()
+        self._silent_s = self._useless_s = 0.0
+        self._seen_one = False
+        self._link = link
+
+    def read(self, timeout_s: float) -> Reading | None:
+        """The next sound record, None if none came in time.
+
+        Raises DeviceLost when the link is gone, or silent for 0.4 s (5 s in a network; five records of a slow
+        glove), or when nothing readable came for 2 s.
+        """
+        deadline = time.monotonic() + timeout_s
+        while not self._ready:
+            link = self._link
+            if link is None:
+                raise DeviceLost(f"the glove at {self._place.name} is not open")
+            begun = time.monotonic()
+            try:
+                data = link.read(max(0.0, min(_WAIT_S, deadline - begun)))
+                samples = self._parser.feed(data) if data else []
+                self.answer(link, data)
+                self._watch(time.monotonic() - begun, bool(data), bool(samples))
+            except DeviceLost:
+                self._let_go()
+                raise
+            self._ready.extend(self._readings(samples))
+            if not self._ready and time.monotonic() >= deadline:
+                return None
+        return self._ready.popleft()
+
+    def close(self) -> None:
+        """Stop the glove and let go of everything; harmless when already closed.
+
+        After a loss a network port stays open for the glove to come back to, until the next close.
+        """
+        if self._link is None:
+            return
+        with contextlib.suppress(DeviceError):  # a link that is gone tells nothing new
+            self.stop(self._link)
+        self._let_go()
+        self._place.close()
+
+    def _let_go(self) -> None:
+        link, self._link = self._link, None
+        self._ready.clear()
+        if link is not None:
+            link.close()
+
+    def _watch(self, waited_s: float, bytes_came: bool, samples_came: bool) -> None:
+        """Only time spent waiting counts, so a caller that was busy elsewhere loses no glove."""
+        self._silent_s = 0.0 if bytes_came else self._silent_s + waited_s
+        self._useless_s = 0.0 if samples_came else self._useless_s + waited_s
+        self._seen_one = self._seen_one or samples_came
+        period_s = 1 / self.rate_hz
+        silent_s = max(self._place.silent_s, 5 * period_s)
+        if self._silent_s >= (silent_s if self._seen_one else max(_FIRST_S, silent_s)):
+            raise DeviceLost(
+                f"nothing comes from {self._place.name} for {self._silent_s:.1f} s: "
+                "is the glove switched on and its cable plugged in?"
+            )
+        garbage_s = max(_GARBAGE_S if self._seen_one else _FIRST_S, 5 * period_s)
+        if self._useless_s >= garbage_s and bytes_came:
+            raise DeviceLost(
+                f"what comes from {self._place.name} is not what a glove of kind {self.name} sends: is it "
+                "another glove, another baud rate, or an option that does not fit?"
+            )
+
+    def _readings(self, samples: Sequence[Sample]) -> list[Reading]:
+        """Give records that came together the times at which they were taken."""
+        now_ns, offset_ns = time.monotonic_ns(), time.time_ns() - time.monotonic_ns()
+        readings = []
+        for behind, sample in zip(range(len(samples) - 1, -1, -1), samples, strict=True):
+            if self._clock is not None and sample.ticks is not None:
+                stamp = self._clock.monotonic_ns(sample.ticks, now_ns)
+            else:
+                stamp = now_ns - int(behind * 1e9 / self.rate_hz)
+            self._last_ns = max(stamp, self._last_ns + 1)
+            readings.append(
+                Reading(
+                    np.array(sample.values, np.float32),
+                    self._last_ns,
+                    self._last_ns + offset_ns,
+                    np.array(sample.context, np.float32),
+                    sample.button,
+                )
+            )
+        return readings

@@ -1,0 +1,1 @@
+"""An emulated CyberGlove I/II control box and its counts."""

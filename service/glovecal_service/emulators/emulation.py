@@ -1,0 +1,89 @@
+"""An emulated glove at a port, served by a thread of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import threading
+import time
+
+from glovecal_service.emulators.faults import Faults
+from glovecal_service.emulators.glove import EmulatedGlove
+from glovecal_service.emulators.ports import Port, wait
+
+_LONGEST_WAIT_S = 0.1
+
+
+class Emulation:
+    """Plugged in from ``with`` on. ``records`` counts what left; ``unplug`` and ``replug`` pull the cable."""
+
+    def __init__(self, glove: EmulatedGlove, port: Port, faults: Faults | None = None) -> None:
+        self.glove = glove
+        self.port = port
+        self.sendings = 0
+        """How often something left."""
+        self._faults = faults or Faults()
+        self._lock = threading.Lock()
+        self._pulled = False
+        self._plugged = False
+        self._running = True
+        self._wake_read, self._wake_write = os.pipe()
+        self._thread = threading.Thread(target=self._serve, name="emulated-glove", daemon=True)
+
+    def __enter__(self) -> Emulation:
+        self._began_s = time.monotonic()
+        self._set_plugged(True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._running = False
+        os.write(self._wake_write, b"x")
+        self._thread.join(timeout=10)
+        self._set_plugged(False)
+        os.close(self._wake_read)
+        os.close(self._wake_write)
+
+    def unplug(self) -> None:
+        """Pull the cable; the glove is without power until ``replug``."""
+        self._pulled = True
+        self._set_plugged(False)
+
+    def replug(self) -> None:
+        """Plug it in again: a new start of the glove at a port of the same name."""
+        self._pulled = False
+        self._set_plugged(True)
+        os.write(self._wake_write, b"x")
+
+    def _set_plugged(self, plugged: bool) -> None:
+        with self._lock:
+            if plugged and not self._plugged:
+                self.glove.power_up()
+                self.port.plug()
+            elif self._plugged and not plugged:
+                self.port.unplug()
+            self._plugged = plugged
+
+    def _serve(self) -> None:
+        while self._running:
+            now_s = time.monotonic()
+            if not self._pulled:
+                self._set_plugged(not self._faults.unplugged(now_s - self._began_s))
+            with self._lock:
+                handle = self.port.handle() if self._plugged else None
+                wait_s = self.glove.next_due_s() - now_s if handle is not None else _LONGEST_WAIT_S
+            watched = [self._wake_read] if handle is None else [self._wake_read, handle]
+            ready = wait(watched, min(_LONGEST_WAIT_S, max(0.0, wait_s)))
+            if self._wake_read in ready:
+                with contextlib.suppress(OSError):
+                    os.read(self._wake_read, 64)
+            with self._lock:
+                if self._plugged and handle is not None and self.port.handle() == handle:
+                    self._exchange(handle in ready)
+
+    def _exchange(self, something_came: bool) -> None:
+        heard = self.port.read() if something_came else b""
+        now_s = time.monotonic()
+        for part in (self.glove.feed(heard, now_s), self.glove.due(now_s)):
+            if part:
+                self.sendings += self.port.write(part)
