@@ -51,6 +51,8 @@ NAVIGATION = {
     "Start": ["Tutorial <docs/tutorial>", "docs/glossary"],
     "Tasks": [
         "docs/capture",
+        "Gloves and their options <docs/gloves>",
+        "Add your glove <docs/own-glove>",
         "docs/references",
         "Train <docs/train>",
         "Compare <docs/compare>",

@@ -103,7 +103,7 @@ def packet(values: list[int], *, temperature: float = 30.5, ticks: int = 77, tai
 
 def test_opencyberglove_packets() -> None:
     values = [*range(0, 18 * 900, 900), 16384]
-    device = OpenCyberGlove.from_options("nowhere", {"temperature": "yes"})
+    device = OpenCyberGlove.from_options("nowhere", {"context": "temperature_c"})
     good = packet(values, tail=b"\x01\x02\x03\x04\x05\x06\x07\x08")
     wrong_sum = good[:-1] + bytes([good[-1] ^ 1])
     found = samples(device, good[50:] + good + wrong_sum + packet([*values[:-1], 16385]) + good)

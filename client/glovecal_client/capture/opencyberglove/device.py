@@ -29,7 +29,7 @@ class OpenCyberGlove(StreamedGlove):
     rate_hz = 120.0
     option_help: ClassVar = {
         "clock": f"{'|'.join(_TICKS_PER_SECOND)} (computer; microseconds are documented)",
-        "temperature": "no|yes (no; yes keeps the packet's temperature as temperature_c)",
+        "context": "none|temperature_c (none; the packet's temperature is kept with each frame)",
         "baud": "BAUD (1000000)",
         **COMMON_HELP,
     }
@@ -39,8 +39,7 @@ class OpenCyberGlove(StreamedGlove):
         self.baud = options.whole("baud", 1_000_000, 1200, 4_000_000)
         super().__init__(address, options)
         self._ticks_per_second = options.choice("clock", _TICKS_PER_SECOND)
-        self._temperature = options.choice("temperature", {"no": False, "yes": True})
-        self.context = ("temperature_c",) if self._temperature else ()
+        self.context = options.choice("context", {"none": (), "temperature_c": ("temperature_c",)})
 
     @classmethod
     def from_options(cls, argument: str | None, options: Mapping[str, str]) -> OpenCyberGlove:
@@ -48,7 +47,7 @@ class OpenCyberGlove(StreamedGlove):
         return cls(argument or "", OptionValues(cls.name, options, cls.option_help))
 
     def new_parser(self) -> StreamParser:
-        return PacketReader(self.counters, temperature=self._temperature)
+        return PacketReader(self.counters, temperature=bool(self.context))
 
     def new_clock(self) -> DeviceClock | None:
         return None if self._ticks_per_second is None else DeviceClock(self._ticks_per_second)
