@@ -2,7 +2,7 @@
 
 An address is a port's path (``/dev/ttyUSB0``, ``COM3``), ``tcp:PORT``, ``tcp:HOST:PORT`` or the same with
 ``udp``. PORT is one of this computer, at which it waits for the glove; HOST is the address of this computer
-at which it listens, all of them if not given.
+at which it listens. Without one nobody in the network is heard, only programs of this computer.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Protocol
 from glovecal_client.capture.serial_link import SerialLink
 from glovecal_client.errors import BadOption, DeviceLost
 
+LOOPBACK = "127.0.0.1"
 _AT_MOST = 65536
 _DIAL_IN_S = 1.0
 """How long one opening waits for a glove to connect; the port stays open between openings."""
@@ -62,7 +63,7 @@ def place_of(address: str, baud: int, device: str) -> Place:
     host, _, port = rest.rpartition(":")
     if not (port.isascii() and port.isdigit() and 0 < int(port) < 65536):
         raise BadOption(f"{device}: {address!r} needs a port from 1 to 65535, as in {kind}:65432")
-    return (TcpPlace if kind == "tcp" else UdpPlace)(host, int(port))
+    return (TcpPlace if kind == "tcp" else UdpPlace)(host or LOOPBACK, int(port))
 
 
 class SerialPlace:
@@ -91,7 +92,7 @@ class TcpPlace:
     """Wireless networks pause; a connection that was closed is seen at once."""
 
     def __init__(self, host: str, port: int) -> None:
-        self.name = f"tcp:{host}:{port}" if host else f"tcp:{port}"
+        self.name = f"tcp:{host}:{port}"
         self._address = host, port
         self._listener: socket.socket | None = None
 
@@ -104,7 +105,7 @@ class TcpPlace:
         if not ready:
             raise DeviceLost(
                 f"no glove has connected to {self.name} yet: is it switched on, and is this computer's "
-                "address in its settings?"
+                f"address in its settings?{_only_here(self._address[0])}"
             )
         connection, peer = self._listener.accept()
         return _TcpLink(connection, f"{self.name} (glove at {peer[0]})")
@@ -148,7 +149,7 @@ class UdpPlace:
     silent_s = 0.4
 
     def __init__(self, host: str, port: int) -> None:
-        self.name = f"udp:{host}:{port}" if host else f"udp:{port}"
+        self.name = f"udp:{host}:{port}"
         self._address = host, port
 
     def open(self) -> Link:
@@ -158,7 +159,10 @@ class UdpPlace:
             link.heard = link.read(_DIAL_IN_S)
         if not link.heard:
             link.close()
-            raise DeviceLost(f"nothing comes to {self.name}: does the glove send to this computer's address?")
+            raise DeviceLost(
+                f"nothing comes to {self.name}: does the glove send to this computer's address?"
+                f"{_only_here(self._address[0])}"
+            )
         return link
 
     def close(self) -> None:
@@ -192,6 +196,13 @@ class _UdpLink:
 
     def close(self) -> None:
         self._port.close()
+
+
+def _only_here(host: str) -> str:
+    """What somebody with a wireless glove has to know."""
+    if host != LOOPBACK:
+        return ""
+    return " For a glove in the network name this computer's address there, as in tcp:192.168.1.20:65432."
 
 
 def _bound(name: str, address: tuple[str, int], kind: socket.SocketKind) -> socket.socket:
