@@ -9,7 +9,14 @@ from glovecal_models.errors import BadInput
 from glovecal_service.emulators import line_glove
 from glovecal_service.emulators.cyberglove.emulated import EmulatedCyberGlove
 from glovecal_service.emulators.cyberglove3 import EmulatedCyberGlove3
-from glovecal_service.emulators.faults import EVERY_GLOVE, WITH_BATTERY, WITH_CLOCK, WITH_ECHO, Faults
+from glovecal_service.emulators.faults import (
+    EVERY_GLOVE,
+    WITH_BATTERY,
+    WITH_CLOCK,
+    WITH_ECHO,
+    WITH_FRAGMENTS,
+    Faults,
+)
 from glovecal_service.emulators.glove import EmulatedGlove
 from glovecal_service.emulators.hand import MovingHand
 from glovecal_service.emulators.homunculus import EmulatedHomunculus
@@ -42,7 +49,7 @@ PROTOCOLS: dict[str, Protocol] = {
     ),
     "cyberglove3": Protocol(
         lambda hand, faults, network: EmulatedCyberGlove3(hand, faults, link="w" if network else "u"),
-        _CLOCK | WITH_BATTERY | WITH_ECHO,
+        _CLOCK | WITH_BATTERY | WITH_ECHO | WITH_FRAGMENTS,
         "cyberglove3:{port}",
         _ADDRESSES,
     ),

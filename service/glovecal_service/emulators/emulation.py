@@ -32,7 +32,7 @@ class Emulation:
 
     def __enter__(self) -> Emulation:
         self._began_s = time.monotonic()
-        self._set_plugged(True)
+        self._settle()
         self._thread.start()
         return self
 
@@ -40,23 +40,26 @@ class Emulation:
         self._running = False
         os.write(self._wake_write, b"x")
         self._thread.join(timeout=10)
-        self._set_plugged(False)
+        self._pulled = True
+        self._settle()
         os.close(self._wake_read)
         os.close(self._wake_write)
 
     def unplug(self) -> None:
         """Pull the cable; the glove is without power until ``replug``."""
         self._pulled = True
-        self._set_plugged(False)
+        self._settle()
 
     def replug(self) -> None:
         """Plug it in again: a new start of the glove at a port of the same name."""
         self._pulled = False
-        self._set_plugged(True)
+        self._settle()
         os.write(self._wake_write, b"x")
 
-    def _set_plugged(self, plugged: bool) -> None:
+    def _settle(self) -> None:
+        """Plug in or pull out, as it should be now."""
         with self._lock:
+            plugged = not (self._pulled or self._faults.unplugged(time.monotonic() - self._began_s))
             if plugged and not self._plugged:
                 self.glove.power_up()
                 self.port.plug()
@@ -66,12 +69,10 @@ class Emulation:
 
     def _serve(self) -> None:
         while self._running:
-            now_s = time.monotonic()
-            if not self._pulled:
-                self._set_plugged(not self._faults.unplugged(now_s - self._began_s))
+            self._settle()
             with self._lock:
                 handle = self.port.handle() if self._plugged else None
-                wait_s = self.glove.next_due_s() - now_s if handle is not None else _LONGEST_WAIT_S
+                wait_s = _LONGEST_WAIT_S if handle is None else self.glove.next_due_s() - time.monotonic()
             watched = [self._wake_read] if handle is None else [self._wake_read, handle]
             ready = wait(watched, min(_LONGEST_WAIT_S, max(0.0, wait_s)))
             if self._wake_read in ready:

@@ -17,7 +17,8 @@ WITH_CLOCK = {
 }
 WITH_BATTERY = {"battery": "the battery falls from 8.2 to 6.2 V in ten minutes"}
 WITH_ECHO = {"dropped-echo": "every second echo loses its first byte"}
-EXPLAINED = EVERY_GLOVE | WITH_CLOCK | WITH_BATTERY | WITH_ECHO
+WITH_FRAGMENTS = {"fragments": "the last two bytes of a time stamp stand alone before 5 % of the records"}
+EXPLAINED = EVERY_GLOVE | WITH_CLOCK | WITH_BATTERY | WITH_ECHO | WITH_FRAGMENTS
 
 OFFSET_S = 100.0
 DRIFT = 100e-6
@@ -47,6 +48,8 @@ class Faults:
         """A record on its way out: cut short, or with noise before it."""
         if "short-records" in self.names and self._chance.random() < _SHARE:
             record = record[: self._chance.randrange(1, len(record))]
+        if "fragments" in self.names and self._chance.random() < _SHARE:
+            record = b"1S" + record
         if "noise" in self.names and self._chance.random() < _SHARE:
             record = self._chance.randbytes(self._chance.randint(1, 40)) + record
         return record

@@ -60,11 +60,14 @@ def explain(path: str, tries: Sequence[Heard]) -> str:
 
 def _explain_text(path: str, item: Heard) -> str:
     if _FLEX_GLOVE_LINE.search(item.came):
-        return f"{path} sends LucidGlove lines at {item.baud} baud: a home-made flex glove, not a CyberGlove"
+        return (
+            f"{path} sends LucidGlove lines at {item.baud} baud: a home-made flex glove; "
+            f"capture it with --device lucidglove:{path}"
+        )
     if _CYBERGLOVE3_RECORD.search(item.came):
         return (
             f"{path} sends time-stamped 16-bit records: a CyberGlove III left streaming in its own mode; "
-            "switch it off and on again"
+            f"capture it with --device cyberglove3:{path}, or switch it off and on again"
         )
     lines = [line.strip() for line in item.came.splitlines() if line.strip()]
     sample = max(lines, key=len)[:40].decode("ascii", "replace")
