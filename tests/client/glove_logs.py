@@ -80,9 +80,10 @@ def line_device(folder: Path, text: str = line_glove.DESCRIPTION, **options: str
     return LineGlove.from_options(str(file), {"port": "nowhere", **options})
 
 
-@cache
-def _folder() -> Path:
-    return Path(tempfile.mkdtemp(prefix="glovecal-test-"))
+def _described() -> StreamedGlove:
+    """The description is read once and not kept."""
+    with tempfile.TemporaryDirectory() as folder:
+        return line_device(Path(folder))
 
 
 def _options(device: type[StreamedGlove], **options: str) -> Callable[[], StreamedGlove]:
@@ -97,7 +98,7 @@ CASES: Mapping[str, Case] = {
     ),
     "homunculus": Case(_options(Homunculus), lambda: _sent(EmulatedHomunculus(), 60), False, True),
     "line": Case(
-        lambda: line_device(_folder()), lambda: _sent(line_glove.EmulatedLineGlove(), 50), True, True
+        _described, lambda: _sent(line_glove.EmulatedLineGlove(), 50), True, True
     ),
     "opencyberglove": Case(
         _options(OpenCyberGlove), lambda: _sent(EmulatedOpenCyberGlove(), 120), True, False

@@ -62,10 +62,10 @@ def main() -> None:
             f"{100 * wrong_share(parser(), records, damage):.1f} %" for damage in (lost_byte, flipped_bit)
         ]
         print(name, in_random_bytes(parser()), *shares, sep="\t")
-    folder = Path(tempfile.mkdtemp(prefix="glovecal-measure-"))
     for columns in (1, 2):
         names = ", ".join(f'"C{number}"' for number in range(columns))
-        device = line_device(folder, f"[line]\ncolumns = [{names}]\n")
+        with tempfile.TemporaryDirectory() as folder:
+            device = line_device(Path(folder), f"[line]\ncolumns = [{names}]\n")
         found = in_random_bytes(device.new_parser(), 2 * RANDOM_BYTES)
         print(f"line, {columns} columns, no checksum, twice as many bytes", found, sep="\t")
 

@@ -141,6 +141,23 @@ def test_a_glove_that_connects_over_tcp(name: str, tmp_path: Path) -> None:
         assert all_were_sent(readings(both.device, 5), both.sent())
 
 
+def test_a_dialer_that_has_nothing_to_read_keeps_its_connection() -> None:
+    """Told too late that an earlier connection could be read, it once waited and hung up."""
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.listen()
+        dialer = TcpDialer("127.0.0.1", listener.getsockname()[1])
+        dialer.plug()
+        connection, _ = listener.accept()
+        with connection:
+            begun = time.monotonic()
+            assert dialer.read() == b""
+            assert time.monotonic() - begun < 0.5
+            assert dialer.write(b"still here")
+            assert connection.recv(100) == b"still here"
+        dialer.unplug()
+
+
 def test_a_glove_that_sends_datagrams(tmp_path: Path) -> None:
     with pair("line", tmp_path, udp=True) as both:
         assert not both.device.simulated

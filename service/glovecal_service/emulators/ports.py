@@ -102,11 +102,15 @@ class TcpDialer:
             with contextlib.suppress(OSError):
                 self._connection = socket.create_connection(self._address, timeout=1.0)
                 self._connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                if self._connection.getsockname() == self._connection.getpeername():
+                    self._drop()  # on one computer a dialer can reach itself where nobody listens
         return self._connection.fileno() if self._connection else None
 
     def read(self) -> bytes:
+        if self._connection is None or not wait([self._connection.fileno()], 0):
+            return b""  # asked again: this may be a new connection under the old one's number
         try:
-            data = self._connection.recv(4096) if self._connection else b""
+            data = self._connection.recv(4096)
         except OSError:
             data = b""
         if not data:  # the computer hung up
@@ -140,6 +144,7 @@ class UdpSender:
     def plug(self) -> None:
         if self._socket is None:
             self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            self._socket.setblocking(False)
 
     def unplug(self) -> None:
         if self._socket is not None:

@@ -181,9 +181,12 @@ class _UdpLink:
         if self.heard:
             data, self.heard = self.heard, b""
             return data
-        if not select.select([self._port], [], [], timeout_s)[0]:
-            return b""
-        data, peer = self._port.recvfrom(_AT_MOST)
+        try:
+            if not select.select([self._port], [], [], timeout_s)[0]:
+                return b""
+            data, peer = self._port.recvfrom(_AT_MOST)
+        except (OSError, ValueError) as error:
+            raise DeviceLost(f"nothing can be received any more ({error})") from error
         if self._peer not in (None, peer):
             return b""  # another sender: the glove is the one that was heard first
         self._peer = peer
