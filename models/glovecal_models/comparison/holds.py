@@ -22,7 +22,7 @@ from glovecal_models.comparison.floor_estimate import NoiseFloor, pooled
 from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
 from glovecal_models.comparison.residuals import TakeResiduals
 
-STEP_S = 0.1
+HELD_STEP_S = 0.1
 """Neighbouring frames whose mean angles are compared."""
 
 
@@ -94,19 +94,19 @@ class _Track(NamedTuple):
     sums: list[float]
     """Of the angles of the first 0 to N frames, degrees."""
     step: list[int]
-    """Of N frames: how many lie within the next ``STEP_S``."""
+    """Of N frames: how many lie within the next ``HELD_STEP_S``."""
     moves_at_once: list[bool]
     """Whether the angle moves within the first two steps from a frame, too early for a hold."""
 
     @classmethod
     def of(cls, time_s: np.ndarray, angle: np.ndarray, limits: ComparisonLimits) -> _Track:
         start, sums = np.arange(len(time_s)), np.concatenate([[0.0], np.cumsum(angle)])
-        step = np.maximum(1, np.searchsorted(time_s, time_s + STEP_S) - start)
+        step = np.maximum(1, np.searchsorted(time_s, time_s + HELD_STEP_S) - start)
         end = np.minimum(start + step, len(time_s))
         following = np.minimum(end + step, len(time_s))
         before = (sums[end] - sums[start]) / (end - start)
         after = (sums[following] - sums[end]) / np.maximum(following - end, 1)
-        moves = (following > end) & (np.abs(after - before) > limits.still_deg_per_s * STEP_S)
+        moves = (following > end) & (np.abs(after - before) > limits.still_deg_per_s * HELD_STEP_S)
         moves &= time_s[end - 1] - time_s < limits.shortest_hold_s
         return cls(time_s.tolist(), sums.tolist(), step.tolist(), moves.tolist())
 
@@ -121,7 +121,10 @@ class _Track(NamedTuple):
         while end < len(time):
             following = min(end + step, len(time))
             after = (sums[following] - sums[end]) / (following - end)
-            if abs(after - before) > still_deg_per_s * STEP_S or time[following - 1] - time[end - 1] > 0.5:
+            if (
+                abs(after - before) > still_deg_per_s * HELD_STEP_S
+                or time[following - 1] - time[end - 1] > 0.5
+            ):
                 break
             end, before = following, after
         return end

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import shutil
 import sys
 import tarfile
@@ -63,6 +64,15 @@ def browser(not_here: Callable[[str], NoReturn]) -> Iterator[Browser]:
         not_here("Chromium is not installed (Debian: apt-get install chromium)")
     with running_browser() as browser:
         yield browser
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _nothing_left_behind() -> Iterator[None]:
+    """What earlier tests left in cycles, zenoh's queries among it, is freed here: freed on the stack of
+    Playwright's greenlet it once ended the process."""
+    gc.collect()
+    yield
+    gc.collect()
 
 
 @pytest.fixture

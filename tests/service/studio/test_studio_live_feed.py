@@ -86,7 +86,9 @@ def test_a_glove_that_does_not_answer_holds_up_nobody() -> None:
         eventually(lambda: len(unanswered) == 2, "both were asked")
         query = next(query for query in unanswered if str(query.key_expr) == mute[0].meta)
         query.reply(mute[0].meta, json.dumps({"sensors": ["A", 5]}))
-        query.drop()
+        for query in unanswered:
+            query.drop()
+        unanswered.clear()
         eventually(lambda: opened[0].sensors == ["A", "5"], "the answer arrives later")
         with pytest.raises(NoAnswer) as told:
             feeds.explain("mute-1", "I_PIP")

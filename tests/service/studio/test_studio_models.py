@@ -78,7 +78,7 @@ def test_takes_have_their_quality_and_gloves_their_layouts(opened: Open, address
     page = opened("models").page
     takes = httpx.get(f"{address}/v1/takes").json()
     rows = page.get_by_role("region", name="Takes and their quality").locator("tbody tr")
-    assert rows.count() == len(takes)
+    expect(rows).to_have_count(len(takes), timeout=PATIENCE_MS)
     for take in takes[:2]:
         check = httpx.get(f"{address}/v1/takes/{take['id']}/check").json()
         row = page.locator(f'[data-take="{take["id"]}"]')
@@ -87,9 +87,9 @@ def test_takes_have_their_quality_and_gloves_their_layouts(opened: Open, address
         )
         for sentence in check["sentences"][:2]:
             expect(row).to_contain_text(sentence)
-    layouts = page.get_by_role("region", name="Layouts").last.locator("tbody th").all_inner_texts()
+    layouts = page.get_by_role("region", name="Layouts").last.locator("tbody th")
     gloves = httpx.get(f"{address}/v1/gloves").json()
-    assert layouts == [each["name"] for each in gloves["layouts"]]
+    expect(layouts).to_have_text([each["name"] for each in gloves["layouts"]], timeout=PATIENCE_MS)
     if gloves["seen"]:
         seen = page.get_by_role("region", name="Gloves seen").last.locator("tbody th").all_inner_texts()
         assert [text.removesuffix(" (simulated)") for text in seen] == [
