@@ -15,7 +15,7 @@ _LONGEST_WAIT_S = 0.1
 
 
 class Emulation:
-    """Plugged in from ``with`` on. ``records`` counts what left; ``unplug`` and ``replug`` pull the cable."""
+    """Plugged in from ``with`` on; ``unplug`` and ``replug`` pull the cable."""
 
     def __init__(self, glove: EmulatedGlove, port: Port, faults: Faults | None = None) -> None:
         self.glove = glove

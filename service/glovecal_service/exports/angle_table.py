@@ -31,11 +31,11 @@ def write_table(motions: Sequence[HandMotion], content: Content, path: Path) -> 
 def _columns(motion: HandMotion, content: Content) -> dict[str, np.ndarray]:
     if content == "raw":
         return {f"s.{name}": column for name, column in zip(motion.sensors, motion.readings.T, strict=True)}
-    found = markers(motion, content)  # refuses a take without a model
+    motion.require_angles(content)
     if content == "joints":
         return {
             f"j.{name.removeprefix(f'{motion.label}_')}.{axis}": place[:, number]
-            for name, place in found.items()
+            for name, place in markers(motion, content).items()
             for number, axis in enumerate("xyz")
         }
     angles = zip(motion.rotations, motion.degrees.T, motion.sd_deg.T, strict=True)
@@ -44,5 +44,5 @@ def _columns(motion: HandMotion, content: Content) -> dict[str, np.ndarray]:
     }
 
 
-CSV = ExportFormat(".csv", "text/csv", "CSV, for any table", write_table)
-PARQUET = ExportFormat(".parquet", "application/vnd.apache.parquet", "Parquet, for data frames", write_table)
+CSV = ExportFormat(".csv", "text/csv", write_table)
+PARQUET = ExportFormat(".parquet", "application/vnd.apache.parquet", write_table)

@@ -16,7 +16,5 @@ class ExportFormat:
     suffix: str
     """With its dot, lower case."""
     media_type: str
-    title: str
-    """For whom it is."""
     write: Callable[[Sequence[HandMotion], Content, Path], None]
     """Writes hands on one time to a file. Raises BadInput."""

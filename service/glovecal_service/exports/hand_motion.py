@@ -39,6 +39,11 @@ class HandMotion:
     skeleton: Skeleton
     simulated: bool = False
 
+    def require_angles(self, content: Content) -> None:
+        """Raises BadInput where nothing is calibrated."""
+        if not self.rotations:
+            raise BadInput(f"{content} need a model; without one a take has raw readings only")
+
 
 def on_one_time(motions: Sequence[HandMotion], shifts_s: Sequence[float] = ()) -> tuple[HandMotion, ...]:
     """All hands at the frames of the first, where every one was recorded.

@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from glovecal_models.errors import BadInput
 from glovecal_models.hand.forward_kinematics import forward_kinematics
 from glovecal_models.hand.rotations import FINGERS, completed
 from glovecal_service.exports.hand_motion import Content, HandMotion
@@ -49,8 +48,7 @@ def markers(motion: HandMotion, content: Content) -> dict[str, np.ndarray]:
     """(N, 3) by name; NaN where something is missing. Raises BadInput where nothing is calibrated."""
     if content == "raw":
         return _grouped(motion, motion.sensors, motion.readings)
-    if not motion.rotations:
-        raise BadInput(f"{content} need a model; without one a take has raw readings only")
+    motion.require_angles(content)
     if content == "angles":
         return _grouped(motion, motion.rotations, motion.degrees)
     frames = forward_kinematics(motion.skeleton, completed(motion.rotations, motion.degrees))

@@ -56,4 +56,4 @@ def trc_text(time_s: np.ndarray, found: Mapping[str, np.ndarray], name: str) -> 
     return "\n".join(lines) + "\n"
 
 
-FORMAT = ExportFormat(".trc", "text/tab-separated-values", "TRC, for OpenSim and MotionBuilder", write_trc)
+FORMAT = ExportFormat(".trc", "text/tab-separated-values", write_trc)

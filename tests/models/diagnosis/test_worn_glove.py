@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -96,8 +97,7 @@ def slip(readings: np.ndarray) -> None:
 def test_each_fault_has_its_finding(model: CalibrationModel, change, part: str, says: str) -> None:
     found = worn_glove_findings(changed(seconds(1), change), RATE_HZ, model)
     assert [finding.part for finding in found] == [part]
-    with pytest.raises(AssertionError, match=says):
-        raise AssertionError(found[0].sentence)
+    assert re.search(says, found[0].sentence)
     assert found[0].advice.endswith(".")
 
 

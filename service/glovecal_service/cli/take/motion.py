@@ -13,7 +13,6 @@ from glovecal_service.cli.terminal.options import model_id
 from glovecal_service.cli.terminal.writing import Overwrite, require_place, write_whole
 
 MOST_HANDS = 2
-SUFFIXES = (".trc", ".csv", ".parquet")
 
 
 def _models(given: list[str] | None) -> list[str] | None:
@@ -40,8 +39,9 @@ def motion(
     overwrite: Overwrite = False,
 ) -> None:
     """Write one hand or both as motion: TRC for OpenSim and MotionBuilder, CSV or Parquet for analysis."""
-    if file.suffix.lower() not in SUFFIXES:
-        raise typer.BadParameter(f"{file.name!r} must end in {', '.join(SUFFIXES)}")
+    from glovecal_service.exports.formats import format_of
+
+    chosen = format_of(file.name)
     if len(take) > MOST_HANDS:
         raise typer.BadParameter(f"{len(take)} takes are too many: one, or one of each hand")
     require_place(file, overwrite=overwrite)
@@ -51,7 +51,7 @@ def motion(
             "takes": [find_take(rows, name)["id"] for name in take],
             "models": model or [],
             "content": content,
-            "format": file.suffix.lower().removeprefix("."),
+            "format": chosen.suffix.removeprefix("."),
             "shifts_s": shift or [],
         }
         write_whole({file: service.made("/motion", body)})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter
 from fastapi.responses import FileResponse
@@ -12,7 +12,7 @@ from pydantic import Field, FiniteFloat
 from starlette.background import BackgroundTask
 
 from glovecal_models.errors import BadInput
-from glovecal_service.exports.formats import FORMATS
+from glovecal_service.exports.formats import FORMATS, format_of
 from glovecal_service.exports.hand_motion import Content, HandMotion, on_one_time
 from glovecal_service.exports.take_motion import motion_of
 from glovecal_service.rest.http.answers import change_problems
@@ -25,7 +25,6 @@ router = APIRouter(prefix="/motion", tags=["takes"])
 MOST_HANDS = 2
 LARGEST_SHIFT_S = 1e9
 Shift = Annotated[FiniteFloat, Field(ge=-LARGEST_SHIFT_S, le=LARGEST_SHIFT_S)]
-Suffix = Literal["trc", "csv", "parquet"]
 
 
 class Motion(StrictBody):
@@ -39,7 +38,9 @@ class Motion(StrictBody):
     content: Content = Field(
         "joints", description="joints: places in mm; angles: calibrated degrees; raw: readings."
     )
-    format: Suffix = "trc"
+    format: Annotated[str, Field(pattern=r"^[a-z0-9]{1,16}$")] = Field(
+        "trc", description=f"One of {', '.join(suffix[1:] for suffix in FORMATS)}."
+    )
     shifts_s: Annotated[list[Shift], Field(max_length=MOST_HANDS)] = Field(
         default_factory=list,
         description="Added to each take's times, where two takes do not come from one capture computer.",
@@ -64,6 +65,7 @@ def export_motion(body: Motion, parts: PartsNeeded) -> FileResponse:
     """Calibrated by the model that is named, else by the active one; effects with a memory start in the
     pre-roll. 409 where angles are asked for and no model is active.
     """
+    chosen = format_of(f"motion.{body.format}")
     for name, given in (("models", body.models), ("shifts_s", body.shifts_s)):
         if given and len(given) != len(body.takes):
             raise BadInput(f"{len(given)} {name} for {len(body.takes)} takes: give one a take, or none")
@@ -73,7 +75,6 @@ def export_motion(body: Motion, parts: PartsNeeded) -> FileResponse:
     if len(set(labels)) < len(labels):
         raise BadInput("both takes are of the same hand; one of the two subjects has the other hand")
     hands = on_one_time(hands, body.shifts_s)
-    chosen = FORMATS[f".{body.format}"]
     folder = tempfile.TemporaryDirectory(prefix="glovecal-motion-")
     try:
         path = Path(folder.name, f"motion{chosen.suffix}")
