@@ -6,7 +6,6 @@ records. Readings are counts from 1 to 4095, sixteen times as fine as those of t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from glovecal_client.capture.cyberglove.order import SENSORS, hardware_order
@@ -53,11 +52,6 @@ class CyberGlove3(StreamedGlove):
         self._ask_battery = options.choice("battery", {"ask": True, "leave": False})
         self._over_network = address.startswith("tcp:")
         self.rate_hz = self._frame_rate * self._multiplier
-
-    @classmethod
-    def from_options(cls, argument: str | None, options: Mapping[str, str]) -> CyberGlove3:
-        """``cyberglove3:PORT`` or ``cyberglove3:tcp:5210``. Raises BadOption."""
-        return cls(argument or "", OptionValues(cls.name, options, cls.option_help))
 
     def start(self, link: Link) -> None:
         """Quiet, battery, destinations, rate, stream. Raises DeviceLost."""

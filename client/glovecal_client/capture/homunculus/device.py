@@ -7,7 +7,6 @@ inverts some joints of each side and clips to 0..100; here readings stay as they
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from glovecal_client.capture.stream.lines import LineReader, whole_number
@@ -42,11 +41,6 @@ class Homunculus(StreamedGlove):
         self.rate_hz = options.number("rate", 60.0, 0.5, 1000.0)
         self._largest = options.whole("largest", 4095, 1, 65535)
         self.counts = (0.0, float(self._largest))
-
-    @classmethod
-    def from_options(cls, argument: str | None, options: Mapping[str, str]) -> Homunculus:
-        """``homunculus:PORT``. Raises BadOption."""
-        return cls(argument or "", OptionValues(cls.name, options, cls.option_help))
 
     def new_parser(self) -> StreamParser:
         return LineReader(self.parse_line, self.counters)

@@ -7,7 +7,6 @@ Written from the public firmware and its reader; no hardware was at hand. Readin
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from typing import ClassVar
 
 from glovecal_client.capture.lucidglove.alpha import KEYS, AlphaLine
@@ -63,11 +62,6 @@ class LucidGlove(StreamedGlove):
             LegacyLine(largest) if legacy else AlphaLine([keys[name] for name in self.sensors], largest)
         )
         self._answers = options.choice("answer", {"line": True, "none": False})
-
-    @classmethod
-    def from_options(cls, argument: str | None, options: Mapping[str, str]) -> LucidGlove:
-        """``lucidglove:PORT`` or ``lucidglove:tcp:65432``. Raises BadOption."""
-        return cls(argument or "", OptionValues(cls.name, options, cls.option_help))
 
     @staticmethod
     def _names(chosen: str) -> tuple[str, ...]:

@@ -5,7 +5,6 @@ Written from its public source; no hardware was at hand. It takes no commands.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from glovecal_client.capture.device_clock import DeviceClock
@@ -40,11 +39,6 @@ class OpenCyberGlove(StreamedGlove):
         super().__init__(address, options)
         self._ticks_per_second = options.choice("clock", _TICKS_PER_SECOND)
         self.context = options.choice("context", {"none": (), "temperature_c": ("temperature_c",)})
-
-    @classmethod
-    def from_options(cls, argument: str | None, options: Mapping[str, str]) -> OpenCyberGlove:
-        """``opencyberglove:PORT``. Raises BadOption."""
-        return cls(argument or "", OptionValues(cls.name, options, cls.option_help))
 
     def new_parser(self) -> StreamParser:
         return PacketReader(self.counters, temperature=bool(self.context))

@@ -9,9 +9,9 @@ import contextlib
 import logging
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import PurePath
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from glovecal_client.capture.stream.links import Link, Place, place_of
 from glovecal_client.capture.stream.option_values import COMMON_HELP, OptionValues
 from glovecal_client.capture.stream.parser import Counters, Sample, StreamParser
 from glovecal_client.errors import DeviceError, DeviceLost
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # the client runs on Python 3.10
 
 EMULATED_PREFIX = "emulated-"
 """A port of this name is an emulator's: its readings are marked as simulated whatever the options say."""
@@ -55,6 +58,11 @@ class StreamedGlove:
         self._link: Link | None = None
         self._ready: deque[Reading] = deque()
         self._last_ns = 0
+
+    @classmethod
+    def from_options(cls, argument: str | None, options: Mapping[str, str]) -> Self:
+        """``NAME:PORT`` or ``NAME:tcp:NUMBER``; overridden where the argument is none. Raises BadOption."""
+        return cls(argument or "", OptionValues(cls.name, options, cls.option_help))
 
     # ------------------------------------------------------------------ hooks of a driver
     def new_parser(self) -> StreamParser:
