@@ -9,7 +9,7 @@ import matplotlib as mpl
 import numpy as np
 from glove_jobs import Row
 from intervals import bootstrap
-from repair_figures import error_after
+from repair_answer import error_after
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

@@ -28,6 +28,9 @@ WITHIN_SD = 1.959964
 """Of the interval that is to cover 95 % of new measurements."""
 COVERAGE = ("saturation", "garment_slip", "sensor_fault")
 """Effects that lose the angle: the interval has to say so, the error cannot fall to the clean twin's."""
+CLOSE_TO_TWIN = 1.1
+"""Times the clean twin's error. Of a glove that stays above, the ceiling says whether anything is left to gain from
+what was recorded: a sensor that lost the angle cannot be brought back to its twin."""
 REMEMBERING = ("creep", "hysteresis", "lag")
 """Where the glove was before the first frame is not in a take without a pre-roll: there the black-box ceiling
 says what could be gained from what was recorded."""
@@ -63,13 +66,18 @@ def repair_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_LIM
         }
     if glove.truth in COVERAGE:
         told["covered"] = _covered(glove, model, rotations)
-    if is_judged_by_ceiling(glove):
+    elif is_judged_by_ceiling(glove) or error_after(told) > CLOSE_TO_TWIN * told["twin_deg"]:
         told["ceiling"] = ceiling_of(model, takes, glove)
     return told
 
 
 def is_judged_by_ceiling(glove: BlindGlove) -> bool:
     return glove.truth in REMEMBERING and glove.lead_s == 0
+
+
+def error_after(answer: dict[str, Any]) -> float:
+    """Degrees; an effect that was undone, or could not be added, leaves the error as it was."""
+    return answer["after_deg"] if answer["added"] else answer["before_deg"]
 
 
 def affected_rotations(glove: BlindGlove) -> tuple[str, ...]:

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from glove_jobs import Row
-from repair_answer import COVERAGE, is_judged_by_ceiling
+from repair_answer import CLOSE_TO_TWIN, COVERAGE, error_after, is_judged_by_ceiling
 from study_figure import StudyFigure
 
-MEDIAN, WORST = 1.1, 1.25
+MEDIAN, WORST = CLOSE_TO_TWIN, 1.25
 WORST_SHARE = 0.95
 """Quantile of the ratios that ``WORST`` limits, and share of gloves of which the ceiling has to hold."""
 COVERS = 0.9
@@ -52,11 +52,6 @@ def repair_figures(rows: Sequence[Row]) -> list[StudyFigure]:
 
 def ratio_of(row: Row) -> float:
     return error_after(row[1]) / row[1]["twin_deg"]
-
-
-def error_after(answer: dict[str, Any]) -> float:
-    """Degrees; an effect that was undone, or could not be added, leaves the error as it was."""
-    return answer["after_deg"] if answer["added"] else answer["before_deg"]
 
 
 def _by_ratio(row: Row) -> bool:
@@ -104,23 +99,36 @@ def _worst(name: str, ratios: Sequence[float], *, judged: bool = True, headline:
 
 def _ceilings(rows: Sequence[Row]) -> list[StudyFigure]:
     some = [(glove, answer["ceiling"]) for glove, answer in rows if is_judged_by_ceiling(glove)]
-
-    def passes(found: dict[str, Any]) -> bool:
-        return found["verdict"] == "none" or found["share"] <= LEFT
-
     label = f"repaired without pre-roll: ceiling none, or at most {100 * LEFT:g} % left"
-    every = [passes(found) for _, found in some]
+    every = [_little_left(found) for _, found in some]
     found = [
         StudyFigure.share(
             label, every, at_least=WORST_SHARE, headline="without pre-roll: ceiling none or <= 10 %"
-        )
+        ),
+        _nothing_left(rows),
     ]
     for effect in dict.fromkeys(glove.truth for glove, _ in some):
         mine = [answer for glove, answer in some if glove.truth == effect]
-        found.append(StudyFigure.share(f"{label}, {effect}", [passes(each) for each in mine]))
+        found.append(StudyFigure.share(f"{label}, {effect}", [_little_left(each) for each in mine]))
         shares = [max(each["share"], 0.0) for each in mine]
         found.append(StudyFigure.mean(f"{effect}: share of the RMSE that the ceiling leaves", shares))
     return found
+
+
+def _nothing_left(rows: Sequence[Row]) -> StudyFigure:
+    """Of the gloves that stay above their twin, by how many nothing was left to gain."""
+    above = [
+        answer["ceiling"] for glove, answer in rows if _by_ratio((glove, answer)) and "ceiling" in answer
+    ]
+    return StudyFigure.share(
+        f"above {MEDIAN:g} x the clean twin: ceiling none, or at most {100 * LEFT:g} % left",
+        [_little_left(found) for found in above],
+        headline=f"above {MEDIAN:g} x: ceiling none or <= 10 %",
+    )
+
+
+def _little_left(ceiling: dict[str, Any]) -> bool:
+    return ceiling["verdict"] == "none" or ceiling["share"] <= LEFT
 
 
 def _kept(rows: Sequence[Row]) -> list[StudyFigure]:

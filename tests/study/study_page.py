@@ -63,7 +63,7 @@ def demanded_table(results: Sequence[StudyResults]) -> str:
             columns = (
                 [f"{each.headline} {each.demanded}" for each in judged],
                 [_measured(each) for each in judged] or ["not measured"],
-                [each.verdict or "not measured" for each in judged],
+                [each.verdict or ("not measured" if each.demanded else "") for each in judged],
             )
             rows.append(" | ".join([f"| {label}", *("<br>".join(lines) for lines in columns)]) + " |")
     return "\n".join(rows)

@@ -136,7 +136,9 @@ def test_repair_is_judged_by_ratio_by_coverage_or_by_the_ceiling() -> None:
         found = headlines(repair_figures([*rows, (glove("lag", 2.6), repaired(9.0, ceiling=verdict))]))
         assert found["without pre-roll: ceiling none or <= 10 %"].is_met is passes
         assert found["median ratio"].gloves == 8
-    led = headlines(repair_figures([(glove("lag", 2.6, lead_s=30.0), repaired(9.0))]))
+    lost = repaired(9.0, ceiling={"verdict": "none", "share": 0.0})
+    led = headlines(repair_figures([(glove("lag", 2.6, lead_s=30.0), lost)]))
+    assert led["above 1.1 x: ceiling none or <= 10 %"].count == 1
     assert led["median ratio"].is_met is False
 
 
