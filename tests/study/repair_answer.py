@@ -29,8 +29,8 @@ WITHIN_SD = 1.959964
 COVERAGE = ("saturation", "garment_slip", "sensor_fault")
 """Effects that lose the angle: the interval has to say so, the error cannot fall to the clean twin's."""
 CLOSE_TO_TWIN = 1.1
-"""Times the clean twin's error. Of a glove that stays above, the ceiling says whether anything is left to gain from
-what was recorded: a sensor that lost the angle cannot be brought back to its twin."""
+"""Times the clean twin's error. Above it the ceiling says whether anything is left to gain: a sensor that
+lost the angle cannot be brought back to its twin."""
 REMEMBERING = ("creep", "hysteresis", "lag")
 """Where the glove was before the first frame is not in a take without a pre-roll: there the black-box ceiling
 says what could be gained from what was recorded."""
