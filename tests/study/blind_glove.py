@@ -50,6 +50,8 @@ class BlindGlove:
     bystander: Bystander = "none"
     """A cause's column that is recorded without the cause."""
     palm: bool = False
+    joints: tuple[str, ...] = FIVE_SENSORS
+    """Each with a sensor of its own; a glove with a palm sensor has its own six."""
     set_aside: bool = False
     wearings: int = 3
     takes_per_wearing: int = 4
@@ -69,7 +71,7 @@ class BlindGlove:
     def plan(self) -> SessionPlan:
         return SessionPlan(
             seed=self.seed,
-            sensors=PALM_SENSORS if self.palm else FIVE_SENSORS,
+            sensors=PALM_SENSORS if self.palm else self.joints,
             bits=self.bits,
             nuisance="white" if self.nuisance == "reference" else self.nuisance,
             rate_hz=self.rate_hz,

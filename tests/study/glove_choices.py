@@ -17,6 +17,7 @@ from blind_glove import BlindGlove, Bystander, Nuisance
 from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES, UNKNOWN_CAUSES, forms
 from glovecal_models.simulation.causes.form import Cause, Form
 from glovecal_models.simulation.session_plan import FIVE_SENSORS
+from glovecal_models.simulation.simulated_hand import ROTATIONS
 
 FLOOR_DEG = 0.77
 """The noise floor of such a glove; sizes are multiples of it."""
@@ -25,6 +26,8 @@ RATES_HZ = (30.0, 60.0, 100.0)
 NUISANCES: tuple[Nuisance, ...] = get_args(Nuisance)
 BYSTANDERS: tuple[Bystander, ...] = get_args(Bystander)
 CONTEXT_CAUSES = ("contact_pressure", "unknown:context")
+WHOLE_HAND = tuple(name for name in ROTATIONS if name != "PALM_ARCH")
+"""Fingers, thumb, abductions and wrist, whose ranges differ by as much as six times."""
 RECORDED_UNNAMED = ("unknown:context", "unknown:posture_locked")
 """Causes without a name that follow a recorded column: of the context, or of the sensors themselves."""
 NOT_RECORDED = ("thumb_across",)
@@ -142,8 +145,17 @@ def _channels(form: Form, number: int, label: tuple[object, ...]) -> tuple[str, 
     """One sensor in every second glove, where the form can sit on one; else where it sits by itself."""
     if form.shared or form.touches not in ("all", "one_or_all"):
         return None
-    one = dealt(FIVE_SENSORS, number, *label, "channel")
+    one = dealt(_joints(number, label), number, *label, "channel")
     return dealt((None, (one,)), number, *label, "channels")
+
+
+def _joints(number: int, label: tuple[object, ...]) -> tuple[str, ...]:
+    """Five bends of fingers, or in every second glove five joints drawn from the whole hand."""
+    if not dealt((False, True), number, *label, "whole hand"):
+        return FIVE_SENSORS
+    random = np.random.default_rng(zlib.crc32(repr((*label, number, "joints")).encode()))
+    drawn = random.choice(len(WHOLE_HAND), len(FIVE_SENSORS), replace=False)
+    return tuple(WHOLE_HAND[place] for place in sorted(drawn))
 
 
 def _glove(
@@ -172,5 +184,6 @@ def _glove(
         linear=linear,
         bystander=bystander,
         palm=palm,
+        joints=_joints(number, label),
         set_aside=set_aside,
     )

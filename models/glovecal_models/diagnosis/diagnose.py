@@ -30,6 +30,7 @@ from glovecal_models.diagnosis.posed_holds import are_pose_labels
 from glovecal_models.diagnosis.problem import DiagnosisProblem
 from glovecal_models.diagnosis.reference_problems import reference_problems
 from glovecal_models.diagnosis.resampled import SMOOTHING
+from glovecal_models.diagnosis.saved_by_known import beside_known, is_beside_known, saved_by_known
 from glovecal_models.diagnosis.signatures import are_held_levels, beside_levels, signature_findings
 from glovecal_models.diagnosis.unexplained_residual import UnexplainedResidual, unexplained_residual
 from glovecal_models.effects.base.effect import Effect
@@ -83,6 +84,8 @@ def diagnose(
     waiting = [item for item in tried if problem.is_sparse and item.needs_movement]
     judged = [item for item in tried if item not in waiting]
     found, impossible = assessed(design, judged, np.random.default_rng(seed), has, progress)
+    saved = saved_by_known(problem, design)
+    found = beside_known(found, saved)
     naming, beside, screened = named(found, limits), problem, design
     undecided = exceeding_named(impossible, naming)
     if undecided:
@@ -91,12 +94,18 @@ def diagnose(
         others = [item for item in judged if item.name not in {each.effect for each in impossible}]
         screened = beside.design()
         found, _ = assessed(screened, others, np.random.default_rng(seed), has, progress)
+        found = beside_known(found, saved)
         naming = named(found, limits)
     impossible += [NotIdentifiable(item.name, SINGLE_POSES) for item in waiting]
     naming = _with_alikes_ordered(naming, beside, screened, by_name)
     lacking = [item for item in every if item.name not in has]
     asked = signature_findings(takes, layout, problem.joints, naming, found, lacking, known)
     findings = tuple(asked) if signatures else ()
+    findings = tuple(
+        item
+        for item in findings
+        if by_name[item.effect].stage != "last" or is_beside_known(item, saved, limits.beside_known_share)
+    )
     naming = beside_levels(naming, takes, findings, by_name)
     progress("testing the residual", 0.95)
     actions: tuple[Action, ...] = ()

@@ -29,6 +29,7 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
         sentences += [hold_sentence(diagnosis.hold_drift), UNITS]
     elif not diagnosis.findings:
         sentences.append(nothing_named_sentence(diagnosis))
+    sentences += [within_known_sentence(item) for item in diagnosis.assessments if item.within_known]
     if diagnosis.next_take is not None:
         sentences.append(next_take_sentence(diagnosis.next_take))
     sentences.append(residual_sentence(diagnosis.residual))
@@ -71,6 +72,16 @@ def nothing_named_sentence(diagnosis: Diagnosis) -> str:
     if blocks < fewest:
         return f"Too few data to judge any effect: {blocks} blocks of 5 s, {fewest} are needed."
     return "No known effect beats its control significantly."
+
+
+def within_known_sentence(item: Assessment) -> str:
+    """Of an effect that is not named because the effects of the model may have left as much."""
+    where = ", ".join(item.joints[i] for i in item.within_known)
+    return (
+        f"{item.effect} on {where} is not named: it would save less than"
+        f" {100 * item.limits.beside_known_share:.0f} % of the squared error that the model's effects save"
+        " there, and the form of those may leave as much."
+    )
 
 
 def candidate_sentence(item: Assessment) -> str:

@@ -95,6 +95,15 @@ def add_effect(
         prepared, chosen, wanted, settings, optima=fit.optima, cancelled=cancelled,
         report=with_it,
     )  # fmt: skip
+    kept = _not_worse(before, after, chosen, limits)
+    if fresh.has_columns and least_gain >= 0 and 0 < len(kept) < len(chosen):
+        judged = [item for item in judged or kept if item in kept] or None
+        found = add_effect(
+            model, takes, name, rotations=kept, constants=constants, settings=settings, judged=judged,
+            before=before.of(kept), least_gain=least_gain, parent_id=parent_id, take_hashes=take_hashes,
+            limits=limits, cancelled=cancelled, report=report,
+        )  # fmt: skip
+        return replace(found, left_out=tuple(item for item in chosen if item not in kept))
     judged = tuple(judged or chosen)
     undone = Addition(name, chosen, False, before, after, model, has, judged=judged, least_gain=least_gain)
     if undone.gain < least_gain:
@@ -124,6 +133,18 @@ def add_effect(
     mine = [item.described() for item in fit.effects if item.name == name]
     described = {key: value for each in mine for key, value in each.items()}
     return replace(undone, added=True, model=child, wanted=tuple(wanted), parameters=described, live=live)
+
+
+def _not_worse(
+    before: HeldOutErrors, after: HeldOutErrors, rotations: Sequence[str], limits: ImprovementLimits
+) -> tuple[str, ...]:
+    """Rotations whose held-out error does not rise with the effect: one where it cannot be learned must not
+    keep it from the others."""
+    return tuple(
+        name
+        for name in rotations
+        if total_rmse_deg(after, [name]) <= limits.worse_times * total_rmse_deg(before, [name])
+    )
 
 
 def _chosen(model: CalibrationModel, effect: Effect, rotations: Sequence[str] | None) -> tuple[str, ...]:

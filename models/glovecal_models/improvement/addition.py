@@ -59,6 +59,8 @@ class Addition:
     """All effects of ``model``."""
     parameters: dict[str, dict[str, float]] = field(default_factory=dict)
     """For each rotation, units in the names."""
+    left_out: tuple[str, ...] = ()
+    """Rotations that were asked for, whose held-out error it raised."""
     judged: tuple[str, ...] = ()
     """Rotations whose held-out error decides."""
     least_gain: float = 0.0

@@ -43,6 +43,8 @@ def addition_sentence(addition: Addition) -> str:
         else f"{name} was undone: held-out error {before:.2f} degrees before, {after:.2f} after"
         f" ({gain:+.0f} % saved, {100 * addition.least_gain:.0f} % needed)."
     )
+    if addition.left_out:
+        sentence += f" It raises the error of {', '.join(addition.left_out)}, where it was left out."
     return sentence if addition.live is None else f"{sentence} {addition.live.sentence}"
 
 

@@ -85,6 +85,8 @@ class Assessment:
     certainty: Certainty = BETWEEN_TAKES
     """Limits of ``p_value``."""
     limits: SignificanceLimits = SIGNIFICANCE_LIMITS
+    known_saved_square: tuple[float, ...] = ()
+    """Squared degrees per row that the effects of the model save on each joint; empty where it has none."""
 
     def shape_described(self, joint: int) -> dict[str, float]:
         """The shape of one joint by its numbers' names."""
@@ -92,7 +94,24 @@ class Assessment:
 
     @cached_property
     def significant_joints(self) -> tuple[int, ...]:
-        """Joints on which the effect beats its control significantly."""
+        """Joints on which the effect beats its control significantly, and saves more than the effects of the
+        model may have left there."""
+        return tuple(i for i in self._beyond_control if not self._is_within_known(i))
+
+    @cached_property
+    def within_known(self) -> tuple[int, ...]:
+        """Joints on which it beats its control, but saves no more than the model's effects may have left."""
+        return tuple(i for i in self._beyond_control if self._is_within_known(i))
+
+    def _is_within_known(self, joint: int) -> bool:
+        if not self.known_saved_square:
+            return False
+        item = self.errors[joint]
+        saved = float(item.base.sum() - item.added.sum()) / max(item.rows, 1)
+        return saved < self.limits.beside_known_share * self.known_saved_square[joint]
+
+    @cached_property
+    def _beyond_control(self) -> tuple[int, ...]:
         if self.p_value is not None:
             return self._significant_in_session(self.p_value)
         limits = self.limits

@@ -39,6 +39,14 @@ class SignificanceLimits:
         "The same test of all joints together.",
         "Not tuned; chosen with the first version of the diagnosis (2026-11-21).",
     )
+    beside_known_share: float = limit(
+        0.2,
+        "share of the squared error that the model's effects save",
+        "A further effect must save so much of a joint's squared error: what the form of the first one leaves"
+        " is no second cause.",
+        "24 simulated gloves of six joints drawn from the whole hand, one cause each (2026-11-23): the second"
+        " names that were not there saved 1 to 22 %.",
+    )
     fewest_blocks: int = limit(
         9,
         "blocks of 5 s",

@@ -13,6 +13,7 @@ from importlib.util import find_spec
 import numpy as np
 
 from glovecal_models.errors import BadInput
+from glovecal_models.simulation.causes import recorded_context
 from glovecal_models.simulation.causes.form import Draws, Form, Stage, form
 from glovecal_models.simulation.scene import Scene
 from glovecal_models.simulation.signals import lasting_noise
@@ -133,7 +134,7 @@ FORMS_BY_NAME: dict[str, tuple[Form, ...]] = {
     "common_swing": (slow_waves, slow_wander),
     "one_channel_wander": (channel_wander,),
     "posture_locked": (grip_pressure, thumb_across),
-    "context": (context_hump, context_wave),
+    "context": (context_hump, context_wave, *recorded_context.FORMS),
     "tilt": (tilt,),
     "bumps": (short_bumps,),
 }

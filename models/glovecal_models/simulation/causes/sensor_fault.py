@@ -6,9 +6,11 @@ Broken solder, cracked film, a plug that loses contact. Usually one sensor of a 
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import ndtr
 
 from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
+from glovecal_models.simulation.signals import lasting_noise
 
 STUCK_PER_S = (0.02, 0.06)
 DROPPED_PER_S = (0.03, 0.1)
@@ -84,4 +86,69 @@ def _stretches(
     return faulty
 
 
-FORMS = (stuck, spikes, dropouts, gain_jump)
+def _noise(scene: Scene, draws: Draws, name: str, channels: int, lasts_s: float) -> np.ndarray:
+    """Noise of its own in every take, shape (T, N, channels)."""
+    frames = len(scene.time_s)
+    return np.stack(
+        [
+            lasting_noise(draws.stream(name, start.key), frames, channels, lasts_s, scene.rate_hz)
+            for start in scene.starts
+        ]
+    )
+
+
+@form(
+    Stage.CONVERTER,
+    "While a wire is open the floating input wanders by itself, for a share of the time (broken conductor).",
+    touches="one",
+    sizes=(0.002, 0.95),
+)
+def floating_input(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The reading leaves its joint for some seconds at a time and drifts about some level."""
+    channels = signal.shape[-1]
+    level = draws.each("level", 0.3, 0.7)
+    lasts_s = draws.one("lasts_s", 1.0, 4.0)
+    wanders_s = draws.one("wanders_s", 1.0, 5.0)
+    wire_open = ndtr(_noise(scene, draws, "contact", channels, lasts_s)) < size
+    wanders = scene.low + scene.span * (level + 0.15 * _noise(scene, draws, "wander", channels, wanders_s))
+    return np.where(wire_open, wanders, signal)
+
+
+@form(
+    Stage.CONVERTER,
+    "A cracked address line of the multiplexer selects another sensor while the hand is closed (ours).",
+    touches="one",
+    sizes=(0.02, 0.95),
+)
+def wrong_channel(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """At times, more often the more the hand is closed, the channel carries the next sensor's reading."""
+    lasts_s = draws.one("lasts_s", 1.0, 3.0)
+    closed = scene.closing[..., None] + 0.15 * _noise(scene, draws, "crack", 1, lasts_s)
+    bend = (signal - scene.low) / scene.span
+    other = np.roll(bend, 1, axis=-1) if signal.shape[-1] > 1 else scene.closing[..., None]
+    return np.where((size > 0) & (closed > 1 - size), scene.low + scene.span * other, signal)
+
+
+@form(
+    Stage.CONVERTER,
+    "Stretches of strong noise from a frayed conductor or shield, quiet in between (contact noise; ours).",
+    touches="one",
+)
+def crackle(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Noise that lasts a few frames, only while a slow random state of the conductor is bad."""
+    channels = signal.shape[-1]
+    lasts_s = draws.one("lasts_s", 2.0, 6.0)
+    crackles_s = draws.one("crackles_s", 0.01, 0.08)
+    bad = np.maximum(_noise(scene, draws, "state", channels, lasts_s) - 0.3, 0.0)
+    return signal + size * 2 * bad * _noise(scene, draws, "crackle", channels, crackles_s)
+
+
+FORMS = (
+    stuck,
+    spikes,
+    dropouts,
+    gain_jump,
+    floating_input,
+    wrong_channel,
+    crackle,
+)

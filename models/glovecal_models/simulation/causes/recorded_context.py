@@ -1,4 +1,4 @@
-"""Set-aside forms of a cause outside every catalogue that follows a recorded column of unfamiliar name."""
+"""Causes outside every catalogue that follow a recorded column of an unfamiliar name."""
 
 from __future__ import annotations
 
@@ -48,7 +48,6 @@ def lining_column(scene: Scene, draws: Draws) -> tuple[str, np.ndarray]:
 @form(
     Stage.WEARING,
     "From one level to another around one value of a recorded column (sigmoid; ours).",
-    set_aside=True,
     touches="one_or_all",
     column=strap_column,
 )
@@ -63,7 +62,6 @@ def context_threshold(signal: np.ndarray, scene: Scene, size: np.ndarray, draws:
 @form(
     Stage.WEARING,
     "A recorded column times a bow over the own bend, nothing at both ends of the range (ours).",
-    set_aside=True,
     touches="one_or_all",
     column=tilt_column,
 )
@@ -79,7 +77,6 @@ def context_times_bow(signal: np.ndarray, scene: Scene, size: np.ndarray, draws:
 @form(
     Stage.WEARING,
     "An exponential rise over a recorded column that also stretches the reading (ours).",
-    set_aside=True,
     touches="one_or_all",
     column=lining_column,
 )
