@@ -23,8 +23,8 @@ def strong(effect: str) -> BlindGlove:
 
 
 def short(glove: BlindGlove) -> BlindGlove:
-    """Half as long and at most 30 frames a second: strong effects need no more."""
-    return replace(glove, take_s=20.0, rate_hz=min(glove.rate_hz, 30.0))
+    """Three quarters as long and at most 30 frames a second: strong effects need no more."""
+    return replace(glove, take_s=30.0, rate_hz=min(glove.rate_hz, 30.0))
 
 
 @pytest.mark.parametrize("effect", STRONG)

@@ -55,7 +55,7 @@ def test_an_early_stop_has_a_little_of_everything() -> None:
     assert {glove.truth for glove in ceilings[: 2 * len(RECORDED_INPUTS)]} == {*RECORDED_INPUTS, "none"}
     recorded = PARTS["recorded"].gloves(FEW)
     assert {(glove.truth, glove.size) for glove in recorded[:6]} == set(product(RECORDED_UNNAMED, (1.3, 2.6)))
-    assert {glove.causes[0].form for glove in recorded} == {"context_hump", "context_wave", "grip_pressure"}
+    assert {glove.causes[0].form for glove in recorded} == open_forms("unknown:context") | {"grip_pressure"}
     sizes = PARTS["sizes"].gloves(FEW)
     assert {(glove.truth, glove.size) for glove in sizes[:36]} == set(product(KNOWN_CAUSES, (0.65, 2.6)))
     repair = PARTS["repair"].gloves(FEW)
