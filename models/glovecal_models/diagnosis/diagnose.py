@@ -16,7 +16,7 @@ from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.hold_drift import hold_drift
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
-from glovecal_models.diagnosis.naming import Naming, named
+from glovecal_models.diagnosis.naming import Naming, beside_known, is_beside_known, named
 from glovecal_models.diagnosis.next_take import NextTake, hold_next_take, next_take
 from glovecal_models.diagnosis.not_identifiable import (
     ONLY_POSE_NAMES,
@@ -30,7 +30,6 @@ from glovecal_models.diagnosis.posed_holds import are_pose_labels
 from glovecal_models.diagnosis.problem import DiagnosisProblem
 from glovecal_models.diagnosis.reference_problems import reference_problems
 from glovecal_models.diagnosis.resampled import SMOOTHING
-from glovecal_models.diagnosis.saved_by_known import beside_known, is_beside_known, saved_by_known
 from glovecal_models.diagnosis.signatures import are_held_levels, beside_levels, signature_findings
 from glovecal_models.diagnosis.unexplained_residual import UnexplainedResidual, unexplained_residual
 from glovecal_models.effects.base.effect import Effect
@@ -84,7 +83,7 @@ def diagnose(
     waiting = [item for item in tried if problem.is_sparse and item.needs_movement]
     judged = [item for item in tried if item not in waiting]
     found, impossible = assessed(design, judged, np.random.default_rng(seed), has, progress)
-    saved = saved_by_known(problem, design)
+    saved = problem.saved_by_known(design)
     found = beside_known(found, saved)
     naming, beside, screened = named(found, limits), problem, design
     undecided = exceeding_named(impossible, naming)
@@ -184,10 +183,7 @@ def _with_alikes_ordered(
 
 
 def _held_out_errors(design: ForwardDesign) -> dict[str, float]:
-    return {
-        name: float(np.sqrt(products.error.sum() / max(products.count.sum(), 1)))
-        for name, products in zip(design.rotations, design.products, strict=True)
-    }
+    return {name: float(np.sqrt(square)) for name, square in design.mean_square().items()}
 
 
 def _of_pose_labels(

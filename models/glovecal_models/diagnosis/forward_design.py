@@ -58,6 +58,13 @@ class ForwardDesign:
         """The signals of one joint alone, without those that its base reads already."""
         return tuple(one_lane(_without(take, self.known[joint]), joint) for take in self.signals)
 
+    def mean_square(self) -> dict[str, float]:
+        """Held-out squared error of each joint, degrees squared per row."""
+        return {
+            name: float(item.error.sum() / max(item.count.sum(), 1))
+            for name, item in zip(self.rotations, self.products, strict=True)
+        }
+
     def units(self, joint: int) -> Iterator[tuple[int, np.ndarray]]:
         """Take and row indices of each unit."""
         return zip(self.unit_take, self.used[joint], strict=True)

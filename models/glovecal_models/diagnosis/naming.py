@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.effects.base.assessment import Assessment, over_joints
+from glovecal_models.effects.base.signature_effect import Finding
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,25 @@ def named(assessments: Sequence[Assessment], limits: DiagnosisLimits = DIAGNOSIS
     worse_se = limits.rival_worse_se
     rivals = [item.effect for item in passing[1:] if not _is_significantly_worse(item, best, worse_se)]
     return Naming(tuple(passing), (best.effect, *rivals))
+
+
+def beside_known(found: Sequence[Assessment], saved: Mapping[str, float]) -> list[Assessment]:
+    """The same, held against what the effects of the model save on each joint, degrees squared per row.
+
+    A named effect is right in its inputs and only nearly right in its form. What the form misses goes along
+    with the same movements, so that another effect can grasp a part of it; a cause of its own saves more.
+    """
+    if not saved:
+        return list(found)
+    return [replace(item, known_saved_square=tuple(saved[name] for name in item.joints)) for item in found]
+
+
+def is_beside_known(finding: Finding, saved: Mapping[str, float], share: float) -> bool:
+    """Whether a finding of a size is larger than what those effects may have left on its rotations."""
+    if finding.size_deg is None:
+        return True
+    least = max((saved.get(name, 0.0) for name in finding.where), default=0.0)
+    return finding.size_deg**2 >= share * least
 
 
 def _is_significantly_worse(item: Assessment, best: Assessment, standard_errors: float) -> bool:

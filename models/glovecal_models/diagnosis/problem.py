@@ -79,6 +79,16 @@ class DiagnosisProblem:
             every=every,
         )
 
+    def saved_by_known(self, design: ForwardDesign) -> dict[str, float]:
+        """Squared degrees per row that the known effects save on each joint, held out; empty without any.
+
+        ``design`` is the one with them.
+        """
+        if not self.known:
+            return {}
+        without = replace(self, known=()).design().mean_square()
+        return {name: max(without[name] - left, 0.0) for name, left in design.mean_square().items()}
+
     def beside(self, *effects: KnownEffect) -> DiagnosisProblem:
         """The same with further effects in the base."""
         return replace(self, known=(*self.known, *effects))

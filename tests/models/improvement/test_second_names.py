@@ -8,7 +8,7 @@ from __future__ import annotations
 import pytest
 
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.diagnosis.saved_by_known import is_beside_known
+from glovecal_models.diagnosis.naming import is_beside_known
 from glovecal_models.diagnosis.text import within_known_sentence
 from glovecal_models.effects.base.signature_effect import Finding
 from glovecal_models.improvement.improve import improve
