@@ -74,7 +74,11 @@ def test_a_model_is_imported_and_a_file_that_is_none_refused(
     assert seen.complaints == []
 
 
-def test_takes_have_their_quality_and_gloves_their_layouts(opened: Open, address: str) -> None:
+def test_takes_have_their_quality_and_gloves_their_layouts(
+    opened: Open, settings: Settings, address: str
+) -> None:
+    with Store.open(settings) as store:
+        store.gloves.seen("seen-once", {"layout": LAYOUT.name, "simulated": True})
     page = opened("models").page
     takes = httpx.get(f"{address}/v1/takes").json()
     rows = page.get_by_role("region", name="Takes and their quality").locator("tbody tr")
@@ -90,8 +94,6 @@ def test_takes_have_their_quality_and_gloves_their_layouts(opened: Open, address
     layouts = page.get_by_role("region", name="Layouts").last.locator("tbody th")
     gloves = httpx.get(f"{address}/v1/gloves").json()
     expect(layouts).to_have_text([each["name"] for each in gloves["layouts"]], timeout=PATIENCE_MS)
-    if gloves["seen"]:
-        seen = page.get_by_role("region", name="Gloves seen").last.locator("tbody th").all_inner_texts()
-        assert [text.removesuffix(" (simulated)") for text in seen] == [
-            each["name"] for each in gloves["seen"]
-        ]
+    seen = page.get_by_role("region", name="Gloves seen").last.locator("tbody th").all_inner_texts()
+    assert [text.removesuffix(" (simulated)") for text in seen] == [each["name"] for each in gloves["seen"]]
+    assert "seen-once (simulated)" in seen

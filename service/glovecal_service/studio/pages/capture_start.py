@@ -49,6 +49,22 @@ class _Form:
         self._worn = GloveAndWearer(studio, gloves)
         self._started = started
 
+    def _ask_trigger(self) -> None:
+        self._trigger = ui.select(TRIGGERS, value="key", label="A step starts").classes("choice")
+
+    def _offer(self, text: str, start: Callable[[], Awaitable[None]]) -> None:
+        """The button that starts it, and the keys that work from then on. ``start`` raises Refusal."""
+
+        async def clicked() -> None:
+            try:
+                await start()
+            except Refusal as refusal:
+                ui.notify(str(refusal), type="warning", timeout=10_000)
+
+        ui.button(text, on_click=clicked).props("unelevated no-caps color=indigo-8 size=lg").classes(
+            "studio-main-act"
+        )
+
     async def _begin(self, body: dict[str, Any]) -> None:
         """Raises Refusal."""
         worn = {"glove": self._worn.glove, "subject": self._worn.subject}
@@ -68,15 +84,13 @@ class SamplingForm(_Form):
             await self._worn.build()
             with ui.element("div").classes("capture-fields"):
                 self._protocol = ui.select(PROTOCOLS, value="new_subject", label="Protocol").classes("choice")
-                self._trigger = ui.select(TRIGGERS, value="key", label="A step starts").classes("choice")
+                self._ask_trigger()
             with ui.element("div").classes("capture-fields"):
                 self._widgets = ui.checkbox("I have widgets (wedges of known angle)", value=True)
                 self._rod = ui.number(
                     "Rod, mm (empty: none)", value=60, min=LEAST_ROD_MM, max=MOST_ROD_MM
                 ).classes("capture-number")
-            ui.button("Start sampling", on_click=self._start).props(
-                "unelevated no-caps color=indigo-8 size=lg"
-            ).classes("studio-main-act")
+            self._offer("Start sampling", self._start)
         show_keys()
 
     async def _start(self) -> None:
@@ -84,13 +98,10 @@ class SamplingForm(_Form):
             "protocol": self._protocol.value, "trigger": self._trigger.value,
             "rod_mm": [] if self._rod.value is None else [self._rod.value],
         }  # fmt: skip
-        try:
-            await self._worn.put_on()
-            if not self._widgets.value:
-                body["widget_deg"] = {rotation: [] for rotation in await self._rotations()}
-            await self._begin(body)
-        except Refusal as refusal:
-            ui.notify(str(refusal), type="warning", timeout=10_000)
+        await self._worn.put_on()
+        if not self._widgets.value:
+            body["widget_deg"] = {rotation: [] for rotation in await self._rotations()}
+        await self._begin(body)
 
     async def _rotations(self) -> list[str]:
         layout = self._worn.layout
@@ -112,21 +123,16 @@ class WearingForm(_Form):
                 self._wearing = ui.input(
                     "Name of this wearing", value=f"{datetime.now():%Y-%m-%d %H.%M}"
                 ).classes("choice")
-                self._trigger = ui.select(TRIGGERS, value="key", label="A step starts").classes("choice")
-            ui.button("Start the check", on_click=self._start).props(
-                "unelevated no-caps color=indigo-8 size=lg"
-            ).classes("studio-main-act")
+                self._ask_trigger()
+            self._offer("Start the check", self._start)
         show_keys()
 
     async def _start(self) -> None:
         wearing = str(self._wearing.value).strip()
         body = {"protocol": "second_wearing", "trigger": self._trigger.value, "wearing": wearing}
-        try:
-            await self._require_model()
-            await self._worn.put_on(wearing)
-            await self._begin(body)
-        except Refusal as refusal:
-            ui.notify(str(refusal), type="warning", timeout=10_000)
+        await self._require_model()
+        await self._worn.put_on(wearing)
+        await self._begin(body)
 
     async def _require_model(self) -> None:
         worn = self._worn
