@@ -17,7 +17,17 @@ import typer
 
 from glovecal_service.cli import demo, serve
 from glovecal_service.cli.effect import catalogue, changes, detectability, diagnosis, improvement
-from glovecal_service.cli.glove import capture, card, doctor, emulate, find_port, layouts, recordings, watch
+from glovecal_service.cli.glove import (
+    capture,
+    card,
+    card_session,
+    doctor,
+    emulate,
+    find_port,
+    layouts,
+    recordings,
+    watch,
+)
 from glovecal_service.cli.job import jobs
 from glovecal_service.cli.model import ceiling, comparison, explain, models, quick_check, training, where
 from glovecal_service.cli.sampling import samplings
@@ -40,6 +50,7 @@ app.command("serve")(serve.serve)
 app.command("capture", cls=capture.WithDeviceOptions)(capture.capture)
 app.command("find-port")(find_port.find_port)
 app.command("emulate", cls=emulate.WithFaults)(emulate.emulate)
+app.command("card")(card_session.card)
 app.command("read-card")(card.read_card)
 app.command("watch")(watch.watch)
 app.command("doctor")(doctor.doctor)
