@@ -1,9 +1,9 @@
 """Two hands' takes on one time: which clock the times of each are of, and how far those are apart.
 
 Three ways lead two gloves, and an optical system, onto one clock: one capture computer, whose clock all
-its takes have; a time code (LTC) that each device follows; an event that all of them see, such as a clap. Krnoul et
-al. 2016 (section 3.1) set the gloves' own clocks together; here how they stand is measured and kept with the
-take (its accounting's ``own_clock``), with the drift that sets them apart again.
+its takes have; a time code (LTC) that each device follows; an event that all of them see, such as a clap.
+Krnoul et al. 2016 (section 3.1) set the gloves' own clocks together; here how they stand is measured and kept
+with the take (its accounting's ``own_clock``), with the drift that sets them apart again.
 """
 
 from __future__ import annotations

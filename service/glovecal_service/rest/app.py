@@ -20,7 +20,7 @@ from glovecal_service.rest.effect import (
     picture,
     trial,
 )
-from glovecal_service.rest.glove import commands, layouts, recordings
+from glovecal_service.rest.glove import commands, layouts, live, recordings
 from glovecal_service.rest.http import front, health
 from glovecal_service.rest.http.answers import install_openapi
 from glovecal_service.rest.http.body_guard import BodyGuard
@@ -66,7 +66,7 @@ JSON_LIMIT_BYTES = 8_000_000
 """Enough for 20,000 frames of 18 sensors to predict."""
 BODY_PATIENCE_S = 30.0
 ROUTERS = (
-    *(subjects, usual_hand, layouts, commands, recordings, samplings),
+    *(subjects, usual_hand, layouts, live, commands, recordings, samplings),
     *(clocks, hands, holds, examination, table_import, takes, reference, uploads, motion),
     *(
         training,
