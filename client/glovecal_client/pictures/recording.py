@@ -44,6 +44,10 @@ class VideoRecording:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self.stop()
+
+    def stop(self) -> None:
+        """End it; harmless when it has ended."""
         self._stop.set()
         self._thread.join(STOPS_WITHIN_S)
         self._source.close()
@@ -55,7 +59,8 @@ class VideoRecording:
         return 0 if self._writer is None else self._writer.pictures
 
     def describe(self, **facts: Any) -> Path:
-        """Write ``NAME.json`` beside the video: what it is of, and whose clock its stamps are; its path."""
+        """End it and write ``NAME.json`` beside it: what it is of, whose clock its stamps are; its path."""
+        self.stop()
         path = self._path.with_suffix(".json")
         document = {
             "video": self._path.name, "source": self._source.name, "simulated": self._source.simulated,

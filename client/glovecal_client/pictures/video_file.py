@@ -1,7 +1,7 @@
 """Videos on disk: every pixel as it came (FFV1 in Matroska), and beside it a table of time stamps.
 
-``NAME.mkv`` and ``NAME.times.csv`` (``picture``, ``monotonic_ns``, ``wall_ns``): a container's own time stamps
-are rounded, and say nothing of the computer's clock.
+``NAME.mkv`` and ``NAME.times.csv`` (``picture``, ``monotonic_ns``, ``wall_ns``): a container's own stamps are
+rounded, and say nothing of the computer's clock.
 """
 
 from __future__ import annotations

@@ -21,9 +21,9 @@ END_SHARE = 0.02
 MOST_OF_ONE = 0.3
 """Of its range: what a single sensor or rotation counts for at most."""
 MISFIT_LIMIT, LINEAR_MISFIT_LIMIT = 0.5, 0.65
-"""Above it the readings are not those of the model's wearer. Chosen on 14 simulated gloves (seeds 0 to 13): their
-right wearers reached 0.46 in 3.5 hours with LMC-GPR, 0.63 with linear models, whose angles leave the hand's range
-sooner. Other gloves prove it: tests/service/test_live_watch.py."""
+"""Above it the readings are not those of the model's wearer. Chosen on 14 simulated gloves (seeds 0 to 13):
+their right wearers reached 0.46 in 3.5 hours with LMC-GPR, 0.63 with linear models, whose angles leave the
+hand's range sooner. Other gloves prove it: tests/service/test_live_watch.py."""
 EXCUSED_SD = 2.0
 """Standard deviations of a rotation's noise, by which angles of the right wearer leave the hand's range."""
 FAR_SHARE = 0.03

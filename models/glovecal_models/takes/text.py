@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from glovecal_models.takes.hand_clocks import HandAlignment, How, TakeClock
+from glovecal_models.takes.session_drift import SessionDrift
 
 HOW: dict[How, str] = {
     "one computer": "one computer captured both, so they have one clock",
@@ -27,3 +30,20 @@ def alignment_sentence(found: HandAlignment, clocks: tuple[TakeClock, TakeClock]
             f"computer's, {abs(apart) * 3.6:.0f} ms an hour from each other."
         )
     return " ".join(told)
+
+
+MOST_NAMED = 3
+
+
+def drift_sentence(found: SessionDrift) -> str:
+    """How far readings, or angles where a model is known, have moved from start to end."""
+    over = f"over {len(found.shapes)} shapes"
+    if found.rms_deg is None:
+        largest = np.argsort(np.abs(found.common_counts))[::-1][:MOST_NAMED]
+        named = ", ".join(f"{found.sensors[at]} {found.common_counts[at]:+.1f}" for at in largest)
+        return (
+            f"Drift from start to end {over}: most in {named} counts (mean). No model is active: no angles."
+        )
+    largest = np.argsort(np.abs(found.common_deg))[::-1][:MOST_NAMED]
+    named = ", ".join(f"{found.rotations[at]} {found.common_deg[at]:+.1f}" for at in largest)
+    return f"Drift from start to end: {found.rms_deg:.1f} degrees RMS {over}; most in {named} degrees (mean)."

@@ -26,6 +26,7 @@ from glovecal_service.cli.glove import (
     find_port,
     layouts,
     recordings,
+    shapes,
     watch,
 )
 from glovecal_service.cli.job import jobs
@@ -55,6 +56,7 @@ app.command("read-card")(card.read_card)
 app.command("watch")(watch.watch)
 app.command("doctor")(doctor.doctor)
 app.command("record")(recordings.record)
+app.command("shapes")(shapes.shapes)
 app.add_typer(samplings.app, name="sample")
 app.add_typer(subjects.app, name="subject")
 app.add_typer(layouts.app, name="glove")

@@ -55,6 +55,7 @@ from glovecal_service.rest.take import (
     holds,
     motion,
     reference,
+    session_drift,
     table_import,
     takes,
     uploads,
@@ -67,7 +68,7 @@ JSON_LIMIT_BYTES = 8_000_000
 BODY_PATIENCE_S = 30.0
 ROUTERS = (
     *(subjects, usual_hand, layouts, live, commands, recordings, samplings),
-    *(clocks, hands, holds, examination, table_import, takes, reference, uploads, motion),
+    *(clocks, hands, session_drift, holds, examination, table_import, takes, reference, uploads, motion),
     *(
         training,
         model_import,

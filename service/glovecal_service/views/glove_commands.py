@@ -16,6 +16,11 @@ class GloveAnswer(BaseModel):
     problem: str | None = Field(description="Why it was refused, or that nobody answered.")
 
 
+class GloveAnswers(BaseModel):
+    answers: list[GloveAnswer]
+    sentences: list[str] = Field(description="How far the gloves' clocks are apart, where they told them.")
+
+
 def clock_sentences(answers: Sequence[Mapping[str, Any]]) -> list[str]:
     """How far each two gloves' clocks are apart, with the standard deviation, and which cannot be trusted."""
     clocks = {item["glove"]: (item["answer"] or {}).get("clock") for item in answers}

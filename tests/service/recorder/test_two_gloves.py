@@ -27,7 +27,6 @@ from glovecal_service.rest.in_process import in_process_client
 from glovecal_service.rest.take.hands import hand_alignment
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
-from glovecal_service.views.glove_commands import clock_sentences
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are a POSIX thing")
 DRIFT = {"left": 4e-3, "right": -4e-3}
@@ -94,7 +93,7 @@ def test_clocks_are_measured_told_and_kept_with_the_takes(
             with pytest.raises(QueryRefused, match="no command 'format'"):
                 ask_json(session, f"{keys[hand].control}?do=format", timeout_s=20)
         with in_process_client(settings) as rest:
-            answers = rest.post("/glove-commands", {"gloves": ["left", "right"]})
+            answers = rest.post("/glove-commands", {"gloves": ["left", "right"]})["answers"]
             assert [item["problem"] for item in answers] == [
                 "the glove records on its card: stop that before 'status'"
             ] * 2
@@ -105,8 +104,9 @@ def test_clocks_are_measured_told_and_kept_with_the_takes(
         for one in asked.values():
             store.recordings.stop(one.id)
         with in_process_client(settings) as rest:
-            answers = rest.post("/glove-commands", {"gloves": ["left", "right"], "do": "stop"})
-            assert "standard deviation" in clock_sentences(answers)[-1]
+            found = rest.post("/glove-commands", {"gloves": ["left", "right"], "do": "stop"})
+            answers = found["answers"]
+            assert "standard deviation" in found["sentences"][-1]
         for hand, item in zip(["left", "right"], answers, strict=True):
             stopped = item["answer"]
             assert stopped["files"] == ["MONDAY.DAT"]

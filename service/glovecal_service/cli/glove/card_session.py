@@ -9,7 +9,6 @@ import typer
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson
 from glovecal_service.cli.terminal.printing import err, out, print_json, print_table
-from glovecal_service.views.glove_commands import clock_sentences
 
 COLUMNS = {
     "glove": "glove",
@@ -41,12 +40,13 @@ def card(
         raise typer.BadParameter("give one of --set-clock, --start and --stop")
     body = {"gloves": gloves, "do": asked[0] if asked else "status", "argument": start or ""}
     with connect() as service:
-        answers: list[dict[str, Any]] = service.post("/glove-commands", body)
+        found = service.post("/glove-commands", body)
+    answers: list[dict[str, Any]] = found["answers"]
     if as_json:
-        print_json(answers)
+        print_json(found)
     else:
         print_table([row(item) for item in answers if item["answer"]], COLUMNS, empty="No glove answered.")
-        for told in clock_sentences(answers):
+        for told in found["sentences"]:
             out.print(told)
     for item in answers:
         if item["problem"]:

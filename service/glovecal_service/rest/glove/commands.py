@@ -17,7 +17,7 @@ from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.request_types import Identifier, StrictBody
 from glovecal_service.store.errors import Conflict
-from glovecal_service.views.glove_commands import GloveAnswer
+from glovecal_service.views.glove_commands import GloveAnswers, clock_sentences
 
 router = APIRouter(prefix="/glove-commands", tags=["gloves"])
 
@@ -37,8 +37,8 @@ class GloveCommand(StrictBody):
     )
 
 
-@router.post("", response_model=list[GloveAnswer], summary="Command gloves", responses=change_problems(409))
-def command_gloves(body: GloveCommand, parts: PartsNeeded) -> list[dict[str, Any]]:
+@router.post("", response_model=GloveAnswers, summary="Command gloves", responses=change_problems(409))
+def command_gloves(body: GloveCommand, parts: PartsNeeded) -> dict[str, Any]:
     """All gloves are asked at the same moment; each answers for itself. 404 for a glove that was never seen,
     409 where no zenoh router answers. A glove's stream pauses while it carries out a command."""
     wanted = list(dict.fromkeys(body.gloves))
@@ -49,9 +49,10 @@ def command_gloves(body: GloveCommand, parts: PartsNeeded) -> list[dict[str, Any
             open_client((parts.settings.zenoh,), wait_s=ROUTER_WITHIN_S) as session,
             ThreadPoolExecutor(len(wanted)) as at_once,
         ):
-            return list(at_once.map(lambda name: _ask(session, parts, name, body), wanted))
+            answers = list(at_once.map(lambda name: _ask(session, parts, name, body), wanted))
     except NoAnswer as error:
         raise Conflict(f"gloves cannot be reached: {error}") from error
+    return {"answers": answers, "sentences": clock_sentences(answers)}
 
 
 def _ask(session: zenoh.Session, parts: Parts, glove: str, body: GloveCommand) -> dict[str, Any]:
