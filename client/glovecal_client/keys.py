@@ -8,7 +8,7 @@ from glovecal_client.errors import BadName
 from glovecal_client.names import check_identifier
 
 ROOT = "glovecal"
-PLANES = ("raw", "pose", "pose/meta", "pose/explain", "status", "meta", "alive", "log")
+PLANES = ("raw", "pose", "pose/meta", "pose/explain", "status", "meta", "alive", "log", "control")
 _RESERVED_GLOVES = frozenset({"service"})
 JSON_ENCODING = "application/json"
 
@@ -68,6 +68,11 @@ class GloveKeys:
     def log(self) -> str:
         """Queryable for frames of the capture log."""
         return self._key("log")
+
+    @property
+    def control(self) -> str:
+        """Queryable: what a glove can be asked beside its stream."""
+        return self._key("control")
 
 
 def all_gloves(site: str, plane: str) -> str:

@@ -47,13 +47,15 @@ def test_incomplete_records_are_counted_and_left_out(seed: int) -> None:
 def test_what_the_glove_wrote_itself_while_it_streamed() -> None:
     glove = EmulatedCyberGlove3()
     assert glove.feed(b"1Amonday\x01", 0.0).endswith(b"\0")
+    assert glove.feed(b"subject anna\x01", 0.0) == b"\0"
     glove.feed(b"1es1m\x03", 0.0)
     glove.feed(b"1S", 1.0)
     glove.due(3.0)
     glove.feed(b"\x03", 3.0)
     assert b"monday" in glove.feed(b"?l", 3.1)
     recording = read_card(glove.feed(b"1D", 3.2)[2:], SENSORS)
-    assert len(recording.records) == len(glove.sent) == 181
+    assert recording.header.startswith(b"subject anna\n")
+    assert len(recording.records) == len(glove.sent) == 180
 
 
 def test_midnight_passes() -> None:

@@ -34,6 +34,7 @@ from glovecal_client.wire.pose import Pose, decode_pose
 from glovecal_models.calibration.artifact import dump
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_service.realtime.model_choice import choose
+from glovecal_service.rest.in_process import in_process_client
 from glovecal_service.serve import real_time
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
@@ -115,6 +116,24 @@ def test_poses_are_what_the_active_model_predicts(
     assert {(pose.model_sha256, pose.run_id) for pose in poses.live} == {(model_id, glove.run_id)}
     with PoseSubscriber(session, settings.site, "g-anna") as subscriber:
         assert subscriber.rotations(poses.live[-1]) == LAYOUT.rotations
+
+
+def test_a_glove_of_the_other_hand_is_told_with_its_first_frames(
+    session: zenoh.Session, settings: Settings, store: Store
+) -> None:
+    model_id = store_model(store, "anna", degrees_per_count=0.5)
+    glove = WireGlove(session, settings, "g-left", subject="anna")
+    glove.say_meta(hand="left")
+    eventually(lambda: served(session, glove, model_id), "the glove is served")
+    assert "wrong hand: g-left is a left glove and anna a right hand" in ask_meta(session, glove)["sentence"]
+    glove.send()
+    eventually(lambda: glove_status(session, settings, "g-left").get("predicted") == 1, "a pose")
+    with in_process_client(settings) as rest:
+        found = {one["glove"]: one for one in rest.get("/live-gloves")}
+    assert found["g-left"]["sentence"].startswith("wrong hand")
+    assert (found["g-left"]["model"], found["g-left"]["warnings"]) == (model_id, [])
+    glove.say_meta(hand="right")
+    eventually(lambda: not ask_meta(session, glove)["sentence"], "exchanged")
 
 
 def test_effects_are_told_the_wearing_and_the_context(

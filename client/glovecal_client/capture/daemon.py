@@ -17,7 +17,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from glovecal_client.capture.computer import computer_id
 from glovecal_client.capture.device import Device, Reading, check_description
+from glovecal_client.capture.glove_commands import GloveCommands
 from glovecal_client.capture.link import CaptureLink, LinkSources
 from glovecal_client.capture.log_folder import LogFolder
 from glovecal_client.capture.log_queries import LogQueries
@@ -78,6 +80,7 @@ class CaptureDaemon:
         self._status = CaptureStatus(self._run_id, time.time_ns())
         self._check = ReadingCheck(device)
         self._refusal: str | None = None
+        self._commands = GloveCommands(device)
         self._earlier_runs: list[dict[str, Any]] = []
         self._flags = FrameFlag.SIMULATED if device.simulated else FrameFlag(0)
 
@@ -95,7 +98,7 @@ class CaptureDaemon:
     def _run_with_log(self, folder: LogFolder, stop: threading.Event) -> CaptureSummary:
         queries = LogQueries(folder)
         self._index = queries.index(self._run_id)
-        sources = LinkSources(self._status.text, self._meta_now, queries)
+        sources = LinkSources(self._status.text, self._meta_now, queries, self._commands.take)
         run = (self._status.started_wall_ns, self._run_id)
         self._link = CaptureLink(self._settings.keys, self._settings.endpoints, run, sources, self._report)
         reopening = ReopeningDevice(self._device)
@@ -104,6 +107,7 @@ class CaptureDaemon:
             self._link.start(stop.is_set)
             self._capture(reopening, stop)
         finally:
+            self._commands.close()
             reopening.close()
             syncing.close()
             self._log.close()
@@ -121,6 +125,8 @@ class CaptureDaemon:
                 self._beat()
                 next_status = time.monotonic() + _STATUS_PERIOD_S
             try:
+                if self._commands.waiting:
+                    self._commands.carry_out(is_open=device.is_open)
                 reading = device.read(_READ_TIMEOUT_S)
             except DeviceFinished as error:
                 self._report(str(error))
@@ -141,6 +147,7 @@ class CaptureDaemon:
         self._status.refusal, self._refusal = self._refusal, None
         damaged = getattr(self._device, "counters", None)
         self._status.damaged_frames = damaged.bad_frames if damaged is not None else 0
+        self._status.own_clock = getattr(self._device, "own_clock", None)
         self._link.publish_status()
         with contextlib.suppress(OSError):  # a disk that fails shows in the log's own problem
             self._index.extend()
@@ -205,6 +212,8 @@ class CaptureDaemon:
             "hand": getattr(device, "hand", "unknown"),
             "simulated": device.simulated,
             "rate_hz": device.rate_hz,
+            "computer": computer_id(),
+            "commands": dict(getattr(device, "commands", {})),
             "run_id": f"{self._run_id:016x}",
             "device": device.name,
             "started_wall_ns": self._status.started_wall_ns,

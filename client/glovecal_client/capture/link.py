@@ -30,6 +30,8 @@ class LinkSources:
     status: Callable[[], str]
     meta: Callable[[], str]
     log: LogQueries
+    command: Callable[[zenoh.Query], None]
+    """Has a command carried out and answers it, later and from another thread."""
 
 
 class CaptureLink:
@@ -113,7 +115,12 @@ class CaptureLink:
         )
         served = zenoh.handlers.Callback(self._hear_pose_meta, indirect=True)
         opened.enter_context(session.declare_subscriber(keys.pose_meta, served))
-        answers = {keys.status: self._answer_status, keys.meta: self._answer_meta, keys.log: self._answer_log}
+        answers: dict[str, Callable[[zenoh.Query], None]] = {
+            keys.status: self._answer_status,
+            keys.meta: self._answer_meta,
+            keys.log: self._answer_log,
+        }
+        answers[keys.control] = self._sources.command
         for key, answer in answers.items():
             opened.enter_context(session.declare_queryable(key, answer))
         for key in (keys.status, keys.meta):

@@ -32,6 +32,8 @@ class CaptureStatus:
     """Why readings were refused in the last second, None if none were."""
     disk_problem: str | None = None
     frames_not_logged: int = 0
+    own_clock: dict[str, Any] | None = None
+    """How the glove's own clock stands against the computer's, None for a glove without one."""
     _times: deque[int] = field(default_factory=lambda: deque(maxlen=241))
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
@@ -66,6 +68,7 @@ class CaptureStatus:
                 "frames_not_logged": self.frames_not_logged,
                 "sentence": self.disk_problem or self.refusal or self._silence(age) or self.sentence,
                 "run_id": f"{self.run_id:016x}",
+                "own_clock": self.own_clock,
                 "started_wall_ns": self.started_wall_ns,
                 "wall_ns": time.time_ns(),
             }

@@ -12,13 +12,15 @@ from typing import Literal
 import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.sensor_sensitivity import trained_ranges
+from glovecal_models.calibration.wearer_fit import Misfit, WearerFit
 from glovecal_models.takes.dead_sensor import dead_sensors
 from glovecal_models.takes.reading_faults import dropouts, spikes
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.take_check import check_take
 
-Part = Literal["capture", "cable", "sensor", "supply", "motion", "wearing", "model"]
+Part = Literal["capture", "cable", "sensor", "supply", "motion", "wearing", "wearer", "model"]
 
 SLOW_SHARE = 0.8
 """Of the nominal rate: fewer frames a second are too few."""
@@ -36,6 +38,9 @@ OUTSIDE_FRAMES = 0.25
 ALL_AT_ONCE = 0.6
 """Share of sensors beyond the same end: what they have in common is the supply."""
 FEWEST_TOGETHER = 3
+MOSTLY = 0.8
+"""Share of the frames at one value, from which on a sensor is looked at more closely."""
+MOST_NAMED = 4
 
 
 @dataclass(frozen=True)
@@ -53,11 +58,68 @@ def worn_glove_findings(
     """Of some seconds of frames, the hand in motion; ``model``: the one that is served, None without any."""
     low, high = _ranges(take, model)
     moved = np.ptp(take.readings, axis=0) >= np.fmax(MOVED_COUNTS, MOVED_SHARE * np.nan_to_num(high - low))
+    jumps = _jumps(take, low, high)
     return (
         *_rhythm(take, nominal_hz),
         *_sensors(take, moved),
-        *_jumps(take, low, high),
-        *_place(take, low, high),
+        *jumps,
+        *((not jumps and _wearer(take, model)) or _place(take, low, high)),
+    )
+
+
+def live_findings(
+    readings: np.ndarray, sensors: Sequence[str], fit: WearerFit | None, degrees: np.ndarray
+) -> tuple[GloveFinding, ...] | None:
+    """Of the last seconds of a glove that is used: ``readings`` (N, S), angles (N, R) by the served model.
+
+    Frames need not be in order. None while the hand does not move: then nothing can be said.
+    """
+    low, high = (np.full(len(sensors), np.nan),) * 2 if fit is None else (fit.low, fit.high)
+    travelled = np.ptp(readings, axis=0)
+    moved = travelled >= np.fmax(MOVED_COUNTS, MOVED_SHARE * np.nan_to_num(high - low))
+    if moved.mean() < FEW_MOVED:
+        return None
+    at_an_end = [
+        (readings == end).mean(axis=0) > MOSTLY for end in (readings.min(axis=0), readings.max(axis=0))
+    ]
+    suspect = (travelled <= 1.0) | at_an_end[0] | at_an_end[1]
+    found: list[GloveFinding] = []
+    if suspect.any():  # what takes a millisecond is done only then
+        take = Take("now", "", tuple(sensors), np.arange(float(len(readings))), readings)
+        found += _sensors(take, moved)
+    if fit is not None:
+        found += _misfit(fit.misfit(readings, degrees))
+    return tuple(found)
+
+
+def _wearer(take: Take, model: CalibrationModel | None) -> Sequence[GloveFinding]:
+    """Whether the model is that of somebody else; nothing where the supply explains the readings."""
+    if model is None:
+        return ()
+    low, high = _ranges(take, model)
+    if any(finding.part == "supply" for finding in _place(take, low, high)):
+        return ()
+    names = model.layout.sensors
+    if not set(names) <= set(take.sensors):
+        return ()
+    readings = take.readings[:, [take.sensors.index(name) for name in names]]
+    predictor = GlovePredictor(model)
+    return _misfit(
+        WearerFit(model, tuple(predictor.rotations)).misfit(readings, predictor.predict(readings).mean)
+    )
+
+
+def _misfit(found: Misfit) -> Sequence[GloveFinding]:
+    if not found.is_clear:
+        return ()
+    named = ", ".join(found.sensors[:MOST_NAMED])
+    who = "it may be a glove of the other hand" if found.is_sideways else "it may be another person's model"
+    return (
+        GloveFinding(
+            "wearer",
+            f"The readings do not fit the model ({named} go beyond what it learned): {who}.",
+            "Check who wears it and on which hand; if that is right, put it on again and do a quick check.",
+        ),
     )
 
 

@@ -17,7 +17,18 @@ import typer
 
 from glovecal_service.cli import demo, serve
 from glovecal_service.cli.effect import catalogue, changes, detectability, diagnosis, improvement
-from glovecal_service.cli.glove import capture, card, doctor, emulate, find_port, layouts, recordings, watch
+from glovecal_service.cli.glove import (
+    capture,
+    card,
+    card_session,
+    doctor,
+    emulate,
+    find_port,
+    layouts,
+    recordings,
+    shapes,
+    watch,
+)
 from glovecal_service.cli.job import jobs
 from glovecal_service.cli.model import ceiling, comparison, explain, models, quick_check, training, where
 from glovecal_service.cli.sampling import samplings
@@ -40,10 +51,12 @@ app.command("serve")(serve.serve)
 app.command("capture", cls=capture.WithDeviceOptions)(capture.capture)
 app.command("find-port")(find_port.find_port)
 app.command("emulate", cls=emulate.WithFaults)(emulate.emulate)
+app.command("card")(card_session.card)
 app.command("read-card")(card.read_card)
 app.command("watch")(watch.watch)
 app.command("doctor")(doctor.doctor)
 app.command("record")(recordings.record)
+app.command("shapes")(shapes.shapes)
 app.add_typer(samplings.app, name="sample")
 app.add_typer(subjects.app, name="subject")
 app.add_typer(layouts.app, name="glove")

@@ -52,6 +52,7 @@ class EmulatedCyberGlove3:
         self._pending = b""
         self._streaming = False
         self._active: str | None = None
+        self._wants_header = False
         self.destinations = {"u"}
         """The power-up state is not public: USB alone is chosen."""
         self.multiplier = 1
@@ -74,10 +75,10 @@ class EmulatedCyberGlove3:
     def record(self, now_s: float) -> bytes:
         """HH:MM:SS:FF:nS, 22 words, CR LF NUL."""
         words = self.words(now_s - (self._began_s or 0.0))
-        clock_s = self.clock_s(now_s)
-        sub_frames = int((clock_s - int(clock_s)) * FRAME_RATE * self.multiplier + 1e-6)
-        frame, sub_sample = divmod(min(sub_frames, FRAME_RATE * self.multiplier - 1), self.multiplier)
-        second = int(clock_s)
+        rate_hz = FRAME_RATE * self.multiplier
+        ticks = int(self.clock_s(now_s) * rate_hz + 1e-5)
+        second, sub_frames = divmod(ticks % (86400 * rate_hz), rate_hz)
+        frame, sub_sample = divmod(sub_frames, self.multiplier)
         stamp = f"{second // 3600:02}:{second // 60 % 60:02}:{second % 60:02}:{frame:02}:{sub_sample}S"
         return stamp.encode() + _WORDS.pack(*words) + _END
 
@@ -100,7 +101,14 @@ class EmulatedCyberGlove3:
     def next_due_s(self) -> float:
         if not self._streaming:
             return float("inf")
-        return self._started_s + self._tick / (FRAME_RATE * self.multiplier)
+        rate_hz = FRAME_RATE * self.multiplier * (1 + self.faults.drift)
+        return self._started_s + self._tick / rate_hz
+
+    def _next_tick_s(self, now_s: float) -> float:
+        """When its own clock next begins a sub-sample: one quartz drives clock and sampling (a choice)."""
+        rate_hz = FRAME_RATE * self.multiplier
+        ticks = self.clock_s(now_s) * rate_hz
+        return now_s + (int(ticks) + 1 - ticks) / (rate_hz * (1 + self.faults.drift))
 
     # ------------------------------------------------------------------ commands
     def feed(self, data: bytes, now_s: float) -> bytes:
@@ -109,7 +117,12 @@ class EmulatedCyberGlove3:
         out = b""
         for value in data:
             self._pending += bytes([value])
-            if self._complete(self._pending):
+            if self._wants_header:
+                if value == 1:
+                    self.card[self._active or ""] = card_header(self._pending[:-1].decode("latin-1"))
+                    self._pending, self._wants_header = b"", False
+                    out += b"\0"
+            elif self._complete(self._pending):
                 command, self._pending = self._pending, b""
                 self.commands.append(command)
                 out += self._run(command, now_s)
@@ -196,14 +209,15 @@ class EmulatedCyberGlove3:
         if letter == "G":
             return self.record(now_s)
         if letter == "S":
-            self._streaming, self._started_s, self._tick = True, now_s, 0
+            self._streaming, self._started_s, self._tick = True, self._next_tick_s(now_s), 0
             return b""
         return None
 
     def _clock(self, rest: bytes, now_s: float) -> bytes | None:
         if rest[:1] == b"g":
-            second = int(self.clock_s(now_s))
-            return f"{second // 3600:02}:{second // 60 % 60:02}:{second % 60:02}:00".encode()
+            clock_s = self.clock_s(now_s)
+            second, frame = int(clock_s), int(clock_s % 1 * FRAME_RATE)
+            return f"{second // 3600:02}:{second // 60 % 60:02}:{second % 60:02}:{frame:02}".encode()
         try:
             hour, minute, second = (int(part) for part in rest[1:].split(b":"))
         except ValueError:
@@ -212,11 +226,11 @@ class EmulatedCyberGlove3:
         return b"\0"
 
     def _open_file(self, name: str) -> bytes:
-        """An existing file answers 0x01, a new one 0x00. Its header text is taken as the name's."""
+        """An existing file answers 0x01, a new one 0x00 and then takes the header's text up to 0x01."""
         self._active = name
         if name in self.card:
             return b"\x01"
-        self.card[name] = card_header(f"recorded as {name}")
+        self._wants_header = True
         return b"\0"
 
 

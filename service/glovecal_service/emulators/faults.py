@@ -32,6 +32,9 @@ class Faults:
 
     def __init__(self, names: Collection[str] = (), seed: int = 0) -> None:
         self.names = set(names)
+        self.drift = DRIFT if "clock-drift" in self.names else 0.0
+        """What the glove's clock gains, s per s; another may be put here."""
+        self.offset_s = OFFSET_S if "clock-offset" in self.names else 0.0
         self._chance = random.Random(seed)
         self._stuck_at: float | None = None
 
@@ -56,9 +59,7 @@ class Faults:
 
     def clock_s(self, time_s: float) -> float:
         """What the glove's clock says at ``time_s``."""
-        drift = DRIFT if "clock-drift" in self.names else 0.0
-        offset = OFFSET_S if "clock-offset" in self.names else 0.0
-        return time_s * (1 + drift) + offset
+        return time_s * (1 + self.drift) + self.offset_s
 
     def battery_v(self, on_for_s: float) -> float:
         """Volts after so many seconds of use."""

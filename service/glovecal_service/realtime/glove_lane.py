@@ -11,6 +11,7 @@ from glovecal_client.wire.frame import Frame
 from glovecal_service.realtime.frame_gate import FrameGate, Standing
 from glovecal_service.realtime.frame_record import FrameRecord
 from glovecal_service.realtime.lane_effects import LaneEffects
+from glovecal_service.realtime.live_watch import LiveWatch
 from glovecal_service.realtime.refusal import RefusalCount, Refused
 from glovecal_service.realtime.served_model import ServedModel
 
@@ -49,6 +50,8 @@ class GloveLane:
         self.model_id: str | None = None
         self.effects: LaneEffects | None = None
         """State of its model's effects; None for a model without."""
+        self.watch: LiveWatch | None = None
+        """Its last seconds; None before the first pose."""
         self.record: FrameRecord | None = None
         """Put here by who wants the next frame's prediction written down; taken away with it."""
         self._waiting: deque[Waiting] = deque()
@@ -110,6 +113,15 @@ class GloveLane:
             self.effects = LaneEffects(model)
         return self.effects
 
+    def watch_of(self, frame: Frame, model: ServedModel | None, names: tuple[str, ...]) -> LiveWatch:
+        """What watches the run of ``frame`` with ``model``; ``names`` of its sensors, where known."""
+        watch, count = self.watch, len(frame.readings)
+        if watch is None or not watch.is_of(frame.run_id, model, count):
+            if len(names) != count:
+                names = tuple(f"sensor {number}" for number in range(1, count + 1))
+            watch = self.watch = LiveWatch(frame.run_id, model, names)
+        return watch
+
     def status(self, unheard: Callable[[str, Standing | None, int], int]) -> dict[str, Any]:
         """Counts for the status document, all of one moment. ``unheard``: as of ``CaptureReports``.
 
@@ -137,4 +149,5 @@ class GloveLane:
             "sequence": self.gate.sequence,
             "model": self.model_id,
             "effects": None if effects is None else effects.status(),
+            "warnings": [] if self.watch is None else self.watch.warnings(),
         }

@@ -23,7 +23,7 @@ from glovecal_service.realtime.pre_roll_request import PreRollRequest
 from glovecal_service.realtime.reconciliation import OutOfTime, Patience, fill_gaps, reconcile
 from glovecal_service.realtime.recording_account import Settlement, recording_account
 from glovecal_service.realtime.refusal import Refusal, Refused
-from glovecal_service.realtime.run_ledger import RunLedger, decoded
+from glovecal_service.realtime.run_ledger import OWN_CLOCK, RunLedger, decoded
 from glovecal_service.realtime.sequence_order import SequenceOrder
 from glovecal_service.store.recordings import PRE_ROLL
 
@@ -71,12 +71,14 @@ class LiveRecording:
         for arrival in self._arrivals.drain():
             self._record(arrival.payload, arrival.received_ns)
         for arrival in self._statuses.drain():
-            self._note_end_of_run(arrival.payload)
+            self._note_status(json_object(arrival.payload) or {})
 
-    def _note_end_of_run(self, message: bytes) -> None:
+    def _note_status(self, status: dict[str, Any]) -> None:
         """The last status of a run says how far it came; once capture is gone nobody can be asked."""
-        status = json_object(message) or {}
-        run_id, last = status.get("run_id"), status.get("sequence")
+        run_id, last, own = status.get("run_id"), status.get("sequence"), status.get(OWN_CLOCK)
+        for books in self.file.runs.values():
+            if f"{books.run_id:016x}" == run_id and isinstance(own, dict):
+                books.own_clock = own
         if status.get("state") != "stopped" or not isinstance(last, int):
             return
         for books in self.file.runs.values():

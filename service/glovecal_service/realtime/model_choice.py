@@ -17,6 +17,7 @@ from glovecal_service.store.store import Store
 
 Prepared = Mapping[tuple[str, tuple[str, ...]], ServedModel]
 """Models in use, by id and by the order in which their gloves send the sensors."""
+HANDS = ("left", "right")
 MOST_NAMED = 4
 
 
@@ -66,7 +67,25 @@ def choose(store: Store, glove: str, meta: Mapping[str, Any] | None, prepared: P
         return replace(serving, sentence=_why_none(store, serving, models, active, sent))
     newest = max(fitting, key=lambda item: item.activation)
     chain = _chain(store, newest.record)
-    return _first_that_loads(store, chain, newest.record.layout, serving, sent, prepared)
+    found = _first_that_loads(store, chain, newest.record.layout, serving, sent, prepared)
+    return replace(
+        found, sentence="; ".join(filter(None, [_other_hand(store, subject, glove, meta), found.sentence]))
+    )
+
+
+def _other_hand(store: Store, subject: str, glove: str, meta: Mapping[str, Any] | None) -> str:
+    """That glove and wearer are said to be of different hands, a clause; "" where they are not."""
+    said = (meta or {}).get("hand")
+    try:
+        hand = store.subjects.get(subject).hand
+    except NotFound:
+        return ""
+    if said not in HANDS or hand == said:
+        return ""
+    return (
+        f"wrong hand: {glove} is a {said} glove and {subject} a {hand} hand; exchange the gloves, or say who "
+        f"wears this one: glovecal glove wear {glove} SUBJECT"
+    )
 
 
 def _sensors_sent(store: Store, layout: str, meta: Mapping[str, Any] | None) -> tuple[str, ...] | None:

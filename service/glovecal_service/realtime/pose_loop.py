@@ -178,6 +178,8 @@ class PoseLoop:
             )  # fmt: skip
             self._publish(lane.glove, message)
             lane.note_pose(message, received_ns, model.model_id)
+            watch = lane.watch_of(frame, model, model.sensors)
+            watch.add(frame.monotonic_ns, frame.readings, angles.mean[row])
             record = lane.record  # another thread takes it away when it waited too long
             if record is not None and record.is_of(frame):
                 record.served(angles.row(row))
@@ -195,6 +197,8 @@ class PoseLoop:
             message = encode_pose(pose)
             self._publish(lane.glove, message)
             lane.note_pose(message, received_ns, None)
+            watch = lane.watch_of(frame, None, self._worn.of(lane.glove).sensors)
+            watch.add(frame.monotonic_ns, frame.readings, None)
 
     def _open(self, lane: GloveLane, limit: int) -> list[tuple[Frame, int]]:
         self._pending.pop(lane)

@@ -10,7 +10,7 @@ from typing import Any
 from glovecal_models.errors import BadInput
 from glovecal_service.realtime.recording_account import Settlement
 from glovecal_service.realtime.recording_take import read_take
-from glovecal_service.realtime.run_ledger import SUFFIX
+from glovecal_service.realtime.run_ledger import OWN_CLOCK, SUFFIX
 from glovecal_service.store.errors import NotFound
 from glovecal_service.store.recordings import ENDED_BY
 from glovecal_service.store.records import RecordingRecord, TakeRecord
@@ -48,8 +48,8 @@ def keep_as_take(
         wearing=record.wearing or "",
         first_sequence=account["first_sequence"],
     )
-    accounting = {**account, **recorded.clock}
     take = _stored_before(store, subject, record)
+    accounting = {**account, **recorded.clock, OWN_CLOCK: _own_clock(account, take)}
     if take is None and "take" in record.facts:
         return {"sentence": f"{sentence}; its take was removed"}
     if take is None:
@@ -65,6 +65,12 @@ def keep_as_take(
     elif take.accounting != accounting:
         take = store.takes.repair(take.id, recorded.take, accounting)
     return {"take": take.id, "sentence": sentence}
+
+
+def _own_clock(account: dict[str, Any], stored: TakeRecord | None) -> dict[str, Any] | None:
+    """Of the last run that has one; a repair reads the frames again, and no status."""
+    said = [run[OWN_CLOCK] for run in account["runs"] if OWN_CLOCK in run]
+    return said[-1] if said else ((stored and stored.accounting) or {}).get(OWN_CLOCK)
 
 
 def _stored_before(store: Store, subject: str, record: RecordingRecord) -> TakeRecord | None:

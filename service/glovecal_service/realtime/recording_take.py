@@ -22,7 +22,8 @@ class RecordedTake:
     take: Take
     clock: dict[str, Any]
     """``wall_minus_time_s``: add it to ``time_s`` for seconds since 1970; ``begins_s``: ``time_s`` of the
-    first frame that was asked for, after the pre-roll; ``left_out``: frames not taken."""
+    first frame that was asked for, after the pre-roll; ``left_out``: frames not taken; ``computer``: whose
+    monotonic clock ``time_s`` is of, null where capture did not say."""
 
 
 def read_take(path: Path, *, name: str, wearing: str, first_sequence: int = 0) -> RecordedTake:
@@ -62,7 +63,12 @@ def read_take(path: Path, *, name: str, wearing: str, first_sequence: int = 0) -
         begins_s=begins_s if lead else None,
     )
     offset = taken[lead].wall_ns / 1e9 - begins_s
-    clock = {"wall_minus_time_s": offset, "begins_s": begins_s, "left_out": len(frames) - len(taken)}
+    clock: dict[str, Any] = {
+        "wall_minus_time_s": offset,
+        "begins_s": begins_s,
+        "left_out": len(frames) - len(taken),
+    }
+    clock["computer"] = meta.get("computer")
     return RecordedTake(take, clock)
 
 

@@ -20,6 +20,7 @@ SUFFIX = ".glog"
 BEGIN = "begin"
 """Of the header: ``run_id``, ``sequence`` and ``wall_ns`` (its clock) where capture stood when the recording
 began. Where it did not say so the recording begins with the first frame that came."""
+OWN_CLOCK = "own_clock"
 CREATED = "created_wall_ns"
 LEFT_FREE_BYTES = 256 << 20
 """Of the disk, for frames that were asked for: hours of one glove."""
@@ -41,6 +42,8 @@ class RunBooks:
     """Of the last frame recorded."""
     ended: bool = False
     """Capture said that the run is over, and that ``last`` was its last frame."""
+    own_clock: dict[str, Any] | None = None
+    """How the glove's own clock stood against the computer's, as capture said last."""
     earlier: list[RunBooks] = field(default_factory=list)
     """What came before each jump of the publisher's numbers; the numbers jumped over were never sent."""
 
@@ -92,7 +95,7 @@ class RunBooks:
             "recorded": self.recorded_frames,
             "repaired": self.repaired,
             "missing": [list(gap) for gap in self.missing()],
-        }
+        } | ({} if self.own_clock is None else {OWN_CLOCK: self.own_clock})
 
 
 class RunLedger:

@@ -95,4 +95,4 @@ class ServiceStatus:
 
 def _nothing_received(missing: int) -> dict[str, Any]:
     counts = dict.fromkeys(("received", "predicted", "skipped", "waiting"), 0)
-    return {"sent": missing, "missing": missing, **counts, "refused": {}}
+    return {"sent": missing, "missing": missing, **counts, "refused": {}, "warnings": []}

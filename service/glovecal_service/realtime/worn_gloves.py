@@ -24,6 +24,8 @@ class WornGlove:
     """Names of a frame's context values, in order."""
     latency_ns: int = 0
     """How long before a frame's time the hand was as it shows; 0 if nobody measured it."""
+    sensors: tuple[str, ...] = ()
+    """Names of a frame's readings, in order; empty while capture has not said them."""
 
     @classmethod
     def of(
@@ -34,7 +36,9 @@ class WornGlove:
         names = meta.get("context")
         context = tuple(map(str, names)) if isinstance(names, list) else ()
         latency_ns = 0 if latency is None else round(1e9 * latency.seconds)
-        return cls(str(meta.get("run_id") or ""), wearing or "", context, latency_ns)
+        said = meta.get("sensors")
+        sensors = tuple(map(str, said)) if isinstance(said, list) else ()
+        return cls(str(meta.get("run_id") or ""), wearing or "", context, latency_ns, sensors)
 
     def wearing_of(self, frame: Frame) -> str:
         """A run of which nothing was said yet is a wearing of its own, without a name."""

@@ -20,7 +20,7 @@ from glovecal_service.rest.effect import (
     picture,
     trial,
 )
-from glovecal_service.rest.glove import layouts, recordings
+from glovecal_service.rest.glove import commands, layouts, live, recordings
 from glovecal_service.rest.http import front, health
 from glovecal_service.rest.http.answers import install_openapi
 from glovecal_service.rest.http.body_guard import BodyGuard
@@ -51,9 +51,11 @@ from glovecal_service.rest.subject import subjects, usual_hand
 from glovecal_service.rest.take import (
     clocks,
     examination,
+    hands,
     holds,
     motion,
     reference,
+    session_drift,
     table_import,
     takes,
     uploads,
@@ -65,8 +67,8 @@ JSON_LIMIT_BYTES = 8_000_000
 """Enough for 20,000 frames of 18 sensors to predict."""
 BODY_PATIENCE_S = 30.0
 ROUTERS = (
-    *(subjects, usual_hand, layouts, recordings, samplings),
-    *(clocks, holds, examination, table_import, takes, reference, uploads, motion),
+    *(subjects, usual_hand, layouts, live, commands, recordings, samplings),
+    *(clocks, hands, session_drift, holds, examination, table_import, takes, reference, uploads, motion),
     *(
         training,
         model_import,

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from glovecal_client.wire.pose import Pose
 
-Word = Literal["lost", "uncalibrated", "stale", "settling", "faulty sensor", "ok", "unwatched"]
+Word = Literal["lost", "uncalibrated", "stale", "settling", "faulty sensor", "check", "ok", "unwatched"]
 
 SENTENCES: dict[Word, str] = {
     "lost": "No frames arrive: glove, cable or capture daemon.",
@@ -17,6 +17,7 @@ SENTENCES: dict[Word, str] = {
     "stale": "The last pose is old: do not use it.",
     "settling": "An effect with a memory started anew; its correction is not complete yet.",
     "faulty sensor": "A sensor fails now: its joints keep their last good angles.",
+    "check": "Something is wrong with glove or wearer.",
     "ok": "Calibrated poses arrive.",
     "unwatched": "Frames arrive.",
 }
@@ -53,7 +54,14 @@ def glove_state(
     """From the capture daemon's ``status``, whether that is old, the newest pose of a watched glove, and the
     service's own ``account`` of the glove."""
     word, account = _word(status, is_silent, pose, is_stale), account or {}
-    told = {"lost": "" if is_silent else status.get("sentence"), "uncalibrated": account.get("sentence")}
+    warning = _warning(account)
+    if warning and word in ("ok", "settling"):
+        word = "check"
+    told = {
+        "lost": "" if is_silent else status.get("sentence"),
+        "uncalibrated": account.get("sentence"),
+        "check": warning,
+    }
     is_here = word not in ("lost", "stale")
     refused = account.get("refused")
     return GloveState(
@@ -67,6 +75,16 @@ def glove_state(
         refused=int(sum(_number(each) or 0 for each in refused.values())) if isinstance(refused, dict) else 0,
         model=None if pose is None else pose.model_sha256,
     )
+
+
+def _warning(account: Mapping[str, Any]) -> str:
+    """What the service noticed in the last seconds, and that glove and wearer are of different hands."""
+    warnings, said = account.get("warnings"), account.get("sentence")
+    told = [said] if isinstance(said, str) and said.startswith("wrong hand") else []
+    for one in warnings if isinstance(warnings, list) else ():
+        if isinstance(one, dict):
+            told.append(f"{one.get('sentence')} {one.get('advice')}")
+    return " ".join(told)
 
 
 def _number(value: Any) -> float | None:

@@ -86,3 +86,11 @@ def test_two_takes_of_one_hand_are_no_pair(client: RestClient) -> None:
     take = takes(client)[0]
     with pytest.raises(Refused, match="of the same hand"):
         client.made("/motion", {"takes": [take, take], "content": "raw"})
+
+
+def test_hands_of_imported_tables_are_joined_as_they_are_and_said_so(client: RestClient) -> None:
+    found = client.post("/takes/hands", {"takes": takes(client)})
+    assert (found["how"], found["shift_s"], found["sd_s"]) == ("assumed", 0, None)
+    assert "Record a clap" in found["sentence"]
+    with pytest.raises(Refused, match=r"clap"):
+        client.post("/takes/hands", {"takes": takes(client), "claps": True})

@@ -58,6 +58,15 @@ def test_why_it_is_uncalibrated_and_what_was_lost_comes_from_the_service() -> No
     assert (state.lost, state.refused, state.skipped) == (4, 3, 3)
 
 
+def test_what_was_noticed_in_the_last_seconds_is_shown_first() -> None:
+    warning = {"part": "wearer", "sentence": "The readings do not fit.", "advice": "Check who wears it."}
+    state = glove_state(STREAMING, False, POSE, False, {"warnings": [warning], "sentence": ""})
+    assert (state.word, state.sentence) == ("check", "The readings do not fit. Check who wears it.")
+    state = glove_state(STREAMING, False, POSE, False, {"sentence": "wrong hand: r is a left glove"})
+    assert (state.word, state.sentence) == ("check", "Wrong hand: r is a left glove.")
+    assert glove_state(STREAMING, False, POSE, False, {"warnings": "junk"}).word == "ok"
+
+
 @pytest.mark.parametrize("junk", [None, "60", [], {"a": 1}, float("nan"), True])
 def test_numbers_that_are_none_are_not_shown(junk: Any) -> None:
     account = {"missing": junk, "refused": {"x": junk}, "sentence": junk}

@@ -18,6 +18,7 @@ START = b"1S"
 _REPLY_S = 0.5
 _TRIES = 3
 _QUIET_S = 0.1
+_NUL, _LINE_FEED = re.compile(rb"\0\Z"), re.compile(rb"\n\Z")
 _VOLTAGE = re.compile(rb"([0-9]{4,5})\s*Volts")
 
 
@@ -34,7 +35,7 @@ def command(link: Link, sent: bytes) -> Reply:
     """Give a command. Raises DeviceLost when nothing ended with NUL comes back, three times."""
     heard = b""
     for _ in range(_TRIES):
-        heard = _ask(link, sent, b"\0")
+        heard = ask(link, sent, _NUL)
         if heard.endswith(b"\0"):
             return Reply(heard, sent in heard)
         quiet(link)
@@ -51,15 +52,15 @@ def quiet(link: Link) -> None:
 
 def battery_volts(link: Link) -> float | None:
     """The battery's voltage; None if the glove does not tell. Its answer says Volts and means millivolts."""
-    found = _VOLTAGE.search(_ask(link, b"V", b"\n"))
+    found = _VOLTAGE.search(ask(link, b"V", _LINE_FEED))
     link.read(_QUIET_S)  # a NUL may follow, in one source it does not
     return None if found is None else int(found[1]) / 1000
 
 
-def _ask(link: Link, sent: bytes, end: bytes) -> bytes:
-    """Send, and read until ``end`` comes last or the time for a reply is over."""
+def ask(link: Link, sent: bytes, end: re.Pattern[bytes]) -> bytes:
+    """Send, and read until ``end`` is found or the time for a reply is over."""
     link.write(sent)
     deadline, heard = time.monotonic() + _REPLY_S, b""
-    while not heard.endswith(end) and (left_s := deadline - time.monotonic()) > 0:
+    while end.search(heard) is None and (left_s := deadline - time.monotonic()) > 0:
         heard += link.read(left_s)
     return heard

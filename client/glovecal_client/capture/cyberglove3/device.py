@@ -6,16 +6,19 @@ records. Readings are counts from 1 to 4095, sixteen times as fine as those of t
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from glovecal_client.capture.cyberglove.order import SENSORS, hardware_order
+from glovecal_client.capture.cyberglove3.card_commands import COMMANDS, run_command
 from glovecal_client.capture.cyberglove3.conversation import START, STOP, battery_volts, command, quiet
 from glovecal_client.capture.cyberglove3.record import LARGEST, TimedRecordReader
 from glovecal_client.capture.device_clock import DeviceClock
+from glovecal_client.capture.own_clock import OwnClock
 from glovecal_client.capture.stream.links import Link
 from glovecal_client.capture.stream.option_values import COMMON_HELP, OptionValues
 from glovecal_client.capture.stream.parser import Counters, Sample, StreamParser
 from glovecal_client.capture.stream.streamed_glove import StreamedGlove
+from glovecal_client.errors import BadOption
 
 _LOW_BATTERY_V = 6.8
 """Of two lithium cells; the manual names no limit, so this is ours."""
@@ -28,11 +31,13 @@ class CyberGlove3(StreamedGlove):
 
     name = "cyberglove3"
     counts = (1.0, float(LARGEST))
+    commands: ClassVar = COMMANDS
     option_help: ClassVar = {
         "layout": f"{'|'.join(LAYOUTS)} (cyberglove3-22)",
         "multiplier": "1|2|3|4 (3): records for each frame of its clock; 4 may lose records over WiFi",
         "frame_rate": "HZ of its clock (30; other with an LTC signal)",
         "clock": "computer|glove (computer; glove takes times from the records)",
+        "timecode": "none|ltc (none; ltc: its clock follows an LTC signal that others follow too)",
         "destinations": "set|leave (set; leave sends no 1e and 1d, after which one left glove stopped)",
         "battery": "ask|leave (ask)",
         "baud": "BAUD (115200)",
@@ -50,8 +55,21 @@ class CyberGlove3(StreamedGlove):
         self._by_its_clock = options.choice("clock", {"computer": False, "glove": True})
         self._set_destinations = options.choice("destinations", {"set": True, "leave": False})
         self._ask_battery = options.choice("battery", {"ask": True, "leave": False})
+        self.clock_kind = options.choice("timecode", {"none": "own", "ltc": "ltc"})
+        self._on_card = False
         self._over_network = address.startswith("tcp:")
         self.rate_hz = self._frame_rate * self._multiplier
+
+    def command(self, name: str, argument: str) -> dict[str, Any]:
+        """One of ``card_commands``; the stream pauses meanwhile. Raises DeviceLost, BadOption.
+
+        A recording on the card would pause too, so until it is stopped nothing else is asked.
+        """
+        if self._on_card and name != "stop":
+            raise BadOption(f"the glove records on its card: stop that before {name!r}")
+        answer = self.between_records(lambda link: run_command(link, name, argument, self._frame_rate))
+        self._on_card = bool(answer.get("recording", False))
+        return answer
 
     def start(self, link: Link) -> None:
         """Quiet, battery, destinations, rate, stream. Raises DeviceLost."""
@@ -72,12 +90,15 @@ class CyberGlove3(StreamedGlove):
         return TimedSamples(self.counters, self.sensors, self._frame_rate, self._multiplier)
 
     def new_clock(self) -> DeviceClock | None:
+        return DeviceClock(*self._ticks()) if self._by_its_clock else None
+
+    def new_own_clock(self) -> OwnClock | None:
+        return OwnClock(*self._ticks())
+
+    def _ticks(self) -> tuple[float, int]:
+        """A second, and a day, after which its clock begins anew."""
         ticks_per_second = self._frame_rate * self._multiplier
-        return (
-            DeviceClock(ticks_per_second, int(_SECONDS_A_DAY * ticks_per_second))
-            if self._by_its_clock
-            else None
-        )
+        return ticks_per_second, int(_SECONDS_A_DAY * ticks_per_second)
 
 
 class TimedSamples:

@@ -9,14 +9,15 @@ import contextlib
 import logging
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import PurePath
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
 from glovecal_client.capture.device import Reading
 from glovecal_client.capture.device_clock import DeviceClock
+from glovecal_client.capture.own_clock import OwnClock
 from glovecal_client.capture.stream.links import Link, Place, place_of
 from glovecal_client.capture.stream.option_values import COMMON_HELP, OptionValues
 from glovecal_client.capture.stream.parser import Counters, Sample, StreamParser
@@ -32,6 +33,7 @@ _FIRST_S = 4.0
 """Until the first record: a microcontroller restarts when its port is opened."""
 _GARBAGE_S = 2.0
 _logger = logging.getLogger(__name__)
+Said = TypeVar("Said")
 
 
 class StreamedGlove:
@@ -44,6 +46,8 @@ class StreamedGlove:
     counts: tuple[float, float] | None = None
     rate_hz = 60.0
     baud = 115200
+    clock_kind = "own"
+    """Or "ltc": its clock follows a time code that other devices follow too."""
     option_help: ClassVar[dict[str, str]] = dict(COMMON_HELP)
 
     def __init__(self, address: str, options: OptionValues) -> None:
@@ -58,6 +62,7 @@ class StreamedGlove:
         self._link: Link | None = None
         self._ready: deque[Reading] = deque()
         self._last_ns = 0
+        self._own_clock: OwnClock | None = None
 
     @classmethod
     def from_options(cls, argument: str | None, options: Mapping[str, str]) -> Self:
@@ -71,6 +76,10 @@ class StreamedGlove:
 
     def new_clock(self) -> DeviceClock | None:
         """The clock behind the samples' ticks, None to go by the time of arrival."""
+        return None
+
+    def new_own_clock(self) -> OwnClock | None:
+        """What measures the clock behind the samples' ticks, None for a glove without one."""
         return None
 
     def start(self, link: Link) -> None:
@@ -94,6 +103,7 @@ class StreamedGlove:
             raise
         self._parser = self.new_parser()
         self._clock = self.new_clock()
+        self._own_clock = self._own_clock or self.new_own_clock()
         self._silent_s = self._useless_s = 0.0
         self._seen_one = False
         self._link = link
@@ -122,6 +132,32 @@ class StreamedGlove:
             if not self._ready and time.monotonic() >= deadline:
                 return None
         return self._ready.popleft()
+
+    @property
+    def own_clock(self) -> dict[str, Any] | None:
+        """How the glove's own clock stands against the computer's; None while that is not known."""
+        line = None if self._own_clock is None else self._own_clock.line
+        return None if line is None else {"kind": self.clock_kind, **line.document()}
+
+    def between_records(self, say: Callable[[Link], Said]) -> Said:
+        """Pause the stream, ``say`` something to the glove, and go on. Raises DeviceLost and what it raises.
+
+        Records that were on their way are lost with the pause; those read already are not.
+        """
+        if self._link is None:
+            raise DeviceLost(f"the glove at {self._place.name} is not open")
+        try:
+            self.stop(self._link)
+            try:
+                answer = say(self._link)
+            finally:
+                self.start(self._link)
+        except DeviceLost:
+            self._let_go()
+            raise
+        self._parser = self.new_parser()
+        self._silent_s = self._useless_s = 0.0
+        return answer
 
     def close(self) -> None:
         """Stop the glove and let go of everything; harmless when already closed.
@@ -165,6 +201,8 @@ class StreamedGlove:
         now_ns, offset_ns = time.monotonic_ns(), time.time_ns() - time.monotonic_ns()
         readings = []
         for behind, sample in zip(range(len(samples) - 1, -1, -1), samples, strict=True):
+            if self._own_clock is not None and sample.ticks is not None:
+                self._own_clock.note(sample.ticks, now_ns)
             if self._clock is not None and sample.ticks is not None:
                 stamp = self._clock.monotonic_ns(sample.ticks, now_ns)
             else:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from glovecal_service.cli.glove.beside import video_beside, warn_of_cold_gloves
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Glove, subject_named
 from glovecal_service.cli.terminal.printing import err, out, print_json
@@ -36,27 +38,73 @@ def record(
             help="Pre-roll: seconds before the take to fetch from the capture log, for effects with memory.",
         ),
     ] = 60.0,
+    both: Annotated[
+        str | None, typer.Option("--with", metavar="GLOVE", help="The other hand, recorded at the same time.")
+    ] = None,
+    video: Annotated[
+        str | None, typer.Option(help="Film it: camera:0, or rendered to try; into this folder.")
+    ] = None,
+    warm_up: Annotated[bool, typer.Option("--warm-up", help="Wait until the gloves are warm.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Record a take from a glove that is streaming to the service. Ctrl-C stops it early."""
-    wanted = {"glove": glove, "name": name, "subject": subject, "wearing": wearing, "lead_s": pre_roll}
+    """Record a take from a glove that is streaming to the service, or both hands. Ctrl-C stops it early."""
+    if both is not None and subject is not None:
+        raise typer.BadParameter("with two gloves the wearers are those of the gloves; leave --subject out")
+    gloves = [glove] if both is None else [glove, both]
+    wanted = {"name": name, "subject": subject, "wearing": wearing, "lead_s": pre_roll}
     with connect() as service:
-        started = service.post(
-            "/recordings", {key: value for key, value in wanted.items() if value is not None}
-        )
-        try:
-            _wait_for_the_recorder(service, started["id"], glove)
-            err.print(f"Recording {name} for {seconds:g} s; Ctrl-C stops early.")
-            wait_seconds(seconds, f"recording {name}", quiet=as_json)
-        except KeyboardInterrupt:
-            err.print("Stopped.")
-        except SystemExit:
-            service.post(f"/recordings/{started['id']}/stop")
-            raise
-        finished = service.finish_recording(started["id"])
+        warn_of_cold_gloves(service, gloves, wait=warm_up)
+        with video_beside(video, name) as film:
+            started = start_takes(service, gloves, wanted)
+            try:
+                err.print(f"Recording {name} for {seconds:g} s; Ctrl-C stops early.")
+                wait_seconds(seconds, f"recording {name}", quiet=as_json)
+            except KeyboardInterrupt:
+                err.print("Stopped.")
+            except SystemExit:
+                _stop(service, started)
+                raise
+            finished = finish_takes(service, started)
+            if film is not None:
+                takes = [one["facts"].get("take") for one in finished]
+                about = film.describe(takes=takes)
+                err.print(f"Video: {film.pictures} pictures, described in {about}.")
     if as_json:
-        print_json(finished)
+        print_json(finished[0] if both is None else finished)
         return
+    for one in finished:
+        _tell(one, told_pre_roll=bool(pre_roll))
+
+
+def start_takes(
+    service: RestClient, gloves: Sequence[str], wanted: Mapping[str, Any]
+) -> list[dict[str, Any]]:
+    """Ask for a recording of each glove and wait until all go on. Raises NobodyThere; then none goes on."""
+    known = {key: value for key, value in wanted.items() if value is not None}
+    started: list[dict[str, Any]] = []
+    try:
+        for glove in gloves:
+            started.append(service.post("/recordings", {"glove": glove, **known}))
+        for one in started:
+            _wait_for_the_recorder(service, one["id"], one["glove"])
+    except BaseException:
+        _stop(service, started)
+        raise
+    return started
+
+
+def finish_takes(service: RestClient, started: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Stop all, then wait for their accounts."""
+    _stop(service, started)
+    return [service.finish_recording(one["id"]) for one in started]
+
+
+def _stop(service: RestClient, started: Sequence[Mapping[str, Any]]) -> None:
+    for one in started:
+        service.post(f"/recordings/{one['id']}/stop")
+
+
+def _tell(finished: Mapping[str, Any], *, told_pre_roll: bool) -> None:
     facts = finished["facts"]
     if "take" in facts:
         out.print(
@@ -69,7 +117,7 @@ def record(
             "glovecal take list shows its state.",
             style="yellow",
         )
-    if pre_roll and "take" in facts:
+    if told_pre_roll and "take" in facts:
         out.print(f"Pre-roll: {facts['pre_roll']['sentence']}.")
 
 
@@ -78,7 +126,6 @@ def _wait_for_the_recorder(service: RestClient, recording: str, glove: str) -> N
     until = time.monotonic() + BEGINS_WITHIN_S
     while service.get(f"/recordings/{recording}")["state"] == "requested":
         if time.monotonic() > until:
-            service.post(f"/recordings/{recording}/stop")
             raise NobodyThere(
                 f"recording {recording} of glove {glove} did not start within {BEGINS_WITHIN_S:g} s; is "
                 "glovecal serve running on this data folder?"

@@ -68,6 +68,7 @@ class _Counts:
         from glovecal_service.realtime.service_status import all_service_statuses
 
         self.newest: dict[str, int] | None = None
+        self.warnings: list[str] = []
         self._glove = glove
         handler = zenoh.handlers.Callback(self._hear, indirect=True)
         self._subscriber = session.declare_subscriber(all_service_statuses(site), handler)
@@ -81,6 +82,7 @@ class _Counts:
 
     def _note(self, status: dict[str, Any]) -> None:
         counts = status.get("gloves", {}).get(self._glove, {})
+        self.warnings = [f"{one['sentence']} {one['advice']}" for one in counts.get("warnings", [])]
         if "sent" in counts:
             names = ("sent", "received", "missing", "predicted", "skipped")
             self.newest = {name: counts[name] for name in names}
@@ -137,6 +139,7 @@ def _document(poses: PoseSubscriber, counts: _Counts, pose: Pose) -> dict[str, A
         "age_ms": pose.age_us / 1000,
         "skipped": pose.skipped,
         "frames": counts.newest,
+        "warnings": counts.warnings,
         "degrees": dict(zip(names, (round(float(v), 3) for v in pose.degrees), strict=True)),
         "sd_deg": dict(zip(names, (round(float(v), 3) for v in pose.deviations), strict=True)),
     }
@@ -153,6 +156,7 @@ def _picture(poses: PoseSubscriber, counts: _Counts, pose: Pose | None, glove: s
     names = _names(poses, pose)
     frames = ", ".join(f"{name} {count}" for name, count in (counts.newest or {}).items())
     lines = [Text(f"frames: {frames}")] if frames else []
+    lines += [Text(warning, style="yellow") for warning in counts.warnings]
     return Group(Text(title, style="bold"), *lines, *([_rotations(names, pose)] if names else []))
 
 

@@ -34,8 +34,11 @@ def motion(
     ] = None,
     shift: Annotated[
         list[float] | None,
-        typer.Option(help="Seconds added to each take's times, where two computers recorded."),
+        typer.Option(help="Seconds added to each take's times; default: as take hands tells."),
     ] = None,
+    claps: Annotated[
+        bool, typer.Option("--claps", help="Join two hands by claps that both gloves felt.")
+    ] = False,
     overwrite: Overwrite = False,
 ) -> None:
     """Write one hand or both as motion: TRC for OpenSim and MotionBuilder, CSV or Parquet for analysis."""
@@ -53,5 +56,6 @@ def motion(
             "content": content,
             "format": chosen.suffix.removeprefix("."),
             "shifts_s": shift or [],
+            "claps": claps,
         }
         write_whole({file: service.made("/motion", body)})

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from glovecal_client.errors import ServiceError
-from glovecal_service.cli.take import clocks, examination, holds, latency, motion, table_import
+from glovecal_service.cli.take import clocks, examination, hands, holds, latency, motion, table_import
 from glovecal_service.cli.take.rows import find_take, find_takes, print_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, OnlySubject, Take, identifier
@@ -23,6 +23,7 @@ app.command("import")(table_import.import_takes)
 app.command("clocks")(clocks.clocks)
 app.command("latency")(latency.latency)
 app.command("examine")(examination.examine)
+app.command("hands")(hands.hands)
 app.command("holds")(holds.holds)
 app.command("motion")(motion.motion)
 

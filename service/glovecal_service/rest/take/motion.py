@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +19,7 @@ from glovecal_service.exports.take_motion import motion_of
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.request_types import ModelReference, StrictBody, TakeReference
+from glovecal_service.rest.take.hands import hand_alignment
 from glovecal_service.store.errors import Conflict
 
 router = APIRouter(prefix="/motion", tags=["takes"])
@@ -43,8 +45,9 @@ class Motion(StrictBody):
     )
     shifts_s: Annotated[list[Shift], Field(max_length=MOST_HANDS)] = Field(
         default_factory=list,
-        description="Added to each take's times, where two takes do not come from one capture computer.",
+        description="Added to each take's times. Not given: two takes are joined as `takes/hands` says.",
     )
+    claps: bool = Field(False, description="Join two takes by claps that both gloves felt.")
 
 
 @router.post(
@@ -74,6 +77,9 @@ def export_motion(body: Motion, parts: PartsNeeded) -> FileResponse:
     labels = [one.label for one in hands]
     if len(set(labels)) < len(labels):
         raise BadInput("both takes are of the same hand; one of the two subjects has the other hand")
+    if len(hands) == MOST_HANDS and not body.shifts_s:
+        found, _ = hand_alignment(parts.store, body.takes[0], body.takes[1], claps=body.claps)
+        hands[1] = replace(hands[1], time_s=found.onto_first(hands[1].time_s))
     hands = on_one_time(hands, body.shifts_s)
     folder = tempfile.TemporaryDirectory(prefix="glovecal-motion-")
     try:

@@ -8,12 +8,18 @@ from nicegui import ui
 
 from glovecal_service.studio.pages.capture_recording import RecordingPage
 from glovecal_service.studio.pages.capture_sampling import SamplingPage
+from glovecal_service.studio.pages.capture_session import SessionPage
 from glovecal_service.studio.pages.capture_start import SamplingForm, WearingForm
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.shell import shell
 from glovecal_service.studio.studio import Studio
 
-MODES = {"sampling": "Guided sampling", "recording": "Free recording", "wearing": "New wearing"}
+MODES = {
+    "sampling": "Guided sampling",
+    "recording": "Free recording",
+    "wearing": "New wearing",
+    "session": "Session",
+}
 AGAIN_EVERY_S = 2.0
 PATIENCE_S = 30.0
 """A busy computer takes longer than the library's three seconds to ask for all that stands on the page."""
@@ -51,6 +57,9 @@ class CapturePage:
         with self._main:
             if self._mode == "recording":
                 await RecordingPage(self._studio, gloves).build(await self._proposed(proposal))
+                return
+            if self._mode == "session":
+                await SessionPage(self._studio).build()
                 return
             view = await self._open_sampling(sampling)
             if view is not None:

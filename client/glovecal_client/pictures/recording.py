@@ -1,0 +1,78 @@
+"""A video beside a take: pictures of a source to disk, in a thread of its own, until it is stopped."""
+
+from __future__ import annotations
+
+import json
+import threading
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from glovecal_client.capture.computer import computer_id
+from glovecal_client.errors import ClientError
+from glovecal_client.pictures.source import PictureSource
+from glovecal_client.pictures.video_file import VideoWriter
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # the client runs on Python 3.10
+
+STOPS_WITHIN_S = 10.0
+
+
+class VideoRecording:
+    """Records from ``with`` on. What ends it early stands in ``problem``; pictures so far are kept."""
+
+    def __init__(self, source: PictureSource, path: Path) -> None:
+        """Raises DeviceError for a file that cannot be."""
+        self.problem = ""
+        self._source, self._path = source, path
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="video", daemon=True)
+        self._writer: VideoWriter | None = None
+
+    def __enter__(self) -> Self:
+        """Raises DeviceLost when there is no camera, DeviceError when the file is there already."""
+        self._source.open()
+        try:
+            self._writer = VideoWriter(self._path, self._source.rate_hz)
+        except BaseException:
+            self._source.close()
+            raise
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+    def stop(self) -> None:
+        """End it; harmless when it has ended."""
+        self._stop.set()
+        self._thread.join(STOPS_WITHIN_S)
+        self._source.close()
+        if self._writer is not None:
+            self._writer.close()
+
+    @property
+    def pictures(self) -> int:
+        return 0 if self._writer is None else self._writer.pictures
+
+    def describe(self, **facts: Any) -> Path:
+        """End it and write ``NAME.json`` beside it: what it is of, whose clock its stamps are; its path."""
+        self.stop()
+        path = self._path.with_suffix(".json")
+        document = {
+            "video": self._path.name, "source": self._source.name, "simulated": self._source.simulated,
+            "pictures": self.pictures, "computer": computer_id(), "problem": self.problem, **facts,
+        }  # fmt: skip
+        path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+        return path
+
+    def _run(self) -> None:
+        assert self._writer is not None
+        try:
+            while not self._stop.is_set():
+                self._writer.write(self._source.read())
+        except (ClientError, OSError) as error:
+            self.problem = str(error)

@@ -1,0 +1,125 @@
+"""Videos on disk: every pixel as it came (FFV1 in Matroska), and beside it a table of time stamps.
+
+``NAME.mkv`` and ``NAME.times.csv`` (``picture``, ``monotonic_ns``, ``wall_ns``): a container's own stamps are
+rounded, and say nothing of the computer's clock.
+"""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from glovecal_client.errors import DeviceError, DeviceFinished, DeviceLost
+from glovecal_client.pictures.source import Picture, opencv
+
+SUFFIX = ".mkv"
+COLUMNS = ("picture", "monotonic_ns", "wall_ns")
+
+
+def times_path(video: Path) -> Path:
+    return video.with_suffix(".times.csv")
+
+
+class VideoWriter:
+    """Writes pictures of one size; a stamp is on disk with its picture. Raises DeviceError, OSError."""
+
+    def __init__(self, path: Path, rate_hz: float) -> None:
+        """``rate_hz`` is for players only. Raises DeviceError for another suffix, or a file that is there."""
+        if path.suffix != SUFFIX:
+            raise DeviceError(f"video {path} must end in {SUFFIX}: pictures are kept losslessly (FFV1)")
+        for each in (path, times_path(path)):
+            if each.exists():
+                raise DeviceError(f"{each} exists already; name a new file")
+        self.path, self.pictures = path, 0
+        self._rate_hz = rate_hz
+        self._cv2 = opencv()
+        self._writer: Any = None
+        self._shape: tuple[int, ...] = ()
+        self._times = times_path(path).open("x", encoding="utf-8", newline="")
+        self._table = csv.writer(self._times)
+        self._table.writerow(COLUMNS)
+
+    def write(self, picture: Picture) -> None:
+        if self._writer is None:
+            self._begin(picture.pixels)
+        if picture.pixels.shape != self._shape:
+            raise DeviceError(f"a picture of {picture.pixels.shape} does not fit a video of {self._shape}")
+        self._writer.write(picture.pixels)
+        self._table.writerow([self.pictures, picture.monotonic_ns, picture.wall_ns])
+        self._times.flush()
+        self.pictures += 1
+
+    def close(self) -> None:
+        if self._writer is not None:
+            self._writer.release()
+            self._writer = None
+        self._times.close()
+
+    def _begin(self, pixels: np.ndarray) -> None:
+        self._shape = pixels.shape
+        height, width = pixels.shape[:2]
+        code = self._cv2.VideoWriter.fourcc(*"FFV1")
+        self._writer = self._cv2.VideoWriter(
+            str(self.path), self._cv2.CAP_FFMPEG, code, self._rate_hz, (width, height)
+        )
+        if not self._writer.isOpened():
+            raise DeviceError(
+                f"{self.path} cannot be written: this OpenCV has no FFV1, or the folder is missing"
+            )
+
+
+class VideoFilePictures:
+    """A video that was written here, with its stamps; one without a table has none and is refused."""
+
+    simulated = False
+
+    def __init__(self, path: Path) -> None:
+        self.name, self._path = f"video:{path}", path
+        self.rate_hz = 30.0
+        self._cv2 = opencv()
+        self._video: Any = None
+        self._stamps: list[tuple[int, int]] = []
+
+    def open(self) -> None:
+        self.close()
+        self._stamps = read_times(self._path)
+        if len(self._stamps) > 1:
+            span_s = (self._stamps[-1][0] - self._stamps[0][0]) / 1e9
+            self.rate_hz = (len(self._stamps) - 1) / max(span_s, 1e-3)
+        video = self._cv2.VideoCapture(str(self._path))
+        if not video.isOpened():
+            raise DeviceLost(f"{self._path} cannot be read as a video")
+        self._video, self._number = video, 0
+
+    def read(self) -> Picture:
+        if self._video is None:
+            raise DeviceLost(f"{self.name} is not open")
+        is_there, pixels = self._video.read()
+        if not is_there or self._number >= len(self._stamps):
+            raise DeviceFinished(f"{self.name} is over after {self._number} pictures")
+        monotonic_ns, wall_ns = self._stamps[self._number]
+        self._number += 1
+        return Picture(pixels, monotonic_ns, wall_ns)
+
+    def close(self) -> None:
+        video, self._video = self._video, None
+        if video is not None:
+            video.release()
+
+
+def read_times(video: Path) -> list[tuple[int, int]]:
+    """Monotonic and wall time of each picture, nanoseconds. Raises DeviceLost for a table that cannot be."""
+    path = times_path(video)
+    try:
+        with path.open(encoding="utf-8", newline="") as stream:
+            rows = list(csv.DictReader(stream))
+        return [(int(row[COLUMNS[1]]), int(row[COLUMNS[2]])) for row in rows]
+    except OSError as error:
+        raise DeviceLost(f"{video} has no time stamps: {path} cannot be read ({error})") from error
+    except (KeyError, TypeError, ValueError) as error:
+        raise DeviceLost(
+            f"{path} must have the columns {', '.join(COLUMNS)}, whole nanoseconds ({error})"
+        ) from error

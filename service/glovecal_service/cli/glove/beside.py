@@ -1,0 +1,48 @@
+"""What goes on beside a recording: a video of the hand, and whether the glove is warm."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from glovecal_client.errors import ServiceError
+from glovecal_service.cli.terminal.printing import err
+from glovecal_service.cli.terminal.waiting import wait_seconds
+from glovecal_service.views.warm_up import warm_up_sentence
+
+if TYPE_CHECKING:
+    from glovecal_client.pictures.recording import VideoRecording
+    from glovecal_client.rest import RestClient
+
+
+@contextmanager
+def video_beside(source: str | None, name: str) -> Iterator[VideoRecording | None]:
+    """Pictures of ``source`` into ``NAME.mkv`` in this folder; nothing for None. Raises DeviceError."""
+    if source is None:
+        yield None
+        return
+    from glovecal_client.pictures.recording import VideoRecording
+    from glovecal_client.pictures.source import build_source
+
+    with VideoRecording(build_source(source), Path(f"{name}.mkv")) as video:
+        yield video
+    if video.problem:
+        err.print(f"The video ended after {video.pictures} pictures: {video.problem}", style="yellow")
+
+
+def warn_of_cold_gloves(service: RestClient, gloves: list[str], *, wait: bool) -> None:
+    """Say it, and with ``wait`` wait until all are warm. Nothing where real time does not answer."""
+    try:
+        live = {one["glove"]: one for one in service.get("/live-gloves")}
+    except ServiceError:
+        return
+    left = {name: live[name]["warm_up_left_s"] or 0.0 for name in gloves if name in live}
+    for name, left_s in left.items():
+        if left_s > 0:
+            err.print(warm_up_sentence(name, left_s), style="yellow")
+    longest = max(left.values(), default=0.0)
+    if wait and longest > 0:
+        err.print("Wear the gloves meanwhile; Ctrl-C stops.")
+        wait_seconds(longest, "warming up")

@@ -1,0 +1,68 @@
+"""``glove-commands``: what gloves can be asked beside their streams: battery, clock, recordings on a card."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from typing import Annotated, Any
+
+import zenoh
+from fastapi import APIRouter
+from pydantic import Field
+
+from glovecal_client.errors import NoAnswer, QueryRefused
+from glovecal_client.keys import GloveKeys
+from glovecal_client.queries import ask_json
+from glovecal_client.session import open_client
+from glovecal_service.rest.http.answers import change_problems
+from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
+from glovecal_service.rest.http.request_types import Identifier, StrictBody
+from glovecal_service.store.errors import Conflict
+from glovecal_service.views.glove_commands import GloveAnswers, clock_sentences
+
+router = APIRouter(prefix="/glove-commands", tags=["gloves"])
+
+MOST_GLOVES = 8
+ROUTER_WITHIN_S = 1.0
+ANSWER_WITHIN_S = 20.0
+"""Setting a clock takes some seconds."""
+
+
+class GloveCommand(StrictBody):
+    gloves: Annotated[list[Identifier], Field(min_length=1, max_length=MOST_GLOVES)]
+    do: Annotated[str, Field(pattern=r"^[a-z][a-z-]{0,31}$")] = Field(
+        "status", description="As the glove's meta lists under `commands`."
+    )
+    argument: Annotated[str, Field(max_length=64, pattern=r"^[A-Za-z0-9._-]*$")] = Field(
+        "", description="What the command needs, such as a file's name."
+    )
+
+
+@router.post("", response_model=GloveAnswers, summary="Command gloves", responses=change_problems(409))
+def command_gloves(body: GloveCommand, parts: PartsNeeded) -> dict[str, Any]:
+    """All gloves are asked at the same moment; each answers for itself. 404 for a glove that was never seen,
+    409 where no zenoh router answers. A glove's stream pauses while it carries out a command."""
+    wanted = list(dict.fromkeys(body.gloves))
+    for name in wanted:
+        parts.store.gloves.get(name)
+    try:
+        with (
+            open_client((parts.settings.zenoh,), wait_s=ROUTER_WITHIN_S) as session,
+            ThreadPoolExecutor(len(wanted)) as at_once,
+        ):
+            answers = list(at_once.map(lambda name: _ask(session, parts, name, body), wanted))
+    except NoAnswer as error:
+        raise Conflict(f"gloves cannot be reached: {error}") from error
+    return {"answers": answers, "sentences": clock_sentences(answers)}
+
+
+def _ask(session: zenoh.Session, parts: Parts, glove: str, body: GloveCommand) -> dict[str, Any]:
+    key = GloveKeys(parts.settings.site, glove).control
+    found: dict[str, Any] = {"glove": glove, "answer": None, "problem": None}
+    try:
+        selector = f"{key}?do={body.do};with={body.argument}"
+        found["answer"] = ask_json(session, selector, timeout_s=ANSWER_WITHIN_S)
+    except QueryRefused as refused:
+        found["problem"] = str(refused).partition(": ")[2]
+    except NoAnswer:
+        found["problem"] = f"no capture of glove {glove} answers; start it: glovecal capture --glove {glove}"
+    return found

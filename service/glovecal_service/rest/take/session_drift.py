@@ -1,0 +1,69 @@
+"""``takes/session-drift``: the calibration shapes at the start of a session against those at its end."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter
+from pydantic import Field
+
+from glovecal_models.errors import BadInput
+from glovecal_models.takes.session_drift import SHAPES, session_drift
+from glovecal_service.rest.http.answers import change_problems, problems
+from glovecal_service.rest.http.dependencies import PartsNeeded
+from glovecal_service.rest.http.request_types import StrictBody, SubjectName, WearingName
+from glovecal_service.store.records import TakeRecord
+from glovecal_service.views.session_drift import SessionDriftView, session_drift_view
+
+router = APIRouter(prefix="/takes/session-drift", tags=["takes"])
+
+START, END = "start-", "end-"
+"""Takes of a sequence are named by its place and the shape: ``start-fist``."""
+
+
+class SessionDriftRequest(StrictBody):
+    subject: SubjectName
+    wearing: Annotated[WearingName | None, Field(description="Null: the newest that has both.")] = None
+
+
+@router.get("", response_model=dict[str, str], summary="Hand shapes of a session", responses=problems())
+def get_shapes() -> dict[str, str]:
+    """Each with what to ask a person for, in order."""
+    return SHAPES
+
+
+@router.post(
+    "", response_model=SessionDriftView, summary="Drift of a session", responses=change_problems(409)
+)
+def examine_session(body: SessionDriftRequest, parts: PartsNeeded) -> dict[str, Any]:
+    """Takes named `start-SHAPE` and `end-SHAPE`, the newest of each; angles by the model that is active."""
+    records = parts.store.takes.list(body.subject)
+    wearings = (
+        [body.wearing] if body.wearing else list(dict.fromkeys(one.wearing for one in reversed(records)))
+    )
+    for wearing in wearings:
+        start, end = (_sequence(records, wearing, place) for place in (START, END))
+        if start and end:
+            break
+    else:
+        raise BadInput(
+            f"{body.subject} has no wearing with both sequences: record the shapes at the start and at the "
+            "end, as glovecal shapes does"
+        )
+    layout = next(iter(start.values())).layout
+    model = parts.store.models.active(body.subject, layout)
+    predictor = None if model is None else parts.predictors.get(model.id)[1]
+    first, last = (
+        {shape: parts.store.takes.load(record.id) for shape, record in sequence.items()}
+        for sequence in (start, end)
+    )
+    if predictor is None:
+        return session_drift_view(session_drift(first, last, None))
+    with parts.predictors.one_at_a_time:
+        return session_drift_view(session_drift(first, last, predictor))
+
+
+def _sequence(records: list[TakeRecord], wearing: str, place: str) -> dict[str, TakeRecord]:
+    """The newest take of each shape."""
+    found = {one.name: one for one in records if one.wearing == wearing}
+    return {shape: found[place + shape] for shape in SHAPES if place + shape in found}
