@@ -85,7 +85,9 @@ def test_chains_are_the_whole_hand_and_inverse_kinematics_uses_the_joint() -> No
     chains = TipChains(RIGHT, ("T", "P"))
     assert chains.rotations[-1] == PALM
     assert not set(chains.rotations) & set(WRIST)
-    angles = np.random.default_rng(2).uniform(*chains.limits_deg.T, (8, len(chains.rotations)))
+    angles = np.random.default_rng(2).uniform(
+        chains.limits_deg[:, 0], chains.limits_deg[:, 1], (8, len(chains.rotations))
+    )
     whole = np.zeros((8, len(ARCHING_ROTATIONS)))
     whole[:, chains.columns] = angles
     frames = forward_kinematics(RIGHT, whole)
