@@ -14,6 +14,7 @@ from glovecal._plotting import MODEL, axes_for, finished
 from glovecal._shown import Shown
 from glovecal._table import Column, Table
 from glovecal._takes import takes_in
+from glovecal_models.calibration.training_settings import LINEAR_METHODS
 from glovecal_models.progress import Cancel
 from glovecal_models.takes.take import Take
 
@@ -130,7 +131,7 @@ def detectable(
         if inner is None:
             session = SurrogateSession.of(recorded, layout_for(layout, recorded))
         else:
-            linear = inner.method in ("raw", "linear")
+            linear = inner.method in LINEAR_METHODS
             repaired = repaired_takes(recorded, requested_effects(inner))
             session = SurrogateSession.of(repaired, inner.layout, linear=linear, known=known_effects(inner))
         report("comparing effects with each other", 0.0)

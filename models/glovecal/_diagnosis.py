@@ -13,6 +13,7 @@ from glovecal._plotting import CONTROL, MODEL, axes_for, finished, named_rows
 from glovecal._shown import Shown
 from glovecal._table import Column, Table
 from glovecal._takes import takes_in
+from glovecal_models.calibration.training_settings import LINEAR_METHODS
 from glovecal_models.progress import Cancel
 from glovecal_models.takes.take import Take
 
@@ -127,7 +128,7 @@ def diagnose(
         found = diagnose_inner(
             repaired_takes(takes, requested_effects(inner)),
             inner.layout,
-            linear=inner.method in ("raw", "linear"),
+            linear=inner.method in LINEAR_METHODS,
             known=known_effects(inner),
             noise_floors={n: item.floor for n, item in noise.items() if item.floor is not None},
             seed=seed,

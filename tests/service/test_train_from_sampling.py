@@ -69,3 +69,25 @@ def test_a_baseline_takes_the_known_angles_as_they_are(sampled: Store) -> None:
     result = trained(sampled, "measured-anna", method="linear")
     assert not any("Tips" in each for each in result["sentences"])
     assert result["held_out_rmse_deg"] is not None
+
+
+def test_a_template_is_made_of_the_shapes_and_touches_of_a_sampling(sampled: Store) -> None:
+    result = trained(sampled, "measured-anna", method="template", activate=True)
+    said = " ".join(result["sentences"])
+    assert "hand shapes tell scale and offset of" in said
+    assert "Distance of the tips that the template leaves (mm, median): touch-I " in said
+    model = load(sampled.models.load_bytes(result["model"]))
+    assert (model.method, model.simulated) == ("template", True)
+    assert "PALM_ARCH" in model.rotation_names
+    assert result["held_out_rmse_deg"] is None
+    active = sampled.models.active("measured-anna", LAYOUT.name)
+    assert active is not None
+    assert active.id == result["model"]
+
+
+def test_the_glove_makers_two_shapes_leave_out_what_they_do_not_show(sampled: Store) -> None:
+    result = trained(sampled, "measured-anna", method="two_shapes")
+    model = load(sampled.models.load_bytes(result["model"]))
+    assert {"T_TMC", "TI_ABD", "I_MCP", "I_PIP"} <= set(model.rotation_names)
+    assert "M_MCP" not in model.rotation_names
+    assert any(each.startswith("Not in both shapes, not in the model: M_MCP") for each in result["sentences"])

@@ -23,9 +23,10 @@ from glovecal_models.calibration.fitted_effects import fitted_effects
 from glovecal_models.calibration.model import CalibrationModel, restore_regressor
 from glovecal_models.calibration.own_signal import OwnSignal
 from glovecal_models.calibration.prepared_takes import PreparedTakes
-from glovecal_models.calibration.samples import Samples, linear_correspondence
-from glovecal_models.calibration.training_plan import task_for
-from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.calibration.samples import Samples
+from glovecal_models.calibration.template import palm_samples
+from glovecal_models.calibration.training_plan import correspondence_by, task_for
+from glovecal_models.calibration.training_settings import LINEAR_METHODS, TrainingSettings
 from glovecal_models.layout import Correspondence
 from glovecal_models.progress import Cancel, stop_if
 from glovecal_models.regression.lmc_search import LmcOptimum
@@ -96,7 +97,7 @@ def fit_with_effects(
     def fit_effects(own: Mapping[str, OwnSignal], *, is_last: bool) -> None:
         nonlocal effects, corrected
         effects = fitted_effects(
-            takes, columns, own, wanted, is_linear=settings.method in ("raw", "linear"), is_last=is_last,
+            takes, columns, own, wanted, is_linear=settings.method in LINEAR_METHODS, is_last=is_last,
             cancelled=cancelled,
         )  # fmt: skip
         corrected = _explained(takes, own, effects)
@@ -135,7 +136,7 @@ def optima_of(model: CalibrationModel) -> Optima:
 def correspondence_for(takes: PreparedTakes, rotation: str, settings: TrainingSettings) -> Correspondence:
     """What the rotation is read from; for a linear calibration its measuring sensor."""
     item = takes.layout.correspondence(rotation)
-    return linear_correspondence(item) if settings.method in ("raw", "linear") else item
+    return correspondence_by(settings.method, item, takes.layout.sensors)
 
 
 def _trained(
@@ -160,7 +161,8 @@ def _trained(
         np.concatenate([np.full(int(rows.sum()), i) for i, rows in enumerate(known)]),
         np.concatenate([part[rows] for part, rows in zip(poses, known, strict=True)]),
     )
-    return KNOWN_FITS.fit(task_for(correspondence, samples, None, settings), cancelled=cancelled)
+    palm = palm_samples(takes.takes, correspondence) if settings.method == "template" else None
+    return KNOWN_FITS.fit(task_for(correspondence, samples, None, settings, palm=palm), cancelled=cancelled)
 
 
 def _explained(

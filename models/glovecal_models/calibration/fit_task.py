@@ -16,10 +16,11 @@ import numpy as np
 
 from glovecal_models.calibration.kernel_choice import fit_best_kernel
 from glovecal_models.calibration.sample_weight import Recorded, fit_weighted
-from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.calibration.training_settings import LINEAR_METHODS, TrainingSettings
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.progress import Cancel, Report
 from glovecal_models.regression.kernel_candidates import CHOOSING
+from glovecal_models.regression.known_line import fit_beside
 from glovecal_models.regression.linear_regressor import fit_linear, rescale_readings
 from glovecal_models.regression.regressor import Regressor
 from glovecal_models.regression.spgp import fit_spgp
@@ -44,6 +45,8 @@ class FitTask:
     settings: TrainingSettings
     without: tuple[str, ...] = ()
     """Wearings that were left out whole."""
+    known_gain: float | None = None
+    """Degrees a count of the second of two inputs, where an equation of a template gives it."""
     key: str = field(default="")
 
     def __post_init__(self) -> None:
@@ -88,7 +91,9 @@ def _fit(task: FitTask, cancelled: Cancel | None, report: Report | None) -> Regr
     if settings.method == "raw":
         span = ACTIVE_RANGE_DEG.get(task.rotation)
         return rescale_readings(task.inputs, task.target, span, sensor_names=task.sensors)
-    if settings.method == "linear":
+    if task.known_gain is not None:
+        return fit_beside(task.inputs, task.target, task.known_gain, sensor_names=task.sensors)
+    if settings.method in LINEAR_METHODS:
         return fit_linear(task.inputs, task.target, sensor_names=task.sensors, cancelled=cancelled)
     samples = Recorded(task.inputs, task.target, task.take, task.position)
     if settings.method in CHOOSING:
@@ -125,6 +130,8 @@ def _key(task: FitTask) -> str:
     }
     if task.without:
         facts["without"] = task.without
+    if task.known_gain is not None:
+        facts["known_gain"] = task.known_gain
     digest.update(json.dumps(facts, sort_keys=True).encode())
     samples = (task.inputs, task.target, task.take, task.position)
     for array in (*samples, task.held_out_inputs, task.held_out_target):

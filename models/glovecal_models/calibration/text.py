@@ -32,6 +32,8 @@ def plan_sentences(plan: TrainingPlan) -> list[str]:
         f"{name} was measured at {angle:g} degrees only: not in the model until there is another angle."
         for name, angle in plan.only_angle_deg.items()
     ]
+    if plan.unshown:
+        sentences.append(f"Not in both shapes, not in the model: {', '.join(plan.unshown)}.")
     return [*sentences, *dead_sensor_sentences(plan.usable, plan.unreadable)]
 
 

@@ -16,7 +16,20 @@ from glovecal_models.calibration.samples import (
     linear_samples,
     representative_index,
 )
-from glovecal_models.calibration.training_settings import METHODS, TrainingSettings, left_out_settings
+from glovecal_models.calibration.template import (
+    missing_shapes,
+    palm_gain,
+    palm_samples,
+    template_correspondence,
+    two_shapes,
+)
+from glovecal_models.calibration.training_settings import (
+    LINEAR_METHODS,
+    METHODS,
+    Method,
+    TrainingSettings,
+    left_out_settings,
+)
 from glovecal_models.calibration.usable_sensors import UsableSensors, usable_sensors
 from glovecal_models.errors import NotTrainable
 from glovecal_models.layout import Correspondence, Layout
@@ -43,6 +56,8 @@ class TrainingPlan:
     unmeasured: tuple[str, ...]
     only_angle_deg: Mapping[str, float]
     """Rotations that were measured at a single angle."""
+    unshown: tuple[str, ...]
+    """Measured rotations of which the method lacks a hand shape."""
     take_count: int
     frame_count: int
     simulated: bool
@@ -74,11 +89,11 @@ def plan_training(
     unmeasured: list[Correspondence] = []
     at_one_angle: list[tuple[Correspondence, Samples]] = []
     unreadable: list[str] = []
+    unshown: list[Correspondence] = []
     wearings = tuple(take.wearing for take in takes)
     gathered: dict[str, Samples] = {}
     for correspondence in layout.correspondences:
-        if settings.method in ("raw", "linear"):
-            correspondence = linear_correspondence(correspondence)
+        correspondence = correspondence_by(settings.method, correspondence, layout.sensors)
         samples = gather_samples(takes, correspondence)
         if len(samples) == 0:
             unmeasured.append(correspondence)
@@ -86,14 +101,19 @@ def plan_training(
         if correspondence.rotation in usable.unreadable:
             unreadable.append(correspondence.rotation)
             continue
-        if np.ptp(samples.target) == 0:
+        told = samples_by(settings.method, samples)
+        if len(told) == 0:
+            unshown.append(correspondence)
+            continue
+        if np.ptp(told.target) == 0:
             at_one_angle.append((correspondence, samples))
             continue
         check_samples(samples.inputs, samples.target, correspondence.inputs)
         chosen[correspondence.rotation] = correspondence
         ranges[correspondence.rotation] = (samples.inputs.min(axis=0), samples.inputs.max(axis=0))
-        tasks.extend(_tasks(correspondence, samples, settings))
-        without = _without_wearings(correspondence, samples, wearings, settings)
+        palm = palm_samples(takes, correspondence) if settings.method == "template" else None
+        tasks.extend(_tasks(correspondence, samples, settings, palm))
+        without = _without_wearings(correspondence, samples, wearings, settings, palm)
         tasks.extend(without)
         if without:
             gathered[correspondence.rotation] = samples
@@ -104,12 +124,14 @@ def plan_training(
             f"no working sensor measures {', '.join(unreadable)}; dead in these takes: "
             f"{', '.join(map(str, usable.dead))}. Is a wire broken?"
         )
+    if not tasks and unshown:
+        raise NotTrainable(missing_shapes([item.rotation for item in unshown], takes))
     if not tasks:
         raise NotTrainable(
             f"no reference angle for any rotation of layout {layout.name!r} in {len(takes)} takes; "
             "import takes with r.ROTATION columns"
         )
-    rules = _rules(unmeasured, chosen)
+    rules = _rules([*unmeasured, *unshown], chosen)
     return TrainingPlan(
         layout=layout,
         subject=subject,
@@ -121,6 +143,7 @@ def plan_training(
         usable=usable,
         unreadable=tuple(unreadable),
         unmeasured=tuple(item.rotation for item in unmeasured),
+        unshown=tuple(item.rotation for item in unshown if item.rotation not in rules),
         only_angle_deg={item.rotation: float(samples.target[0]) for item, samples in at_one_angle},
         take_count=len(takes),
         frame_count=sum(len(take.time_s) for take in takes),
@@ -130,21 +153,40 @@ def plan_training(
     )
 
 
-def _tasks(correspondence: Correspondence, samples: Samples, settings: TrainingSettings) -> list[FitTask]:
-    tasks = [task_for(correspondence, samples, None, settings)]
+def correspondence_by(method: Method, item: Correspondence, sensors: Sequence[str]) -> Correspondence:
+    """What a model of ``method`` reads a rotation from; ``sensors``: those of the glove that work."""
+    if method == "template":
+        return template_correspondence(item, sensors)
+    return linear_correspondence(item) if method in LINEAR_METHODS else item
+
+
+def samples_by(method: Method, samples: Samples) -> Samples:
+    """Those that a model of ``method`` can be trained on."""
+    return two_shapes(samples) if method == "two_shapes" else samples
+
+
+def _tasks(
+    correspondence: Correspondence, samples: Samples, settings: TrainingSettings, palm: Samples | None
+) -> list[FitTask]:
+    tasks = [task_for(correspondence, samples, None, settings, palm=palm)]
     for number, fold in enumerate(folds_over_takes(samples.take, settings.folds)):
-        kept = samples.select(~fold.held_out)
+        kept = samples_by(settings.method, samples.select(~fold.held_out))
         try:
             check_samples(kept.inputs, kept.target, correspondence.inputs)
         except NotTrainable:
             continue  # what is left of the fold cannot carry a model: it says nothing about the error
-        task = task_for(correspondence, kept, number, settings, held_out=samples.select(fold.held_out))
+        held_out = samples.select(fold.held_out)
+        task = task_for(correspondence, kept, number, settings, held_out=held_out, palm=palm)
         tasks.append(task)
     return tasks
 
 
 def _without_wearings(
-    correspondence: Correspondence, samples: Samples, wearings: Sequence[str], settings: TrainingSettings
+    correspondence: Correspondence,
+    samples: Samples,
+    wearings: Sequence[str],
+    settings: TrainingSettings,
+    palm: Samples | None,
 ) -> list[FitTask]:
     """Fits that have not seen some wearings; none without an error estimate."""
     if settings.folds < 1:
@@ -152,13 +194,14 @@ def _without_wearings(
     tasks, owner = [], np.array(wearings, dtype=object)[samples.take]
     for number, group in enumerate(wearing_groups(wearings)):
         is_left_out = np.isin(owner, group)
-        kept = samples.select(~is_left_out)
+        kept = samples_by(settings.method, samples.select(~is_left_out))
         try:
             check_samples(kept.inputs, kept.target, correspondence.inputs)
         except NotTrainable:
             continue  # what is left cannot carry a model: it says nothing about the error
         if is_left_out.any():
-            task = task_for(correspondence, kept, settings.folds + number, left_out_settings(settings))
+            fold, chosen = settings.folds + number, left_out_settings(settings)
+            task = task_for(correspondence, kept, fold, chosen, palm=palm)
             tasks.append(replace(task, without=group, key=""))
     return tasks
 
@@ -169,9 +212,13 @@ def task_for(
     fold: int | None,
     settings: TrainingSettings,
     held_out: Samples | None = None,
+    palm: Samples | None = None,
 ) -> FitTask:
-    if settings.method == "linear":
-        samples = linear_samples(samples)
+    """``palm``: samples of the palm; those of takes that ``samples`` has are used."""
+    known_gain = None
+    if palm is not None:
+        known_gain = palm_gain(palm.select(np.isin(palm.take, samples.take)))
+    samples = linear_samples(samples) if settings.method == "linear" else samples_by(settings.method, samples)
     index = representative_index(samples, settings.samples, seed=settings.seed)
     return FitTask(
         rotation=correspondence.rotation,
@@ -184,6 +231,7 @@ def task_for(
         held_out_target=held_out.target if held_out else np.empty(0),
         sensors=correspondence.inputs,
         settings=settings,
+        known_gain=known_gain,
     )
 
 

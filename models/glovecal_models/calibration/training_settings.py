@@ -9,11 +9,16 @@ from glovecal_models.calibration.samples import DEFAULT_SAMPLES
 from glovecal_models.errors import BadInput
 from glovecal_models.regression.lmc_search import LmcOptimum
 
-Method = Literal["raw", "linear", "lmc_gpr", "spgp", "auto", "polynomial_gpr", "general_gpr"]
+Method = Literal[
+    "raw", "linear", "lmc_gpr", "spgp", "auto", "polynomial_gpr", "general_gpr", "two_shapes", "template"
+]
 METHODS: tuple[Method, ...] = get_args(Method)
 """``raw`` is no calibration at all, the scale that the others are read against; ``auto`` takes for each
-rotation what fits it (``kernel_choice``), ``polynomial_gpr`` and ``general_gpr`` insist on a kind of kernel.
+rotation what fits it (``kernel_choice``), ``polynomial_gpr`` and ``general_gpr`` insist on a kind of kernel;
+``two_shapes`` and ``template`` are calibrations by scale and offset (``template``).
 """
+LINEAR_METHODS: tuple[Method, ...] = ("raw", "linear", "two_shapes", "template")
+"""Those whose regressors are planes."""
 """Called with a sentence and the fraction done, 0 to 1."""
 
 

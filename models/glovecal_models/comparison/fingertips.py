@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from glovecal_models.comparison.floor_estimate import NoiseFloor
-from glovecal_models.comparison.hand_poses import HandPoses, hand_poses, tips_mm
+from glovecal_models.comparison.hand_poses import HandPoses, compared_rotations, hand_poses, tips_mm
 from glovecal_models.comparison.residuals import Residuals
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.forward_kinematics import forward_kinematics, tip_jacobian
-from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS
+from glovecal_models.hand.rotations import FINGERS, PALM
 from glovecal_models.hand.skeleton import Skeleton, hand_skeleton
 
 MOST_FRAMES = 3000
@@ -53,7 +53,7 @@ class CarriedFloors:
         slopes = tip_jacobian(skeleton, self._frames)
         self._slopes = slopes * poses.compared[:, None, None, :]
         self._counts = poses.counts
-        self._floors = [floors.get(name) for name in HAND_ROTATIONS]
+        self._floors = [floors.get(name) for name in skeleton.rotations]
 
     def of_tips(self, tips: list[int]) -> FingertipFloor | None:
         """Of some fingertips together; None when some joint's floor is unknown."""
@@ -65,7 +65,7 @@ class CarriedFloors:
         both = self._counts[:, first] & self._counts[:, second]
         slopes = (self._slopes[:, first] - self._slopes[:, second])[both]
         gaps = (self._frames.tips_mm[:, first] - self._frames.tips_mm[:, second])[both]
-        drawn = np.random.default_rng(0).standard_normal((len(gaps), len(HAND_ROTATIONS)))
+        drawn = np.random.default_rng(0).standard_normal((len(gaps), len(self._floors)))
 
         def mean_square(sizes: np.ndarray) -> float:
             moved = gaps + np.einsum("nar,nr->na", slopes, drawn * sizes)
@@ -157,7 +157,8 @@ def fingertip_errors(
     poses = hand_poses(found)
     if poses is None:
         return None
-    skeleton = hand_skeleton(dimensions)
+    palm = "arching" if PALM in compared_rotations(found) else "rigid"
+    skeleton = hand_skeleton(dimensions, palm=palm)
     answers = (poses.measured, poses.predicted, _always_mean(poses))
     tips = tuple(tips_mm(skeleton, angles) for angles in answers)
     carried = CarriedFloors(skeleton, poses, floors)
@@ -172,7 +173,8 @@ def fingertip_errors(
     overall, thumb_index = errors(counting), _thumb_index(skeleton, poses, tips, carried)
     sizes = skeleton.dimensions
     return FingertipErrors(
-        sizes.hand_length_mm, sizes.is_assumed, overall, fingers, thumb_index, _worst(off, poses, found),
+        sizes.hand_length_mm, sizes.is_assumed, overall, fingers, thumb_index,
+        _worst(off, poses, found, skeleton.rotations),
     )  # fmt: skip
 
 
@@ -221,17 +223,16 @@ def _assumed_equal(skeleton: Skeleton, poses: HandPoses, tips: Sequence[int]) ->
     for tip in tips:
         rows = poses.counts[:, tip]
         for name in skeleton.chain(list(FINGERS)[tip]):
-            if not poses.compared[rows, HAND_ROTATIONS.index(name)].all():
+            if not poses.compared[rows, skeleton.rotations.index(name)].all():
                 found.add(name)
-    return tuple(name for name in HAND_ROTATIONS if name in found)
+    return tuple(name for name in skeleton.rotations if name in found)
 
 
-def _worst(off: np.ndarray, poses: HandPoses, found: Residuals) -> WorstTip:
+def _worst(off: np.ndarray, poses: HandPoses, found: Residuals, hand: Sequence[str]) -> WorstTip:
     frame, tip = np.unravel_index(np.nanargmax(off), off.shape)
     take = found.takes[poses.take[frame]].take.name
     measured, predicted = (
-        dict(zip(HAND_ROTATIONS, angles[frame].tolist(), strict=True))
-        for angles in (poses.measured, poses.predicted)
+        dict(zip(hand, angles[frame].tolist(), strict=True)) for angles in (poses.measured, poses.predicted)
     )
     error, time = float(off[frame, tip]), float(poses.time_s[frame])
     return WorstTip(TIPS[tip], error, take, time, measured, predicted)

@@ -14,7 +14,7 @@ import numpy as np
 
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 from glovecal_models.hand.forward_kinematics import forward_kinematics
-from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS, WRIST, completed
+from glovecal_models.hand.rotations import ARCHING_ROTATIONS, FINGERS, HAND_ROTATIONS, PALM, WRIST, completed
 from glovecal_models.hand.skeleton import Skeleton
 
 NEEDED = {
@@ -28,7 +28,7 @@ _WRIST = [HAND_ROTATIONS.index(name) for name in WRIST]
 
 @dataclass(frozen=True)
 class HandPoses:
-    """N frames, and R rotations in the order of ``HAND_ROTATIONS``."""
+    """N frames, and R rotations in the order of the hand's, which ``compared_rotations`` tells."""
 
     predicted: np.ndarray
     """(N, R), degrees."""
@@ -52,20 +52,32 @@ class HandPoses:
         return HandPoses(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
+def compared_rotations(found: Residuals) -> tuple[str, ...]:
+    """Of a hand whose palm arches where its arch was both predicted and measured, else of a rigid one."""
+    arches = PALM in found.rotations and any(
+        np.isfinite(item.take.reference_at_frames((PALM,))).any() for item in found.takes
+    )
+    return ARCHING_ROTATIONS if arches else HAND_ROTATIONS
+
+
 def hand_poses(found: Residuals) -> HandPoses | None:
     """Both hands, where a fingertip counts; None where no finger's chain was predicted and measured."""
-    takes = [poses_of_take(item, found.rotations, index) for index, item in enumerate(found.takes)]
+    hand = compared_rotations(found)
+    takes = [poses_of_take(item, found.rotations, index, hand) for index, item in enumerate(found.takes)]
     counting = [one.at(np.flatnonzero(one.counts.any(axis=1))) for one in takes]
     names = HandPoses.__dataclass_fields__
     joined = HandPoses(*(np.concatenate([getattr(one, name) for one in counting]) for name in names))
     return joined if len(joined.time_s) else None
 
 
-def poses_of_take(item: TakeResiduals, rotations: tuple[str, ...], index: int = 0) -> HandPoses:
-    """Every frame of a take, those too in which no fingertip counts; ``rotations``: of the residuals."""
-    measured = item.take.reference_at_frames(HAND_ROTATIONS)
+def poses_of_take(
+    item: TakeResiduals, rotations: tuple[str, ...], index: int = 0, hand: tuple[str, ...] = HAND_ROTATIONS
+) -> HandPoses:
+    """Every frame of a take, those too in which no fingertip counts; ``rotations``: of the residuals,
+    ``hand``: of the hand."""
+    measured = item.take.reference_at_frames(hand)
     predicted = np.full_like(measured, np.nan)
-    for column, name in enumerate(HAND_ROTATIONS):
+    for column, name in enumerate(hand):
         if name in rotations:
             angle = item.predicted[:, rotations.index(name)]
             predicted[:, column] = np.where(np.isfinite(angle), angle, np.nan)
@@ -73,7 +85,7 @@ def poses_of_take(item: TakeResiduals, rotations: tuple[str, ...], index: int = 
     compared[:, _WRIST] = False
     places = [[HAND_ROTATIONS.index(name) for name in NEEDED[finger]] for finger in FINGERS]
     counts = np.column_stack([compared[:, needed].all(axis=1) for needed in places])
-    whole = completed(HAND_ROTATIONS, np.where(np.isfinite(measured), measured, predicted))
+    whole = completed(hand, np.where(np.isfinite(measured), measured, predicted), hand)
     whole[:, _WRIST] = 0.0
     time = item.take.time_s - item.take.time_s[:1]
     return HandPoses(

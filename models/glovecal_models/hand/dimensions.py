@@ -29,6 +29,8 @@ KNUCKLE_PLACES = {"I": (0.447, 0.252), "M": (0.446, 0.0), "R": (0.409, -0.206), 
 """Knuckle (MCP): from the wrist in hand lengths, from the middle finger to the thumb in hand breadths."""
 THUMB_BASE = (0.073, 0.196)
 """Base of the thumb (TMC), likewise."""
+PINKY_BASE = (0.092, -0.235)
+"""Base of the little finger's metacarpal (CMC), likewise; ours: its bone is then 0.29 hand lengths long."""
 _SEGMENTS = {
     "T_metacarpal": 0.251, "T_proximal": 0.196, "T_distal": 0.158,
     "I_proximal": 0.265, "I_middle": 0.143, "I_distal": 0.097,
@@ -80,6 +82,10 @@ class HandDimensions:
     def thumb_base_mm(self) -> tuple[float, float]:
         """Distal and thumbward place of the base of the thumb."""
         return THUMB_BASE[0] * self.hand_length_mm, THUMB_BASE[1] * self.sizes_mm["hand_breadth"]
+
+    def pinky_base_mm(self) -> tuple[float, float]:
+        """Distal and thumbward place of the base of the little finger's metacarpal."""
+        return PINKY_BASE[0] * self.hand_length_mm, PINKY_BASE[1] * self.sizes_mm["hand_breadth"]
 
 
 def _scaled(length: float, breadth: float | None) -> dict[str, float]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.rotations import HAND_ROTATIONS
 from glovecal_models.hand.skeleton import Skeleton
 
 
@@ -24,17 +23,19 @@ class HandFrames:
 
 
 def forward_kinematics(skeleton: Skeleton, angles_deg: np.ndarray) -> HandFrames:
-    """The hands with ``angles_deg`` (N, R), in the order of ``HAND_ROTATIONS``.
+    """The hands with ``angles_deg`` (N, R), in the order of ``skeleton.rotations``.
 
     Raises BadInput for another shape, and for angles that are not finite.
     """
     angles = np.asarray(angles_deg, dtype=float)
-    if angles.ndim != 2 or angles.shape[1] != len(HAND_ROTATIONS):
-        raise BadInput(f"angles have shape {angles.shape}, expected (N, {len(HAND_ROTATIONS)})")
+    if angles.ndim != 2 or angles.shape[1] != len(skeleton.rotations):
+        raise BadInput(f"angles have shape {angles.shape}, expected (N, {len(skeleton.rotations)})")
     if not np.isfinite(angles).all():
         frame, rotation = np.argwhere(~np.isfinite(angles))[0]
         value = angles[frame, rotation]
-        raise BadInput(f"{HAND_ROTATIONS[rotation]} is {value} in frame {frame}; a hand needs every angle")
+        raise BadInput(
+            f"{skeleton.rotations[rotation]} is {value} in frame {frame}; a hand needs every angle"
+        )
     turns = np.radians(angles) @ skeleton.weights.T
     count = len(angles)
     orientations = np.empty((count, len(skeleton.joints), 3, 3))

@@ -6,6 +6,9 @@ joint turns about one axis; its frame follows from that of its parent:
 
     frame(joint) = frame(parent) . translate(offset) . orient(orientation) . turn(axis, angle)
 
+The palm is rigid, or it arches: then the little finger's metacarpal turns about its base, as the thumb's does
+(Krnoul et al. 2016, section 3.3.3). With a flat palm the two hands are equal.
+
 The first joint's parent is the forearm. A joint's angle is a weighted sum of rotations: the spread between
 ring and middle finger carries the pinky too, so the pinky's spread is ``MR_ABD`` + ``RP_ABD``. The middle
 finger is what the others spread from.
@@ -22,9 +25,10 @@ from typing import Literal
 import numpy as np
 
 from glovecal_models.hand.dimensions import HandDimensions
-from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS, WRIST
+from glovecal_models.hand.rotations import ARCHING_ROTATIONS, FINGERS, HAND_ROTATIONS, PALM, WRIST
 
 Handedness = Literal["right", "left"]
+Palm = Literal["rigid", "arching"]
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
@@ -43,6 +47,12 @@ THUMB_BASE_DEPTH = 0.03
 These four are ours: nobody measures them on a subject. With them the relaxed thumb is pronated by 76 degrees
 to the middle metacarpal (its base by 80: Cooney et al. 1981, J. Bone Joint Surg. 63-A, 1371-1381), and the
 posture that the paper calls "ok" brings thumb and index finger together within 10 mm.
+"""
+
+PALM_SLANT_DEG = 35.0
+"""Between the axis about which the little finger's metacarpal turns and the axis of pure flexion: a palm that
+arches also turns the little finger to the thumb. Ours; the paper gives no axis. About 25 degrees of arch
+(``hand_ranges``) its knuckle comes some 22 mm out of the palm's plane.
 """
 
 
@@ -79,6 +89,12 @@ class Skeleton:
     """In the order of ``FINGERS``."""
 
     @cached_property
+    def rotations(self) -> tuple[str, ...]:
+        """The order of angles of this hand: ``HAND_ROTATIONS``, or ``ARCHING_ROTATIONS``."""
+        arches = any(PALM in joint.rotations for joint in self.joints)
+        return ARCHING_ROTATIONS if arches else HAND_ROTATIONS
+
+    @cached_property
     def parents(self) -> tuple[int | None, ...]:
         """Index of each joint's parent."""
         places = {joint.name: index for index, joint in enumerate(self.joints)}
@@ -93,7 +109,7 @@ class Skeleton:
     @cached_property
     def weights(self) -> np.ndarray:
         """(J, R): joint angles are weights @ rotations."""
-        rows = [[joint.rotations.get(name, 0.0) for name in HAND_ROTATIONS] for joint in self.joints]
+        rows = [[joint.rotations.get(name, 0.0) for name in self.rotations] for joint in self.joints]
         return np.array(rows)
 
     @cached_property
@@ -130,12 +146,16 @@ class Skeleton:
         return tuple(name for joint in joints for name in joint.rotations if name not in WRIST)
 
 
-def hand_skeleton(dimensions: HandDimensions | None = None, hand: Handedness = "right") -> Skeleton:
+def hand_skeleton(
+    dimensions: HandDimensions | None = None, hand: Handedness = "right", palm: Palm = "rigid"
+) -> Skeleton:
     """The skeleton of a hand; without ``dimensions`` that of an assumed one."""
     dimensions = HandDimensions.from_measured({}) if dimensions is None else dimensions
     joints = [*_wrist(), *_thumb(dimensions)]
     for finger in "IMRP":
-        joints += _finger(finger, dimensions)
+        joints += (
+            _arching_pinky(dimensions) if (finger, palm) == ("P", "arching") else _finger(finger, dimensions)
+        )
     lasts = {"T": "T_IP", **{finger: f"{finger}_DIP" for finger in "IMRP"}}
     tips = [
         Tip(finger, last, (dimensions.sizes_mm[f"{finger}_distal"], 0.0, 0.0))
@@ -164,6 +184,18 @@ def _finger(finger: str, dimensions: HandDimensions) -> list[Joint]:
         name = f"{finger}_{joint}"
         joints.append(Joint(name, joints[-1].name, offset, NO_TURN, Y, {name: 1.0}))
     return joints
+
+
+def _arching_pinky(dimensions: HandDimensions) -> list[Joint]:
+    """The finger, carried by its metacarpal."""
+    x, y = dimensions.pinky_base_mm()
+    slant = math.radians(PALM_SLANT_DEG)
+    base = Joint(
+        "P_CMC", "W_FLEX", (x, y, 0.0), NO_TURN, (math.sin(slant), math.cos(slant), 0.0), {PALM: 1.0}
+    )
+    spread, *bends = _finger("P", dimensions)
+    from_base = (spread.offset_mm[0] - x, spread.offset_mm[1] - y, 0.0)
+    return [base, replace(spread, parent=base.name, offset_mm=from_base), *bends]
 
 
 _TOWARDS_PINKY = (0.0, 0.0, -1.0)

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS, REST_DEG, RULES
+from glovecal_models.hand.rotations import FINGERS, FLAT_PALM_DEG, PALM, REST_DEG, RULES
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 
@@ -38,7 +38,7 @@ def skeleton_document(skeleton: Skeleton) -> dict[str, Any]:
             "sizes": dict(skeleton.dimensions.sizes_mm),
             "measured": list(skeleton.dimensions.measured),
         },
-        "rotations": [_rotation(name) for name in HAND_ROTATIONS],
+        "rotations": [_rotation(name) for name in skeleton.rotations],
         "joints": [
             {
                 "name": joint.name,
@@ -59,5 +59,8 @@ def skeleton_document(skeleton: Skeleton) -> dict[str, Any]:
 
 def _rotation(name: str) -> dict[str, Any]:
     low, high = ACTIVE_RANGE_DEG[name]
-    missing = {"rule": RULES[name], "rest": None} if name in RULES else {"rule": None, "rest": REST_DEG[name]}
+    if name in RULES:
+        missing = {"rule": RULES[name], "rest": None}
+    else:
+        missing = {"rule": None, "rest": FLAT_PALM_DEG if name == PALM else REST_DEG[name]}
     return {"name": name, "low": low, "high": high, **missing}

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.training_settings import LINEAR_METHODS
 from glovecal_models.diagnosis.candidates import assessed
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.formed_error import formed_control_share
@@ -48,7 +49,7 @@ def share_left_by_control(
     bridge = bridge_s(takes)
     even = [smoothed(resampled(take, model.layout.sensors, joints, bridge), SMOOTHING) for take in takes]
     known = [item for item in known_effects(model) if item.effect.name != effect.name]
-    linear = model.method in ("raw", "linear")
+    linear = model.method in LINEAR_METHODS
     direction = forward(even, model.layout, joints, linear=linear, known=known, limits=limits)
     if known_share is None:
         found, _ = assessed(direction, [effect], np.random.default_rng(0), set(), progress)

@@ -20,7 +20,7 @@ from glovecal_models.calibration.model_recipe import (
 )
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training import noise_of, train
-from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.calibration.training_settings import LINEAR_METHODS, TrainingSettings
 from glovecal_models.calibration.unseen_wearing import unseen_wearing
 from glovecal_models.calibration.usable_sensors import usable_sensors
 from glovecal_models.ceiling.black_box_ceiling import black_box_ceiling
@@ -143,7 +143,7 @@ class _Loop:
         self._say("diagnosing the residual", share)
         takes = self._repaired()
         self.diagnosis = diagnose(
-            takes, self.layout, linear=self.settings.method in ("raw", "linear"), known=known_effects(model),
+            takes, self.layout, linear=self.settings.method in LINEAR_METHODS, known=known_effects(model),
             noise_floors=self._known_floors(takes), seed=self.seed, limits=self.limits.diagnosis,
             cancelled=self.cancelled,
         )  # fmt: skip

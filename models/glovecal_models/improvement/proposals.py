@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.model_recipe import repaired_takes, requested_effects, trained_rotations
+from glovecal_models.calibration.training_settings import LINEAR_METHODS
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.known_effect import known_effects
@@ -106,7 +107,7 @@ def _by_comparison(
     found = diagnose(
         takes,
         model.layout,
-        linear=model.method in ("raw", "linear"),
+        linear=model.method in LINEAR_METHODS,
         known=[item for item in known_effects(model) if item.effect.name not in (effect.name, *effect.alike)],
         effects=[effect],
         signatures=False,

@@ -51,10 +51,9 @@ class HandShape:
     @classmethod
     def at_rest(cls, rotations: Sequence[str]) -> HandShape:
         """A relaxed hand: what is left to say without a calibration."""
-        rest = completed((), np.empty((1, 0)))[0]
-        columns = [HAND_ROTATIONS.index(name) for name in rotations]
+        rest = completed((), np.empty((1, 0)), rotations)
         firmness = [THUMB_SD_DEG if name.startswith("T") else FINGER_SD_DEG for name in rotations]
-        return cls(tuple(rotations), rest[columns][None], np.array(firmness)[None])
+        return cls(tuple(rotations), rest, np.array(firmness)[None])
 
     def misfit(self, angles_deg: np.ndarray) -> np.ndarray:
         """How far hands (N, K) are from this shape, in standard deviations of the whole, (N,)."""
@@ -69,7 +68,7 @@ LEAST_SD_DEG = 0.5
 
 @dataclass(frozen=True)
 class PredictedHand:
-    """N frames of all ``HAND_ROTATIONS``."""
+    """N frames of all rotations of a hand."""
 
     mean_deg: np.ndarray
     """(N, R)."""
@@ -88,8 +87,13 @@ class PredictedHand:
         return HandShape(chains.rotations, self.mean_deg[:, columns], self.sd_deg[:, columns])
 
 
-def predicted_hand(take: Take, model: CalibrationModel) -> PredictedHand:
-    """Every frame of ``take``, effects included. Raises LayoutMismatch where a sensor is missing."""
+def predicted_hand(
+    take: Take, model: CalibrationModel, rotations: Sequence[str] = HAND_ROTATIONS
+) -> PredictedHand:
+    """Every frame of ``take``, effects included; ``rotations``: those of the skeleton.
+
+    Raises LayoutMismatch where a sensor is missing.
+    """
     require_layout(take, model.layout)
     readings = take.readings[:, [take.sensors.index(name) for name in model.layout.sensors]]
     angles = GlovePredictor(model).predict_take(take.time_s, readings, take.context, take.wearing)
@@ -100,9 +104,9 @@ def predicted_hand(take: Take, model: CalibrationModel) -> PredictedHand:
     faulty = dict(zip(names, ((angles.flags & FAULTY_SENSOR) > 0).T, strict=True))
     healthy = np.zeros(len(sd), dtype=bool)
     return PredictedHand(
-        completed(names, angles.mean),
-        np.column_stack([_sd(name, known, len(sd)) for name in HAND_ROTATIONS]),
-        np.column_stack([faulty.get(name, healthy) for name in HAND_ROTATIONS]),
+        completed(names, angles.mean, rotations),
+        np.column_stack([_sd(name, known, len(sd)) for name in rotations]),
+        np.column_stack([faulty.get(name, healthy) for name in rotations]),
     )
 
 

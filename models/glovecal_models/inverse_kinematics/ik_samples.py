@@ -57,7 +57,7 @@ def ik_samples(take: Take, model: CalibrationModel, skeleton: Skeleton, contact:
     """
     chains = TipChains(skeleton, contact.fingers)
     require_possible(chains, contact, skeleton)
-    hand = predicted_hand(take, model).frames(slice(take.pre_roll_frames, None))
+    hand = predicted_hand(take, model, skeleton.rotations).frames(slice(take.pre_roll_frames, None))
     hand = replace(hand, mean_deg=steadied(take.time_s[take.pre_roll_frames :], hand.mean_deg))
     shape = hand.shape(chains)
     if not len(shape):

@@ -11,8 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS, LIMITS_DEG, WRIST
+from glovecal_models.hand.rotations import FINGERS, WRIST
 from glovecal_models.hand.skeleton import Skeleton
+from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 
 
 class TipChains:
@@ -26,10 +27,10 @@ class TipChains:
             raise BadInput(f"fingers are {named}; name each once: {', '.join(FINGERS)}")
         self.fingers = tuple(fingers)
         moving = {name for finger in fingers for name in skeleton.chain(finger)}
-        self.rotations = tuple(name for name in HAND_ROTATIONS if name in moving)
-        self.columns = [HAND_ROTATIONS.index(name) for name in self.rotations]
-        """Of these rotations among ``HAND_ROTATIONS``."""
-        self.limits_deg = LIMITS_DEG[self.columns]
+        self.rotations = tuple(name for name in skeleton.rotations if name in moving)
+        self.columns = [skeleton.rotations.index(name) for name in self.rotations]
+        """Of these rotations among the skeleton's."""
+        self.limits_deg = np.array([ACTIVE_RANGE_DEG[name] for name in self.rotations])
         """(K, 2)."""
         self._fill(skeleton)
 

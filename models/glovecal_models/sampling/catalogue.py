@@ -18,14 +18,16 @@ from glovecal_models.sampling.steps import (
     check_steps,
     key_pose_steps,
     rod_step,
+    shape_steps,
     touch_steps,
     verification_steps,
     widget_steps,
 )
 
-ProtocolName = Literal["new_subject", "fk_only", "ik_only", "second_wearing", "active"]
+ProtocolName = Literal["new_subject", "fk_only", "ik_only", "second_wearing", "active", "five_shapes"]
 PROTOCOLS: tuple[ProtocolName, ...] = get_args(ProtocolName)
 POSE_ROUNDS = 2
+SHAPE_ROUNDS = 3
 ROD_MM = 60.0
 SHORTEST_MM, LONGEST_MM = 5.0, 200.0
 
@@ -61,11 +63,12 @@ def make_protocol(
     ``seed``: poses and widgets in random order, the first again at the end (``order.py``); None: in the
     paper's order.
 
+    ``five_shapes`` is the calibration take of Krnoul et al. 2016 (section 3.3.4), always in its own order;
     ``fk_only`` and ``ik_only`` are the paper's accuracy adaptation (section 8.2); ``active`` begins with free
     motion and grows (``active_sampling``). Raises BadInput.
     """
     protocol = _in_fixed_order(name, layout, equipment or Equipment())
-    return protocol if seed is None else in_random_order(protocol, seed)
+    return protocol if seed is None or name == "five_shapes" else in_random_order(protocol, seed)
 
 
 def _in_fixed_order(name: str, layout: Layout, own: Equipment) -> Protocol:
@@ -80,6 +83,9 @@ def _in_fixed_order(name: str, layout: Layout, own: Equipment) -> Protocol:
         "fk_only": independent,
         "ik_only": touching,
     }
+    if name == "five_shapes":
+        shapes = [_loosen(6.0), *shape_steps(SHAPE_ROUNDS, own.pose_deg)]
+        return Protocol(name, tuple(steps_for_layout(shapes, layout)))
     if name == "second_wearing":
         return Protocol(name, tuple(steps_for_layout([_loosen(3.0), *check_steps(KEY_POSES)], layout)))
     if name not in steps:

@@ -15,6 +15,7 @@ they are is worked out afterwards, by inverse kinematics on the subject's own ha
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from glovecal_models.layout import Layout
 from glovecal_models.quick_check.pose_book import KEY_POSES_DEG
@@ -55,6 +56,28 @@ def key_pose_steps(rounds: int = 1, angles: PoseAngles | None = None) -> list[St
         for round_ in range(1, rounds + 1)
         for pose in known
     ]
+
+
+def shape_steps(rounds: int, angles: PoseAngles | None = None) -> list[Step]:
+    """Flat, spread, fist, and the two "o" of thumb with index and with little finger (Krnoul et al. 2016,
+    section 3.3.4), every one once a round; ``angles`` as in ``key_pose_steps``."""
+    known = usual_angles() | {pose: dict(own) for pose, own in (angles or {}).items()}
+    touches = [step for step in touch_steps() if step.touches[1] in ("I", "P")]
+    steps = []
+    for round_ in range(1, rounds + 1):
+        part = f"shapes-{round_}"
+        steps += [
+            _held(f"{pose}-{round_}", "fk_independent", pose, known[pose], f"{part}-held")
+            for pose in ("flat", "spread", "fist")
+        ]
+        steps += [_closed(step, f"{step.name}-{round_}", f"{part}-o") for step in touches]
+    return steps
+
+
+def _closed(touch: Step, name: str, part: str) -> Step:
+    """The "o" of a touch: held, not moved."""
+    ask = f"Thumb and {_FINGER[touch.touches[1]]} fingertip together like an o; hold still."
+    return replace(touch, name=name, motion="hold", ask=ask, seconds=HOLD_S, part=part, moves=())
 
 
 def verification_steps(when: str) -> list[Step]:

@@ -7,6 +7,8 @@ near each other: this hand has no skin, so its touches serve the protocol and no
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from glovecal_models.sampling.protocol import Step
@@ -38,6 +40,20 @@ _SWINGS: dict[str, tuple[float, float]] = {
     "W_ABD": (-28.0, 19.0),
 }
 _SPEEDS_HZ = (0.5, 1.2)
+
+
+@dataclass(frozen=True)
+class _Held:
+    """The first posture of a motion, kept."""
+
+    motion: HandMotion
+    duration_s: float = LONGEST_S
+
+    def driven(self, time_s: np.ndarray) -> np.ndarray:
+        return np.repeat(self.motion.driven(np.zeros(1)), len(time_s), axis=0)
+
+    def poses(self, time_s: np.ndarray) -> tuple[str, ...]:
+        return self.motion.poses(time_s)
 
 
 class AskedHand:
@@ -83,6 +99,9 @@ class AskedHand:
     def _doing(self, step: Step) -> HandMotion:
         posture = dict(POSTURES.get(step.pose, POSTURES["ok" if step.touches else "rest"]))
         posture |= {name: angle for name, angle in step.angles.items() if name in posture}
+        if step.motion == "hold" and step.touches and self._touches is not None:
+            self._held = [column for column, name in enumerate(DRIVEN) if name[0] in step.touches]
+            return _Held(self._touches.motion(step, int(self._random.integers(1 << 30))))
         if step.motion == "hold":
             return self._still(posture_vector(posture), step.pose)
         if step.touches and self._touches is not None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from glovecal_models.calibration.artifact import load
 from glovecal_models.calibration.model_recipe import declared_effects, repaired_takes, requested_effects
+from glovecal_models.calibration.training_settings import LINEAR_METHODS
 from glovecal_models.diagnosis.known_effect import known_effects
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.catalogue import catalogue, effect, effect_of_declaration, known_by_name
@@ -110,7 +111,7 @@ def run(work: DetectabilityWork, cancelled: Callable[[], bool], report: Report) 
     else:
         model = load(session.artifact, expected_id=session.model)
         takes = repaired_takes(session.takes, requested_effects(model))
-        linear, known = model.method in ("raw", "linear"), known_effects(model)
+        linear, known = model.method in LINEAR_METHODS, known_effects(model)
         of_model = declared_effects(model)
     with known_by_name([*of_model, *own]):
         fitted = SurrogateSession.of(takes, session.layout, linear=linear, known=known)

@@ -8,6 +8,7 @@ from typing import Any
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.model_recipe import declared_effects, repaired_takes, requested_effects
+from glovecal_models.calibration.training_settings import LINEAR_METHODS
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.noise_floor import rotation_noise
 from glovecal_models.comparison.residuals import residuals
@@ -76,7 +77,7 @@ def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> T
         found = diagnose(
             repaired_takes(work.on.takes, requested_effects(model)),
             model.layout,
-            linear=model.method in ("raw", "linear"),
+            linear=model.method in LINEAR_METHODS,
             known=known_effects(model),
             noise_floors=floors,
             seed=work.seed,

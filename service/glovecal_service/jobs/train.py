@@ -15,7 +15,7 @@ from glovecal_models.calibration.order_confounding import OrderConfounding, orde
 from glovecal_models.calibration.text import order_sentences, plan_sentences, weight_sentence
 from glovecal_models.calibration.training import assemble
 from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
-from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.calibration.training_settings import LINEAR_METHODS, TrainingSettings
 from glovecal_models.errors import BadInput, NotTrainable
 from glovecal_models.progress import Report
 from glovecal_models.regression.kernel_scores import choice_of, kernel_sentences
@@ -65,7 +65,7 @@ class TrainJob:
             tasks=[Task(task.key, _label(task), fit, task, _effort(task)) for task in plan.tasks],
             step=_stepper(plan),
             finish=finish,
-            in_this_process=settings.method in ("raw", "linear"),
+            in_this_process=settings.method in LINEAR_METHODS,
         )
 
 

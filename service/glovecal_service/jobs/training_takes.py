@@ -1,4 +1,4 @@
-"""What a training job trains on: takes with measured angles, and the labelled_samples of guided samplings."""
+"""What a training job trains on: takes with measured angles, and what guided samplings teach a method."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.guided.guided_calibration import BASELINES, GuidedSamples, guided_samples
 from glovecal_models.sampling.guided.labelled_takes import LabelledTake
+from glovecal_models.sampling.template.named_takes import named_takes
+from glovecal_models.sampling.template.template_samples import TemplateSamples, template_samples
 from glovecal_models.takes.take import Take
 from glovecal_service.store import Store
 from glovecal_service.store.records import SubjectRecord, TakeRecord, incomplete_sentences
@@ -22,7 +24,7 @@ class TrainingTakes:
     """How rotations are read in training."""
     settings: TrainingSettings
     sentences: tuple[str, ...] = ()
-    _guided: GuidedSamples | None = None
+    _sampled: GuidedSamples | TemplateSamples | None = None
 
     @classmethod
     def of(
@@ -51,6 +53,13 @@ class TrainingTakes:
             for record in sampled
         ]
         measured = subject.skeleton() if subject.dimensions else None
+        if settings.method == "two_shapes":
+            return cls((*named_takes(taught, measured), *plain), layout, settings, tuple(incomplete))
+        if settings.method == "template":
+            template = template_samples(taught, layout, measured)
+            said = (*incomplete, *template.sentences)
+            settings = settings if plain else replace(settings, folds=0)
+            return cls((*template.takes, *plain), layout, settings, said, template)
         guided = guided_samples(taught, layout, measured)
         said = [*incomplete, *guided.sentences]
         if measured is None and any(each.contacts for each in taught):
@@ -63,4 +72,4 @@ class TrainingTakes:
 
     def finished(self, model: CalibrationModel) -> CalibrationModel:
         """``model`` as it is kept."""
-        return model if self._guided is None else self._guided.finished(model)
+        return model if self._sampled is None else self._sampled.finished(model)

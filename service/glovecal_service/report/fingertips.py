@@ -13,6 +13,7 @@ from glovecal_models.comparison.fingertips import FingertipErrors, TipErrors
 from glovecal_models.comparison.text import fingertips_sentence
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.forward_kinematics import HandFrames, forward_kinematics
+from glovecal_models.hand.rotations import PALM
 from glovecal_models.hand.skeleton import Skeleton, hand_skeleton
 from glovecal_service.report.drawing import FLOOR, MEASURED, MODEL, QUIET, figure_svg, legend_above
 from glovecal_service.report.html import figure, paragraph, table
@@ -71,7 +72,7 @@ def _floor(one: TipErrors) -> str:
 def _picture(errors: FingertipErrors, dimensions: HandDimensions | None) -> tuple[str, str]:
     """Errors against their floors; beside them both hands in the worst frame."""
     worst = errors.worst
-    skeleton = hand_skeleton(dimensions)
+    skeleton = hand_skeleton(dimensions, palm="arching" if PALM in worst.measured_deg else "rigid")
     measured, predicted = (
         forward_kinematics(skeleton, np.array([list(angles.values())]))
         for angles in (worst.measured_deg, worst.predicted_deg)

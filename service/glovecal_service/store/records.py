@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from typing import Any, Literal
 
 from glovecal_models.hand.dimensions import HandDimensions
-from glovecal_models.hand.skeleton import Handedness, Skeleton, hand_skeleton
+from glovecal_models.hand.skeleton import Handedness, Palm, Skeleton, hand_skeleton
 from glovecal_models.sampling.sampled_takes import is_labelled
 from glovecal_models.takes.known_latency import KnownLatency
 
@@ -34,9 +34,9 @@ class SubjectRecord:
     created_at: datetime
     hand: Handedness = "right"
 
-    def skeleton(self, hand: Handedness | None = None) -> Skeleton:
+    def skeleton(self, hand: Handedness | None = None, palm: Palm = "rigid") -> Skeleton:
         """This person's hand, or the other one. Raises BadInput for dimensions that no hand has."""
-        return hand_skeleton(HandDimensions.from_measured(self.dimensions), hand or self.hand)
+        return hand_skeleton(HandDimensions.from_measured(self.dimensions), hand or self.hand, palm)
 
 
 @dataclass(frozen=True)

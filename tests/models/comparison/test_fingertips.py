@@ -14,7 +14,7 @@ from glovecal_models.comparison.hand_poses import hand_poses, tips_mm
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 from glovecal_models.comparison.text import fingertips_sentence
 from glovecal_models.hand.dimensions import HandDimensions
-from glovecal_models.hand.rotations import HAND_ROTATIONS, completed
+from glovecal_models.hand.rotations import ARCHING_ROTATIONS, HAND_ROTATIONS, completed
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.simulation.hand_motion import random_posture
 from glovecal_models.simulation.simulated_hand import DRIVEN
@@ -221,3 +221,19 @@ def test_the_sentence_says_whether_the_hand_was_measured() -> None:
     assert "(RMSE, for a hand of 190 mm; noise floor" in fingertips_sentence(known)
     other = found({"A": np.zeros(5)}, {"A": np.ones(5)}, ("A",))
     assert summed_up(other).fingertips is None
+
+
+def test_an_arch_that_was_measured_moves_the_little_finger_only() -> None:
+    arched, flat = still(PALM_ARCH=20.0), still(PALM_ARCH=0.0)
+    errors = fingertip_errors(found(arched, flat, ARCHING_ROTATIONS), {}, HAND)
+    assert errors is not None
+    hand = hand_skeleton(HAND, palm="arching")
+    angles = np.array([[*FLAT.values(), arch] for arch in (20.0, 0.0)])
+    apart = np.linalg.norm(np.subtract(*tips_mm(hand, angles)), axis=1)
+    assert errors.fingers["pinky"].rmse_mm == pytest.approx(apart[4])
+    assert errors.fingers["ring"].rmse_mm == pytest.approx(0.0)
+    assert errors.worst.finger == "pinky"
+    assert errors.worst.measured_deg["PALM_ARCH"] == 20.0
+    only_predicted = fingertip_errors(found(still(), flat, ARCHING_ROTATIONS), {}, HAND)
+    assert only_predicted is not None
+    assert "PALM_ARCH" not in only_predicted.worst.measured_deg

@@ -82,3 +82,12 @@ def test_errors_in_mm_are_those_of_the_subjects_hand(
     assert ">Fingertips</h2>" in page
     assert own["sentence"] in page
     assert "largest error, take b at" in page
+
+
+def test_a_hand_whose_palm_arches_has_one_joint_more(client: RestClient) -> None:
+    client.post("/subjects", {"name": "arne", "dimensions": {"hand_length": 176.0}})
+    dimensions = HandDimensions.from_measured({"hand_length": 176.0})
+    expected = skeleton_document(hand_skeleton(dimensions, "right", "arching"))
+    assert client.get("/subjects/arne/skeleton", {"palm": "arching"}) == expected
+    with pytest.raises(Refused, match="palm"):
+        client.get("/subjects/arne/skeleton", {"palm": "cupped"})

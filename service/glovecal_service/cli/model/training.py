@@ -16,7 +16,9 @@ from glovecal_service.cli.terminal.waiting import wait_for_job
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
 
-Method = Literal["raw", "linear", "lmc_gpr", "spgp", "auto", "polynomial_gpr", "general_gpr"]
+Method = Literal[
+    "raw", "linear", "lmc_gpr", "spgp", "auto", "polynomial_gpr", "general_gpr", "two_shapes", "template"
+]
 
 
 def train(
@@ -26,7 +28,9 @@ def train(
         Method,
         typer.Option(
             help="auto chooses each rotation's kernel by evidence and error, for hardware nobody knows. "
-            "raw is no calibration at all: the scale to read the others against."
+            "raw is no calibration at all: the scale to read the others against. template is a scale and an "
+            "offset for each sensor and the palm's part, from five hand shapes; two_shapes is the glove "
+            "maker's line through two."
         ),
     ] = "lmc_gpr",
     take: Annotated[

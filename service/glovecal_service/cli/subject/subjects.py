@@ -10,7 +10,7 @@ import typer
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
-from glovecal_models.hand.skeleton import Handedness
+from glovecal_models.hand.skeleton import Handedness, Palm
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, subject_named
 from glovecal_service.cli.terminal.printing import moment, out, print_facts, print_json, print_table, text
@@ -101,10 +101,17 @@ def history(name: Name, layout: OnlyLayout = None, as_json: AsJson = False) -> N
 
 
 @app.command("skeleton")
-def skeleton(name: Name, hand: Hand = None, as_json: AsJson = False) -> None:
+def skeleton(
+    name: Name,
+    hand: Hand = None,
+    palm: Annotated[
+        Palm, typer.Option(help="arching: with the joint of the little finger's metacarpal.")
+    ] = "rigid",
+    as_json: AsJson = False,
+) -> None:
     """Show the sizes of a subject's hand; --json prints joints, axes and limits for a viewer."""
     with connect() as service:
-        query = {"hand": hand} if hand is not None else None
+        query = {"palm": palm} | ({"hand": hand} if hand is not None else {})
         document = service.get(f"/subjects/{name}/skeleton", query)
     if as_json:
         print_json(document)

@@ -10,6 +10,7 @@ from glovecal_models.calibration.model_recipe import (
     repaired_takes,
     requested_effects,
 )
+from glovecal_models.calibration.training_settings import LINEAR_METHODS
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.known_effect import known_effects
 from glovecal_models.effects.catalogue import known_by_name
@@ -62,7 +63,7 @@ def try_effect(id: ModelInPath, body: TrialRequest, parts: PartsNeeded) -> Trial
         found = diagnose(
             repaired_takes(takes, requested_effects(model)),
             model.layout,
-            linear=model.method in ("raw", "linear"),
+            linear=model.method in LINEAR_METHODS,
             known=known_effects(model),
             effects=[effect],
             signatures=False,

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field
 
 from glovecal_models.hand.dimensions import DIMENSIONS
-from glovecal_models.hand.skeleton import Handedness
+from glovecal_models.hand.skeleton import Handedness, Palm
 from glovecal_models.hand.skeleton_document import skeleton_document
 from glovecal_service.rest.http.answers import change_problems, problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
@@ -156,9 +156,12 @@ def measure_hand(name: SubjectInPath, body: MeasuredHand, store: StoreNeeded) ->
     summary="The subject's hand, for viewers",
     responses=problems(),
 )
-def get_skeleton(name: SubjectInPath, store: StoreNeeded, hand: Handedness | None = None) -> dict[str, Any]:
-    """Joints, axes, offsets and limits; of the other hand with `hand`."""
-    return skeleton_document(store.subjects.get(name).skeleton(hand))
+def get_skeleton(
+    name: SubjectInPath, store: StoreNeeded, hand: Handedness | None = None, palm: Palm = "rigid"
+) -> dict[str, Any]:
+    """Joints, axes, offsets and limits; of the other hand with `hand`. With `palm=arching` the little
+    finger's metacarpal is a joint, turned by the rotation PALM_ARCH."""
+    return skeleton_document(store.subjects.get(name).skeleton(hand, palm))
 
 
 @router.delete(

@@ -19,6 +19,7 @@ PROTOCOLS = {
     "active": "Active: the model chooses each step (2 to 4 min)",
     "fk_only": "Poses and widgets only",
     "ik_only": "Touches only",
+    "five_shapes": "Five hand shapes (two minutes)",
 }
 TRIGGERS = {
     "key": "By key or foot pedal",
