@@ -40,6 +40,7 @@ from glovecal_service.rest.model import (
     models,
     predictions,
     quick_check,
+    refinement,
     replay,
     residual_column,
     series,
@@ -72,6 +73,7 @@ ROUTERS = (
     *(
         training,
         model_import,
+        refinement,
         models,
         predictions,
         comparison,

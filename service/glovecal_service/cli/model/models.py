@@ -146,6 +146,26 @@ def activate(model: Model) -> None:
     out.print(f"Model {document['model'][:12]} is active for {document['subject']}, {document['layout']}.")
 
 
+@app.command("refine")
+def refine(
+    model: Model,
+    rotation: Annotated[str, typer.Option("--rotation", "-r", help="Which, such as I_PIP.")],
+    scale: Annotated[float, typer.Option("--scale", help="Times the angle.")] = 1.0,
+    offset: Annotated[float, typer.Option("--offset", help="Added after it, degrees.")] = 0.0,
+    activate: Annotated[bool, typer.Option("--activate", help="Predict live with it at once.")] = False,
+) -> None:
+    """Turn scale and offset of one rotation by hand: a new version, of a model that is a line there.
+
+    Its error is not measured. `glovecal model rollback` takes back what was activated.
+    """
+    with connect() as service:
+        body = {"rotations": {rotation: {"scale": scale, "offset_deg": offset}}, "activate": activate}
+        child = service.post(f"/models/{model}/refine", body)
+    out.print(f"Model {child['id'][:12]} of {child['subject']}: {child['facts']['sentences'][0]}")
+    if not activate:
+        out.print(f"  glovecal model activate {child['id'][:12]}")
+
+
 @app.command("rollback")
 def rollback(subject: Subject, layout: OnlyLayout = None) -> None:
     """Return to the model that was active before. The layout is needed only if there are several."""

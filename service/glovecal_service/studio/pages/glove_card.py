@@ -17,6 +17,7 @@ from glovecal_service.studio.glove_state import GloveState
 from glovecal_service.studio.hand.hand_view import HandView, Side
 from glovecal_service.studio.heading import heading
 from glovecal_service.studio.pages.explained_joint import ExplainedJoint
+from glovecal_service.studio.pages.refine_by_hand import RefineByHand
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.strips.live_values import AngleList, SensorStrips
 from glovecal_service.studio.studio import Studio
@@ -128,6 +129,7 @@ class GloveCard:
                     ).classes("glove-hand")  # fmt: skip
                     self._view_acts(view, reads, least)
                     self._joint = ExplainedJoint(self._studio, self._glove, view)
+                    self._refine = RefineByHand(self._studio, self._follow)
                 with ui.element("div").classes("glove-values"):
                     self._joint.choose_in(AngleList(feed, label="Angles and their standard deviations"))
                     heading(3, "Readings, last 6 s")
@@ -204,6 +206,7 @@ class GloveCard:
                 ).classes("choice")
         else:
             self._select.set_options(names, value=active)
+        await self._refine.follow(active)
 
     async def _activate(self, event: Any) -> None:
         if event.value in (None, self._active):  # this page follows a change made elsewhere

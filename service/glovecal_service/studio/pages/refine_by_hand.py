@@ -1,0 +1,114 @@
+"""Refinement by hand on a live glove: scale and offset of a rotation by sliders, every change a version."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from functools import partial
+from typing import Any
+from urllib.parse import quote
+
+from nicegui import ui
+from nicegui.events import GenericEventArguments
+
+from glovecal_service.studio.amounts import version_name
+from glovecal_service.studio.service import Refusal
+from glovecal_service.studio.studio import Studio
+
+LEAST_SCALE, MOST_SCALE, SCALE_STEP = 0.5, 2.0, 0.01
+MOST_OFFSET_DEG, OFFSET_STEP_DEG = 45.0, 0.5
+WHAT = (
+    "Turn the angle until the hand looks right beside the real one. Each release of a slider makes a version "
+    "and serves it; its error is not measured."
+)
+
+
+class RefineByHand:
+    """Hidden where the served model has no line to refine. ``changed``: told when another model is served."""
+
+    def __init__(self, studio: Studio, changed: Callable[[], Awaitable[None]]) -> None:
+        self._studio, self._changed = studio, changed
+        self._model: dict[str, Any] = {}
+        self._busy = False
+        with ui.expansion("Refine by hand").classes("refine") as self._part:
+            ui.label(WHAT)
+            self._rotation = ui.select([], label="Rotation").classes("choice")
+            self._scale = self._slider("Scale, times", LEAST_SCALE, MOST_SCALE, SCALE_STEP, 1.0)
+            self._offset = self._slider(
+                "Offset, degrees", -MOST_OFFSET_DEG, MOST_OFFSET_DEG, OFFSET_STEP_DEG, 0.0
+            )
+            with ui.row():
+                ui.button("Undo", on_click=self._undo).props("outline no-caps")
+            self._said = ui.label("").classes("refine-said").props('role="status"')
+        self._part.set_visibility(False)
+
+    async def follow(self, model: str | None) -> None:
+        """The model that is served now."""
+        if model == self._model.get("id"):
+            return
+        self._model = {}
+        lines: list[str] = []
+        if model is not None:
+            try:
+                self._model = await self._studio.service.get(f"/models/{quote(model)}")
+            except Refusal:
+                self._part.set_visibility(False)
+                return
+            lines = _lines(self._model)
+        kept = self._rotation.value if self._rotation.value in lines else next(iter(lines), None)
+        self._rotation.set_options(lines, value=kept)
+        self._part.set_visibility(bool(lines))
+
+    def _slider(self, label: str, least: float, most: float, step: float, neutral: float) -> ui.slider:
+        with ui.element("div").classes("refine-slider"):
+            ui.label(label)
+            shown = ui.label(f"{neutral:g}").classes("refine-value")
+            slider = ui.slider(min=least, max=most, step=step, value=neutral).props(f'aria-label="{label}"')
+            slider.on_value_change(lambda event: shown.set_text(f"{event.value:g}"))
+            slider.on("change", partial(self._released, slider))
+        return slider
+
+    async def _released(self, slider: ui.slider, event: GenericEventArguments) -> None:
+        """The value comes with the event: that of the slider may still be on its way."""
+        slider.set_value(float(event.args))
+        await self._apply()
+
+    async def _apply(self) -> None:
+        scale, offset = self._scale.value or 1.0, self._offset.value or 0.0
+        if self._busy or (scale == 1.0 and offset == 0.0):
+            return
+        self._busy = True
+        rotation, before = self._rotation.value, self._model.get("id")
+        body = {"rotations": {rotation: {"scale": scale, "offset_deg": offset}}, "activate": True}
+        try:
+            child = await self._studio.service.post(f"/models/{before}/refine", body)
+        except Refusal as refusal:
+            self._said.set_text(str(refusal))
+        else:
+            self._said.set_text(
+                f"{rotation} times {scale:g}, {offset:+g} degrees: {version_name(child)} is served."
+            )
+            await self._changed()
+        finally:
+            self._scale.set_value(1.0)
+            self._offset.set_value(0.0)
+            self._busy = False
+
+    async def _undo(self) -> None:
+        which = {key: self._model.get(key) for key in ("subject", "layout")}
+        try:
+            back = await self._studio.service.post("/models/rollback", which)
+        except Refusal as refusal:
+            self._said.set_text(str(refusal))
+            return
+        self._said.set_text(f"Taken back: {back['model'][:12]} is served again.")
+        await self._changed()
+
+
+def _lines(model: dict[str, Any]) -> list[str]:
+    """Rotations that may be refined: as REST would refuse the others."""
+    corrected = {rotation for effect in model["effect_details"] for rotation in effect["parameters"]}
+    return [
+        each["rotation"]
+        for each in model["rotations"]
+        if each["method"] == "linear" and each["rotation"] not in corrected
+    ]

@@ -1,0 +1,83 @@
+"""Refinement by hand on the Live page: a slider makes a version that is served; undo takes it back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import httpx
+import pytest
+import zenoh
+from effect_models import model_with
+from playwright.sync_api import expect
+from realtime_support import LAYOUT
+from studio_support import Open, moving, serious
+
+from glovecal_client.session import open_client
+from glovecal_models.calibration.artifact import dump
+from glovecal_service.settings import Settings
+from glovecal_service.store import Store
+
+pytestmark = pytest.mark.needs_chromium
+PATIENCE_MS = 60_000
+
+
+@pytest.fixture(scope="module")
+def session(settings: Settings, address: str) -> Iterator[zenoh.Session]:
+    with open_client((settings.zenoh,), wait_s=60.0) as session:
+        yield session
+
+
+@pytest.fixture(scope="module")
+def line(settings: Settings, address: str) -> str:
+    """The id of a model of lines, of subject carla."""
+    with Store.open(settings) as store:
+        store.subjects.create("carla")
+        record = store.models.add(
+            dump(model_with()), subject="carla", layout=LAYOUT.name, method="linear", parent=None,
+            facts={"held_out_rmse_deg": 1.0},
+        )  # fmt: skip
+        store.models.activate(record.id)
+        return record.id
+
+
+def active(address: str) -> str:
+    models = httpx.get(f"{address}/v1/models", params={"subject": "carla"}).json()
+    return next(each["id"] for each in models if each["active"])
+
+
+def test_a_slider_makes_a_version_and_undo_takes_it_back(
+    opened: Open, session: zenoh.Session, settings: Settings, address: str, line: str
+) -> None:
+    with moving(session, settings, "refined", "carla"):
+        seen = opened("live")
+        page, card = seen.page, seen.page.get_by_role("region", name="Glove refined")
+        expect(card.locator(".state-word").first).to_have_text("ok", timeout=PATIENCE_MS)
+        card.get_by_text("Refine by hand").click()
+        slider = card.get_by_role("slider", name="Offset, degrees")
+        slider.locator('[tabindex="0"]').press("ArrowRight")
+        expect(card.locator(".refine-said")).to_contain_text("+0.5 degrees", timeout=PATIENCE_MS)
+        child = active(address)
+        assert child != line
+        found = httpx.get(f"{address}/v1/models/{child}").json()
+        assert found["parent"] == line
+        assert found["held_out_rmse_deg"] is None
+        assert "Its error was not measured." in found["facts"]["sentences"][0]
+        expect(card.locator(".refine-value").last).to_have_text("0", timeout=PATIENCE_MS)
+        page.wait_for_timeout(300)
+        assert serious(page) == []
+        card.get_by_role("button", name="Undo").click()
+        expect(card.locator(".refine-said")).to_contain_text("Taken back", timeout=PATIENCE_MS)
+        assert active(address) == line
+        assert seen.complaints == []
+
+
+def test_what_is_no_line_is_refused(address: str, line: str) -> None:
+    for rotations, said in (
+        ({"NOSE": {"scale": 1.1}}, "no rotation 'NOSE'"),
+        ({}, "rotations"),
+        ({"I_MCP": {"scale": 0.0}}, "scale"),
+        ({"I_MCP": {"scale": 1.1, "gain": 2}}, "gain"),
+    ):
+        answer = httpx.post(f"{address}/v1/models/{line}/refine", json={"rotations": rotations})
+        assert answer.status_code in (400, 422)
+        assert said in answer.text
