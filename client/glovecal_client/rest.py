@@ -137,6 +137,10 @@ class RestClient:
             query["reference_filename"] = reference.name
         return self._send_file("POST", "/takes", file, query)
 
+    def upload(self, file: Path) -> str:
+        """Keep a file of any kind with the service; the sha256 by which a later request names it."""
+        return self._send_file("POST", "/uploads", file, None, ARTIFACT)["sha256"]
+
     def attach_reference(self, take: str, file: Path, *, clock: str = "take") -> dict[str, Any]:
         """Give a take the reference angles of a table; ``clock`` is ``take`` or ``wall`` (Unix seconds)."""
         query = {"clock": clock, "filename": file.name}

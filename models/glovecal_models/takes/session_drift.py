@@ -7,12 +7,12 @@ some degrees only: a single shape tells little of the drift, the mean over shape
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.take import Take
 
@@ -26,6 +26,23 @@ SHAPES = {
 """The five shapes of the calibration take (section 3.3.4), each with what to say to a person."""
 HELD_S = 1.0
 """The stillest part of a take, whose median counts."""
+
+
+class _Angles(Protocol):
+    @property
+    def mean(self) -> np.ndarray: ...
+
+
+class Predictor(Protocol):
+    """What a GlovePredictor gives; a take knows no models."""
+
+    @property
+    def sensors(self) -> Sequence[str]: ...
+
+    @property
+    def rotations(self) -> Sequence[str]: ...
+
+    def predict(self, readings: np.ndarray) -> _Angles: ...
 
 
 @dataclass(frozen=True)
@@ -58,7 +75,7 @@ class SessionDrift:
 
 
 def session_drift(
-    start: Mapping[str, Take], end: Mapping[str, Take], predictor: GlovePredictor | None
+    start: Mapping[str, Take], end: Mapping[str, Take], predictor: Predictor | None
 ) -> SessionDrift:
     """``start`` and ``end``: a take by shape. Raises BadInput where none is in both, or sensors differ."""
     shapes = tuple(name for name in start if name in end)

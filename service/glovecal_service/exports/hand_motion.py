@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 import numpy as np
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.skeleton import Skeleton
+from glovecal_service.exports.body_markers import HandFrame, Wrist
 
 Content = Literal["joints", "angles", "raw"]
 """Places of joints in mm, calibrated rotations in degrees, or readings as the glove sent them."""
@@ -38,6 +39,12 @@ class HandMotion:
     """(N, R)."""
     skeleton: Skeleton
     simulated: bool = False
+    frame: HandFrame | None = None
+    """Where the hand is, if an optical system saw it; else joints are in the forearm's frame."""
+    wrist: Wrist = "glove"
+    """With "optical" the glove's wrist angles are ignored: the frame is that of the hand itself."""
+    beside: Mapping[str, np.ndarray] = field(default_factory=dict)
+    """Other markers, (N, 3) by name, mm, to be written with the hand."""
 
     def require_angles(self, content: Content) -> None:
         """Raises BadInput where nothing is calibrated."""

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from glovecal_models.hand.forward_kinematics import forward_kinematics
-from glovecal_models.hand.rotations import FINGERS, completed
+from glovecal_models.hand.rotations import FINGERS, WRIST, completed
 from glovecal_service.exports.hand_motion import Content, HandMotion
 
 TRIPLES: dict[str, tuple[str, ...]] = {
@@ -51,13 +51,20 @@ def markers(motion: HandMotion, content: Content) -> dict[str, np.ndarray]:
     motion.require_angles(content)
     if content == "angles":
         return _grouped(motion, motion.rotations, motion.degrees)
-    frames = forward_kinematics(motion.skeleton, completed(motion.rotations, motion.degrees))
+    degrees = motion.degrees
+    if motion.wrist == "optical":
+        is_wrist = [name in WRIST for name in motion.rotations]
+        degrees = np.where(is_wrist, 0.0, degrees)
+    frames = forward_kinematics(motion.skeleton, completed(motion.rotations, degrees))
     names = [joint.name for joint in motion.skeleton.joints]
     found = {name: frames.joints_mm[:, names.index(joint)] for name, joint in PLACES.items()}
     tips = zip(motion.skeleton.tips, frames.tips_mm.swapaxes(0, 1), strict=True)
     found |= {f"{FINGERS[tip.finger]}_tip": place for tip, place in tips}
+    if motion.frame is not None:
+        found = {name: motion.frame.placed(place) for name, place in found.items()}
     unknown = np.isnan(motion.degrees).all(axis=1, keepdims=True)
-    return {f"{motion.label}_{name}": np.where(unknown, np.nan, at) for name, at in found.items()}
+    hand = {f"{motion.label}_{name}": np.where(unknown, np.nan, at) for name, at in found.items()}
+    return hand | dict(motion.beside)
 
 
 def _grouped(motion: HandMotion, names: Sequence[str], values: np.ndarray) -> dict[str, np.ndarray]:

@@ -10,6 +10,7 @@ import pytest
 import trc
 
 from glovecal_client.rest import Refused, RestClient
+from glovecal_service.exports.trc import trc_text
 
 Write = Callable[..., Path]
 
@@ -94,3 +95,23 @@ def test_hands_of_imported_tables_are_joined_as_they_are_and_said_so(client: Res
     assert "Record a clap" in found["sentence"]
     with pytest.raises(Refused, match=r"clap"):
         client.post("/takes/hands", {"takes": takes(client), "claps": True})
+
+
+def test_markers_of_a_body_are_joined_to_the_joints(client: RestClient, tmp_path: Path) -> None:
+    right = takes(client)[0]
+    job = client.post("/models/train", {"subject": "anna", "method": "linear"})
+    client.wait_for_job(job["id"], patience_s=300)
+    time_s = np.arange(300) / 200
+    arm = {"RAD": (0.0, 30.0, 0.0), "ULN": (0.0, -30.0, 0.0), "ELB": (-250.0, 0.0, 0.0)}
+    places = {name: np.tile(place, (300, 1)) + [0.0, 0.0, 900.0] for name, place in arm.items()}
+    (tmp_path / "body.trc").write_text(trc_text(time_s, places, "body.trc"))
+    body = {"upload": client.upload(tmp_path / "body.trc"), "right": list(arm)}
+    asked = {"takes": [right], "body": body, "format": "trc"}
+    data = read(client.made("/motion", asked), tmp_path)
+    assert set(arm) < set(data["Markers"])
+    np.testing.assert_allclose(data["R_wrist"], np.tile([0.0, 0.0, 900.0], (120, 1)), atol=1e-6)
+    np.testing.assert_allclose(data["ELB"][:100], places["ELB"][:100], atol=1e-6)
+    with pytest.raises(Refused, match="joined to joints in a TRC file"):
+        client.made("/motion", {**asked, "content": "raw"})
+    with pytest.raises(Refused, match="no upload"):
+        client.made("/motion", {**asked, "body": {"upload": "0" * 64}})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -19,6 +19,10 @@ def _models(given: list[str] | None) -> list[str] | None:
     for id in given or ():
         model_id(id)
     return given
+
+
+def _names(given: str | None) -> list[str]:
+    return [name.strip() for name in (given or "").split(",") if name.strip()]
 
 
 def motion(
@@ -39,6 +43,21 @@ def motion(
     claps: Annotated[
         bool, typer.Option("--claps", help="Join two hands by claps that both gloves felt.")
     ] = False,
+    wrist: Annotated[
+        Literal["glove", "optical"],
+        typer.Option(help="Turn the hand by the glove's wrist sensors, or by markers on its back."),
+    ] = "glove",
+    body: Annotated[
+        Path | None,
+        typer.Option(exists=True, dir_okay=False, help="Markers of an optical system (TRC), to be joined."),
+    ] = None,
+    body_shift: Annotated[
+        float | None, typer.Option(help="Seconds added to its times; default: both begin at once.")
+    ] = None,
+    right: Annotated[
+        str | None, typer.Option(metavar="MARKERS", help="That place the right hand, see docs/two-gloves.md.")
+    ] = None,
+    left: Annotated[str | None, typer.Option(metavar="MARKERS", help="That place the left hand.")] = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Write one hand or both as motion: TRC for OpenSim and MotionBuilder, CSV or Parquet for analysis."""
@@ -50,12 +69,17 @@ def motion(
     require_place(file, overwrite=overwrite)
     with connect() as service:
         rows = service.get("/takes")
-        body = {
+        asked: dict[str, Any] = {
             "takes": [find_take(rows, name)["id"] for name in take],
             "models": model or [],
             "content": content,
             "format": chosen.suffix.removeprefix("."),
             "shifts_s": shift or [],
             "claps": claps,
+            "wrist": wrist,
         }
-        write_whole({file: service.made("/motion", body)})
+        if body is not None:
+            markers = {"right": _names(right), "left": _names(left)}
+            body_of = {"upload": service.upload(body), "shift_s": body_shift, **markers}
+            asked["body"] = body_of
+        write_whole({file: service.made("/motion", asked)})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -13,6 +14,8 @@ from pydantic import Field, FiniteFloat
 from starlette.background import BackgroundTask
 
 from glovecal_models.errors import BadInput
+from glovecal_models.takes.common_event import common_events
+from glovecal_service.exports.body_markers import Wrist, hand_frame, read_trc
 from glovecal_service.exports.formats import FORMATS, format_of
 from glovecal_service.exports.hand_motion import Content, HandMotion, on_one_time
 from glovecal_service.exports.take_motion import motion_of
@@ -20,13 +23,30 @@ from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.request_types import ModelReference, StrictBody, TakeReference
 from glovecal_service.rest.take.hands import hand_alignment
-from glovecal_service.store.errors import Conflict
+from glovecal_service.store.errors import Conflict, NotFound
 
 router = APIRouter(prefix="/motion", tags=["takes"])
 
 MOST_HANDS = 2
 LARGEST_SHIFT_S = 1e9
+CLAPS_WITHIN_S = 5.0
+MarkerNames = Annotated[list[Annotated[str, Field(min_length=1, max_length=64)]], Field(max_length=4)]
 Shift = Annotated[FiniteFloat, Field(ge=-LARGEST_SHIFT_S, le=LARGEST_SHIFT_S)]
+
+
+class Body(StrictBody):
+    upload: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")] = Field(
+        description="A TRC file sent to `uploads`, in mm, cm or m."
+    )
+    shift_s: Shift | None = Field(
+        None, description="Added to its times; null: both begin at once. Claps refine it within 5 s."
+    )
+    right: MarkerNames = Field(default_factory=list, description="Markers that place the right hand.")
+    left: MarkerNames = Field(
+        default_factory=list,
+        description="wrist=glove: wrist at the thumb's and at the little finger's side, elbow; "
+        "wrist=optical: both of the wrist, then both of the back of the hand.",
+    )
 
 
 class Motion(StrictBody):
@@ -47,7 +67,11 @@ class Motion(StrictBody):
         default_factory=list,
         description="Added to each take's times. Not given: two takes are joined as `takes/hands` says.",
     )
-    claps: bool = Field(False, description="Join two takes by claps that both gloves felt.")
+    claps: bool = Field(False, description="Join two takes, and the body, by claps that all of them felt.")
+    wrist: Wrist = Field("glove", description="optical: the glove's wrist angles are ignored.")
+    body: Body | None = Field(
+        None, description="Markers of an optical system, joined to the joints in a TRC."
+    )
 
 
 @router.post(
@@ -81,6 +105,12 @@ def export_motion(body: Motion, parts: PartsNeeded) -> FileResponse:
         found, _ = hand_alignment(parts.store, body.takes[0], body.takes[1], claps=body.claps)
         hands[1] = replace(hands[1], time_s=found.onto_first(hands[1].time_s))
     hands = on_one_time(hands, body.shifts_s)
+    if body.wrist == "optical":
+        hands = [replace(one, wrist="optical") for one in hands]
+    if body.body is not None:
+        if (body.content, body.format) != ("joints", "trc"):
+            raise BadInput("markers of a body are joined to joints in a TRC file: content joints, format trc")
+        hands = _with_body(parts, body, body.body, hands)
     folder = tempfile.TemporaryDirectory(prefix="glovecal-motion-")
     try:
         path = Path(folder.name, f"motion{chosen.suffix}")
@@ -91,6 +121,26 @@ def export_motion(body: Motion, parts: PartsNeeded) -> FileResponse:
     return FileResponse(
         path, media_type=chosen.media_type, filename=path.name, background=BackgroundTask(folder.cleanup)
     )
+
+
+def _with_body(parts: Parts, asked: Motion, body: Body, hands: Sequence[HandMotion]) -> list[HandMotion]:
+    """Hands placed by the body's markers where those are named, and the markers beside the first."""
+    path = parts.uploads.find(body.upload)
+    if path is None:
+        raise NotFound(f"no upload {body.upload[:12]}; send the TRC file to /v1/uploads first")
+    found = read_trc(path, "the body's file")
+    shift_s = float(hands[0].time_s[0] - found.time_s[0]) if body.shift_s is None else body.shift_s
+    if asked.claps:
+        take = parts.store.takes.load(asked.takes[0])
+        moved = replace(found, time_s=found.time_s + shift_s).as_take()
+        shift_s += common_events(take, moved, CLAPS_WITHIN_S).shift_s
+    at = replace(found, time_s=found.time_s + shift_s).at(hands[0].time_s)
+    placed = []
+    for hand in hands:
+        names = body.left if hand.label == "L" else body.right
+        frame = hand_frame(at, names, asked.wrist, is_left=hand.label == "L") if names else None
+        placed.append(replace(hand, frame=frame))
+    return [replace(placed[0], beside=at), *placed[1:]]
 
 
 def _hand(parts: Parts, take: str, model: str | None, content: Content) -> HandMotion:
