@@ -153,7 +153,9 @@ def _least_squares(
         return np.concatenate([rows, *(each.missing(found)[1] for each in touching)])
 
     start = np.linalg.lstsq(rows, target)[0]
-    found = least_squares(residuals, start, jac=slopes, method="lm").x if touching else start
+    if not touching:
+        return start, rows
+    found = least_squares(residuals, start, jac=slopes, method="lm").x  # pyright: ignore[reportArgumentType]
     return found, slopes(found)
 
 

@@ -40,7 +40,7 @@ def shape_angles(pose: str) -> dict[str, KnownAngle]:
     """What the name of a shape tells of a hand; nothing for another pose."""
     if pose not in KEY_POSES_DEG:
         return {}
-    usual = POSES_DEG[pose] | KEY_POSES_DEG[pose]
+    usual = {**POSES_DEG[pose], **KEY_POSES_DEG[pose]}
     found = {name: KnownAngle(degrees, _sd(name, degrees)) for name, degrees in usual.items()}
     for finger in "IMRP":
         bend = found[f"{finger}_PIP"]

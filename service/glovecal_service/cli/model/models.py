@@ -8,6 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from glovecal_service.cli.model.rows import EFFECT_COLUMNS, KERNEL_COLUMNS, effect_rows, kernel_rows
+from glovecal_service.cli.model.vendor_files import (
+    VendorFormat,
+    exported_calibration,
+    imported_calibration,
+    print_left_out,
+)
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import (
     AsJson,
@@ -190,9 +196,19 @@ def export(
     model: Model,
     file: Annotated[Path, typer.Argument(help="Where to write the artifact (.safetensors).")],
     overwrite: Overwrite = False,
+    form: VendorFormat = None,
 ) -> None:
-    """Write the model's artifact (safetensors with its manifest inside); its sha256 is the model's id."""
+    """Write the model's artifact (safetensors with its manifest inside); its sha256 is the model's id.
+
+    With --format it is written for another program, where the model is linear.
+    """
     require_place(file, overwrite=overwrite)
+    if form is not None:
+        with connect() as service:
+            text, left_out = exported_calibration(service, model, form)
+        write_whole({file: text.encode()})
+        print_left_out(left_out)
+        return
     with connect() as service:
         write_whole({file: service.download(f"/models/{model}/export")})
     err.print(f"In Python: glovecal_models.calibration.artifact.load(open({str(file)!r}, 'rb').read())")
@@ -200,7 +216,10 @@ def export(
 
 @app.command("import")
 def import_model(
-    file: Annotated[Path, typer.Argument(help="What `model export` wrote.", exists=True, dir_okay=False)],
+    file: Annotated[
+        Path,
+        typer.Argument(help="Of `model export`, or of another program.", exists=True, dir_okay=False),
+    ],
     subject: Annotated[
         str | None,
         typer.Option(
@@ -210,11 +229,26 @@ def import_model(
     create_subject: Annotated[
         bool, typer.Option("--create-subject", help="Add the subject if it is not there.")
     ] = False,
+    form: VendorFormat = None,
+    layout: Annotated[
+        str | None, typer.Option("--layout", "-l", help="Of the glove; with --format only.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Take over a model that another service exported; it is tried first, and not activated."""
+    """Take over a model that another service exported, or with --format another program's calibration.
+
+    It is tried first, and not activated.
+    """
+    if (form is None) != (layout is None) or (form is not None and subject is None):
+        raise typer.BadParameter("--format, --layout and --subject go together: whose, of which glove")
     with connect() as service:
-        found = service.import_model(file, subject=subject, create_subject=create_subject)
+        if form is not None and layout is not None and subject is not None:
+            found, left_out = imported_calibration(
+                service, file, form, layout, subject, create_subject=create_subject
+            )
+            print_left_out(left_out)
+        else:
+            found = service.import_model(file, subject=subject, create_subject=create_subject)
     if as_json:
         print_json(found)
         return
