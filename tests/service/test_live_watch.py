@@ -16,7 +16,7 @@ from glovecal_client.wire.frame import Frame
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.calibration.training_settings import Method, TrainingSettings
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.protocol import free_segment, segments
 from glovecal_models.simulation.simulated_glove import Counts, SimulatedGlove, Wearing
@@ -32,7 +32,7 @@ NOTICED_S = 10.0
 MOTIONS = ("key_poses", "cross_couple", "evaluation", "wrist", "thumb")
 
 
-def trained(seed: int, method: str = "lmc_gpr") -> CalibrationModel:
+def trained(seed: int, method: Method = "lmc_gpr") -> CalibrationModel:
     glove = SimulatedGlove(seed, LAYOUT)
     takes = [simulate_take(glove, segments(name, seed), rate_hz=10, name=name).take for name in MOTIONS]
     return train(takes, LAYOUT, "anna", TrainingSettings(method=method, folds=0))

@@ -47,6 +47,7 @@ class VideoWriter:
             self._begin(picture.pixels)
         if picture.pixels.shape != self._shape:
             raise DeviceError(f"a picture of {picture.pixels.shape} does not fit a video of {self._shape}")
+        assert self._writer is not None
         self._writer.write(picture.pixels)
         self._table.writerow([self.pictures, picture.monotonic_ns, picture.wall_ns])
         self._times.flush()
