@@ -103,7 +103,7 @@ def test_markers_of_a_body_are_joined_to_the_joints(client: RestClient, tmp_path
     client.wait_for_job(job["id"], patience_s=300)
     time_s = np.arange(300) / 200
     arm = {"RAD": (0.0, 30.0, 0.0), "ULN": (0.0, -30.0, 0.0), "ELB": (-250.0, 0.0, 0.0)}
-    places = {name: np.tile(place, (300, 1)) + [0.0, 0.0, 900.0] for name, place in arm.items()}
+    places = {name: np.tile(place, (300, 1)) + np.array([0.0, 0.0, 900.0]) for name, place in arm.items()}
     (tmp_path / "body.trc").write_text(trc_text(time_s, places, "body.trc"))
     body = {"upload": client.upload(tmp_path / "body.trc"), "right": list(arm)}
     asked = {"takes": [right], "body": body, "format": "trc"}
