@@ -53,6 +53,7 @@ NAVIGATION = {
         "docs/capture",
         "Gloves and their options <docs/gloves>",
         "Add your glove <docs/own-glove>",
+        "Two gloves <docs/two-gloves>",
         "docs/references",
         "Train <docs/train>",
         "Compare <docs/compare>",
