@@ -55,6 +55,7 @@ NAVIGATION = {
         "Add your glove <docs/own-glove>",
         "docs/references",
         "Train <docs/train>",
+        "Template calibration <docs/template-calibration>",
         "Compare <docs/compare>",
         "docs/effects",
         "An effect of your own <docs/own-effect>",

@@ -49,9 +49,8 @@ def test_a_prior_that_reads_another_sensor_brings_it_along() -> None:
     (item,) = model.rotations
     assert item.correspondence.sensors == ("P_MCP", "PALM_ARCH")
     again = load(dump(model))
-    np.testing.assert_array_equal(
-        *(GlovePredictor(each).predict(take.readings[:9]).mean for each in (model, again))
-    )
+    before, after = (GlovePredictor(each).predict(take.readings[:9]).mean for each in (model, again))
+    np.testing.assert_array_equal(before, after)
     off = GlovePredictor(model).predict(take.readings).mean[:, 0] - take.reference_at_frames(["P_MCP"])[:, 0]
     assert np.sqrt(np.mean(off**2)) < 2.5
 
