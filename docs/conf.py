@@ -56,6 +56,7 @@ NAVIGATION = {
         "Two gloves <docs/two-gloves>",
         "docs/references",
         "Train <docs/train>",
+        "Template calibration <docs/template-calibration>",
         "Compare <docs/compare>",
         "docs/effects",
         "An effect of your own <docs/own-effect>",

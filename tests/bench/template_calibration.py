@@ -28,6 +28,7 @@ from asked_session import RECORDING, asked_session
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
+from glovecal_models.calibration.prior_mean import planes_of
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import PALM, WRIST
@@ -131,15 +132,23 @@ def of_template(seed: int, law: str) -> dict[str, object]:
 
 
 def of_guided(seed: int, law: str) -> dict[str, object]:
-    """LMC-GPR of the whole guided sampling of the same person."""
+    """LMC-GPR of the whole guided sampling of the same person; then with the five shapes' template as its
+    prior mean."""
     glove = glove_of(seed, law)
     takes = sampled(glove, "new_subject")
     settings = replace(TrainingSettings(), samples=400, folds=0)
     found = guided_calibration(takes, glove.layout, "anna", RIGID, settings)
     errors = mean_error_deg(found.model, glove)
+    template = template_calibration(sampled(glove, "five_shapes"), glove.layout, "anna", ARCHING)
+    on_top = guided_calibration(
+        takes, glove.layout, "anna", RIGID, replace(settings, prior=planes_of(template))
+    )
+    with_prior = mean_error_deg(on_top.model, glove)
     return {
         "glove": seed,
         "guided_mean_deg": round(float(np.mean(list(errors.values()))), 2),
+        "on_template_mean_deg": round(float(np.mean(list(with_prior.values()))), 2),
+        "on_template_worst_deg": round(max(with_prior.values()), 1),
         "worst": max(errors, key=lambda each: errors[each]),
         "worst_deg": round(max(errors.values()), 1),
         "refused_touches": [each.pose for each in found.refused],

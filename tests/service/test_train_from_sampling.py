@@ -91,3 +91,13 @@ def test_the_glove_makers_two_shapes_leave_out_what_they_do_not_show(sampled: St
     assert {"T_TMC", "TI_ABD", "I_MCP", "I_PIP"} <= set(model.rotation_names)
     assert "M_MCP" not in model.rotation_names
     assert any(each.startswith("Not in both shapes, not in the model: M_MCP") for each in result["sentences"])
+
+
+def test_a_template_is_the_prior_mean_of_lmc_gpr(sampled: Store) -> None:
+    template = trained(sampled, "measured-anna", method="template")["model"]
+    result = trained(sampled, "measured-anna", prior=template, samples=60)
+    model = load(sampled.models.load_bytes(result["model"]))
+    assert model.method == "lmc_gpr"
+    by_name = {item.rotation: item for item in model.rotations}
+    assert by_name["TI_ABD"].correspondence.sensors[-1] == "PALM_ARCH"
+    assert by_name["I_MCP"].regressor.settings()["evidence"]["prior"] == ["I_MCP"]

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from glovecal_models.calibration.kernel_choice import fit_best_kernel
+from glovecal_models.calibration.prior_mean import fit_on_plane, plane_for
 from glovecal_models.calibration.sample_weight import Recorded, fit_weighted
 from glovecal_models.calibration.training_settings import LINEAR_METHODS, TrainingSettings
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
@@ -95,6 +96,9 @@ def _fit(task: FitTask, cancelled: Cancel | None, report: Report | None) -> Regr
         return fit_beside(task.inputs, task.target, task.known_gain, sensor_names=task.sensors)
     if settings.method in LINEAR_METHODS:
         return fit_linear(task.inputs, task.target, sensor_names=task.sensors, cancelled=cancelled)
+    plane = plane_for(task.rotation, settings.prior) if settings.prior else None
+    if plane is not None:
+        return fit_on_plane(task.inputs, task.target, task.sensors, plane, cancelled=cancelled, report=report)
     samples = Recorded(task.inputs, task.target, task.take, task.position)
     if settings.method in CHOOSING:
         thorough = task.fold is None  # what a user is shown; a fold only repeats the choice

@@ -9,6 +9,7 @@ import numpy as np
 
 from glovecal_models.calibration.fit_task import FitTask
 from glovecal_models.calibration.folds import folds_over_takes, wearing_groups
+from glovecal_models.calibration.prior_mean import plane_for, with_sensors_of
 from glovecal_models.calibration.samples import (
     Samples,
     gather_samples,
@@ -94,6 +95,10 @@ def plan_training(
     gathered: dict[str, Samples] = {}
     for correspondence in layout.correspondences:
         correspondence = correspondence_by(settings.method, correspondence, layout.sensors)
+        if settings.prior:
+            correspondence = with_sensors_of(
+                correspondence, plane_for(correspondence.rotation, settings.prior)
+            )
         samples = gather_samples(takes, correspondence)
         if len(samples) == 0:
             unmeasured.append(correspondence)

@@ -7,6 +7,7 @@ from typing import Literal, get_args
 
 from glovecal_models.calibration.samples import DEFAULT_SAMPLES
 from glovecal_models.errors import BadInput
+from glovecal_models.regression.known_line import PriorPlane
 from glovecal_models.regression.lmc_search import LmcOptimum
 
 Method = Literal[
@@ -45,6 +46,9 @@ class TrainingSettings:
     """(rotation, optimum) already found with more takes: a fold of the same training keeps its sample weight
     and begins its search there."""
 
+    prior: tuple[PriorPlane, ...] = ()
+    """Planes that are the mean of LMC-GPR (``prior_mean``); no other method has one."""
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "kernels", tuple((str(name), str(kernel)) for name, kernel in self.kernels))
         if self.folds < 0 or self.folds == 1:
@@ -52,6 +56,8 @@ class TrainingSettings:
                 f"folds is {self.folds}: one fold would hold out everything; 0 trains without an error "
                 "estimate, 2 or more with one"
             )
+        if self.prior and self.method != "lmc_gpr":
+            raise BadInput(f"a prior mean is for method lmc_gpr, not for {self.method}")
 
 
 LEFT_OUT_SAMPLES = 500

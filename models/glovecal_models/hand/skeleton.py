@@ -26,6 +26,7 @@ import numpy as np
 
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import ARCHING_ROTATIONS, FINGERS, HAND_ROTATIONS, PALM, WRIST
+from glovecal_models.hand.thumb_axes import ThumbAxes
 
 Handedness = Literal["right", "left"]
 Palm = Literal["rigid", "arching"]
@@ -147,11 +148,15 @@ class Skeleton:
 
 
 def hand_skeleton(
-    dimensions: HandDimensions | None = None, hand: Handedness = "right", palm: Palm = "rigid"
+    dimensions: HandDimensions | None = None,
+    hand: Handedness = "right",
+    palm: Palm = "rigid",
+    thumb: ThumbAxes | None = None,
 ) -> Skeleton:
-    """The skeleton of a hand; without ``dimensions`` that of an assumed one."""
+    """The skeleton of a hand; without ``dimensions`` that of an assumed one, without ``thumb`` with
+    ``SENSOR_AXES``."""
     dimensions = HandDimensions.from_measured({}) if dimensions is None else dimensions
-    joints = [*_wrist(), *_thumb(dimensions)]
+    joints = [*_wrist(), *_thumb(dimensions, thumb or SENSOR_AXES)]
     for finger in "IMRP":
         joints += (
             _arching_pinky(dimensions) if (finger, palm) == ("P", "arching") else _finger(finger, dimensions)
@@ -207,18 +212,22 @@ _SPREADS: dict[str, tuple[Vector, dict[str, float]]] = {
 }
 
 
-def _thumb(dimensions: HandDimensions) -> list[Joint]:
+SENSOR_AXES = ThumbAxes(
+    (-math.cos(math.radians(THUMB_SLANT_DEG)), math.sin(math.radians(THUMB_SLANT_DEG)), 0.0), Z
+)
+"""Each of the thumb's two sensors turns one of these."""
+
+
+def _thumb(dimensions: HandDimensions, axes: ThumbAxes) -> list[Joint]:
     x, y = dimensions.thumb_base_mm()
     base = (x, y, -THUMB_BASE_DEPTH * dimensions.hand_length_mm)
     metacarpal, proximal = (
         (dimensions.sizes_mm[f"T_{part}"], 0.0, 0.0) for part in ("metacarpal", "proximal")
     )
     here, roll = (0.0, 0.0, 0.0), (-1.0, 0.0, 0.0)
-    slant = math.radians(THUMB_SLANT_DEG)
-    across = (-math.cos(slant), math.sin(slant), 0.0)
     return [
-        Joint("T_TMC", "W_FLEX", base, _turn(Y, THUMB_TILT_DEG), across, {"T_TMC": 1.0}),
-        Joint("TI_ABD", "T_TMC", here, NO_TURN, Z, {"TI_ABD": 1.0}),
+        Joint("T_TMC", "W_FLEX", base, _turn(Y, THUMB_TILT_DEG), axes.roll, {"T_TMC": 1.0}),
+        Joint("TI_ABD", "T_TMC", here, NO_TURN, axes.abduction, {"TI_ABD": 1.0}),
         Joint("T_VIR", "TI_ABD", here, _turn(roll, THUMB_ROLL_DEG), roll, {"T_VIR": 1.0}),
         Joint("T_MCP", "T_VIR", metacarpal, NO_TURN, Y, {"T_MCP": 1.0}),
         Joint("T_IP", "T_MCP", proximal, NO_TURN, Y, {"T_IP": 1.0}),

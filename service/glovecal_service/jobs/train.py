@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from typing import Any
 
-from glovecal_models.calibration.artifact import dump
+from glovecal_models.calibration.artifact import dump, load
 from glovecal_models.calibration.fit_task import FitResult, FitTask
 from glovecal_models.calibration.fit_task import run_task as run_fit
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.order_confounding import OrderConfounding, order_confounding
+from glovecal_models.calibration.prior_mean import planes_of
 from glovecal_models.calibration.text import order_sentences, plan_sentences, weight_sentence
 from glovecal_models.calibration.training import assemble
 from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
@@ -25,13 +26,13 @@ from glovecal_service.jobs.training_takes import TrainingTakes
 from glovecal_service.store import Store
 from glovecal_service.store.records import JobRecord, TakeRecord
 
-_OWN_KEYS = {"subject", "layout", "takes", "activate", "parent"}
-_SETTINGS = {field.name for field in fields(TrainingSettings)} - {"kernels"}
+_OWN_KEYS = {"subject", "layout", "takes", "activate", "parent", "prior"}
+_SETTINGS = {field.name for field in fields(TrainingSettings)} - {"kernels", "prior"}
 
 
 class TrainJob:
     """Payload: ``subject``, ``layout``, ``takes`` (ids, or None for all that teach), ``activate``,
-    ``parent`` (model id or None), and any of ``TrainingSettings``.
+    ``parent`` (model id or None), ``prior`` (id of a linear model or None), and any of ``TrainingSettings``.
 
     Result: ``model``, ``held_out_rmse_deg``, ``rmse_unseen_wearing_deg``, ``per_rotation`` (held-out
     degrees, None for a rule), ``sentences``, ``confounded_order`` (rotations of wearings in which posture
@@ -43,6 +44,8 @@ class TrainJob:
         payload = job.payload
         subject, layout_name = _text(payload, "subject"), _text(payload, "layout")
         settings = _settings(payload)
+        if (prior := payload.get("prior")) is not None:
+            settings = replace(settings, prior=planes_of(load(store.models.load_bytes(prior))))
         person = store.subjects.get(subject)
         layout = store.layouts.get(layout_name)
         parent = payload.get("parent")

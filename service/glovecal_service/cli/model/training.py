@@ -55,6 +55,9 @@ def train(
         bool,
         typer.Option("--keep-dead", help="Refuse sensors that never move instead of leaving them out."),
     ] = False,
+    prior: Annotated[
+        str | None, typer.Option(help="Linear model, such as a template, as the mean of lmc_gpr.")
+    ] = None,
     activate: Annotated[bool, typer.Option(help="Predict live with the new model.")] = True,
     wait: Annotated[bool, typer.Option(help="Wait for the model, else only start the job.")] = True,
     as_json: AsJson = False,
@@ -74,6 +77,7 @@ def train(
         body: dict[str, Any] = {"subject": subject, "layout": layout, "method": method, "takes": chosen}
         body |= {"activate": activate, "pseudo_inputs": pseudo_inputs, "samples": samples}
         body |= {"folds": folds, "seed": seed, "keep_dead": keep_dead}
+        body |= {"prior": prior} if prior else {}
         job = service.post("/models/train", body)
         if not wait:
             _say_job(job, as_json)

@@ -14,7 +14,7 @@ from glovecal_service.rest.http.dependencies import StoreNeeded
 from glovecal_service.rest.http.request_types import Id, Identifier, ModelReference, StrictBody, SubjectName
 from glovecal_service.rest.job.jobs import Job, new_job
 from glovecal_service.store.errors import Conflict
-from glovecal_service.store.records import JobRecord, TakeRecord
+from glovecal_service.store.records import JobRecord, ModelRecord, TakeRecord
 from glovecal_service.store.store import Store
 
 router = APIRouter(prefix="/models", tags=["models"])
@@ -34,6 +34,9 @@ class Training(StrictBody):
     activate: bool = Field(True, description="Predict live with the model once it is trained.")
     pseudo_inputs: Annotated[int, Field(ge=2, le=1000)] = Field(100, description="SPGP only.")
     parent: ModelReference | None = None
+    prior: ModelReference | None = Field(
+        None, description="A linear model of the same glove: LMC-GPR's mean where samples say nothing."
+    )
     samples: Annotated[int, Field(ge=10, le=5000)] = Field(2000, description="At most, for one rotation.")
     folds: Annotated[int, Field(ge=0, le=20)] = Field(3, description="Held-out folds; 0: no error estimate.")
     iterations: Annotated[int, Field(ge=1, le=2000)] = Field(200, description="SPGP only.")
@@ -67,7 +70,18 @@ def train(body: Training, store: StoreNeeded, response: Response) -> JobRecord:
     payload: dict[str, Any] = body.model_dump() | chosen
     if body.parent is not None:
         payload["parent"] = store.models.get(body.parent).id
+    if body.prior is not None:
+        payload["prior"] = _prior(store, body).id
     return new_job(store, response, "train", payload, body.subject)
+
+
+def _prior(store: Store, body: Training) -> ModelRecord:
+    prior = store.models.get(body.prior or "")
+    if prior.subject != body.subject:
+        raise Conflict(f"model {prior.id} is of subject {prior.subject!r}, not {body.subject!r}")
+    if body.method != "lmc_gpr":
+        raise NotTrainable(f"a prior mean is for method lmc_gpr, not for {body.method}")
+    return prior
 
 
 def _chosen_takes(store: Store, body: Training) -> list[TakeRecord]:
