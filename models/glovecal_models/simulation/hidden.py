@@ -125,8 +125,8 @@ class _Measure:
 def _form(cause: Cause, random: np.random.Generator) -> Form:
     known = forms(cause.name)
     if cause.form is None:
-        open_forms = [form for form in known if not form.set_aside] or list(known)
-        return open_forms[int(random.integers(len(open_forms)))]
+        drawn = [form for form in known if not form.set_aside and not form.only_by_name] or list(known)
+        return drawn[int(random.integers(len(drawn)))]
     for form in known:
         if form.name == cause.form:
             return form

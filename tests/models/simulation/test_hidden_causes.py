@@ -113,8 +113,8 @@ def test_the_set_aside_forms_are_as_they_were_written():
     assert found == listed
 
 
-def test_a_form_that_is_set_aside_is_never_drawn():
-    aside = {form.name for form in forms("hysteresis") if form.set_aside}
+def test_a_form_that_is_set_aside_or_asked_for_by_name_is_never_drawn():
+    aside = {form.name for form in forms("hysteresis") if form.set_aside or form.only_by_name}
     plans = [SessionPlan(seed=seed, wearings=1, takes_per_wearing=1, take_s=6.0) for seed in range(12)]
     drawn = {record_session(plan, [Cause("hysteresis")]).causes[0].form for plan in plans}
     assert len(drawn) > 1

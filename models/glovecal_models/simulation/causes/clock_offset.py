@@ -76,6 +76,7 @@ def _moved(signal: np.ndarray, scene: Scene, offset_s: np.ndarray) -> np.ndarray
     "The clocks run apart and are set right again at even intervals (sawtooth of periodic syncing).",
     sizes=(0.002, 1.2),
     shared=True,
+    only_by_name=True,
 )
 def resynchronised(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The difference grows from nothing to the size in seconds, then starts again."""
@@ -90,6 +91,7 @@ def resynchronised(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Dr
     "Each take begins with a time difference that a clock servo pulls in (phase-locked loop; shape ours).",
     sizes=(0.002, 1.2),
     shared=True,
+    only_by_name=True,
 )
 def pulled_in(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The difference begins each take with the size in seconds and falls exponentially to a small rest."""
@@ -104,6 +106,7 @@ def pulled_in(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) 
     "The time difference wanders to and fro (network time with a path delay that varies; shape ours).",
     sizes=(0.002, 1.2),
     shared=True,
+    only_by_name=True,
 )
 def wandering(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The difference is a sum of three waves, slow enough that time never runs backwards."""

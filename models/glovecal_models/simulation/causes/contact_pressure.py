@@ -76,6 +76,7 @@ def levels_off(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws)
     Stage.MECHANICAL,
     "Padding gives way with the two-thirds power of the force (Hertz 1882).",
     column=contact_column,
+    only_by_name=True,
 )
 def hertz(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Degrees in proportion to the depth of a round fingertip in its padding."""
@@ -88,6 +89,7 @@ def hertz(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> n
     Stage.MECHANICAL,
     "Little at a light touch, then a steep rise and a limit (curve of Hill 1910, as of foam that closes).",
     column=contact_column,
+    only_by_name=True,
 )
 def foam_closes(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A power of the force over one plus that power."""
@@ -102,6 +104,7 @@ def foam_closes(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws
     Stage.MECHANICAL,
     "Pressure flattens the sensor of a straight finger and folds that of a bent one (buckling; ours).",
     column=contact_column,
+    only_by_name=True,
 )
 def flattens_or_folds(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The force times a half wave over the bend, which changes its sign in mid-range."""

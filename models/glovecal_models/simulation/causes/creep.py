@@ -87,6 +87,7 @@ def _ages(scene: Scene) -> np.ndarray:
 @form(
     Stage.MECHANICAL,
     "Relaxation by a stretched exponential of the time since each bend (Kohlrausch 1854; polymers).",
+    only_by_name=True,
 )
 def stretched_exponential(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """What is still missing after each bend falls with the exponential of a power of time."""
@@ -103,6 +104,7 @@ def stretched_exponential(signal: np.ndarray, scene: Scene, size: np.ndarray, dr
 @form(
     Stage.MECHANICAL,
     "Flow with the hyperbolic sine of what is missing: fast when far, very slow when near (Eyring 1936).",
+    only_by_name=True,
 )
 def eyring_flow(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A crept part follows the bend at a speed that grows more than in proportion to its distance."""
@@ -121,6 +123,7 @@ def eyring_flow(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws
 @form(
     Stage.MECHANICAL,
     "Cloth gives within seconds under load and recovers several times slower (knitted fabrics; shape ours).",
+    only_by_name=True,
 )
 def slow_recovery(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A crept part follows the bend with one time when it is pulled on and a longer one when it is let go."""

@@ -89,6 +89,7 @@ def _neighbours(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     Stage.MECHANICAL,
     "The web of cloth between two joints is pulled by the difference of their bends and levels off (ours).",
     touches="two",
+    only_by_name=True,
 )
 def difference_levels_off(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Each neighbour pulls with the hyperbolic tangent of how much more it is bent than the own joint."""
@@ -104,6 +105,7 @@ def difference_levels_off(signal: np.ndarray, scene: Scene, size: np.ndarray, dr
     Stage.MECHANICAL,
     "Cloth is drawn in only when both neighbours are bent together: the product of their bends (ours).",
     touches="two",
+    only_by_name=True,
 )
 def both_neighbours(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The pull is the product of two other joints' bends, so that either alone does nothing."""
@@ -115,6 +117,7 @@ def both_neighbours(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: D
     Stage.MECHANICAL,
     "A neighbour's knuckle lifts the sensor while it passes half-way under it and lets it down again (ours).",
     touches="two",
+    only_by_name=True,
 )
 def passing_knuckle(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The pull rises and falls as a bell curve over the nearest neighbour's bend."""

@@ -57,6 +57,7 @@ def _drawn_per_wearing(scene: Scene, draws: Draws, name: str, count: int) -> np.
 @form(
     Stage.WEARING,
     "A finger not pushed home leaves slack per wearing that shows when straight, not when bent (ours).",
+    only_by_name=True,
 )
 def loose_when_straight(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The wearing's shift of each sensor falls exponentially from the straight end of its range."""
@@ -69,6 +70,7 @@ def loose_when_straight(signal: np.ndarray, scene: Scene, size: np.ndarray, draw
 @form(
     Stage.WEARING,
     "One number per wearing, how far the glove is pulled on, shifts and stretches all sensors (ours).",
+    only_by_name=True,
 )
 def pulled_on_how_far(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """All sensors move with one common depth, each with its own weight, more so when bent."""
@@ -82,6 +84,7 @@ def pulled_on_how_far(signal: np.ndarray, scene: Scene, size: np.ndarray, draws:
 @form(
     Stage.WEARING,
     "The knuckle lies under another part of the sensor per wearing: a step in its answer moves (ours).",
+    only_by_name=True,
 )
 def knuckle_elsewhere(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A sigmoid over the bend whose place and height are drawn for each wearing."""

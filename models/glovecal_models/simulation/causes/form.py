@@ -97,6 +97,8 @@ class Form:
     stage: Stage
     set_aside: bool = False
     """Kept for final tests; nobody looks at it while building."""
+    only_by_name: bool = False
+    """Not among the forms that a session draws by its seed: what a seed makes stays what it was."""
     judged_by: Literal["own_map", "straight_line", "lost_angle"] = "own_map"
     sizes: tuple[float, float] | None = None
     """Bounds of the size where the disturbance does not simply grow in proportion with it."""

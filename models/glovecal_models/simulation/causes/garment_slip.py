@@ -64,6 +64,7 @@ MOVES = 1000
 @form(
     Stage.WEARING,
     "The glove works along the hand with every closing: a shift by the fingers' path so far (ours).",
+    only_by_name=True,
 )
 def works_along_with_use(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The shift goes with all closing and opening of the hand so far, with little of it between takes."""
@@ -78,6 +79,7 @@ def works_along_with_use(signal: np.ndarray, scene: Scene, size: np.ndarray, dra
 @form(
     Stage.WEARING,
     "Tugs at cable or cuff at random moments shift all sensors at once and stay (compound Poisson; ours).",
+    only_by_name=True,
 )
 def tugs(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Steps of Laplace-distributed height at moments without memory, added up since donning."""
@@ -95,6 +97,7 @@ def tugs(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np
 @form(
     Stage.WEARING,
     "Cloth slides along the finger at one steady speed, then another, and bends count more or less (ours).",
+    only_by_name=True,
 )
 def slides_along_finger(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A path of straight pieces since donning, times the bend."""

@@ -93,6 +93,7 @@ def _late_by(signal: np.ndarray, scene: Scene, delay_s: np.ndarray | float) -> n
     "Every reading arrives the same time later (serial link, driver and queue; pure transport delay).",
     sizes=(0.002, 0.4),
     shared=True,
+    only_by_name=True,
 )
 def transport_delay(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """All channels are shifted by the size in seconds and by nothing else."""
@@ -104,6 +105,7 @@ def transport_delay(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: D
     "All channels pass a symmetric filter, which delays all frequencies alike (linear-phase filter).",
     sizes=(0.002, 0.4),
     shared=True,
+    only_by_name=True,
 )
 def linear_phase_filter(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Nine taps of a raised cosine around the size in seconds, over a part of the time that is available."""
@@ -122,6 +124,7 @@ def linear_phase_filter(signal: np.ndarray, scene: Scene, size: np.ndarray, draw
     "Frames travel in batches and are stamped in quick succession on arrival (packets of radio links).",
     sizes=(0.002, 0.4),
     shared=True,
+    only_by_name=True,
 )
 def stamped_in_batches(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The delay falls while a batch's frames are stamped and rises until the next; its mean is the size."""

@@ -48,6 +48,7 @@ def _damper(scene: Scene) -> np.ndarray:
 @form(
     Stage.ELECTRICAL,
     "Zero points follow the water fibres take up, by an isotherm (Guggenheim, Anderson, de Boer).",
+    only_by_name=True,
 )
 def sorption_isotherm(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Water content rises steeply in dry air, slowly in the middle and steeply again in damp air."""
@@ -65,6 +66,7 @@ def sorption_isotherm(signal: np.ndarray, scene: Scene, size: np.ndarray, draws:
 @form(
     Stage.ELECTRICAL,
     "A damp film leaks in parallel to the sensor: exponential in humidity, quadratic in bend (ours).",
+    only_by_name=True,
 )
 def parallel_leak(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The leak takes away the square of a resistance that grows with the bend."""
@@ -78,6 +80,7 @@ def parallel_leak(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Dra
 @form(
     Stage.ELECTRICAL,
     "A hygroscopic film goes from stiff to swollen around one humidity and answers more when swollen (ours).",
+    only_by_name=True,
 )
 def swollen_film(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The gain goes from one level to another around one humidity."""

@@ -104,6 +104,7 @@ def _plays(signal: np.ndarray, radii: Sequence[np.ndarray]) -> np.ndarray:
 @form(
     Stage.MECHANICAL,
     "A band over the knuckle slides only past a ratio of pulls that grows with its wrap (Euler's capstan).",
+    only_by_name=True,
 )
 def capstan(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The band's far end stays put until the near end pulls stronger or weaker by the capstan's factor."""
@@ -124,6 +125,7 @@ def capstan(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) ->
 @form(
     Stage.MECHANICAL,
     "A state that runs after an S-curve of the angle with the path travelled (Coleman & Hodgdon 1986).",
+    only_by_name=True,
 )
 def coleman_hodgdon(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The loop is open where the S-curve is steep and closed towards both ends of the range."""
@@ -152,6 +154,7 @@ def _upper_branch(load: np.ndarray) -> np.ndarray:
 @form(
     Stage.MECHANICAL,
     "A strip that buckles at one angle when closing and snaps back at a lower one (cusp of a buckled strip).",
+    only_by_name=True,
 )
 def snap_through(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The strip stays on its branch of a cubic's equilibria until that branch ends."""

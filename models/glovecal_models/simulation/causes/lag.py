@@ -100,6 +100,7 @@ def _through(signal: np.ndarray, rate_hz: float, response: Callable[[np.ndarray]
     Stage.ELECTRICAL,
     "A resistive strip with capacitance to the skin all along it (diffusion; distributed RC line).",
     sizes=(0.002, 0.8),
+    only_by_name=True,
 )
 def distributed_line(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The response of an open line's far end, with the size as its mean delay in seconds."""
@@ -111,6 +112,7 @@ def distributed_line(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: 
     Stage.ELECTRICAL,
     "A second-order low-pass that overshoots a little (Sallen-Key filter with complex poles).",
     sizes=(0.002, 0.8),
+    only_by_name=True,
 )
 def overshooting(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Two complex poles, with the size as the delay of slow motion in seconds."""
@@ -123,6 +125,7 @@ def overshooting(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draw
     Stage.ELECTRICAL,
     "A low-pass that opens when the joint moves fast (1 Euro filter in firmware; Casiez et al. 2012).",
     sizes=(0.002, 0.8),
+    only_by_name=True,
 )
 def opens_when_fast(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A first-order low-pass whose time, the size at rest in seconds, shrinks with the smoothed speed."""

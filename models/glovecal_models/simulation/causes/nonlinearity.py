@@ -63,6 +63,7 @@ def _bent(signal: np.ndarray, scene: Scene) -> np.ndarray:
     Stage.ELECTRICAL,
     "Exponential in the bend (macrobend loss of optical fibre; tunnelling resistance of strain sensors).",
     judged_by="straight_line",
+    only_by_name=True,
 )
 def exponential_rise(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Each sensor answers little at first and ever more towards one end of its range."""
@@ -78,6 +79,7 @@ def exponential_rise(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: 
     Stage.ELECTRICAL,
     "The logarithm of a signal with an offset (logarithmic amplifier behind a photodiode).",
     judged_by="straight_line",
+    only_by_name=True,
 )
 def log_amplifier(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Each sensor answers in proportion to the logarithm of its bend above a small threshold."""
@@ -90,6 +92,7 @@ def log_amplifier(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Dra
     Stage.ELECTRICAL,
     "A hump at one place of the range, where a seam or fold passes over the knuckle (ours).",
     judged_by="straight_line",
+    only_by_name=True,
 )
 def seam_hump(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Each sensor is right at both ends and off by a bell curve around one angle of its range."""

@@ -64,6 +64,7 @@ def _weights(scene: Scene, draws: Draws) -> np.ndarray:
     Stage.MECHANICAL,
     "The first degrees of arch count most, then the cloth across the palm is slack (exponential; ours).",
     touches="palm",
+    only_by_name=True,
 )
 def levels_off(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The pull approaches a limit exponentially as the palm is cupped."""
@@ -76,6 +77,7 @@ def levels_off(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws)
     Stage.MECHANICAL,
     "Cupping tilts the joint's axis, so that the sensor sees its bend in projection (tilted hinge; ours).",
     touches="palm",
+    only_by_name=True,
 )
 def tilted_axis(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The square of the arch times the sine of twice the bend: a tilted hinge's first term."""
@@ -88,6 +90,7 @@ def tilted_axis(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws
     Stage.MECHANICAL,
     "A fold across the palm forms at a certain arch and takes up cloth while it forms (sigmoid; ours).",
     touches="palm",
+    only_by_name=True,
 )
 def palm_fold(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The pull goes from one level to another around one arch, differently placed for each sensor."""

@@ -50,6 +50,7 @@ def lining_column(scene: Scene, draws: Draws) -> tuple[str, np.ndarray]:
     "From one level to another around one value of a recorded column (sigmoid; ours).",
     touches="one_or_all",
     column=strap_column,
+    only_by_name=True,
 )
 def context_threshold(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A hyperbolic tangent of the strap's tension."""
@@ -64,6 +65,7 @@ def context_threshold(signal: np.ndarray, scene: Scene, size: np.ndarray, draws:
     "A recorded column times a bow over the own bend, nothing at both ends of the range (ours).",
     touches="one_or_all",
     column=tilt_column,
+    only_by_name=True,
 )
 def context_times_bow(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The tilt of the hand lets the cloth hang down where the joint is half bent."""
@@ -79,6 +81,7 @@ def context_times_bow(signal: np.ndarray, scene: Scene, size: np.ndarray, draws:
     "An exponential rise over a recorded column that also stretches the reading (ours).",
     touches="one_or_all",
     column=lining_column,
+    only_by_name=True,
 )
 def context_exponential(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Hardly anything on one side of the column and ever more on the other, more so when bent."""

@@ -75,6 +75,7 @@ def _held(signal: np.ndarray, missing: np.ndarray) -> np.ndarray:
     "A new frame is sent only once a joint has moved by some degrees (send-on-delta; Miskowicz 2006).",
     sizes=(0.1, 60.0),
     shared=True,
+    only_by_name=True,
 )
 def sent_on_change(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Frames repeat until some joint is further than the size from where it was at the last new one."""
@@ -92,6 +93,7 @@ def sent_on_change(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Dr
     "Frames are lost more often while the closed hand covers the antenna (body shadowing of 2.4 GHz links).",
     sizes=(0.005, 0.97),
     shared=True,
+    only_by_name=True,
 )
 def shadowed_by_hand(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The chance of a lost frame, at most the size, goes with a sigmoid of how far the hand is closed."""
@@ -106,6 +108,7 @@ def shadowed_by_hand(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: 
     "The link falls back to halved rates and recovers in steps (rate adaptation of radio links; shape ours).",
     sizes=(0.02, 3.0),
     shared=True,
+    only_by_name=True,
 )
 def rate_fallback(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """New frames come every size seconds, or a half, a quarter, ... of it, for seconds at a time."""

@@ -71,6 +71,7 @@ def dead_zone(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) 
     judged_by="lost_angle",
     touches="two",
     sizes=(0.02, 1.6),
+    only_by_name=True,
 )
 def used_up(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The reading approaches its end exponentially from the first degree on, sooner for a greater size."""
@@ -86,6 +87,7 @@ def used_up(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) ->
     judged_by="lost_angle",
     touches="two",
     sizes=(0.02, 1.6),
+    only_by_name=True,
 )
 def narrow_window(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A part of the range is cut off at the lower and another at the upper end."""
@@ -100,6 +102,7 @@ def narrow_window(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Dra
     judged_by="lost_angle",
     touches="two",
     sizes=(0.02, 1.6),
+    only_by_name=True,
 )
 def overload_recovery(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Above a ceiling readings stand still; afterwards they return to the joint within tenths of a second."""

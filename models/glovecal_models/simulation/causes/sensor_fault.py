@@ -102,6 +102,7 @@ def _noise(scene: Scene, draws: Draws, name: str, channels: int, lasts_s: float)
     "While a wire is open the floating input wanders by itself, for a share of the time (broken conductor).",
     touches="one",
     sizes=(0.002, 0.95),
+    only_by_name=True,
 )
 def floating_input(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The reading leaves its joint for some seconds at a time and drifts about some level."""
@@ -119,6 +120,7 @@ def floating_input(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Dr
     "A cracked address line of the multiplexer selects another sensor while the hand is closed (ours).",
     touches="one",
     sizes=(0.02, 0.95),
+    only_by_name=True,
 )
 def wrong_channel(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """At times, more often the more the hand is closed, the channel carries the next sensor's reading."""
@@ -133,6 +135,7 @@ def wrong_channel(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Dra
     Stage.CONVERTER,
     "Stretches of strong noise from a frayed conductor or shield, quiet in between (contact noise; ours).",
     touches="one",
+    only_by_name=True,
 )
 def crackle(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Noise that lasts a few frames, only while a slow random state of the conductor is bad."""

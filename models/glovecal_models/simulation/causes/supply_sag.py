@@ -62,6 +62,7 @@ CELL_V = 3.7
 @form(
     Stage.ELECTRICAL,
     "Charging a sensor to a fixed threshold takes longer at low voltage (logarithm of an RC timer).",
+    only_by_name=True,
 )
 def timing_threshold(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The time to reach the threshold stretches the reading, also what is there when straight."""
@@ -76,6 +77,7 @@ def timing_threshold(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: 
 @form(
     Stage.ELECTRICAL,
     "A fibre's light dims as the voltage nears its diode's knee, most while the fibre is straight (ours).",
+    only_by_name=True,
 )
 def diode_knee(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Light grows evenly above a rounded knee of the voltage and falls exponentially with the bend."""
@@ -93,6 +95,7 @@ def diode_knee(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws)
 @form(
     Stage.ELECTRICAL,
     "A buck-boost converter puts out another voltage on either side of where it changes mode (ours).",
+    only_by_name=True,
 )
 def changes_mode(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Zero points and gains go from one level to another around one supply voltage of the whole glove."""

@@ -62,6 +62,7 @@ def _warmer(scene: Scene) -> np.ndarray:
 @form(
     Stage.ELECTRICAL,
     "Leakage at the amplifier's input doubles every few degrees (rule of thumb for semiconductor junctions).",
+    only_by_name=True,
 )
 def leakage_doubles(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Zero points move exponentially with the temperature."""
@@ -73,6 +74,7 @@ def leakage_doubles(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: D
 @form(
     Stage.ELECTRICAL,
     "The polymer carrier softens within a few degrees and then follows its joint less (glass transition).",
+    only_by_name=True,
 )
 def softening(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The gain goes from one level to another around one temperature; the straight finger stays right."""
@@ -86,6 +88,7 @@ def softening(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) 
 @form(
     Stage.ELECTRICAL,
     "The curve bows with the temperature while both ends stay right (unequal arms of a bridge; ours).",
+    only_by_name=True,
 )
 def curve_bends(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A skewed parabola over the bend, in proportion to the temperature."""

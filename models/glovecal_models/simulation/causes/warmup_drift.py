@@ -53,6 +53,7 @@ def _on(scene: Scene) -> np.ndarray:
 @form(
     Stage.ELECTRICAL,
     "Zero points settle ever slower as heat soaks into a thick housing (half-space; Carslaw & Jaeger).",
+    only_by_name=True,
 )
 def heat_soaks_in(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """What is missing falls with exp(t) erfc(sqrt(t)), whose tail goes with one over the root of time."""
@@ -64,6 +65,7 @@ def heat_soaks_in(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Dra
 @form(
     Stage.ELECTRICAL,
     "Zero points move away and come back, as the chip warms before its reference does (ours).",
+    only_by_name=True,
 )
 def there_and_back(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The shift rises with time since power-on, has its peak after minutes and dies away."""
@@ -75,6 +77,7 @@ def there_and_back(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Dr
 @form(
     Stage.ELECTRICAL,
     "The curve's bow in mid-range settles by a hyperbola while both ends stay right (ours).",
+    only_by_name=True,
 )
 def curve_settles(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A parabola over the bend, times one over one plus the time since power-on."""
