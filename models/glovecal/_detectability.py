@@ -14,7 +14,6 @@ from glovecal._plotting import MODEL, axes_for, finished
 from glovecal._shown import Shown
 from glovecal._table import Column, Table
 from glovecal._takes import takes_in
-from glovecal_models.calibration.training_settings import LINEAR_METHODS
 from glovecal_models.progress import Cancel
 from glovecal_models.takes.take import Take
 
@@ -116,6 +115,7 @@ def detectable(
     A trial takes seconds. Raises BadInput, Cancelled.
     """
     from glovecal_models.calibration.model_recipe import declared_effects, repaired_takes, requested_effects
+    from glovecal_models.calibration.training_settings import LINEAR_METHODS
     from glovecal_models.diagnosis.detectability.confusability import confusability
     from glovecal_models.diagnosis.detectability.detection import Control, detectability, trial
     from glovecal_models.diagnosis.detectability.surrogate_session import SurrogateSession

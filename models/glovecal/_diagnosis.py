@@ -13,7 +13,6 @@ from glovecal._plotting import CONTROL, MODEL, axes_for, finished, named_rows
 from glovecal._shown import Shown
 from glovecal._table import Column, Table
 from glovecal._takes import takes_in
-from glovecal_models.calibration.training_settings import LINEAR_METHODS
 from glovecal_models.progress import Cancel
 from glovecal_models.takes.take import Take
 
@@ -114,6 +113,7 @@ def diagnose(
     of the controls. Raises BadInput, Cancelled.
     """
     from glovecal_models.calibration.model_recipe import declared_effects, repaired_takes, requested_effects
+    from glovecal_models.calibration.training_settings import LINEAR_METHODS
     from glovecal_models.comparison.noise_floor import rotation_noise
     from glovecal_models.comparison.residuals import residuals
     from glovecal_models.diagnosis.diagnose import diagnose as diagnose_inner

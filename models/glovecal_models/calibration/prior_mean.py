@@ -15,19 +15,20 @@ from dataclasses import replace
 import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.training_settings import PriorPlane
 from glovecal_models.covariance.linear_ard import LinearArd
 from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Correspondence
 from glovecal_models.progress import Cancel, Report
 from glovecal_models.regression.exact import fit_exact
-from glovecal_models.regression.known_line import PriorPlane, gains_of
+from glovecal_models.regression.known_line import gains_of
 from glovecal_models.regression.linear_regressor import LinearRegressor
 from glovecal_models.regression.mean import ZeroMean
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.regression.training_samples import check_samples
 
-MOST_SAMPLES = 400
+MOST_PRIOR_SAMPLES = 400
 """Of a rotation, evenly from those that were chosen: every one is a node of an exact process."""
 
 
@@ -80,7 +81,7 @@ def fit_on_plane(
     gains = np.zeros(len(sensors))
     for name, gain in zip(plane.sensors, plane.gains, strict=True):
         gains[list(sensors).index(name)] = gain
-    some = slice(None, None, max(1, -(-len(target) // MOST_SAMPLES)))
+    some = slice(None, None, max(1, -(-len(target) // MOST_PRIOR_SAMPLES)))
     left = target[some] - inputs[some] @ gains - plane.offset_deg
     process = fit_exact(
         inputs[some], left, ZeroMean(), LinearArd() + SquaredExponentialArd(), starts=2,

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 from glovecal_models.calibration.samples import DEFAULT_SAMPLES
 from glovecal_models.errors import BadInput
-from glovecal_models.regression.known_line import PriorPlane
 from glovecal_models.regression.lmc_search import LmcOptimum
 
 Method = Literal[
@@ -21,6 +20,17 @@ rotation what fits it (``kernel_choice``), ``polynomial_gpr`` and ``general_gpr`
 LINEAR_METHODS: tuple[Method, ...] = ("raw", "linear", "two_shapes", "template")
 """Those whose regressors are planes."""
 """Called with a sentence and the fraction done, 0 to 1."""
+
+
+class PriorPlane(NamedTuple):
+    """What a linear calibration says of one rotation, by the names of its sensors."""
+
+    rotation: str
+    sensors: tuple[str, ...]
+    gains: tuple[float, ...]
+    """Degrees a count."""
+    offset_deg: float
+    """At readings of 0."""
 
 
 @dataclass(frozen=True)

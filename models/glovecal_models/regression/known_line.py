@@ -3,22 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from glovecal_models.regression.linear_regressor import LinearRegressor, fit_linear
-
-
-class PriorPlane(NamedTuple):
-    """What a linear calibration says of one rotation, by the names of its sensors."""
-
-    rotation: str
-    sensors: tuple[str, ...]
-    gains: tuple[float, ...]
-    """Degrees a count."""
-    offset_deg: float
-    """At readings of 0."""
 
 
 def line_of(

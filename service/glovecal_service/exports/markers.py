@@ -31,6 +31,7 @@ TRIPLES: dict[str, tuple[str, ...]] = {
 """Channels of each marker, X first; another channel has a marker of its own name."""
 PLACES = {
     "wrist": "W_FLEX",
+    "pinky_cmc": "P_CMC",
     "thumb_cmc": "T_TMC",
     "thumb_mcp": "T_MCP",
     "thumb_ip": "T_IP",
@@ -41,7 +42,7 @@ PLACES = {
         for joint in ("MCP", "PIP", "DIP")
     },
 }
-"""Where joints are: joints of one place, such as flexion and abduction of a knuckle, are one marker."""
+"""Where joints are, those that the hand has; flexion and abduction of a knuckle are one marker."""
 
 
 def markers(motion: HandMotion, content: Content) -> dict[str, np.ndarray]:
@@ -55,9 +56,12 @@ def markers(motion: HandMotion, content: Content) -> dict[str, np.ndarray]:
     if motion.wrist == "optical":
         is_wrist = [name in WRIST for name in motion.rotations]
         degrees = np.where(is_wrist, 0.0, degrees)
-    frames = forward_kinematics(motion.skeleton, completed(motion.rotations, degrees))
+    angles = completed(motion.rotations, degrees, motion.skeleton.rotations)
+    frames = forward_kinematics(motion.skeleton, angles)
     names = [joint.name for joint in motion.skeleton.joints]
-    found = {name: frames.joints_mm[:, names.index(joint)] for name, joint in PLACES.items()}
+    found = {
+        name: frames.joints_mm[:, names.index(joint)] for name, joint in PLACES.items() if joint in names
+    }
     tips = zip(motion.skeleton.tips, frames.tips_mm.swapaxes(0, 1), strict=True)
     found |= {f"{FINGERS[tip.finger]}_tip": place for tip, place in tips}
     if motion.frame is not None:

@@ -150,3 +150,17 @@ def test_a_take_without_a_model_has_raw_readings_only(tmp_path: Path) -> None:
                 FORMATS[suffix].write([bare], content, tmp_path / f"x{suffix}")
     with pytest.raises(BadInput, match=r"must end in \.trc, \.csv, \.parquet"):
         format_of("hand.bvh")
+
+
+def test_a_hand_whose_palm_arches_has_the_place_of_its_joint_too() -> None:
+    rigid, arching = hand_skeleton(), hand_skeleton(palm="arching")
+    plain = replace(motion("R"), skeleton=rigid)
+    arched = replace(
+        plain, skeleton=arching, rotations=(*plain.rotations, "PALM_ARCH"),
+        degrees=np.column_stack([plain.degrees, np.full(len(plain.time_s), 20.0)]),
+        sd_deg=np.column_stack([plain.sd_deg, np.ones(len(plain.time_s))]),
+    )  # fmt: skip
+    before, after = markers(plain, "joints"), markers(arched, "joints")
+    assert set(after) - set(before) == {"R_pinky_cmc"}
+    np.testing.assert_allclose(after["R_ring_tip"], before["R_ring_tip"])
+    assert (np.linalg.norm(after["R_pinky_tip"] - before["R_pinky_tip"], axis=1) > 5).all()

@@ -23,7 +23,7 @@ from glovecal_models.quick_check.pose_book import REPEAT_SD_DEG
 from glovecal_models.sampling.template.equations import TemplateEquations, equations_for
 from glovecal_models.sampling.template.observations import Observation
 
-CONTACT_SD_MM = 3.0
+LINES_CONTACT_SD_MM = 3.0
 """How far tips that touch are from one point, by a calibration of lines."""
 WIDE_DEG = 300.0
 """How far scale and offset may be from 0: data decide them."""
@@ -133,11 +133,11 @@ class TouchConditions:
             len(tips), -1, self.rows.shape[1]
         )
         by_parameter = -(by_angle @ self.rows).reshape(-1, len(found))
-        return np.stack(left).ravel() / CONTACT_SD_MM, by_parameter / CONTACT_SD_MM
+        return np.stack(left).ravel() / LINES_CONTACT_SD_MM, by_parameter / LINES_CONTACT_SD_MM
 
     def left_mm(self, found: np.ndarray) -> float:
         left = self.missing(found)[0].reshape(len(self.rows), -1)
-        return float(np.median(np.linalg.norm(left, axis=1)) * CONTACT_SD_MM)
+        return float(np.median(np.linalg.norm(left, axis=1)) * LINES_CONTACT_SD_MM)
 
 
 def _least_squares(

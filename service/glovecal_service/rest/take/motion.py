@@ -14,6 +14,7 @@ from pydantic import Field, FiniteFloat
 from starlette.background import BackgroundTask
 
 from glovecal_models.errors import BadInput
+from glovecal_models.hand.rotations import PALM
 from glovecal_models.takes.common_event import common_events
 from glovecal_service.exports.body_markers import Wrist, hand_frame, read_trc
 from glovecal_service.exports.formats import FORMATS, format_of
@@ -160,4 +161,6 @@ def _hand(parts: Parts, take: str, model: str | None, content: Content) -> HandM
             )
         found, _ = parts.predictors.get(chosen.id)
     label = "L" if subject.hand == "left" else "R"
-    return motion_of(parts.store.takes.load(record.id), found, subject.skeleton(), label)
+    arches = found is not None and found.method == "template" and PALM in found.rotation_names
+    skeleton = subject.skeleton(palm="arching" if arches else "rigid")
+    return motion_of(parts.store.takes.load(record.id), found, skeleton, label)
