@@ -14,7 +14,7 @@ from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.errors import BadInput
 from glovecal_models.regression.linear_regressor import LinearRegressor
 
-SMALLEST_SCALE, LARGEST_SCALE = 0.1, 10.0
+LEAST_SCALE, MOST_SCALE = 0.1, 10.0
 LARGEST_OFFSET_DEG = 180.0
 HOW = "refined by hand: not measured"
 
@@ -27,8 +27,8 @@ class Refinement:
     offset_deg: float = 0.0
 
     def __post_init__(self) -> None:
-        if not SMALLEST_SCALE <= self.scale <= LARGEST_SCALE:
-            raise BadInput(f"scale is {self.scale}; it must be {SMALLEST_SCALE:g} to {LARGEST_SCALE:g}")
+        if not LEAST_SCALE <= self.scale <= MOST_SCALE:
+            raise BadInput(f"scale is {self.scale}; it must be {LEAST_SCALE:g} to {MOST_SCALE:g}")
         if not abs(self.offset_deg) <= LARGEST_OFFSET_DEG:
             raise BadInput(
                 f"offset_deg is {self.offset_deg}; it must be within {LARGEST_OFFSET_DEG:g} degrees of 0"

@@ -20,15 +20,15 @@ JOLT_S = 0.08
 """Around an event: what is compared."""
 REACH_S = 0.045
 """A reading is held against those so long before and after it: longer than a jolt, shorter than a motion."""
-MOST_OF_ONE = 20.0
+MOST_BEND_OF_ONE = 20.0
 """Of its usual bend: no single sensor makes an event."""
-APART_S = 0.3
+EVENTS_APART_S = 0.3
 """Of two events of one take."""
 FAR_ABOVE = 10.0
 """Median absolute deviations above the median acceleration make an event."""
 COINCIDE_S = 0.06
 MOST_EVENTS = 60
-LEAST_CORRELATION = 0.5
+LEAST_LIKENESS = 0.5
 DISAGREE_S = 0.02
 """Shifts of single events that differ by more from their median are left out."""
 
@@ -110,7 +110,7 @@ class _Jolts:
         bend = np.abs(readings[reach:-reach] - (readings[2 * reach :] + readings[: -2 * reach]) / 2)
         alive = np.ptp(readings, axis=0) > 0
         scale = np.maximum(bend[:, alive].mean(axis=0), 1e-9)
-        jolt = np.minimum(bend[:, alive] / scale, MOST_OF_ONE).mean(axis=1)
+        jolt = np.minimum(bend[:, alive] / scale, MOST_BEND_OF_ONE).mean(axis=1)
         middle_s = time_s[reach:-reach]
         grid = np.arange(middle_s[0], middle_s[-1], STEP_S)
         signal = np.interp(grid, middle_s, jolt)
@@ -125,14 +125,14 @@ class _Jolts:
 
 
 def _events(time_s: np.ndarray, jolt: np.ndarray) -> np.ndarray:
-    """Times of the peaks far above what is usual, ``APART_S`` from each other, the largest first kept."""
+    """Times of the peaks far above what is usual, ``EVENTS_APART_S`` apart, the largest first kept."""
     usual = float(np.median(jolt))
     deviation = max(1.4826 * float(np.median(np.abs(jolt - usual))), 1e-9)
     events: list[float] = []
     for place in np.argsort(jolt)[::-1]:
         if jolt[place] < usual + FAR_ABOVE * deviation or len(events) >= MOST_EVENTS:
             break
-        if all(abs(time_s[place] - other) > APART_S for other in events):
+        if all(abs(time_s[place] - other) > EVENTS_APART_S for other in events):
             events.append(float(time_s[place]))
     return np.sort(np.array(events))
 
@@ -150,7 +150,7 @@ def _refined(first: _Jolts, second: _Jolts, early: float, late: float) -> float 
         piece = piece - piece.mean()
         score[place] = pattern @ piece / max(float(np.linalg.norm(pattern) * np.linalg.norm(piece)), 1e-12)
     best = int(np.argmax(score))
-    if score[best] < LEAST_CORRELATION or not 0 < best < places - 1:
+    if score[best] < LEAST_LIKENESS or not 0 < best < places - 1:
         return None
     before, at, after = score[best - 1 : best + 2]
     part = 0.5 * (before - after) / min(before - 2 * at + after, -1e-12)

@@ -29,11 +29,11 @@ def session(settings: Settings, address: str) -> Iterator[zenoh.Session]:
 
 @pytest.fixture(scope="module")
 def line(settings: Settings, address: str) -> str:
-    """The id of a model of lines, of subject carla."""
+    """The id of a model of lines, of subject refined-by-hand."""
     with Store.open(settings) as store:
-        store.subjects.create("carla")
+        store.subjects.create("refined-by-hand")
         record = store.models.add(
-            dump(model_with()), subject="carla", layout=LAYOUT.name, method="linear", parent=None,
+            dump(model_with()), subject="refined-by-hand", layout=LAYOUT.name, method="linear", parent=None,
             facts={"held_out_rmse_deg": 1.0},
         )  # fmt: skip
         store.models.activate(record.id)
@@ -41,14 +41,14 @@ def line(settings: Settings, address: str) -> str:
 
 
 def active(address: str) -> str:
-    models = httpx.get(f"{address}/v1/models", params={"subject": "carla"}).json()
+    models = httpx.get(f"{address}/v1/models", params={"subject": "refined-by-hand"}).json()
     return next(each["id"] for each in models if each["active"])
 
 
 def test_a_slider_makes_a_version_and_undo_takes_it_back(
     opened: Open, session: zenoh.Session, settings: Settings, address: str, line: str
 ) -> None:
-    with moving(session, settings, "refined", "carla"):
+    with moving(session, settings, "refined", "refined-by-hand"):
         seen = opened("live")
         page, card = seen.page, seen.page.get_by_role("region", name="Glove refined")
         expect(card.locator(".state-word").first).to_have_text("ok", timeout=PATIENCE_MS)

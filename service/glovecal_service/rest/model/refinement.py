@@ -10,8 +10,8 @@ from pydantic import Field
 from glovecal_models.calibration.artifact import dump
 from glovecal_models.calibration.refinement import (
     LARGEST_OFFSET_DEG,
-    LARGEST_SCALE,
-    SMALLEST_SCALE,
+    LEAST_SCALE,
+    MOST_SCALE,
     Refinement,
     refined,
 )
@@ -26,7 +26,7 @@ MOST_ROTATIONS = 64
 
 
 class RefinementBody(StrictBody):
-    scale: float = Field(1.0, ge=SMALLEST_SCALE, le=LARGEST_SCALE, description="Times the angle.")
+    scale: float = Field(1.0, ge=LEAST_SCALE, le=MOST_SCALE, description="Times the angle.")
     offset_deg: float = Field(
         0.0, ge=-LARGEST_OFFSET_DEG, le=LARGEST_OFFSET_DEG, description="Added after it, degrees."
     )
