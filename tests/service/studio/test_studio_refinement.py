@@ -62,10 +62,19 @@ def test_a_slider_makes_a_version_and_undo_takes_it_back(
         assert found["parent"] == line
         assert found["held_out_rmse_deg"] is None
         assert "Its error was not measured." in found["facts"]["sentences"][0]
-        expect(card.locator(".refine-value").last).to_have_text("0", timeout=PATIENCE_MS)
+        expect(card.locator(".refine-value").last).to_have_text("0.5", timeout=PATIENCE_MS)
         page.wait_for_timeout(300)
         assert serious(page) == []
+        slider.locator('[tabindex="0"]').press("ArrowRight")
+        expect(card.locator(".refine-said")).to_contain_text("+1 degrees", timeout=PATIENCE_MS)
+        second = httpx.get(f"{address}/v1/models/{active(address)}").json()
+        assert second["parent"] == child
+        assert "+0.5 degrees" in second["facts"]["sentences"][0], "what is new beside the first"
         card.get_by_role("button", name="Undo").click()
+        expect(card.locator(".refine-value").last).to_have_text("0.5", timeout=PATIENCE_MS)
+        assert active(address) == child
+        card.get_by_role("button", name="Undo").click()
+        expect(card.locator(".refine-value").last).to_have_text("0", timeout=PATIENCE_MS)
         expect(card.locator(".refine-said")).to_contain_text("Taken back", timeout=PATIENCE_MS)
         assert active(address) == line
         assert seen.complaints == []

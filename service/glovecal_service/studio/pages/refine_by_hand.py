@@ -16,6 +16,8 @@ from glovecal_service.studio.studio import Studio
 
 LEAST_SCALE, MOST_SCALE, SCALE_STEP = 0.5, 2.0, 0.01
 MOST_OFFSET_DEG, OFFSET_STEP_DEG = 45.0, 0.5
+NEUTRAL = (1.0, 0.0)
+"""Scale and offset that change nothing."""
 WHAT = (
     "Turn the angle until the hand looks right beside the real one. Each release of a slider makes a version "
     "and serves it; its error is not measured."
@@ -28,10 +30,12 @@ class RefineByHand:
     def __init__(self, studio: Studio, changed: Callable[[], Awaitable[None]]) -> None:
         self._studio, self._changed = studio, changed
         self._model: dict[str, Any] = {}
+        self._served: list[tuple[float, float]] = [NEUTRAL]
+        """Where the sliders stood at each version made here, the one that is served last."""
         self._busy = False
         with ui.expansion("Refine by hand").classes("refine") as self._part:
             ui.label(WHAT)
-            self._rotation = ui.select([], label="Rotation").classes("choice")
+            self._rotation = ui.select([], label="Rotation", on_change=self._begin).classes("choice")
             self._scale = self._slider("Scale, times", LEAST_SCALE, MOST_SCALE, SCALE_STEP, 1.0)
             self._offset = self._slider(
                 "Offset, degrees", -MOST_OFFSET_DEG, MOST_OFFSET_DEG, OFFSET_STEP_DEG, 0.0
@@ -46,6 +50,7 @@ class RefineByHand:
         if model == self._model.get("id"):
             return
         self._model = {}
+        self._begin()
         lines: list[str] = []
         if model is not None:
             try:
@@ -73,25 +78,38 @@ class RefineByHand:
         await self._apply()
 
     async def _apply(self) -> None:
-        scale, offset = self._scale.value or 1.0, self._offset.value or 0.0
-        if self._busy or (scale == 1.0 and offset == 0.0):
+        """Make the version at which the sliders stand out of the one that is served."""
+        wanted, now = (self._scale.value or 1.0, self._offset.value or 0.0), self._served[-1]
+        if self._busy or wanted == now:
             return
         self._busy = True
         rotation, before = self._rotation.value, self._model.get("id")
-        body = {"rotations": {rotation: {"scale": scale, "offset_deg": offset}}, "activate": True}
+        scale = wanted[0] / now[0]
+        change = {"scale": scale, "offset_deg": wanted[1] - scale * now[1]}
+        body = {"rotations": {rotation: change}, "activate": True}
         try:
-            child = await self._studio.service.post(f"/models/{before}/refine", body)
+            self._model = await self._studio.service.post(f"/models/{before}/refine", body)
         except Refusal as refusal:
             self._said.set_text(str(refusal))
+            self._stand(now)
         else:
+            self._served.append(wanted)
+            version = version_name(self._model)
             self._said.set_text(
-                f"{rotation} times {scale:g}, {offset:+g} degrees: {version_name(child)} is served."
+                f"{rotation} times {wanted[0]:g}, {wanted[1]:+g} degrees: {version} is served."
             )
             await self._changed()
         finally:
-            self._scale.set_value(1.0)
-            self._offset.set_value(0.0)
             self._busy = False
+
+    def _begin(self) -> None:
+        """From the served version on."""
+        self._served = [NEUTRAL]
+        self._stand(NEUTRAL)
+
+    def _stand(self, at: tuple[float, float]) -> None:
+        self._scale.set_value(at[0])
+        self._offset.set_value(at[1])
 
     async def _undo(self) -> None:
         which = {key: self._model.get(key) for key in ("subject", "layout")}
@@ -100,6 +118,9 @@ class RefineByHand:
         except Refusal as refusal:
             self._said.set_text(str(refusal))
             return
+        self._served = self._served[:-1] or [NEUTRAL]
+        self._stand(self._served[-1])
+        self._model = {**self._model, "id": back["model"]}
         self._said.set_text(f"Taken back: {back['model'][:12]} is served again.")
         await self._changed()
 
