@@ -104,20 +104,19 @@ def _wearer(take: Take, model: CalibrationModel | None) -> Sequence[GloveFinding
         return ()
     readings = take.readings[:, [take.sensors.index(name) for name in names]]
     predictor = GlovePredictor(model)
-    return _misfit(
-        WearerFit(model, tuple(predictor.rotations)).misfit(readings, predictor.predict(readings).mean)
-    )
+    return _misfit(WearerFit(model, predictor).misfit(readings, predictor.predict(readings).mean))
 
 
 def _misfit(found: Misfit) -> Sequence[GloveFinding]:
     if not found.is_clear:
         return ()
-    named = ", ".join(found.sensors[:MOST_NAMED])
+    beyond = [(found.rotations, "reach angles no hand reaches"), (found.sensors, "go beyond what it learned")]
+    named = "; ".join(f"{', '.join(names[:MOST_NAMED])} {how}" for names, how in beyond if names)
     who = "it may be a glove of the other hand" if found.is_sideways else "it may be another person's model"
     return (
         GloveFinding(
             "wearer",
-            f"The readings do not fit the model ({named} go beyond what it learned): {who}.",
+            f"The readings do not fit the model ({named}): {who}.",
             "Check who wears it and on which hand; if that is right, put it on again and do a quick check.",
         ),
     )

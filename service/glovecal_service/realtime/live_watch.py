@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.calibration.wearer_fit import WearerFit
 from glovecal_models.diagnosis.worn_glove import GloveFinding, live_findings
 from glovecal_service.realtime.served_model import ServedModel
 
@@ -39,7 +38,7 @@ class LiveWatch:
         self._rows = 0
         self._began_ns: int | None = None
         self._next_ns = 0
-        self._fit = None if model is None else WearerFit(model.model, model.rotations)
+        self._fit = None if model is None else model.wearer_fit
         self._found: tuple[GloveFinding, ...] = ()
         self._clear = 0
         self._looked_s = 0.0

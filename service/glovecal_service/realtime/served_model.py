@@ -12,6 +12,7 @@ from glovecal_client.wire.pose import model_bytes
 from glovecal_models.calibration.effect_correction import EffectCorrection
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
+from glovecal_models.calibration.wearer_fit import WearerFit
 from glovecal_service.realtime.pace import Pace
 from glovecal_service.realtime.refusal import Refusal, Refused
 
@@ -37,6 +38,7 @@ class ServedModel:
     counts: tuple[float, float] | None
     predictor: GlovePredictor
     model: CalibrationModel
+    wearer_fit: WearerFit
     effects: tuple[str, ...] = ()
     """Names of the effects that correct the prediction."""
     pace: Pace = field(default_factory=Pace)
@@ -62,6 +64,7 @@ class ServedModel:
             counts=model.layout.counts,
             predictor=predictor,
             model=model,
+            wearer_fit=WearerFit(model, predictor),
             effects=predictor.stream().names,
             pace=Pace(2 * seconds + BESIDES_PREDICTION_S),
         )
