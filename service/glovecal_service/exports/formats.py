@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import PurePath
 
 from glovecal_models.errors import BadInput
-from glovecal_service.exports import angle_table, trc
+from glovecal_service.exports import angle_table, bvh, trc
 from glovecal_service.exports.export_format import ExportFormat
 
 FORMATS: dict[str, ExportFormat] = {
-    one.suffix: one for one in (trc.FORMAT, angle_table.CSV, angle_table.PARQUET)
+    one.suffix: one for one in (trc.FORMAT, bvh.FORMAT, angle_table.CSV, angle_table.PARQUET)
 }
 
 

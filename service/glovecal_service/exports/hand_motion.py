@@ -69,10 +69,11 @@ def on_one_time(motions: Sequence[HandMotion], shifts_s: Sequence[float] = ()) -
         raise BadInput(
             f"the takes have no moment in common ({spans}); shift one of them onto the other's clock"
         )
-    return tuple(_at(one, at) for one in moved)
+    return tuple(at_times(one, at) for one in moved)
 
 
-def _at(motion: HandMotion, at: np.ndarray) -> HandMotion:
+def at_times(motion: HandMotion, at: np.ndarray) -> HandMotion:
+    """At other times (M,) inside the recording: angles interpolated, NaN in gaps; the nearest readings."""
     time = motion.time_s
     after = np.clip(np.searchsorted(time, at), 1, len(time) - 1) if len(time) > 1 else np.zeros(len(at), int)
     before = np.maximum(after - 1, 0)

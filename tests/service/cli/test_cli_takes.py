@@ -317,4 +317,4 @@ def test_a_take_becomes_a_motion_file(anna: Run, tmp_path: Path) -> None:
     assert file.read_text().startswith("PathFileType\t4\t(X/Y/Z)\tmotion.trc (simulated)\n")
     assert "--overwrite" in anna("take", "motion", file, take).said
     assert "no model of anna" in anna("take", "motion", tmp_path / "a.trc", take).said
-    assert "must end in .trc" in anna("take", "motion", tmp_path / "a.bvh", take).said
+    assert "must end in .trc" in anna("take", "motion", tmp_path / "a.fbx", take).said

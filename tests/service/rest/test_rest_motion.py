@@ -73,7 +73,7 @@ def test_angles_are_those_of_the_active_model(client: RestClient, tmp_path: Path
         ({"takes": []}, 422, "takes"),
         ({"models": ["0123456789"]}, 422, "1 models for 2 takes"),
         ({"shifts_s": [0.0, 1e6]}, 422, "no moment in common"),
-        ({"format": "bvh"}, 422, "format"),
+        ({"format": "fbx"}, 422, "format"),
         ({"content": "wrist"}, 422, "content"),
     ],
 )

@@ -26,7 +26,7 @@ def _names(given: str | None) -> list[str]:
 
 
 def motion(
-    file: Annotated[Path, typer.Argument(help="Where to write; .trc, .csv or .parquet.")],
+    file: Annotated[Path, typer.Argument(help="Where to write; .bvh, .trc, .csv or .parquet.")],
     take: Annotated[list[str], typer.Argument(help="One take, or a take of each hand: names or ids.")],
     content: Annotated[
         Literal["joints", "angles", "raw"],
@@ -60,7 +60,8 @@ def motion(
     left: Annotated[str | None, typer.Option(metavar="MARKERS", help="That place the left hand.")] = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Write one hand or both as motion: TRC for OpenSim and MotionBuilder, CSV or Parquet for analysis."""
+    """Write one hand or both as motion: BVH for animation (on a body at rest), TRC for OpenSim and
+    MotionBuilder, CSV or Parquet for analysis."""
     from glovecal_service.exports.formats import format_of
 
     chosen = format_of(file.name)

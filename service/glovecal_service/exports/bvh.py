@@ -1,0 +1,213 @@
+"""BVH (Biovision hierarchy): calibrated hands on the skeleton of a whole body, as animation tools read it.
+
+Lengths are centimetres, x to the body's left, y up, z forward. All rotations zero is the body with its arms
+out to the sides, palms down, fingers straight; only the hands move. A file has one frame time: frames stand
+on even steps, and an angle that is not known there stays as it last was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from glovecal_models.errors import BadInput
+from glovecal_models.hand.forward_kinematics import forward_kinematics
+from glovecal_models.hand.rotations import FINGERS, WRIST, completed
+from glovecal_models.hand.skeleton import Skeleton, hand_skeleton
+from glovecal_service.exports.body_at_rest import (
+    PALM_DOWN,
+    ROOT,
+    SIDES,
+    Bone,
+    body_at_rest,
+    wrist_offset_mm,
+)
+from glovecal_service.exports.export_format import ExportFormat
+from glovecal_service.exports.hand_motion import Content, HandMotion, at_times
+
+MOST_FRAMES = 1_000_000
+MM_PER_UNIT = 10.0
+ORDER = "ZXY"
+"""Of a bone's three turns. The middle one, about the finger's length, stays far from 90 degrees."""
+SIMULATED = "SimulatedGlove"
+"""A bone without length that marks what no person did: the format has no comments."""
+
+
+def write_bvh(motions: Sequence[HandMotion], content: Content, path: Path) -> None:
+    """Hands on one time, on one body. Raises BadInput for raw readings, for one frame, and for too many."""
+    if content == "raw":
+        raise BadInput("BVH holds rotations of joints; raw readings go into .trc, .csv or .parquet")
+    for motion in motions:
+        motion.require_angles(content)
+        if motion.frame is not None:
+            raise BadInput("BVH puts hands on a body at rest; hands placed by markers go into .trc")
+    time_s = _even_times(motions[0].time_s)
+    hands = {motion.label: _Hand.moving(at_times(motion, time_s)) for motion in motions}
+    length = float(np.mean([motion.skeleton.dimensions.hand_length_mm for motion in motions]))
+    for label in SIDES:
+        if label not in hands:
+            hands[label] = _Hand.at_rest(motions[0].skeleton, label, len(time_s))
+    bones = body_at_rest(length)
+    turns: dict[str, np.ndarray] = {}
+    for label, hand in hands.items():
+        bones += hand.bones(label, wrist_offset_mm(length, label))
+        turns |= hand.turns(label)
+    if any(motion.simulated for motion in motions):
+        bones.append(Bone(SIMULATED, ROOT, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    path.write_text(_text(bones, turns, time_s), encoding="ascii", newline="\n")
+
+
+@dataclass(frozen=True)
+class _Hand:
+    skeleton: Skeleton
+    degrees: np.ndarray
+    """(N, R) in the skeleton's order, finite."""
+
+    @classmethod
+    def moving(cls, motion: HandMotion) -> _Hand:
+        degrees = _held(motion.degrees)
+        if motion.wrist == "optical":
+            degrees[:, [name in WRIST for name in motion.rotations]] = 0.0
+        return cls(motion.skeleton, completed(motion.rotations, degrees, motion.skeleton.rotations))
+
+    @classmethod
+    def at_rest(cls, other: Skeleton, label: str, count: int) -> _Hand:
+        """Of the other hand's dimensions."""
+        skeleton = hand_skeleton(other.dimensions, "left" if label == "L" else "right")
+        return cls(skeleton, np.zeros((count, len(skeleton.rotations))))
+
+    def bones(self, label: str, wrist_mm: tuple[float, float, float]) -> list[Bone]:
+        """From the wrist to the fingertips."""
+        to_body = PALM_DOWN[label]
+        rest = self._rest()
+        found = []
+        tips = {tip.joint: tip.offset_mm for tip in self.skeleton.tips}
+        for first, last in _places(self.skeleton):
+            parent = self.skeleton.parents[first]
+            offset, end = wrist_mm, None
+            if parent is not None:
+                offset = _vector(to_body @ rest[parent] @ self.skeleton.offsets_mm[first])
+            if (tip := tips.get(self.skeleton.joints[last].name)) is not None:
+                end = _vector(to_body @ rest[last] @ np.array(tip))
+            found.append(Bone(self._name(last, label), self._parent(parent, label), offset, end))
+        return found
+
+    def turns(self, label: str) -> dict[str, np.ndarray]:
+        """(N, 3, 3) of each bone against its parent, in the body's axes."""
+        to_body, rest = PALM_DOWN[label], self._rest()
+        frames = forward_kinematics(self.skeleton, self.degrees).orientations
+        from_rest = to_body @ frames @ rest.swapaxes(1, 2) @ to_body.T
+        found = {}
+        for first, last in _places(self.skeleton):
+            parent = self.skeleton.parents[first]
+            own = from_rest[:, last]
+            found[self._name(last, label)] = (
+                own if parent is None else from_rest[:, parent].swapaxes(1, 2) @ own
+            )
+        return found
+
+    def _rest(self) -> np.ndarray:
+        """(J, 3, 3)."""
+        return forward_kinematics(self.skeleton, np.zeros((1, len(self.skeleton.rotations)))).orientations[0]
+
+    def _parent(self, joint: int | None, label: str) -> str:
+        return f"{SIDES[label]}ForeArm" if joint is None else self._name(joint, label)
+
+    def _name(self, joint: int, label: str) -> str:
+        """As common rigs call it: Index1 to Index3 from the knuckle on; the palm's joint InHandPinky."""
+        name = self.skeleton.joints[joint].name
+        finger, _, part = name.partition("_")
+        side = SIDES[label]
+        if finger == "W":
+            return f"{side}Hand"
+        if name == "P_CMC":
+            return f"{side}InHandPinky"
+        numbers = {"T": ("VIR", "MCP", "IP")}.get(finger, ("MCP", "PIP", "DIP"))
+        return f"{side}Hand{FINGERS[finger].capitalize()}{numbers.index(part) + 1}"
+
+
+def _places(skeleton: Skeleton) -> Iterator[tuple[int, int]]:
+    """First and last of the joints that lie in one place and turn one bone."""
+    here = [not np.any(skeleton.offsets_mm[joint]) for joint in range(len(skeleton.joints))]
+    for joint, parent in enumerate(skeleton.parents):
+        if parent is not None and here[joint]:
+            continue
+        last = joint
+        while last + 1 < len(here) and here[last + 1] and skeleton.parents[last + 1] == last:
+            last += 1
+        yield joint, last
+
+
+def _even_times(time_s: np.ndarray) -> np.ndarray:
+    if len(time_s) < 2:
+        raise BadInput(f"{len(time_s)} frames are no motion; BVH needs two or more")
+    step = float(np.median(np.diff(time_s)))
+    count = round((time_s[-1] - time_s[0]) / step) + 1
+    if count > MOST_FRAMES:
+        raise BadInput(f"{count} frames on even steps are too many; at most {MOST_FRAMES}")
+    return np.minimum(time_s[0] + step * np.arange(count), time_s[-1])
+
+
+def _held(degrees: np.ndarray) -> np.ndarray:
+    """A copy in which a missing angle is the last known one; NaN before the first."""
+    known = np.where(np.isfinite(degrees), np.arange(len(degrees))[:, None], -1)
+    last = np.maximum.accumulate(known, axis=0)
+    return np.where(last < 0, np.nan, np.take_along_axis(degrees, np.maximum(last, 0), axis=0))
+
+
+def _vector(values: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
+def _text(bones: Sequence[Bone], turns: dict[str, np.ndarray], time_s: np.ndarray) -> str:
+    from scipy.spatial.transform import Rotation  # slow to load, and every command that exports loads this
+
+    children: dict[str | None, list[Bone]] = {}
+    for bone in bones:
+        children.setdefault(bone.parent, []).append(bone)
+    order: list[str] = []
+    lines = ["HIERARCHY"]
+
+    def offset(values: tuple[float, float, float]) -> str:
+        return "OFFSET " + " ".join(f"{value / MM_PER_UNIT:.6f}" for value in values)
+
+    def write(bone: Bone, depth: int) -> None:
+        tab, is_root = "\t" * depth, bone.parent is None
+        places = "Xposition Yposition Zposition " if is_root else ""
+        count = 6 if is_root else 3
+        rotations = " ".join(f"{axis}rotation" for axis in ORDER)
+        order.append(bone.name)
+        lines.extend([f"{tab}{'ROOT' if is_root else 'JOINT'} {bone.name}", f"{tab}{{"])
+        # The root's place is in its channels, where readers differ in whether they add the offset to it.
+        at = replace(bone, offset_mm=(0.0, 0.0, 0.0)) if is_root else bone
+        lines.append(f"{tab}\t{offset(at.offset_mm)}")
+        lines.append(f"{tab}\tCHANNELS {count} {places}{rotations}")
+        for child in children.get(bone.name, []):
+            write(child, depth + 1)
+        if bone.end_mm is not None:
+            lines.extend([f"{tab}\tEnd Site", f"{tab}\t{{", f"{tab}\t\t{offset(bone.end_mm)}", f"{tab}\t}}"])
+        lines.append(f"{tab}}}")
+
+    root = children[None][0]
+    write(root, 0)
+    count = len(time_s)
+    columns = [np.tile(np.array(root.offset_mm) / MM_PER_UNIT, (count, 1))]
+    for name in order:
+        found = turns.get(name)
+        columns.append(
+            np.zeros((count, 3))
+            if found is None
+            else Rotation.from_matrix(found).as_euler(ORDER, degrees=True)
+        )
+    step = (time_s[-1] - time_s[0]) / (count - 1)
+    lines += ["MOTION", f"Frames: {count}", f"Frame Time: {step:.9f}"]
+    for row in (np.concatenate(columns, axis=1) + 0.0).tolist():
+        lines.append(" ".join(f"{value:.6f}" for value in row))
+    return "\n".join(lines) + "\n"
+
+
+FORMAT = ExportFormat(".bvh", "application/octet-stream", write_bvh)
