@@ -17,7 +17,7 @@ class Settings(BaseSettings):
     model_config = SettingsConfigDict(env_prefix="GLOVECAL_", frozen=True, extra="ignore")
 
     data: Path = Path("glovecal-data")
-    """Folder of the database, artifacts, uploads, recordings and fits."""
+    """Folder of the database, artifacts, uploads, videos, recordings and fits."""
     database: str | None = None
     """SQLAlchemy URL, such as ``postgresql+psycopg://user@host/glovecal``; None: SQLite in ``data``."""
     artifacts: str | None = None
@@ -74,6 +74,10 @@ class Settings(BaseSettings):
     @property
     def uploads_folder(self) -> Path:
         return self.data / "uploads"
+
+    @property
+    def videos_folder(self) -> Path:
+        return self.data / "videos"
 
     @property
     def recordings_folder(self) -> Path:

@@ -60,6 +60,7 @@ from glovecal_service.rest.take import (
     table_import,
     takes,
     uploads,
+    videos,
 )
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
@@ -69,7 +70,19 @@ JSON_LIMIT_BYTES = 8_000_000
 BODY_PATIENCE_S = 30.0
 ROUTERS = (
     *(subjects, usual_hand, layouts, live, commands, recordings, samplings),
-    *(clocks, hands, session_drift, holds, examination, table_import, takes, reference, uploads, motion),
+    *(
+        clocks,
+        hands,
+        session_drift,
+        holds,
+        examination,
+        table_import,
+        takes,
+        reference,
+        uploads,
+        motion,
+        videos,
+    ),
     *(
         training,
         model_import,

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import httpx
+import numpy as np
 import pytest
 import zenoh
 from effect_models import model_with
@@ -12,8 +15,14 @@ from playwright.sync_api import expect
 from realtime_support import LAYOUT
 from studio_support import Open, moving, serious
 
+from glovecal_client.capture.computer import computer_id
+from glovecal_client.pictures.recording import VideoRecording
+from glovecal_client.pictures.rendered import RenderedPictures
+from glovecal_client.rest import RestClient
 from glovecal_client.session import open_client
 from glovecal_models.calibration.artifact import dump
+from glovecal_models.takes.take import Take
+from glovecal_service.cli.glove.beside import attach_video
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 
@@ -77,6 +86,48 @@ def test_a_slider_makes_a_version_and_undo_takes_it_back(
         expect(card.locator(".refine-value").last).to_have_text("0", timeout=PATIENCE_MS)
         expect(card.locator(".refine-said")).to_contain_text("Taken back", timeout=PATIENCE_MS)
         assert active(address) == line
+        assert seen.complaints == []
+
+
+def test_the_takes_video_beside_the_sliders(
+    opened: Open, session: zenoh.Session, settings: Settings, address: str, line: str, tmp_path: Path
+) -> None:
+    film = tmp_path / "fist.mkv"
+    with VideoRecording(RenderedPictures(), film) as video:
+        time.sleep(1.2)
+    video.describe()
+    time_s = np.arange(time.monotonic() - 3.0, time.monotonic(), 1 / 60)
+    bend = np.column_stack([140 + 60 * np.sin(3 * time_s)] * len(LAYOUT.sensors))
+    with Store.open(settings) as store:
+        take = store.takes.add(
+            Take("fist", "w", LAYOUT.sensors, time_s, bend), subject="refined-by-hand", layout=LAYOUT.name,
+            source="recording", accounting={"computer": computer_id()},
+        ).id  # fmt: skip
+    with RestClient(address) as client:
+        attach_video(client, film, [take])
+    with moving(session, settings, "refined", "refined-by-hand"):
+        seen = opened("live")
+        page, card = seen.page, seen.page.get_by_role("region", name="Glove refined")
+        expect(card.locator(".state-word").first).to_have_text("ok", timeout=PATIENCE_MS)
+        card.get_by_text("Refine by hand").click()
+        card.get_by_label("Beside the video of take").click()
+        page.get_by_role("option", name="fist").click()
+        picture = card.locator(".video-picture")
+        expect(picture).to_be_visible(timeout=PATIENCE_MS)
+        page.wait_for_function("document.querySelector('.video-picture').naturalWidth > 0")
+        for _ in range(4):
+            card.get_by_role("button", name="One picture on").click()
+        expect(picture).to_have_attribute("src", f"/v1/videos/{take}/pictures/4")
+        hand = card.get_by_label("Calibrated hand at the moment of the picture")
+        before = hand.screenshot()
+        slider = card.get_by_role("slider", name="Offset, degrees")
+        for _ in range(3):
+            slider.locator('[tabindex="0"]').press("ArrowRight")
+            expect(card.locator(".refine-said")).to_contain_text("degrees", timeout=PATIENCE_MS)
+        expect(picture).to_have_attribute("src", f"/v1/videos/{take}/pictures/4")
+        page.wait_for_timeout(500)
+        assert hand.screenshot() != before, "the hand beside the picture follows the slider"
+        assert serious(page) == []
         assert seen.complaints == []
 
 

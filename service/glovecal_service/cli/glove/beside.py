@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from glovecal_client.errors import ServiceError
+from glovecal_client.errors import ClientError, ServiceError
+from glovecal_models.errors import BadInput
 from glovecal_service.cli.terminal.printing import err
 from glovecal_service.cli.terminal.waiting import wait_seconds
 from glovecal_service.views.warm_up import warm_up_sentence
@@ -30,6 +32,40 @@ def video_beside(source: str | None, name: str) -> Iterator[VideoRecording | Non
         yield video
     if video.problem:
         err.print(f"The video ended after {video.pictures} pictures: {video.problem}", style="yellow")
+
+
+def finish_video(service: RestClient, video: VideoRecording, finished: Sequence[Mapping[str, Any]]) -> None:
+    """End it, write what it is of, and show it beside the takes of the recordings that ``finished``."""
+    takes = [one["facts"].get("take") for one in finished]
+    about = video.describe(takes=takes)
+    err.print(f"Video: {video.pictures} pictures, described in {about}.")
+    if video.pictures:
+        try:
+            attach_video(service, about.with_suffix(".mkv"), [take for take in takes if take])
+        except ClientError as error:
+            err.print(f"It stays here and is not shown in the studio: {error}", style="yellow")
+
+
+def attach_video(service: RestClient, video: Path, takes: Sequence[str]) -> None:
+    """A small copy of it to each take's id. Raises DeviceError, BadInput (its description), ServiceError."""
+    from glovecal_client.pictures.preview import write_preview
+
+    described = video.with_suffix(".json")
+    try:
+        about = json.loads(described.read_text(encoding="utf-8"))
+        about = {key: about[key] for key in ("source", "simulated", "computer")}
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
+        raise BadInput(
+            f"{described} must describe {video.name}, as glovecal record writes it: {error}"
+        ) from error
+    preview = write_preview(video, about)
+    try:
+        upload = service.upload(preview)
+    finally:
+        preview.unlink()
+    for take in takes:
+        answer = service.put(f"/videos/{take}", {"upload": upload})
+        err.print(f"Video beside take {answer['name']}: {answer['sentence']}")
 
 
 def warn_of_cold_gloves(service: RestClient, gloves: list[str], *, wait: bool) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from glovecal_service.cli.glove.beside import video_beside, warn_of_cold_gloves
+from glovecal_service.cli.glove.beside import finish_video, video_beside, warn_of_cold_gloves
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Glove, subject_named
 from glovecal_service.cli.terminal.printing import err, out, print_json
@@ -66,9 +66,7 @@ def record(
                 raise
             finished = finish_takes(service, started)
             if film is not None:
-                takes = [one["facts"].get("take") for one in finished]
-                about = film.describe(takes=takes)
-                err.print(f"Video: {film.pictures} pictures, described in {about}.")
+                finish_video(service, film, finished)
     if as_json:
         print_json(finished[0] if both is None else finished)
         return

@@ -9,7 +9,7 @@ import typer
 
 from glovecal_client.errors import ServiceError
 from glovecal_models.takes.session_drift import SHAPES
-from glovecal_service.cli.glove.beside import video_beside, warn_of_cold_gloves
+from glovecal_service.cli.glove.beside import finish_video, video_beside, warn_of_cold_gloves
 from glovecal_service.cli.glove.recordings import finish_takes, start_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson
@@ -44,8 +44,7 @@ def shapes(
         subjects = list(dict.fromkeys(one["subject"] for one in takes if one["subject"]))
         drifts = [_drift(service, subject) for subject in subjects] if at == "end" else []
         if film is not None:
-            about = film.describe(takes=[one["facts"].get("take") for one in takes])
-            err.print(f"Video: {film.pictures} pictures, described in {about}.")
+            finish_video(service, film, takes)
     if as_json:
         print_json({"takes": takes, "drifts": drifts})
         return

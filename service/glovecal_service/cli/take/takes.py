@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from glovecal_client.errors import ServiceError
-from glovecal_service.cli.take import clocks, examination, hands, holds, latency, motion, table_import
+from glovecal_service.cli.take import clocks, examination, hands, holds, latency, motion, table_import, video
 from glovecal_service.cli.take.rows import find_take, find_takes, print_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, OnlySubject, Take, identifier
@@ -26,6 +26,7 @@ app.command("examine")(examination.examine)
 app.command("hands")(hands.hands)
 app.command("holds")(holds.holds)
 app.command("motion")(motion.motion)
+app.command("video")(video.video)
 
 CONFLICT = 409
 """The service's answer when a take is two tables."""

@@ -17,6 +17,7 @@ from glovecal_service.rest.http.metrics import Metrics
 from glovecal_service.rest.http.upload_folder import UploadFolder
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
+from glovecal_service.store.videos import Videos
 
 IMPORTS_AT_ONCE = 2
 MOST_KEPT = 8
@@ -61,6 +62,10 @@ class Parts:
         default_factory=lambda: anyio.CapacityLimiter(IMPORTS_AT_ONCE)
     )
     """Tables are parsed in memory: so many at once and no more, the others wait."""
+
+    @property
+    def videos(self) -> Videos:
+        return Videos(self.settings.videos_folder)
 
 
 def _parts(request: Request) -> Parts:

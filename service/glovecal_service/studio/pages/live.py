@@ -20,6 +20,7 @@ def add(studio: Studio) -> None:
     @ui.page("/live")
     async def live() -> None:
         with shell(studio, "live", "Live"):
+            ui.add_head_html('<link rel="stylesheet" href="/studio/static/compare.css">')
             await LivePage(studio).build()
 
 

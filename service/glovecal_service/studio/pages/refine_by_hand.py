@@ -11,6 +11,7 @@ from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from glovecal_service.studio.amounts import version_name
+from glovecal_service.studio.pages.refined_video import RefinedVideo
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.studio import Studio
 
@@ -43,6 +44,7 @@ class RefineByHand:
             with ui.row():
                 ui.button("Undo", on_click=self._undo).props("outline no-caps")
             self._said = ui.label("").classes("refine-said").props('role="status"')
+            self._video = RefinedVideo(studio)
         self._part.set_visibility(False)
 
     async def follow(self, model: str | None) -> None:
@@ -62,6 +64,8 @@ class RefineByHand:
         kept = self._rotation.value if self._rotation.value in lines else next(iter(lines), None)
         self._rotation.set_options(lines, value=kept)
         self._part.set_visibility(bool(lines))
+        if lines:
+            await self._video.follow(self._model)
 
     def _slider(self, label: str, least: float, most: float, step: float, neutral: float) -> ui.slider:
         with ui.element("div").classes("refine-slider"):
@@ -98,6 +102,7 @@ class RefineByHand:
             self._said.set_text(
                 f"{rotation} times {wanted[0]:g}, {wanted[1]:+g} degrees: {version} is served."
             )
+            await self._video.follow(self._model)
             await self._changed()
         finally:
             self._busy = False
@@ -122,6 +127,7 @@ class RefineByHand:
         self._stand(self._served[-1])
         self._model = {**self._model, "id": back["model"]}
         self._said.set_text(f"Taken back: {back['model'][:12]} is served again.")
+        await self._video.follow(self._model)
         await self._changed()
 
 

@@ -1,0 +1,119 @@
+"""Previews of videos that were filmed beside takes: one file a take, checked before it is kept."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import zipfile
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+
+from glovecal_client.pictures.preview import ABOUT, MOST_PICTURES, picture_name
+from glovecal_models.errors import BadInput
+from glovecal_service.store.errors import NotFound
+
+LARGEST_PICTURE = 1_000_000
+LARGEST_ABOUT = 2_000_000
+JPEG_BEGINS = b"\xff\xd8\xff"
+Line = Annotated[str, Field(max_length=300)]
+
+
+class VideoFacts(BaseModel):
+    """What a preview is of."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    source: Line
+    simulated: bool = Field(description="Its pictures were drawn, not taken.")
+    computer: Annotated[str, Field(max_length=64)]
+    times_s: Annotated[list[FiniteFloat], Field(min_length=1, max_length=MOST_PICTURES)] = Field(
+        description="Of each picture, seconds of the computer's monotonic clock: the clock of its takes."
+    )
+
+
+class Videos:
+    """The folder ``videos`` of the data folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def attach(self, take: str, preview: Path) -> VideoFacts:
+        """Keep ``preview`` for a take's id, in place of an earlier one. Raises BadInput."""
+        facts = check_preview(preview)
+        self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        partial = self._path(take).with_suffix(".partial")
+        shutil.copyfile(preview, partial)
+        os.replace(partial, self._path(take))
+        return facts
+
+    def takes(self) -> list[str]:
+        """Ids of takes that have a video."""
+        return sorted(path.stem for path in self._folder.glob("*.zip"))
+
+    def facts(self, take: str) -> VideoFacts:
+        """Raises NotFound, BadInput for a file that was damaged since."""
+        return _facts(self._found(take))
+
+    def picture(self, take: str, number: int) -> bytes:
+        """One JPEG picture. Raises NotFound, BadInput."""
+        try:
+            with zipfile.ZipFile(self._found(take)) as file:
+                return file.read(picture_name(number))
+        except KeyError as error:
+            raise NotFound(f"the video of take {take} has no picture {number}") from error
+        except (zipfile.BadZipFile, OSError) as error:
+            raise BadInput(f"the video of take {take} is damaged: {error}") from error
+
+    def _found(self, take: str) -> Path:
+        path = self._path(take)
+        if not path.is_file():
+            raise NotFound(f"take {take} has no video; glovecal take video attaches one")
+        return path
+
+    def _path(self, take: str) -> Path:
+        return self._folder / f"{take}.zip"
+
+
+def check_preview(path: Path) -> VideoFacts:
+    """Every entry of the file. Raises BadInput that says what is wrong."""
+    facts = _facts(path)
+    if not (np.diff(facts.times_s) > 0).all():
+        raise BadInput("times_s of the video's pictures must increase")
+    with zipfile.ZipFile(path) as file:
+        wanted = {picture_name(number) for number in range(len(facts.times_s))} | {ABOUT}
+        entries = {entry.filename: entry for entry in file.infolist()}
+        if set(entries) != wanted or len(entries) != len(file.infolist()):
+            raise BadInput(f"the video must hold {ABOUT} and {len(wanted) - 1} pictures, one a time")
+        for name, entry in entries.items():
+            if entry.compress_type != zipfile.ZIP_STORED:
+                raise BadInput(f"{name} in the video is compressed; pictures are stored as they are")
+            if name == ABOUT:
+                continue
+            if entry.file_size > LARGEST_PICTURE:
+                raise BadInput(f"{name} has {entry.file_size} bytes; at most {LARGEST_PICTURE}")
+            try:
+                begins = file.open(entry).read(len(JPEG_BEGINS))
+            except (zipfile.BadZipFile, OSError) as error:
+                raise BadInput(f"{name} in the video cannot be read: {error}") from error
+            if begins != JPEG_BEGINS:
+                raise BadInput(f"{name} in the video is no JPEG picture")
+    return facts
+
+
+def _facts(path: Path) -> VideoFacts:
+    try:
+        with zipfile.ZipFile(path) as file:
+            entry = file.getinfo(ABOUT)
+            if entry.file_size > LARGEST_ABOUT:
+                raise BadInput(f"{ABOUT} has {entry.file_size} bytes; at most {LARGEST_ABOUT}")
+            return VideoFacts.model_validate(json.loads(file.read(entry)))
+    except (zipfile.BadZipFile, KeyError, OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise BadInput(f"no preview of a video: {error}; glovecal record --video makes one") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise BadInput(f"{ABOUT} of the video: {where}: {first['msg']}") from error
