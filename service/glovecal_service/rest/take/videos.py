@@ -15,7 +15,7 @@ from glovecal_models.hand.rotations import completed
 from glovecal_service.exports.hand_motion import at_times
 from glovecal_service.exports.take_motion import motion_of
 from glovecal_service.plain import plain
-from glovecal_service.rest.http.answers import change_problems
+from glovecal_service.rest.http.answers import change_problems, problems
 from glovecal_service.rest.http.dependencies import PartsNeeded
 from glovecal_service.rest.http.request_types import (
     SHA256_PREFIX,
@@ -62,7 +62,7 @@ class HandBeside(BaseModel):
     )
 
 
-@router.get("", response_model=list[Video], summary="Takes with a video")
+@router.get("", response_model=list[Video], summary="Takes with a video", responses=problems())
 def list_videos(parts: PartsNeeded, subject: SubjectFilter = None) -> list[Video]:
     """Newest takes first; a damaged file is left out here and named when it is asked for."""
     known = set(parts.videos.takes())
@@ -98,7 +98,7 @@ def put_video(id: IdInPath, body: Attached, parts: PartsNeeded) -> Video:
     return Video.of(take, facts)
 
 
-@router.get("/{id}", response_model=Video, summary="A take's video", responses=change_problems())
+@router.get("/{id}", response_model=Video, summary="A take's video", responses=problems())
 def get_video(id: IdInPath, parts: PartsNeeded) -> Video:
     return Video.of(parts.store.takes.get(id), parts.videos.facts(id))
 
@@ -107,7 +107,7 @@ def get_video(id: IdInPath, parts: PartsNeeded) -> Video:
     "/{id}/pictures/{number}",
     response_class=Response,
     summary="One picture",
-    responses={200: {"content": {"image/jpeg": {}}}, **change_problems()},
+    responses={200: {"content": {"image/jpeg": {}}}, **problems()},
 )
 def get_picture(
     id: IdInPath, number: Annotated[int, Path(ge=0, lt=MOST_PICTURES)], parts: PartsNeeded
@@ -120,7 +120,7 @@ def get_picture(
 
 @router.get(
     "/{id}/hand", response_model=HandBeside, summary="A model's hand at each picture",
-    responses=change_problems(409),
+    responses=problems(409),
 )  # fmt: skip
 def get_hand(
     id: IdInPath,
