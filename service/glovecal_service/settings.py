@@ -80,6 +80,10 @@ class Settings(BaseSettings):
         return self.data / "videos"
 
     @property
+    def films_folder(self) -> Path:
+        return self.data / "films"
+
+    @property
     def recordings_folder(self) -> Path:
         return self.data / "recordings"
 

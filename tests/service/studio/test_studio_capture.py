@@ -193,6 +193,8 @@ def test_a_free_recording_with_its_reference(opened: Open, address: str, referen
     name = "<img src=x onerror=alert(1)>"
     seen = opened("capture?mode=recording")
     page = seen.page
+    page.get_by_label("Film it").click()
+    page.get_by_role("option", name="Drawn pictures, to try").click()
     page.get_by_label("Name of the take").fill(name)
     page.keyboard.press("Tab")
     page.evaluate("document.activeElement.blur()")
@@ -201,12 +203,14 @@ def test_a_free_recording_with_its_reference(opened: Open, address: str, referen
     expect(page.locator(".board-note")).to_contain_text("frames", timeout=PATIENCE_MS)
     page.keyboard.press("Enter")
     page.get_by_role("heading", name=f"{name}: done").wait_for(timeout=PATIENCE_MS)
+    expect(page.get_by_text("in the service's folder films")).to_be_visible(timeout=PATIENCE_MS)
     assert serious(page) == []
     page.locator("input[type=file]").set_input_files(reference)
     told = page.get_by_role("region", name="Reference").get_by_role("status")
     expect(told).to_contain_text("measured rotations", timeout=PATIENCE_MS)
     take = next(each for each in asked(address, "takes", subject=SUBJECT) if each["name"] == name)
     assert take["rotations"]
+    assert asked(address, f"videos/{take['id']}")["simulated"], "shown beside the take"
     page.get_by_role("button", name="Check its clock").press("Enter")
     expect(told).to_contain_text("clock", timeout=PATIENCE_MS)
     assert seen.complaints == []

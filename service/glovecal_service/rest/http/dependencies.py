@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Annotated
 
 import anyio
@@ -13,6 +14,7 @@ from fastapi import Depends, Request
 from glovecal_models.calibration import artifact
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
+from glovecal_service.filming import Filming
 from glovecal_service.rest.http.metrics import Metrics
 from glovecal_service.rest.http.upload_folder import UploadFolder
 from glovecal_service.settings import Settings
@@ -62,6 +64,10 @@ class Parts:
         default_factory=lambda: anyio.CapacityLimiter(IMPORTS_AT_ONCE)
     )
     """Tables are parsed in memory: so many at once and no more, the others wait."""
+
+    @cached_property
+    def filming(self) -> Filming:
+        return Filming(self.settings.films_folder)
 
     @property
     def videos(self) -> Videos:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from fastapi import APIRouter, Path, Query, Response
+from fastapi import APIRouter, Query, Response
+from fastapi import Path as InPath
 from pydantic import BaseModel, Field
 
 from glovecal_client.pictures.preview import MOST_PICTURES
@@ -16,7 +18,7 @@ from glovecal_service.exports.hand_motion import at_times
 from glovecal_service.exports.take_motion import motion_of
 from glovecal_service.plain import plain
 from glovecal_service.rest.http.answers import change_problems, problems
-from glovecal_service.rest.http.dependencies import PartsNeeded
+from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.request_types import (
     SHA256_PREFIX,
     IdInPath,
@@ -81,20 +83,25 @@ def put_video(id: IdInPath, body: Attached, parts: PartsNeeded) -> Video:
     upload = parts.uploads.find(body.upload)
     if upload is None:
         raise NotFound(f"no upload {body.upload[:12]}; send the preview to /v1/uploads first")
-    facts = check_preview(upload)
+    return attach_preview(parts, take, upload)
+
+
+def attach_preview(parts: Parts, take: TakeRecord, preview: Path) -> Video:
+    """Show ``preview`` beside a take from now on. Raises BadInput, Conflict."""
+    facts = check_preview(preview)
     computer = (take.accounting or {}).get("computer")
     if computer != facts.computer:
         raise Conflict(
             f"take {take.name!r} was captured by another computer's clock, or before it restarted: the "
             "video's times mean nothing there. Film on the computer that captures."
         )
-    time_s = parts.store.takes.load(id).time_s
+    time_s = parts.store.takes.load(take.id).time_s
     if facts.times_s[-1] < time_s[0] or facts.times_s[0] > time_s[-1]:
         raise Conflict(
             f"the video lasts from {facts.times_s[0]:.1f} to {facts.times_s[-1]:.1f} s and take "
             f"{take.name!r} from {time_s[0]:.1f} to {time_s[-1]:.1f} s: no moment in common"
         )
-    parts.videos.attach(id, upload)
+    parts.videos.attach(take.id, preview)
     return Video.of(take, facts)
 
 
@@ -110,7 +117,7 @@ def get_video(id: IdInPath, parts: PartsNeeded) -> Video:
     responses={200: {"content": {"image/jpeg": {}}}, **problems()},
 )
 def get_picture(
-    id: IdInPath, number: Annotated[int, Path(ge=0, lt=MOST_PICTURES)], parts: PartsNeeded
+    id: IdInPath, number: Annotated[int, InPath(ge=0, lt=MOST_PICTURES)], parts: PartsNeeded
 ) -> Response:
     parts.store.takes.get(id)
     return Response(

@@ -24,6 +24,12 @@ FREE = "free-"
 OF_A_SAMPLING = "sampling-"
 """Recordings of this name belong to a guided sampling."""
 READY = "Ready to record"
+FILMED = {
+    "": "No video",
+    "camera:0": "Camera 0",
+    "camera:1": "Camera 1",
+    "rendered": "Drawn pictures, to try",
+}
 WAITING = Shown("waiting", "Press Space to start.", ask=READY)
 OPEN = ("requested", "recording", "stopping")
 
@@ -36,6 +42,9 @@ class RecordingPage:
         self._worn = GloveAndWearer(studio, gloves)
         self._recording: dict[str, Any] | None = None
         self._proposed: Mapping[str, Any] = {}
+        self._films = False
+        """A video goes on that was begun here."""
+        self._filmed = ""
 
     async def build(self, proposed: Mapping[str, Any] | None) -> None:
         self._proposed = proposed or {}
@@ -59,6 +68,8 @@ class RecordingPage:
                 self._pre_roll = ui.number(
                     "Pre-roll, s", value=PRE_ROLL_S, min=0, max=LONGEST_PRE_ROLL_S
                 ).classes("capture-number")
+            self._film = ui.select(FILMED, value="", label="Film it, with a camera of the service's computer")
+            self._film.classes("choice")
         self._board = Board(WAITING, keys={"main": MAIN_KEYS}, label="What happens now")
         self._board.on_act(self._act)
         with ui.element("div").classes("capture-acts"):
@@ -92,14 +103,23 @@ class RecordingPage:
     async def _start(self) -> None:
         await self._worn.put_on()
         self._account.clear()
+        if self._film.value:
+            await self._studio.service.post("/films", {"source": self._film.value})
+            self._films = True
         body = {
             "glove": self._worn.glove,
             "name": str(self._name.value).strip(),
             "subject": self._worn.subject,
         }
-        self._recording = await self._studio.service.post(
-            "/recordings", body | {"lead_s": self._pre_roll.value or 0}
-        )
+        try:
+            self._recording = await self._studio.service.post(
+                "/recordings", body | {"lead_s": self._pre_roll.value or 0}
+            )
+        except Refusal:
+            if self._films:
+                self._films = False
+                await self._studio.service.post("/films/stop")
+            raise
 
     async def _look(self) -> None:
         """Nothing is asked while nothing is recorded."""
@@ -108,6 +128,7 @@ class RecordingPage:
             return
         try:
             now = await self._studio.service.get(f"/recordings/{before['id']}")
+            self._filmed = await self._film_line()
             limit = self._seconds.value
             if now["state"] == "recording" and limit and _seconds(now) >= limit:
                 now = await self._studio.service.post(f"/recordings/{now['id']}/stop")
@@ -143,7 +164,7 @@ class RecordingPage:
         is_on = state == "recording"
         shown = Shown(
             phase=state, line=line, ask=self._proposed.get("what") or f"{seconds:.0f} s",
-            note="" if frames is None else f"{frames} frames", number=1 if is_on else 0,
+            note="" if frames is None else f"{frames} frames{self._filmed}", number=1 if is_on else 0,
             tone="begin" if is_on else "", of_s=limit or None,
             left_s=max(0.0, limit - seconds) if limit else None,
         )  # fmt: skip
@@ -164,9 +185,30 @@ class RecordingPage:
                 ui.label(f"Pre-roll: {pre_roll.get('seconds', 0):.0f} s before the start.")
             if facts.get("sentence"):
                 ui.label(facts["sentence"])
+            if self._films:
+                await self._tell_video(facts.get("take"))
             if facts.get("take"):
                 ui.label(f"Take {facts['take']}.").classes("version-id")
                 await self._reference.choose(facts["take"])
+
+    async def _film_line(self) -> str:
+        if not self._films:
+            return ""
+        film = await self._studio.service.get("/films")
+        return f", {film['pictures']} pictures" + ("" if film["is_on"] else "; the camera is lost")
+
+    async def _tell_video(self, take: str | None) -> None:
+        """End it, and show it beside the take."""
+        self._films = False
+        try:
+            film = await self._studio.service.post("/films/stop", {"takes": [take] if take else []})
+        except Refusal as refusal:
+            ui.label(str(refusal)).classes("studio-notice")
+            return
+        ui.label(f"Video {film['file']}: {film['pictures']} pictures, in the service's folder films.")
+        for sentence in (film["problem"], *film["sentences"]):
+            if sentence:
+                ui.label(sentence)
 
 
 def _free_name() -> str:

@@ -1,0 +1,30 @@
+"""A video recording as a process of its own: ``python -m glovecal_client.pictures.film SOURCE FILE.mkv``.
+
+A camera's driver may hang or crash, and then only this does. It films until its standard input ends, which is
+also when the program that started it dies, and leaves ``FILE.json`` beside the video.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from glovecal_client.errors import ClientError
+from glovecal_client.pictures.recording import VideoRecording
+from glovecal_client.pictures.source import build_source
+
+
+def main(source: str, file: str) -> int:
+    """0, or 1 with a sentence on standard error when there is no camera or no place."""
+    try:
+        with VideoRecording(build_source(source), Path(file)) as video:
+            sys.stdin.buffer.read()
+        video.describe()
+    except (ClientError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))
