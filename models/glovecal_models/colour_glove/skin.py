@@ -69,7 +69,7 @@ class HandSkin:
     @cached_property
     def unbound(self) -> tuple[np.ndarray, np.ndarray]:
         """Takes the surface at rest into each joint's frame: matrices (J, 3, 3), offsets (J, 3)."""
-        turned, places = _joint_frames(*self.chain, self.rest_deg)
+        turned, places = joint_frames(*self.chain, self.rest_deg)
         back = np.ascontiguousarray(turned.swapaxes(1, 2))
         return back, -np.einsum("jab,jb->ja", back, places)
 
@@ -104,17 +104,28 @@ def hand_skin(
 
 def posed(skin: HandSkin, state: HandState) -> np.ndarray:
     """The vertices (V, 3) in the camera's frame, mm."""
-    turned, places = _joint_frames(*skin.chain, state.angles_deg)
+    turned, places = joint_frames(*skin.chain, state.angles_deg)
     back, offsets = skin.unbound
-    return _skinned(
+    return skinned(
         skin.vertices_mm, skin.joints, skin.weights, turned, places, back, offsets, state.rotation,
         state.position_mm,
     )  # fmt: skip
 
 
+def configured(skin: HandSkin, angles_deg: np.ndarray, every: int = 1) -> np.ndarray:
+    """Every ``every``-th vertex of many hands (N, 20) in the palm's frame, (N, V', 3) mm."""
+    body = [array[::every].copy() for array in (skin.vertices_mm, skin.joints, skin.weights)]
+    angles = np.ascontiguousarray(angles_deg, dtype=float)
+    found = np.empty((len(angles), len(body[0]), 3))
+    _configure(skin.chain, (body[0], body[1], body[2]), skin.unbound, angles, found)
+    return found
+
+
+# A kernel kept on disk is compiled anew when its own file changes, not when another does: here and beside,
+# kernels use nothing but their own file (test_colour_glove_kernels).
 @numba.njit(cache=True)
-def _joint_frames(parents, offsets, turns, weights, angles_deg):  # type: ignore[no-untyped-def]
-    """Orientations (J, 3, 3) and places (J, 3) of all joints; ``forward_kinematics`` for one hand."""
+def joint_frames(parents, offsets, turns, weights, angles_deg):  # type: ignore[no-untyped-def]
+    """Kernel: orientations (J, 3, 3) and places (J, 3) of all joints; ``forward_kinematics`` for one hand."""
     count = len(parents)
     turned, places = np.empty((count, 3, 3)), np.empty((count, 3))
     for joint in range(count):
@@ -145,7 +156,7 @@ def _joint_frames(parents, offsets, turns, weights, angles_deg):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _skinned(vertices, joints, weights, turned, places, back, offsets, rotation, position):  # type: ignore[no-untyped-def]
+def skinned(vertices, joints, weights, turned, places, back, offsets, rotation, position):  # type: ignore[no-untyped-def]
     count = len(places)
     matrices, shifts = np.empty((count, 3, 3)), np.empty((count, 3))
     for joint in range(count):
@@ -165,6 +176,17 @@ def _skinned(vertices, joints, weights, turned, places, back, offsets, rotation,
                     total += weight * (moved + shifts[joints[vertex, place], a])
             found[vertex, a] = total
     return found
+
+
+@numba.njit(cache=True)
+def _configure(chain, body, unbound, angles, found):  # type: ignore[no-untyped-def]
+    vertices, joints, weights = body
+    back, offsets = unbound
+    for index in range(len(angles)):
+        turned, places = joint_frames(chain[0], chain[1], chain[2], chain[3], angles[index])
+        found[index] = skinned(
+            vertices, joints, weights, turned, places, back, offsets, np.eye(3), np.zeros(3)
+        )
 
 
 @dataclass(frozen=True)
