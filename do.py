@@ -7,7 +7,8 @@
     python3 do.py test      the test suite; with -m slow what it leaves out because it takes minutes
     python3 do.py check     format, lint, types
     python3 do.py bench     speed against other libraries, as ratios, with a picture
-    python3 do.py paper     Wang & Neff 2013 reproduced: every table and figure, as one page (5 minutes)
+    python3 do.py paper     Wang & Neff 2013 reproduced: every table and figure, as one page (5 minutes);
+                            --part colour-glove: Wang & Popovic 2009's, as far as built (20 minutes)
     python3 do.py docs      the documentation as a site in site/, readable without a network
     python3 do.py study     the blind study of the diagnosis: figures, confusion matrix, a page (hours;
                             --quick, --minutes N; --page docs/study.md writes what was found);

@@ -13,7 +13,7 @@ MAP = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
 PATHS = sorted(set(re.findall(r"`((?:models|client|service|tests)/[\w./-]+)`", MAP)))
 TOPS = ("models/glovecal", "models/glovecal_models", "client/glovecal_client", "service/glovecal_service")
 PACKAGES = [path.parent for top in TOPS for path in sorted((ROOT / top).rglob("__init__.py"))]
-MOST_SIBLINGS = 15
+MOST_SIBLINGS = 16
 """Packages at one level: about a dozen."""
 
 

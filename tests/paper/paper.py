@@ -34,7 +34,7 @@ def main(arguments: Sequence[str]) -> int:
         _parser().error(f"there is no part {unknown[0]!r}; there are {', '.join(PARTS)}")
     if options.seed < 0 or options.workers < 1:
         _parser().error(f"seed {options.seed} and {options.workers} workers: at least 0 and 1 are possible")
-    wanted = options.part or list(PARTS)
+    wanted = options.part or [name for name, part in PARTS.items() if not part.asked_for]
     kept = KeptResults(options.folder, programs_hash())
     try:
         failed = compute(wanted, kept, options.seed, options.quick, options.again, options.workers)
@@ -75,7 +75,7 @@ def _jobs(parts: Sequence[str]) -> list[PaperJob]:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="do.py paper", description=(__doc__ or "").partition("\n")[0])
-    named = f"one part, may be repeated: {', '.join(PARTS)}; default: all"
+    named = f"one part, may be repeated: {', '.join(PARTS)}; default: all but colour-glove"
     parser.add_argument("--part", action="append", metavar="NAME", help=named)
     parser.add_argument("--quick", action="store_true", help="few samples: to see that it works")
     smoke = f"{SMOKE_PART} with few samples, in a temporary folder: seconds"

@@ -7,10 +7,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from colour_glove import SAMPLINGS, CodeRow, CoverageRow, codes, coverage
+from colour_glove import SIZES as DATABASE_SIZES
 from figure_11 import Figure11Row
 from figure_12 import Figure12Row
 from multiple_wearings import WearingRow
 from paper_job import PaperJob
+from paper_page.colour_glove_section import colour_glove_section
 from paper_page.figure_11_section import figure_11_section
 from paper_page.figure_12_section import figure_12_section
 from paper_page.section import Section
@@ -42,6 +45,8 @@ class PaperPart:
     """Of the rows that the section is made of."""
     section: Callable[..., Section]
     """From the rows of each kind."""
+    asked_for: bool = False
+    """Computed only when it is named: it takes long."""
 
 
 def _table_1(seed: int, quick: bool, report: Report) -> Mapping[str, Sequence[Table1Row]]:
@@ -67,6 +72,26 @@ _SUBJECTS = tuple(
 _SIZED = tuple(
     PaperJob(f"table-4-{size or 'exact'}", partial(_table_4, size), weight=size or 10)
     for size in (*SIZES, None)
+)
+
+
+def _coverage(
+    size: int, sampling: str, seed: int, quick: bool, report: Report
+) -> Mapping[str, Sequence[CoverageRow | CodeRow]]:
+    return {**coverage(size, sampling, seed, quick, report), "codes": []}
+
+
+def _codes(seed: int, quick: bool, report: Report) -> Mapping[str, Sequence[CoverageRow | CodeRow]]:
+    return {**codes(seed, quick, report), "coverage": []}
+
+
+_DATABASES = (
+    *(
+        PaperJob(f"colour-glove-{size}-{sampling}", partial(_coverage, size, sampling), weight=size / 100)
+        for size in DATABASE_SIZES
+        for sampling in SAMPLINGS
+    ),
+    PaperJob("colour-glove-codes", _codes, weight=2000),
 )
 
 PARTS: dict[str, PaperPart] = {
@@ -105,5 +130,12 @@ PARTS: dict[str, PaperPart] = {
     ),
     "wearings": PaperPart(
         "Section 8.2: one training, many wearings", _SUBJECTS, {"wearings": WearingRow}, wearings_section
+    ),
+    "colour-glove": PaperPart(
+        "Wang & Popovic 2009, Figures 8 and 9: the colour glove's database, on rendered images",
+        _DATABASES,
+        {"coverage": CoverageRow, "codes": CodeRow},
+        colour_glove_section,
+        asked_for=True,
     ),
 }

@@ -1,0 +1,81 @@
+"""All that a picture of a hand depends on: twenty angles of the fingers, and the palm's place and turn.
+
+26 degrees of freedom as in Wang & Popovic 2009, section 5.1. The wrist does not count: its angles are zero,
+so that the palm's frame is that of ``hand_skeleton`` (origin at the wrist, x to the fingers, y to the thumb
+of the right hand, z out of the back of the hand). Frame of a camera: x right, y down, z forward, mm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from glovecal_models.errors import BadInput
+from glovecal_models.hand.rotations import HAND_ROTATIONS, WRIST
+from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
+
+FINGER_ROTATIONS: tuple[str, ...] = tuple(name for name in HAND_ROTATIONS if name not in WRIST)
+"""The order of a state's angles: ``HAND_ROTATIONS`` without the wrist, 20."""
+RANGE_DEG = np.array([ACTIVE_RANGE_DEG[name] for name in FINGER_ROTATIONS])
+"""Lowest and highest angle, (20, 2)."""
+DEGREES_OF_FREEDOM = len(FINGER_ROTATIONS) + 6
+_IS_ROTATION_WITHIN = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class HandState:
+    """One hand before a camera. Raises BadInput for other shapes, values that are not finite, and a matrix
+    that is no rotation."""
+
+    angles_deg: np.ndarray
+    """(20,), in the order of ``FINGER_ROTATIONS``."""
+    rotation: np.ndarray
+    """(3, 3), from the palm's frame to the camera's."""
+    position_mm: np.ndarray
+    """(3,), the wrist in the camera's frame."""
+
+    def __post_init__(self) -> None:
+        shapes = {"angles_deg": (len(FINGER_ROTATIONS),), "rotation": (3, 3), "position_mm": (3,)}
+        for name, shape in shapes.items():
+            value = np.asarray(getattr(self, name), dtype=float)
+            if value.shape != shape:
+                raise BadInput(f"{name} of a hand's state has shape {value.shape}, expected {shape}")
+            if not np.isfinite(value).all():
+                raise BadInput(f"{name} of a hand's state is not finite: {value}")
+            object.__setattr__(self, name, value)
+        error = np.abs(self.rotation @ self.rotation.T - np.eye(3)).max()
+        if error > _IS_ROTATION_WITHIN or np.linalg.det(self.rotation) < 0:
+            raise BadInput(f"rotation of a hand's state is no rotation matrix (off by {error:.2g})")
+
+    @classmethod
+    def from_vector(cls, vector: np.ndarray) -> HandState:
+        """From 26 numbers as ``vector`` gives them. Raises BadInput for another count."""
+        from scipy.spatial.transform import Rotation
+
+        vector = np.asarray(vector, dtype=float)
+        if vector.shape != (DEGREES_OF_FREEDOM,):
+            raise BadInput(f"a hand's state has {DEGREES_OF_FREEDOM} numbers, not shape {vector.shape}")
+        if not np.isfinite(vector).all():
+            raise BadInput(f"a hand's state is not finite: {vector}")
+        return cls(vector[:20], Rotation.from_rotvec(vector[20:23], degrees=True).as_matrix(), vector[23:])
+
+    def vector(self) -> np.ndarray:
+        """(26,): angles in degrees, rotation vector in degrees, position in mm."""
+        from scipy.spatial.transform import Rotation
+
+        turn = Rotation.from_matrix(self.rotation).as_rotvec(degrees=True)
+        return np.concatenate([self.angles_deg, turn, self.position_mm])
+
+    def moved(self, step: np.ndarray) -> HandState:
+        """This state after a small step (26,): angles and position are added to, the palm turns about the
+        camera's axes (rotation vector in degrees, multiplied from the left). Limited to no range."""
+        from scipy.spatial.transform import Rotation
+
+        step = np.asarray(step, dtype=float)
+        turn = Rotation.from_rotvec(step[20:23], degrees=True) * Rotation.from_matrix(self.rotation)
+        return HandState(self.angles_deg + step[:20], turn.as_matrix(), self.position_mm + step[23:])
+
+    def within_range(self) -> HandState:
+        """The nearest state whose angles a healthy hand reaches (``hand_ranges``)."""
+        return HandState(np.clip(self.angles_deg, *RANGE_DEG.T), self.rotation, self.position_mm)

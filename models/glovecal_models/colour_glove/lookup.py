@@ -1,0 +1,109 @@
+"""A tiny image looked up: candidates by their code, ranked again by image distance, the ten nearest blended.
+
+Wang & Popovic 2009, sections 4.5 and 5.2. The paper leaves the hand's position to inverse kinematics; here
+the window's size and place already give a first one, as the entry was rendered at a known distance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from glovecal_models.colour_glove.camera_model import Camera
+from glovecal_models.colour_glove.crop import Window
+from glovecal_models.colour_glove.database import (
+    VIEW_DISTANCE_MM,
+    VIEW_FOCAL_PX,
+    VIEW_PX,
+    PoseDatabase,
+)
+from glovecal_models.colour_glove.hand_state import HandState
+from glovecal_models.colour_glove.image_distance import distance_transform, distances
+from glovecal_models.errors import BadInput
+
+RERANKED, BLENDED = 300, 10
+
+
+class Code(Protocol):
+    def nearest(self, transform: np.ndarray, count: int) -> np.ndarray: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """Entries of a database, nearest first."""
+
+    entries: np.ndarray
+    """(K,)."""
+    distances: np.ndarray
+    """(K,): image distances, squared pixels."""
+
+    @property
+    def weights(self) -> np.ndarray:
+        """(K,): Gaussian in the distance, its sigma the mean of the distances (equation 1); sum 1."""
+        sigma = max(float(self.distances.mean()), 1e-9)
+        weights = np.exp(-((self.distances / sigma) ** 2))
+        return weights / weights.sum()
+
+
+@dataclass(frozen=True, eq=False)
+class PoseLookup:
+    """``code`` None: every entry is compared (the paper's brute force)."""
+
+    database: PoseDatabase
+    code: Code | None
+
+    def neighbours(self, tiny: np.ndarray, count: int = BLENDED, *, reranked: int = RERANKED) -> Neighbours:
+        """The ``count`` nearest entries of a tiny image (40, 40) uint8.
+
+        Raises BadInput for another kind of image, one without a glove, and counts out of range.
+        """
+        if not 1 <= count <= reranked:
+            raise BadInput(f"{count} neighbours of {reranked} compared; expected 1 to {reranked}")
+        transform = distance_transform(tiny, self.database.transforms.shape[1])
+        if not tiny.any():
+            raise BadInput("a tiny image without any glove pixel cannot be looked up")
+        size = len(self.database)
+        candidates = np.arange(size) if self.code is None else self.code.nearest(transform, reranked)
+        apart = distances(tiny, transform, self.database.tiny, self.database.transforms, candidates)
+        order = np.argsort(apart, kind="stable")[:count]
+        return Neighbours(candidates[order], apart[order])
+
+    def blend(self, neighbours: Neighbours) -> tuple[np.ndarray, np.ndarray]:
+        """Angles (20,) and rotation (3, 3) before the virtual camera: weighted means, the rotation's in the
+        chordal metric."""
+        weights, entries = neighbours.weights, neighbours.entries
+        angles = weights @ self.database.angles_deg[entries].astype(float)
+        mean = np.einsum("k,kab->ab", weights, self.database.rotations[entries].astype(float))
+        left, _, right = np.linalg.svd(mean)
+        flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+        return angles, left @ flip @ right
+
+    def placed(self, neighbours: Neighbours, window: Window, camera: Camera) -> HandState:
+        """The blend where ``camera`` saw it, in the camera's own frame.
+
+        The ratio of the windows' sizes gives the distance, the window's centre the direction; along that
+        direction the hand looks as it did along the virtual camera's axis.
+        """
+        angles, rotation = self.blend(neighbours)
+        own = self.database.windows[neighbours.entries].astype(float)
+        u, v, half = neighbours.weights @ own
+        focal = float(np.mean(camera.focal_px))
+        distance = VIEW_DISTANCE_MM * (focal / VIEW_FOCAL_PX) * (half / window.half)
+        # What lay on the virtual camera's axis lies beside the window's centre by as much as it did there.
+        offset = (np.full(2, (VIEW_PX - 1) / 2) - (u, v)) * (window.half / half)
+        direction = camera.undistort(np.array([[window.u, window.v]]) + offset)[0]
+        ray = np.append(direction, 1.0)
+        turn = _turn_from_axis(ray / np.linalg.norm(ray))
+        # Depth, not distance, is what sizes in a picture tell.
+        centre = turn @ np.array([0.0, 0.0, distance * np.linalg.norm(ray)])
+        rotation = turn @ rotation
+        return HandState(angles, rotation, centre - rotation @ self.database.palm_centre_mm)
+
+
+def _turn_from_axis(direction: np.ndarray) -> np.ndarray:
+    """The smallest rotation (3, 3) from the camera's z to a unit vector with positive z."""
+    x, y, z = direction
+    cross = np.array([[0.0, 0.0, x], [0.0, 0.0, y], [-x, -y, 0.0]])
+    return np.eye(3) + cross + cross @ cross / (1.0 + z)
