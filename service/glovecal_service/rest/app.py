@@ -45,6 +45,7 @@ from glovecal_service.rest.model import (
     residual_column,
     series,
     training,
+    vendor_calibrations,
     where,
 )
 from glovecal_service.rest.sampling import next_steps, samplings
@@ -86,6 +87,7 @@ ROUTERS = (
     *(
         training,
         model_import,
+        vendor_calibrations,
         refinement,
         models,
         predictions,

@@ -85,7 +85,11 @@ async def import_model(
 def _import(parts: Parts, path: Path, options: ModelImport) -> dict[str, Any]:
     if (size := path.stat().st_size) > LARGEST_BYTES:
         raise BadInput(f"{size >> 20} MB are no model: {LARGEST_BYTES >> 20} MB at most")
-    artifact = path.read_bytes()
+    return import_artifact(parts, path.read_bytes(), options)
+
+
+def import_artifact(parts: Parts, artifact: bytes, options: ModelImport) -> dict[str, Any]:
+    """An ``ImportedModel``. Raises BadInput for what does not predict a frame, NotFound, Conflict."""
     model = _tried(artifact)
     subject = options.subject or model.subject
     layout_is_new = _layout_is_new(parts, model)

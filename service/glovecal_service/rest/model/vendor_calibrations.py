@@ -1,0 +1,80 @@
+"""``models/calibrations``: other programs' calibrations as models, and models of lines as such files."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Query, Response
+from pydantic import BaseModel, Field
+
+from glovecal_models.calibration.artifact import dump
+from glovecal_service.rest.http.answers import change_problems, problems
+from glovecal_service.rest.http.dependencies import PartsNeeded
+from glovecal_service.rest.http.request_types import Identifier, ModelInPath, StrictBody, SubjectName
+from glovecal_service.rest.model.model_import import ImportedModel, ModelImport, import_artifact
+from glovecal_service.store.errors import NotFound
+from glovecal_service.vendor_calibrations.formats import calibration_format
+from glovecal_service.vendor_calibrations.line_model import MOST_CHARACTERS, read_model, write_model
+
+router = APIRouter(prefix="/models", tags=["models"])
+
+FormatName = Literal["virtualhand", "asr", "shadow_xml", "shadow_yaml", "opengloves"]
+
+
+class Calibration(StrictBody):
+    format: FormatName
+    text: Annotated[str, Field(min_length=1, max_length=MOST_CHARACTERS)] = Field(description="The file's.")
+    layout: Identifier = Field(description="Of the glove that it calibrates.")
+    subject: SubjectName
+    create_subject: bool = Field(False, description="Add the subject if it is not there; else 404.")
+
+
+class ImportedCalibration(ImportedModel):
+    left_out: dict[str, str] = Field(
+        description="Sensors of the file that the layout does not read, and why."
+    )
+
+
+class CalibrationFile(BaseModel):
+    text: str
+    left_out: dict[str, str] = Field(description="Rotations that the format cannot say, and why.")
+
+
+@router.post(
+    "/calibrations",
+    status_code=201,
+    response_model=ImportedCalibration,
+    summary="Import another program's calibration",
+    responses=change_problems(409)
+    | {200: {"model": ImportedCalibration, "description": "This very model was here already."}},
+)
+def import_calibration(body: Calibration, response: Response, parts: PartsNeeded) -> dict[str, Any]:
+    """Kept as a model of lines, each with its scale and offset; it is not activated. 422 names the line."""
+    try:
+        hand = parts.store.subjects.get(body.subject).hand
+    except NotFound:
+        if not body.create_subject:
+            raise
+        hand = "right"
+    layout = parts.store.layouts.get(body.layout)
+    model, found = read_model(body.text, calibration_format(body.format), layout, body.subject, hand)
+    options = ModelImport(subject=body.subject, create_subject=body.create_subject)
+    answer = import_artifact(parts, dump(model), options)
+    response.status_code = 201 if answer["is_new"] else 200
+    return answer | {"left_out": dict(found.left_out)}
+
+
+@router.get(
+    "/{id}/calibration",
+    response_model=CalibrationFile,
+    summary="A model of lines as another program's calibration",
+    responses=problems(),
+)
+def export_calibration(
+    id: ModelInPath, parts: PartsNeeded, format: Annotated[FormatName, Query()]
+) -> CalibrationFile:
+    """422 where no rotation is a line of one sensor, or effects would be lost."""
+    record = parts.store.models.get(id)
+    model, _ = parts.predictors.get(record.id)
+    written = write_model(model, calibration_format(format), parts.store.subjects.get(record.subject).hand)
+    return CalibrationFile(text=written.text, left_out=dict(written.left_out))
