@@ -22,6 +22,7 @@ def test_the_command_imports_and_exports(run: Run, tmp_path: Path) -> None:
     assert "was imported" in imported.out
     models = run("model", "list", "--json")
     model = models.json[0]["id"]
+    assert "scale (°/count)" in run("model", "show", model).out
     exported = run("model", "export", model, tmp_path / "again.cal", "--format", "asr")
     assert exported.code == 0, exported.err
     assert (tmp_path / "again.cal").read_text() == text

@@ -21,6 +21,12 @@ def test_in_and_out_again(client: RestClient) -> None:
     assert (found["is_new"], found["subject_created"]) == (True, True)
     model = found["model"]["id"]
     assert not found["model"]["active"]
+    line = next(each for each in client.get(f"/models/{model}")["rotations"] if each["rotation"] == "I_MCP")[
+        "line"
+    ]
+    assert list(line["scale_deg"]) == ["I_MCP"]
+    assert line["scale_deg"]["I_MCP"] == pytest.approx(0.8)
+    assert line["offset_deg"] == pytest.approx(-0.8 * 60.0)
     assert client.get(f"/models/{model}/calibration", {"format": "asr"})["text"] == TEXT
     assert client.post("/models/calibrations", BODY)["is_new"] is False
 

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from glovecal_service.cli.model.rows import EFFECT_COLUMNS, KERNEL_COLUMNS, effect_rows, kernel_rows
+from glovecal_service.cli.model.rows import (
+    EFFECT_COLUMNS,
+    KERNEL_COLUMNS,
+    LINE_COLUMNS,
+    effect_rows,
+    kernel_rows,
+    line_rows,
+)
 from glovecal_service.cli.model.vendor_files import (
     VendorFormat,
     exported_calibration,
@@ -103,6 +110,11 @@ def show(model: Model, as_json: AsJson = False) -> None:
         "sensors": "sensors",
     }
     print_table(document["rotations"], columns, empty="No rotations.")
+    lines = line_rows(document["rotations"])
+    if lines:
+        out.print()
+        out.print("Lines: angle = scale x reading + ... + offset")
+        print_table(lines, LINE_COLUMNS, empty="")
     tried = kernel_rows(document["rotations"])
     if tried:
         out.print()

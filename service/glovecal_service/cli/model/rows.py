@@ -21,6 +21,12 @@ KERNEL_COLUMNS = {
     "nlml": "NLML (nats)",
     "evidence_gain": "evidence (nats)",
 }
+LINE_COLUMNS = {
+    "rotation": "rotation",
+    "sensor": "sensor",
+    "scale": "scale (°/count)",
+    "offset": "offset (°)",
+}
 SCALE = (("mean angle", "spread_deg"), ("straight line", "straight_line_deg"))
 """What the candidates' errors are to be read against."""
 
@@ -63,3 +69,18 @@ def kernel_rows(rotations: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         rows += [{**name, "kernel": words, "held_out_rmse_deg": found[error]} for words, error in SCALE]
         rows += [{**item, **name, "chosen": item["chosen"] or None} for item in found["candidates"]]
     return rows
+
+
+def line_rows(rotations: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """One row for each reading of a linear rotation, the offset in its first."""
+    return [
+        {
+            "rotation": "" if place else rotation["rotation"],
+            "sensor": sensor,
+            "scale": f"{scale:.4g}",
+            "offset": "" if place else f"{rotation['line']['offset_deg']:.1f}",
+        }
+        for rotation in rotations
+        if rotation["line"]
+        for place, (sensor, scale) in enumerate(rotation["line"]["scale_deg"].items())
+    ]

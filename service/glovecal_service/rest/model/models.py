@@ -11,6 +11,8 @@ from pydantic import BaseModel, Field
 
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.errors import DamagedArtifact
+from glovecal_models.regression.known_line import gains_of
+from glovecal_models.regression.linear_regressor import LinearRegressor
 from glovecal_service.plain import plain
 from glovecal_service.rest.http.answers import change_problems, problems
 from glovecal_service.rest.http.damaged_rows import warn, without_damaged
@@ -52,6 +54,13 @@ class Model(BaseModel):
     created_at: datetime
 
 
+class LineView(BaseModel):
+    """angle = offset_deg + the sum of scale times reading (Krnoul et al. 2016, Figure 1)."""
+
+    scale_deg: dict[str, float] = Field(description="Degrees a count, by what is read.")
+    offset_deg: float = Field(description="The angle at reading zero.")
+
+
 class Rotation(BaseModel):
     rotation: str
     kind: str = Field(description="1S1R, MS1R, 0S1R or MSMR.")
@@ -62,6 +71,7 @@ class Rotation(BaseModel):
     uncertain_above_deg: float
     samples: int
     kernel_choice: KernelChoiceView | None = Field(description="Of a model trained with `auto`, else null.")
+    line: LineView | None = Field(description="Of a linear rotation or a template's equation, else null.")
 
 
 class ModelInFull(Model):
@@ -209,4 +219,15 @@ def _rotation(item: RotationModel) -> dict[str, Any]:
         "uncertain_above_deg": item.uncertain_above_deg,
         "samples": item.samples,
         "kernel_choice": kernel_view(item.rotation, item.regressor),
+        "line": _line(item),
+    }
+
+
+def _line(item: RotationModel) -> dict[str, Any] | None:
+    if not isinstance(item.regressor, LinearRegressor):
+        return None
+    gains, offset = gains_of(item.regressor)
+    return {
+        "scale_deg": dict(zip(item.correspondence.inputs, gains.tolist(), strict=True)),
+        "offset_deg": offset,
     }
