@@ -16,7 +16,7 @@ from glovecal_models.errors import BadInput
 
 CAP = 144
 """Squared pixels; fits into a byte."""
-_REACH = 12
+_REACH_PX = 12
 COLOURS = 10
 
 
@@ -57,20 +57,20 @@ def transform_into(tiny, found):  # type: ignore[no-untyped-def]
             found[index] = CAP
             continue
         for x in range(size):
-            far = _REACH + 1
+            far = _REACH_PX + 1
             for y in range(size):
-                far = 0 if tiny[y, x] == index + 1 else min(far + 1, _REACH + 1)
+                far = 0 if tiny[y, x] == index + 1 else min(far + 1, _REACH_PX + 1)
                 along[y, x] = far
-            far = _REACH + 1
+            far = _REACH_PX + 1
             for y in range(size - 1, -1, -1):
-                far = 0 if tiny[y, x] == index + 1 else min(far + 1, _REACH + 1)
+                far = 0 if tiny[y, x] == index + 1 else min(far + 1, _REACH_PX + 1)
                 along[y, x] = min(along[y, x], far)
         for y in range(size):
             # The row's distances are the lower envelope of parabolas, one on each column that has the colour
             # near (Felzenszwalb & Huttenlocher 2012, "Distance transforms of sampled functions").
             last = -1
             for x in range(size):
-                if along[y, x] > _REACH:
+                if along[y, x] > _REACH_PX:
                     continue
                 height = along[y, x] ** 2 + x * x
                 while last >= 0:

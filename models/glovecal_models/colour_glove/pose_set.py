@@ -19,7 +19,7 @@ from glovecal_models.hand.rotations import FINGERS, completed
 from glovecal_models.takes.take import Take
 
 PAPER_COUNT = 18_000
-NOISE_DEG = 5.0
+POSE_NOISE_DEG = 5.0
 _SYNERGY_DEG = 6.0
 _BENDS = {
     "s": (0.0, 0.0, 0.0),  # straight
@@ -67,7 +67,7 @@ def generated_poses(count: int = PAPER_COUNT, *, seed: int = 1) -> np.ndarray:
     towards = np.where(rng.random(count) < 0.5, rng.random(count), 0.0)[:, None]
     mixed = mixed + towards * (shapes[way] - mixed)
     mixed += _SYNERGY_DEG * rng.normal(size=(count, len(_SYNERGIES))) @ _SYNERGIES
-    return np.clip(mixed + rng.normal(0.0, NOISE_DEG, mixed.shape), *RANGE_DEG.T)
+    return np.clip(mixed + rng.normal(0.0, POSE_NOISE_DEG, mixed.shape), *RANGE_DEG.T)
 
 
 def poses_of_takes(takes: Sequence[Take]) -> np.ndarray:

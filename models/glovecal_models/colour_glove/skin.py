@@ -23,7 +23,7 @@ from glovecal_models.hand.skeleton import Skeleton, hand_skeleton
 
 CELL_MM = 3.6
 """Of the grid that the surface is meshed on: about 5,000 vertices."""
-MOST_JOINTS = 4
+MOST_JOINTS_OF_A_VERTEX = 4
 """That move one vertex."""
 _BIND_DEG = {"T_TMC": 20.0, "TI_ABD": 45.0, "T_VIR": 30.0, "IM_ABD": 16.0, "MR_ABD": 16.0, "RP_ABD": 12.0}
 """Fingers apart, so that the grid does not join them; what is not here is 0."""
@@ -284,7 +284,7 @@ def _template() -> _Template:
     by_joint = np.zeros((len(vertices), 1 + max(bone.joint for bone in bones)))
     for column, bone in enumerate(bones):
         by_joint[:, bone.joint] += bone_weights[:, column]
-    joints = np.argsort(-by_joint, axis=1, kind="stable")[:, :MOST_JOINTS]
+    joints = np.argsort(-by_joint, axis=1, kind="stable")[:, :MOST_JOINTS_OF_A_VERTEX]
     weights = np.take_along_axis(by_joint, joints, axis=1)
     weights[weights < 1e-3] = 0.0
     weights /= weights.sum(axis=1, keepdims=True)
