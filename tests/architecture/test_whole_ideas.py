@@ -60,7 +60,9 @@ def test_no_module_of_the_mathematics_is_imported_by_nobody() -> None:
     # Simulated sessions are for tests and scripts; IK samples are for who has no guided sampling.
     entered = {"glovecal_models.simulation.session", "glovecal_models.inverse_kinematics.ik_samples"}
     # The colour glove's tracker and its codes of the paper are asked for by the service and the study.
-    entered |= {f"glovecal_models.colour_glove.{name}" for name in ("codes.boosted", "pose.prepared")}
+    asked = ("codes.boosted", "pose.prepared", "pictures.white_balance")
+    entered |= {f"glovecal_models.colour_glove.{name}" for name in asked}
+    entered.add("glovecal_models.simulation.colour_glove.examples")
     alone = [
         name
         for name, file in modules().items()

@@ -34,7 +34,7 @@ from glovecal_models.colour_glove.pose.window_view import (
 from glovecal_models.colour_glove.pose_estimate import STAGES, PoseEstimate
 from glovecal_models.errors import BadInput
 
-LONGEST_GAP_S = 0.5
+LONGEST_UNSEEN_S = 0.5
 """Without a picture of the glove: after more, nothing is expected of the next."""
 _CLEARLY_FEWER = 0.9
 """Of the followed answer's disagreeing points: then the picture alone knows better."""
@@ -122,7 +122,7 @@ class HandTracker:
             if (found := self.glimpse(labels, camera)) is not None
         ]
         before = self._before
-        if before is not None and not 0.0 < seconds - before.seconds <= LONGEST_GAP_S:
+        if before is not None and not 0.0 < seconds - before.seconds <= LONGEST_UNSEEN_S:
             before = self._before = None
         if not glimpses:
             return None
