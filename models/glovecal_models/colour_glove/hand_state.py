@@ -76,6 +76,14 @@ class HandState:
         turn = Rotation.from_rotvec(step[20:23], degrees=True) * Rotation.from_matrix(self.rotation)
         return HandState(self.angles_deg + step[:20], turn.as_matrix(), self.position_mm + step[23:])
 
+    def step_from(self, other: HandState) -> np.ndarray:
+        """(26,): the step that moves ``other`` here, the inverse of ``moved``."""
+        from scipy.spatial.transform import Rotation
+
+        turn = Rotation.from_matrix(self.rotation @ other.rotation.T).as_rotvec(degrees=True)
+        apart = self.position_mm - other.position_mm
+        return np.concatenate([self.angles_deg - other.angles_deg, turn, apart])
+
     def within_range(self) -> HandState:
         """The nearest state whose angles a healthy hand reaches (``hand_ranges``)."""
         return HandState(np.clip(self.angles_deg, *RANGE_DEG.T), self.rotation, self.position_mm)

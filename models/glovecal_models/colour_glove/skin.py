@@ -157,24 +157,40 @@ def joint_frames(parents, offsets, turns, weights, angles_deg):  # type: ignore[
 
 @numba.njit(cache=True)
 def skinned(vertices, joints, weights, turned, places, back, offsets, rotation, position):  # type: ignore[no-untyped-def]
-    count = len(places)
-    matrices, shifts = np.empty((count, 3, 3)), np.empty((count, 3))
-    for joint in range(count):
-        palm = rotation @ turned[joint]
-        matrices[joint] = palm @ back[joint]
-        shifts[joint] = palm @ offsets[joint] + rotation @ places[joint] + position
+    # Written out: a call of a library costs more than a product of 3 x 3.
+    carried = np.empty((len(places), 3, 4))
+    for joint in range(len(places)):
+        for a in range(3):
+            for b in range(3):
+                carried[joint, a, b] = 0.0
+            carried[joint, a, 3] = position[a]
+        for a in range(3):
+            for c in range(3):
+                palm = 0.0
+                for b in range(3):
+                    palm += rotation[a, b] * turned[joint, b, c]
+                for b in range(3):
+                    carried[joint, a, b] += palm * back[joint, c, b]
+                carried[joint, a, 3] += palm * offsets[joint, c] + rotation[a, c] * places[joint, c]
     found = np.empty_like(vertices)
     for vertex in range(len(vertices)):
-        x, y, z = vertices[vertex]
-        for a in range(3):
-            total = 0.0
-            for place in range(joints.shape[1]):
-                weight = weights[vertex, place]
-                if weight > 0.0:
-                    matrix = matrices[joints[vertex, place]]
-                    moved = matrix[a, 0] * x + matrix[a, 1] * y + matrix[a, 2] * z
-                    total += weight * (moved + shifts[joints[vertex, place], a])
-            found[vertex, a] = total
+        x, y, z = vertices[vertex, 0], vertices[vertex, 1], vertices[vertex, 2]
+        at_x, at_y, at_z = 0.0, 0.0, 0.0
+        for place in range(joints.shape[1]):
+            weight = weights[vertex, place]
+            if weight == 0.0:  # heaviest first
+                break
+            j = joints[vertex, place]
+            at_x += weight * (
+                carried[j, 0, 0] * x + carried[j, 0, 1] * y + carried[j, 0, 2] * z + carried[j, 0, 3]
+            )
+            at_y += weight * (
+                carried[j, 1, 0] * x + carried[j, 1, 1] * y + carried[j, 1, 2] * z + carried[j, 1, 3]
+            )
+            at_z += weight * (
+                carried[j, 2, 0] * x + carried[j, 2, 1] * y + carried[j, 2, 2] * z + carried[j, 2, 3]
+            )
+        found[vertex, 0], found[vertex, 1], found[vertex, 2] = at_x, at_y, at_z
     return found
 
 

@@ -1,0 +1,191 @@
+"""Refinement on the labels of all pixels: the fourth stage, which the paper calls too slow for 2009.
+
+Shares of colours in the cells of the window, seen against drawn, by Levenberg-Marquardt. A share changes only
+where a boundary between two labels moves, and a boundary moves as the nearer of its two surfaces does: the
+derivatives are a sum over the boundaries of one drawing, and no drawing is needed for each degree of freedom.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, HandState
+from glovecal_models.colour_glove.pose.gaussian_step import Belief, cost, damped_step
+from glovecal_models.colour_glove.pose.vertex_motion import pixel_motion
+from glovecal_models.colour_glove.pose.window_view import (
+    CELLS,
+    DRAWN_POINTS,
+    SEEN_POINTS,
+    PrintedHand,
+    WindowView,
+    colour_shares,
+)
+from glovecal_models.colour_glove.skin import posed
+
+ITERATIONS = 12
+SHARE_SD = 0.17
+"""Standard deviation of a cell's share of a colour. Neighbouring cells err together; this stands for that."""
+_BLURS = 1
+_LEAST_GAIN = 1e-3
+"""Of the cost: what gains less is done."""
+
+
+@dataclass(frozen=True, eq=False)
+class DenseFit:
+    state: HandState
+    cost: float
+
+
+def refine_by_labels(
+    hand: PrintedHand,
+    views: Sequence[WindowView],
+    start: HandState,
+    beliefs: tuple[Belief, ...],
+    iterations: int = ITERATIONS,
+) -> DenseFit:
+    """The state of least cost that at most ``iterations`` steps from ``start`` find."""
+    channels = int(hand.colour_of.max()) + 1
+    targets = [seen_shares(view, channels, _BLURS) for view in views]
+
+    def measured(state: HandState) -> tuple[float, list[_Drawn]]:
+        placed = posed(hand.skin, state)
+        drawn = [_Drawn(hand, view, placed, channels, _BLURS) for view in views]
+        apart = sum(float(np.square(t - d.shares).sum()) for t, d in zip(targets, drawn, strict=True))
+        return 0.5 * apart / SHARE_SD**2 + cost(state, beliefs), drawn
+
+    state = start
+    (best, here), damping = measured(state), 0.05
+    for _ in range(iterations):
+        hessian = np.zeros((DEGREES_OF_FREEDOM,) * 2)
+        gradient = np.zeros(DEGREES_OF_FREEDOM)
+        for target, drawn in zip(targets, here, strict=True):
+            jacobian = drawn.jacobian(state) / np.float32(SHARE_SD)
+            hessian += jacobian.T @ jacobian
+            gradient += jacobian.T @ ((target - drawn.shares).ravel() / np.float32(SHARE_SD))
+        before = best
+        for _ in range(4):
+            moved = damped_step(state, beliefs, hessian, gradient, damping)
+            cost_moved, drawn_moved = measured(moved)
+            if cost_moved < best:
+                state, here, best, damping = moved, drawn_moved, cost_moved, damping * 0.4
+                break
+            damping = max(damping, 0.02) * 6.0
+        if before - best < _LEAST_GAIN * max(best, 1.0):
+            break
+    return DenseFit(state, best)
+
+
+def label_equations(hand: PrintedHand, views: Sequence[WindowView], state: HandState) -> np.ndarray:
+    """(26, 26): J' J over the square of ``SHARE_SD`` at ``state``: the information of the pictures alone."""
+    placed, channels = posed(hand.skin, state), int(hand.colour_of.max()) + 1
+    found = np.zeros((DEGREES_OF_FREEDOM,) * 2)
+    for view in views:
+        jacobian = _Drawn(hand, view, placed, channels, _BLURS).jacobian(state) / np.float32(SHARE_SD)
+        found += jacobian.T @ jacobian
+    return found
+
+
+def seen_shares(view: WindowView, channels: int, blurs: int) -> np.ndarray:
+    return colour_shares(view.labels, np.arange(channels, dtype=np.uint8), channels, SEEN_POINTS, blurs)
+
+
+class _Drawn:
+    """A state drawn into one view."""
+
+    def __init__(
+        self, hand: PrintedHand, view: WindowView, placed_mm: np.ndarray, channels: int, blurs: int
+    ) -> None:
+        self.hand, self.view, self.placed_mm, self.channels, self.blurs = (
+            hand, view, placed_mm, channels, blurs,
+        )  # fmt: skip
+        self.shown = view.shown(hand, placed_mm)
+        self.shares = colour_shares(hand.patch_of[self.shown], hand.colour_of, channels, DRAWN_POINTS, blurs)
+
+    def jacobian(self, state: HandState) -> np.ndarray:
+        """(cells * cells * channels, 26) float32."""
+        depth = self.view.projected(self.placed_mm)[1]
+        colour = self.hand.colour_of[self.hand.patch_of[self.shown]]
+        vertices, which, cells, before, after, across = boundaries(
+            self.shown, colour, self.hand.skin.triangles, depth, DRAWN_POINTS
+        )
+        moving = pixel_motion(self.hand.skin, state, vertices, self.placed_mm[vertices], self.view.camera)
+        moving *= 1.0 / (DRAWN_POINTS * self.view.cell_px)  # one point's row of a boundary, in cells
+        return moved_shares(
+            moving, which, cells, before, after, across, CELLS, self.channels, self.blurs
+        ).reshape(-1, DEGREES_OF_FREEDOM)
+
+
+@numba.njit(cache=True)
+def boundaries(shown, colour, triangles, depth, points_a_cell):  # type: ignore[no-untyped-def]
+    """Kernel: every pair of neighbouring points of different colour, (B,) each: the vertex (of the K listed)
+    that it moves with, its cell, the colours before and after it, whether it moves across (u) or down."""
+    side = shown.shape[0]
+    most = 2 * side * side
+    row_of = np.full(len(depth), -1, dtype=np.int64)
+    listed = np.empty(min(most, len(depth)), dtype=np.int64)
+    which, cells = np.empty(most, dtype=np.int64), np.empty(most, dtype=np.int64)
+    before, after = np.empty(most, dtype=np.uint8), np.empty(most, dtype=np.uint8)
+    across = np.empty(most, dtype=np.bool_)
+    count, vertices, wide = 0, 0, side // points_a_cell
+    for v in range(side):
+        for u in range(side):
+            for is_across in (True, False):
+                other_u, other_v = (u + 1, v) if is_across else (u, v + 1)
+                if other_u >= side or other_v >= side or colour[v, u] == colour[other_v, other_u]:
+                    continue
+                here, there = shown[v, u], shown[other_v, other_u]
+                nearer = max(here, there)
+                if here >= 0 and there >= 0:
+                    nearer = here
+                    if depth[triangles[there, 0]] < depth[triangles[here, 0]]:
+                        nearer = there
+                vertex = triangles[nearer, 0]
+                if row_of[vertex] < 0:
+                    row_of[vertex], listed[vertices] = vertices, vertex
+                    vertices += 1
+                which[count] = row_of[vertex]
+                cells[count] = (v // points_a_cell) * wide + u // points_a_cell
+                before[count], after[count] = colour[v, u], colour[other_v, other_u]
+                across[count] = is_across
+                count += 1
+    return (
+        listed[:vertices].copy(), which[:count], cells[:count], before[:count], after[:count], across[:count],
+    )  # fmt: skip
+
+
+@numba.njit(cache=True)
+def moved_shares(moving, which, cells, before, after, across, wide, channels, blurs):  # type: ignore[no-untyped-def]
+    """Kernel: (cells, cells, channels, 26) float32, blurred as the shares are."""
+    degrees = moving.shape[2]
+    found = np.zeros((wide * wide, channels, degrees), dtype=np.float32)
+    for index in range(len(which)):
+        axis = 0 if across[index] else 1
+        for column in range(degrees):
+            moved = np.float32(moving[which[index], axis, column])
+            found[cells[index], before[index], column] += moved
+            found[cells[index], after[index], column] -= moved
+    field = found.reshape((wide, wide, channels * degrees))
+    other = np.empty_like(field)
+    half, quarter = np.float32(0.5), np.float32(0.25)
+    for _ in range(blurs):
+        for row in range(wide):
+            for column in range(wide):
+                left, right = max(column - 1, 0), min(column + 1, wide - 1)
+                for value in range(channels * degrees):
+                    other[row, column, value] = (
+                        quarter * (field[row, left, value] + field[row, right, value])
+                        + half * field[row, column, value]
+                    )
+        for row in range(wide):
+            above, below = max(row - 1, 0), min(row + 1, wide - 1)
+            for column in range(wide):
+                for value in range(channels * degrees):
+                    field[row, column, value] = (
+                        quarter * (other[above, column, value] + other[below, column, value])
+                        + half * other[row, column, value]
+                    )
+    return field

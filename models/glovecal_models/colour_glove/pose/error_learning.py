@@ -1,0 +1,260 @@
+"""Learn the tracker's errors on rendered hands that are not the model's: other bones, radii and sizes.
+
+The paper learns R, Q and P on a recorded sequence about local averages of its own answers (section 5.3);
+rendered hands have a truth, and errors that last are errors too. Labels are spoilt as a classifier spoils
+them. Kept beside the database: the same hand, database and cameras are learned once.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections import defaultdict
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
+from multiprocessing import get_context
+
+import numpy as np
+
+from glovecal_models.colour_glove.camera_model import Camera
+from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, HandState
+from glovecal_models.colour_glove.lookup import PoseLookup
+from glovecal_models.colour_glove.pose.hand_motion import hand_motion
+from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
+from glovecal_models.colour_glove.pose.learned_errors import LearnedErrors, fitted_scale, scale_name
+from glovecal_models.colour_glove.pose.window_view import PrintedHand
+from glovecal_models.colour_glove.pose_estimate import STAGES
+from glovecal_models.colour_glove.rasterise import rasterise
+from glovecal_models.colour_glove.skin import RADII_MM, HandSkin, hand_skin, posed
+from glovecal_models.errors import BadInput
+from glovecal_models.hand.dimensions import HandDimensions
+from glovecal_models.hand.skeleton import hand_skeleton
+from glovecal_models.progress import Cancel, Report, part, stop_if
+from glovecal_models.threads import begin_worker
+
+BONES, RADII, OVERALL = 0.045, 0.05, 0.02
+"""Relative standard deviations of another hand's bones, radii and size about the measured ones."""
+CLIPS = 24
+"""Each with a hand of its own."""
+_APART, _CLOSE = (20, 1.5), (24, 30.0)
+"""States of a clip and how many a second: nearly independent, and a sequence."""
+_WRONG, _CLUTTER = 0.04, 3
+"""Share of wrong glove pixels, and little blobs of glove colour beside the hand."""
+_FORMAT = 1
+_LEAST_PIXELS = 400
+
+
+def other_hand(
+    skin: HandSkin, seed: int, bones: float = BONES, radii: float = RADII, overall: float = OVERALL
+) -> HandSkin:
+    """A hand like ``skin``'s but for its bones, radii and size: what a model of this hand may be wrong by."""
+    rng = np.random.default_rng([seed, 3])
+    sizes, grown = skin.skeleton.dimensions.sizes_mm, 1.0 + overall * rng.standard_normal()
+    whole = ("hand_length", "hand_breadth")
+    changed = {
+        name: float(size * grown * (1.0 if name in whole else 1.0 + bones * rng.standard_normal()))
+        for name, size in sizes.items()
+    }
+    skeleton = hand_skeleton(HandDimensions.from_measured(changed), skin.skeleton.hand)
+    share = skeleton.dimensions.hand_length_mm / hand_skin().skeleton.dimensions.hand_length_mm
+    thicker = {name: 1.0 + radii * rng.standard_normal() for name in RADII_MM}
+    return hand_skin(
+        skeleton,
+        {
+            name: (low * share * thicker[name], high * share * thicker[name])
+            for name, (low, high) in RADII_MM.items()
+        },
+    )
+
+
+def spoilt(labels: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Labels with some pixels wrong and some clutter, as from a classifier."""
+    found, glove = labels.copy(), labels > 0
+    wrong = glove & (rng.random(labels.shape) < _WRONG)
+    count = int(wrong.sum())
+    found[wrong] = np.where(rng.random(count) < 0.7, 0, rng.integers(1, 11, count))
+    for _ in range(_CLUTTER):
+        v, u, size = rng.integers(0, labels.shape[0]), rng.integers(0, labels.shape[1]), rng.integers(1, 6)
+        blob = found[v : v + size, u : u + size]
+        blob[blob == 0] = rng.integers(1, 11)
+    return found
+
+
+def learned_errors(
+    hand: PrintedHand,
+    lookup: PoseLookup,
+    cameras: Sequence[Camera],
+    *,
+    clips: int = CLIPS,
+    workers: int | None = None,
+    report: Report | None = None,
+    cancelled: Cancel | None = None,
+) -> LearnedErrors:
+    """Those of this hand, database and cameras: loaded from beside the database, or learned and kept there.
+
+    Raises BadInput, Cancelled.
+    """
+    name = _digest(hand, lookup, cameras, clips)
+    file = lookup.database.folder / f"errors-{name}.npz"
+    if file.exists():
+        try:
+            return LearnedErrors.load(file)
+        except BadInput:
+            file.unlink()
+    said = part(report, 0.0, 0.25)
+    steps = _over_clips(partial(_blend_errors, hand, lookup, cameras), clips, workers, said, cancelled)
+    blends = np.concatenate(steps)
+    covariance = blends.T @ blends / len(blends) + np.eye(DEGREES_OF_FREEDOM)
+    speed = _speed(hand.skin, clips)
+    first = LearnedErrors(covariance, speed, _no_scales())
+    said = part(report, 0.25, 0.6)
+    alone = _over_clips(partial(_errors_alone, hand, lookup, cameras, first), clips, workers, said, cancelled)
+    scales = {}
+    for stage in STAGES:
+        scales[stage] = fitted_scale(*_joined(alone, stage))
+    first = replace(
+        first,
+        scales=_no_scales() | scales | {scale_name(stage, True): scales[stage] for stage in ("ik", "dense")},
+    )
+    said = part(report, 0.6, 1.0)
+    # A followed answer differs from one alone only while a hand is followed: half the clips tell enough.
+    followed = _over_clips(
+        partial(_errors_followed, hand, lookup, cameras, first), -(-clips // 2), workers, said, cancelled
+    )
+    for stage in ("ik", "dense"):
+        scales[scale_name(stage, True)] = fitted_scale(*_joined(followed, stage))
+    found = LearnedErrors(covariance, speed, scales)
+    unfinished = file.with_suffix(f".{os.getpid()}")
+    found.save(unfinished)
+    unfinished.replace(file)
+    return found
+
+
+def _digest(hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], clips: int) -> str:
+    found = hashlib.sha256(repr((_FORMAT, clips, lookup.database.folder.name, tuple(cameras))).encode())
+    for array in (hand.skin.vertices_mm, hand.pattern.colour_of_patch):
+        found.update(np.ascontiguousarray(array).tobytes())
+    return found.hexdigest()[:20]
+
+
+def _no_scales() -> dict[str, np.ndarray]:
+    plain = np.tile([0.0, 1.0, 0.0], (DEGREES_OF_FREEDOM, 1))
+    return {scale_name(stage, followed): plain for stage in STAGES for followed in (False, True)}
+
+
+def _over_clips(
+    job, clips: int, workers: int | None, report: Report | None, cancelled: Cancel | None
+) -> list:  # type: ignore[no-untyped-def, type-arg]
+    workers = min(workers or os.cpu_count() or 1, clips)
+    found: dict[int, object] = {}
+    if workers == 1:
+        for clip in range(clips):
+            stop_if(cancelled, "learning the tracker's errors")
+            found[clip] = job(clip)
+            if report:
+                report("learning errors", (clip + 1) / clips)
+    else:
+        with ProcessPoolExecutor(workers, get_context("spawn"), begin_worker) as pool:
+            waiting = {pool.submit(job, clip): clip for clip in range(clips)}
+            try:
+                for done, future in enumerate(as_completed(waiting), 1):
+                    found[waiting[future]] = future.result()
+                    stop_if(cancelled, "learning the tracker's errors")
+                    if report:
+                        report("learning errors", done / clips)
+            except BaseException:
+                pool.shutdown(cancel_futures=True)
+                raise
+    return [found[clip] for clip in range(clips)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Clip:
+    states: list[HandState]
+    pictures: list[list[np.ndarray]]
+    seconds: np.ndarray
+
+
+def _clip(hand: PrintedHand, cameras: Sequence[Camera], seed: int, frames: int, rate_hz: float) -> _Clip:
+    other, rng = other_hand(hand.skin, seed), np.random.default_rng([seed, 4])
+    seconds = np.arange(frames) / rate_hz
+    states = hand_motion(other, frames / rate_hz, rate_hz, seed=seed)[:frames]
+    pictures = []
+    for state in states:
+        placed = posed(other, state)
+        drawn = [
+            rasterise(placed, other.triangles, camera).painted(hand.pattern.colour) for camera in cameras
+        ]
+        pictures.append([spoilt(labels, rng) for labels in drawn])
+    seen = [sum(np.count_nonzero(labels) for labels in views) >= _LEAST_PIXELS for views in pictures]
+    kept = [index for index, is_seen in enumerate(seen) if is_seen]
+    return _Clip([states[i] for i in kept], [pictures[i] for i in kept], seconds[kept])
+
+
+def _blend_errors(hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], clip: int) -> np.ndarray:
+    plain = LearnedErrors(np.eye(DEGREES_OF_FREEDOM), np.ones(DEGREES_OF_FREEDOM), _no_scales())
+    tracker = HandTracker(hand, lookup, cameras[:1], plain, stage="blend")
+    made = _clip(hand, cameras[:1], 1000 + clip, 2 * _APART[0], _APART[1])
+    steps = []
+    for state, views in zip(made.states, made.pictures, strict=True):
+        glimpse = tracker.glimpse(views[0], cameras[0])
+        if glimpse is not None:
+            steps.append(state.step_from(glimpse.blend.state))
+    return np.array(steps).reshape(-1, DEGREES_OF_FREEDOM)
+
+
+_Errors = dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]
+
+
+def _errors_alone(
+    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], errors: LearnedErrors, clip: int
+) -> _Errors:
+    return _errors(hand, lookup, cameras, errors, clip, STAGES, False, _APART)
+
+
+def _errors_followed(
+    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], errors: LearnedErrors, clip: int
+) -> _Errors:
+    return _errors(hand, lookup, cameras, errors, clip, ("ik", "dense"), True, _CLOSE)
+
+
+def _errors(
+    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], errors: LearnedErrors, clip: int,
+    stages: Sequence[str], follows: bool, frames: tuple[int, float],
+) -> _Errors:  # fmt: skip
+    """Per stage: errors (N, 26), posterior deviations (N, 26), disagreeing shares (N,)."""
+    made, found = _clip(hand, cameras, 2000 + clip, *frames), {}
+    for stage in stages:
+        tracker = HandTracker(hand, lookup, cameras, errors, stage=stage, follows=follows)
+        rows = defaultdict(list)
+        for state, views, seconds in zip(made.states, made.pictures, made.seconds, strict=True):
+            answer = tracker.answered(views, float(seconds))
+            if answer is None or answer.followed != follows:
+                continue
+            rows["error"].append(state.step_from(answer.state))
+            rows["posterior"].append(answer.posterior_sd)
+            rows["disagreeing"].append(answer.disagreeing)
+        found[stage] = (
+            np.array(rows["error"]).reshape(-1, DEGREES_OF_FREEDOM),
+            np.array(rows["posterior"]).reshape(-1, DEGREES_OF_FREEDOM),
+            np.array(rows["disagreeing"]),
+        )
+    return found
+
+
+def _joined(found: Sequence[_Errors], stage: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    errors, posterior, disagreeing = (
+        np.concatenate([clip[stage][part] for clip in found]) for part in range(3)
+    )
+    return errors, posterior, disagreeing
+
+
+def _speed(skin: HandSkin, clips: int) -> np.ndarray:
+    steps = []
+    for clip in range(clips):
+        states = hand_motion(skin, _CLOSE[0] / _CLOSE[1], _CLOSE[1], seed=3000 + clip)
+        steps += [later.step_from(before) for before, later in pairwise(states)]
+    return np.sqrt(np.square(steps).mean(axis=0)) * _CLOSE[1]

@@ -1,0 +1,228 @@
+"""Label images in, the hand's pose out: look-up, inverse kinematics, refinement, and the pose before.
+
+Each stage can be the last one, so that a user sees what it buys. From picture to picture the hand is expected
+where it was, the less so the more time has passed (Wang & Popovic 2009, section 5.4). That term is dangerous:
+a hand once lost stays lost, and its jitter looks excellent. So every picture is also solved alone, and that
+answer is taken where it explains clearly more of the picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from glovecal_models.colour_glove.camera_model import Camera
+from glovecal_models.colour_glove.crop import glove_window, tiny_image
+from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, HandState
+from glovecal_models.colour_glove.lookup import PoseLookup
+from glovecal_models.colour_glove.pose.centroid_ik import (
+    FULL_NOISE_CELLS,
+    centroid_equations,
+    refine_by_centroids,
+)
+from glovecal_models.colour_glove.pose.dense import ITERATIONS, label_equations, refine_by_labels
+from glovecal_models.colour_glove.pose.gaussian_step import Belief, damped_step
+from glovecal_models.colour_glove.pose.learned_errors import LearnedErrors
+from glovecal_models.colour_glove.pose.window_view import (
+    DRAWN_POINTS,
+    SEEN_POINTS,
+    PrintedHand,
+    WindowView,
+)
+from glovecal_models.colour_glove.pose_estimate import STAGES, PoseEstimate
+from glovecal_models.errors import BadInput
+
+LONGEST_GAP_S = 0.5
+"""Without a picture of the glove: after more, nothing is expected of the next."""
+_CLEARLY_FEWER = 0.9
+"""Of the followed answer's disagreeing points: then the picture alone knows better."""
+ACCEPTED_SD_DEG = 4.5
+"""A joint that is known as well as this may serve as a reference."""
+
+
+@dataclass(frozen=True, eq=False)
+class Glimpse:
+    """What one camera gives before anything is refined."""
+
+    view: WindowView
+    nearest: HandState
+    blend: Belief
+    """In the frame of the first camera."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """The state of least cost, and what errors are told from."""
+
+    state: HandState
+    posterior_sd: np.ndarray
+    """(26,)."""
+    disagreeing: float
+    followed: bool
+    """Whether the pose before has a part in it."""
+    patches: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Before:
+    state: HandState
+    variance: np.ndarray
+    seconds: float
+
+
+class HandTracker:
+    """One hand before one or more cameras. Raises BadInput for another stage and for no camera."""
+
+    def __init__(
+        self,
+        hand: PrintedHand,
+        lookup: PoseLookup,
+        cameras: Sequence[Camera],
+        errors: LearnedErrors,
+        *,
+        stage: str = "dense",
+        follows: bool = True,
+        iterations: int = ITERATIONS,
+    ) -> None:
+        if stage not in STAGES:
+            raise BadInput(f"stage {stage!r} is none of {', '.join(STAGES)}")
+        if not cameras:
+            raise BadInput("a hand is tracked by at least one camera; none was given")
+        self.hand, self.lookup, self.cameras, self.errors = hand, lookup, tuple(cameras), errors
+        self.stage, self.follows, self.iterations = stage, follows, iterations
+        self._before: _Before | None = None
+
+    def forget(self) -> None:
+        """The next picture stands alone."""
+        self._before = None
+
+    def track(self, label_images: Sequence[np.ndarray], seconds: float) -> PoseEstimate | None:
+        """The pose at ``seconds``, from one label image (H, W) uint8 of each camera; None: no glove in any.
+
+        Raises BadInput for another number of images, and images that are none.
+        """
+        answer = self.answered(label_images, seconds)
+        if answer is None:
+            return None
+        deviation = self.errors.deviation(
+            self.stage, answer.followed, answer.posterior_sd, answer.disagreeing
+        )
+        accepted = deviation[:20] <= ACCEPTED_SD_DEG
+        return PoseEstimate(answer.state, deviation, accepted, answer.patches, answer.disagreeing, self.stage)
+
+    def answered(self, label_images: Sequence[np.ndarray], seconds: float) -> Answer | None:
+        """As ``track``, before what the posterior says is compared with real errors."""
+        if len(label_images) != len(self.cameras):
+            raise BadInput(f"{len(label_images)} pictures of {len(self.cameras)} cameras")
+        glimpses = [
+            found
+            for labels, camera in zip(label_images, self.cameras, strict=True)
+            if (found := self.glimpse(labels, camera)) is not None
+        ]
+        before = self._before
+        if before is not None and not 0.0 < seconds - before.seconds <= LONGEST_GAP_S:
+            before = self._before = None
+        if not glimpses:
+            return None
+        views = [glimpse.view for glimpse in glimpses]
+        if self.stage in ("nearest", "blend") or before is None or not self.follows:
+            state = self._alone(glimpses, self.stage)
+            disagreeing, followed = self._disagreeing(views, state), False
+        else:
+            state, disagreeing, followed = self._followed(glimpses, before, seconds)
+        beliefs = tuple(glimpse.blend for glimpse in glimpses)
+        posterior = self._posterior_sd(views, beliefs, state)
+        deviation = self.errors.deviation(self.stage, followed, posterior, disagreeing)
+        self._before = _Before(state, deviation**2, seconds)
+        return Answer(state, posterior, disagreeing, followed, self._patches(views, state))
+
+    def glimpse(self, labels: np.ndarray, camera: Camera) -> Glimpse | None:
+        window = glove_window(labels)
+        tiny = None if window is None else tiny_image(labels, window)
+        if window is None or tiny is None or not tiny.any():
+            return None
+        neighbours = self.lookup.neighbours(tiny)
+        blend = self.lookup.placed(neighbours, window, camera)
+        first = neighbours.entries[0]
+        # The nearest entry alone keeps the blend's place: the paper's look-up gives none.
+        nearest = HandState(
+            self.lookup.database.angles_deg[first].astype(float), blend.rotation, blend.position_mm
+        )
+        turn = np.array(camera.rotation)
+        covariance = self.errors.blend_covariance
+        if not np.array_equal(turn, np.eye(3)):
+            carried = np.eye(DEGREES_OF_FREEDOM)
+            carried[20:23, 20:23] = carried[23:, 23:] = turn.T
+            covariance = carried @ covariance @ carried.T
+        belief = Belief(_in_first(blend, camera), covariance)
+        return Glimpse(WindowView.of(labels, window, camera), _in_first(nearest, camera), belief)
+
+    def _alone(self, glimpses: Sequence[Glimpse], stage: str) -> HandState:
+        if stage == "nearest":
+            return glimpses[0].nearest
+        beliefs = tuple(glimpse.blend for glimpse in glimpses)
+        start = beliefs[0].state
+        if len(beliefs) > 1:
+            nothing = np.zeros((DEGREES_OF_FREEDOM,) * 2)
+            start = damped_step(start, beliefs, nothing, nothing[0], 0.0)
+        if stage == "blend":
+            return start
+        views = [glimpse.view for glimpse in glimpses]
+        state = refine_by_centroids(self.hand, views, start, beliefs)
+        if stage == "ik":
+            return state
+        return refine_by_labels(self.hand, views, state, beliefs, self.iterations).state
+
+    def _followed(
+        self, glimpses: Sequence[Glimpse], before: _Before, seconds: float
+    ) -> tuple[HandState, float, bool]:
+        """State, disagreeing share, and whether the pose before has a part in it."""
+        views = [glimpse.view for glimpse in glimpses]
+        variance = before.variance + (self.errors.speed * (seconds - before.seconds)) ** 2
+        beliefs = (*(glimpse.blend for glimpse in glimpses), Belief(before.state, np.diag(variance)))
+        followed = refine_by_centroids(self.hand, views, before.state, beliefs, FULL_NOISE_CELLS[2:])
+        if self.stage == "dense":
+            followed = refine_by_labels(self.hand, views, followed, beliefs, self.iterations).state
+        alone = self._alone(glimpses, "ik")
+        left, left_alone = self._disagreeing(views, followed), self._disagreeing(views, alone)
+        if self.stage == "dense" and left_alone < 1.5 * left:
+            alone = refine_by_labels(self.hand, views, alone, beliefs[:-1], self.iterations).state
+            left_alone = self._disagreeing(views, alone)
+        if left_alone < _CLEARLY_FEWER * left:
+            return alone, left_alone, False
+        return followed, left, True
+
+    def _posterior_sd(
+        self, views: Sequence[WindowView], beliefs: tuple[Belief, ...], state: HandState
+    ) -> np.ndarray:
+        """(26,): what the pictures and the look-up leave open, before it is compared with real errors."""
+        information = np.sum([belief.information for belief in beliefs], axis=0)
+        if self.stage == "ik":
+            information = information + centroid_equations(self.hand, views, state, FULL_NOISE_CELLS[-1])[0]
+        elif self.stage == "dense":
+            information = information + label_equations(self.hand, views, state)
+        return np.sqrt(np.diag(np.linalg.inv(information)))
+
+    def _disagreeing(self, views: Sequence[WindowView], state: HandState) -> float:
+        different = either = 0
+        finer = SEEN_POINTS // DRAWN_POINTS
+        for view in views:
+            drawn = self.hand.colour_of[view.drawn(self.hand, state)]
+            seen = view.labels[finer // 2 :: finer, finer // 2 :: finer]
+            either += int(np.count_nonzero(drawn | seen))
+            different += int(np.count_nonzero(drawn != seen))
+        return different / max(either, 1)
+
+    def _patches(self, views: Sequence[WindowView], state: HandState) -> tuple[int, ...]:
+        found: set[int] = set()
+        for view in views:
+            found |= set(np.unique(view.drawn(self.hand, state)).tolist())
+        return tuple(sorted(found - {0}))
+
+
+def _in_first(state: HandState, camera: Camera) -> HandState:
+    """A state in a camera's own frame, in the frame of the first."""
+    turn, shift = np.array(camera.rotation), np.array(camera.translation_mm)
+    return HandState(state.angles_deg, turn.T @ state.rotation, turn.T @ (state.position_mm - shift))

@@ -1,0 +1,135 @@
+"""What both refinements rest on: motions of points and of boundaries, against finite differences."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from glovecal_models.colour_glove.camera_model import Camera
+from glovecal_models.colour_glove.crop import Window
+from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, RANGE_DEG, HandState
+from glovecal_models.colour_glove.pattern import glove_pattern
+from glovecal_models.colour_glove.pose.dense import label_equations, refine_by_labels, seen_shares
+from glovecal_models.colour_glove.pose.gaussian_step import Belief, damped_step
+from glovecal_models.colour_glove.pose.vertex_motion import pixel_motion
+from glovecal_models.colour_glove.pose.window_view import PrintedHand, WindowView, colour_shares
+from glovecal_models.colour_glove.rasterise import rasterise
+from glovecal_models.colour_glove.skin import hand_skin, posed
+from glovecal_models.hand.skeleton import hand_skeleton
+
+SKIN = hand_skin()
+HAND = PrintedHand(SKIN, glove_pattern(SKIN))
+PLAIN = Camera()
+BESIDE = Camera(
+    distortion=(-0.12, 0.05, 0.001, -0.002, 0.01),
+    rotation=tuple(map(tuple, Rotation.from_rotvec([0.1, 0.4, 0.05]).as_matrix())),
+    translation_mm=(-160.0, 20.0, 30.0),
+)
+FACING = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+"""Fingers up in the picture, the back of the hand away from the camera."""
+
+
+def state(seed: int) -> HandState:
+    rng = np.random.default_rng(seed)
+    turn = Rotation.from_rotvec(rng.normal(0.0, 0.4, 3)).as_matrix() @ FACING
+    return HandState(rng.uniform(*(0.6 * RANGE_DEG).T), turn, np.array([0.0, 80.0, 450.0]))
+
+
+def view(truth: HandState, camera: Camera = PLAIN) -> WindowView:
+    labels = rasterise(posed(SKIN, truth), SKIN.triangles, camera).painted(HAND.pattern.colour)
+    v, u = np.nonzero(labels)
+    half = 0.6 * max(np.ptp(u), np.ptp(v))
+    return WindowView.of(labels, Window(float(u.mean()), float(v.mean()), float(half)), camera)
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_points_move_as_finite_differences_say(side):
+    skin = hand_skin(hand_skeleton(hand=side))
+    here, vertices = state(3), np.arange(0, len(skin.vertices_mm), 211)
+    found = pixel_motion(skin, here, vertices, posed(skin, here)[vertices], BESIDE)
+    for degree in range(DEGREES_OF_FREEDOM):
+        step = 1e-4 * np.eye(DEGREES_OF_FREEDOM)[degree]
+        ahead, behind = (BESIDE.project(posed(skin, here.moved(sign * step))[vertices]) for sign in (1, -1))
+        assert np.allclose(found[:, :, degree], (ahead - behind) / 2e-4, atol=1e-5)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10_000))
+def test_a_step_leads_from_one_state_to_the_other(seed):
+    first, second = state(seed), state(seed + 1)
+    reached = first.moved(second.step_from(first))
+    assert np.allclose(reached.vector(), second.vector(), atol=1e-9)
+
+
+def test_the_kernel_projects_as_the_camera():
+    points = np.random.default_rng(1).uniform((-200, -200, 200), (200, 200, 900), (50, 3))
+    seen = replace(view(state(1)), camera=BESIDE)
+    pixels, depth = seen.projected(points)
+    assert np.allclose(pixels, BESIDE.project(points))
+    assert np.allclose(depth, BESIDE.from_outside(points)[:, 2])
+
+
+def test_shares_of_a_cell_add_up_to_one():
+    seen = view(state(2))
+    for blurs in (0, 1, 2):
+        assert np.allclose(seen_shares(seen, 11, blurs).sum(axis=2), 1.0, atol=1e-5)
+    drawn = colour_shares(seen.drawn(HAND, state(2)), HAND.colour_of, 11, 3, 1)
+    assert np.abs(drawn - seen_shares(seen, 11, 1)).mean() < 0.004  # one hand, once by pixels, once by points
+
+
+def test_boundaries_move_as_drawings_do():
+    """The analytic derivative of all shares against drawings a visible step apart."""
+    from glovecal_models.colour_glove.pose.dense import _Drawn
+
+    for seed in (4, 5):
+        here = state(seed)
+        seen = view(here)
+
+        def drawn(moved: HandState, seen: WindowView = seen) -> _Drawn:
+            return _Drawn(HAND, seen, posed(SKIN, moved), 11, 1)
+
+        jacobian = drawn(here).jacobian(here)
+        compared = 0
+        for degree in range(DEGREES_OF_FREEDOM):
+            size = 12.0 if degree == 25 else 4.0
+            step = size * np.eye(DEGREES_OF_FREEDOM)[degree]
+            ahead, behind = (drawn(here.moved(sign * step)).shares.ravel() for sign in (1, -1))
+            expected, found = (ahead - behind) / (2 * size), jacobian[:, degree]
+            if np.linalg.norm(expected) < 0.1:  # nearly hidden: single points come and go
+                continue
+            compared += 1
+            alike = expected @ found / np.linalg.norm(expected) / np.linalg.norm(found)
+            assert alike > 0.85, f"degree {degree}"
+            assert 0.7 < expected @ found / (expected @ expected) < 1.3, f"degree {degree}"
+        assert compared > 10
+
+
+def test_a_step_stays_within_a_hands_range_and_follows_the_tighter_belief():
+    here = state(6)
+    far = HandState(here.angles_deg + 500.0, here.rotation, here.position_mm)
+    loose, tight = (Belief(s, v * np.eye(DEGREES_OF_FREEDOM)) for s, v in ((far, 400.0), (here, 4.0)))
+    nothing = np.zeros((DEGREES_OF_FREEDOM, DEGREES_OF_FREEDOM))
+    moved = damped_step(here, (loose, tight), nothing, nothing[0], 0.0)
+    assert (moved.angles_deg >= RANGE_DEG[:, 0]).all()
+    assert (moved.angles_deg <= RANGE_DEG[:, 1]).all()
+    middle = damped_step(here, (Belief(state(7), 1e-6 * np.eye(26)), tight), nothing, nothing[0], 0.0)
+    near = state(7).step_from(here)
+    assert np.abs(middle.step_from(here)[:20] - np.clip(near[:20], -28, 28)).max() < 0.5
+
+
+def test_labels_lead_back_to_the_truth():
+    truth = state(8)
+    off = truth.moved(np.random.default_rng(8).normal(0.0, 1.0, 26) * ([5.0] * 20 + [3.0] * 3 + [6.0] * 3))
+    start = off.within_range()
+    loose = Belief(start, np.diag([20.0] * 20 + [10.0] * 3 + [30.0] * 3) ** 2)
+    views = [view(truth), view(truth, BESIDE)]
+    found = refine_by_labels(HAND, views, start, (loose,))
+    before, after = (np.abs(s.step_from(truth)) for s in (start, found.state))
+    assert after[20:23].max() < 1.0
+    assert after[23:].max() < 2.0
+    assert after[:20].mean() < 0.5 * before[:20].mean()
+    information = label_equations(HAND, views, truth)
+    assert np.allclose(information, information.T, rtol=1e-3, atol=1e-2)
