@@ -1,4 +1,4 @@
-"""Label images come back bit by bit; a file that was cut or damaged anywhere gives what lies before, bounded."""
+"""Label images come back bit by bit; of a file that was cut or damaged anywhere what lies before is read."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ class LabelWriter:
         """Raises DeviceError for another size, OSError on a full disk: nothing of the record stays then."""
         if labels.shape != self.size or labels.dtype != np.uint8:
             raise DeviceError(f"labels {labels.shape} {labels.dtype} do not fit a file of {self.size} uint8")
-        packed = zlib.compress(np.ascontiguousarray(labels), COMPRESSION)
+        packed = zlib.compress(labels.tobytes(), COMPRESSION)
         payload = _STAMPS.pack(monotonic_ns, wall_ns) + packed
         self._append(_PAIR.pack(len(payload), zlib.crc32(payload)) + payload)
         self.pictures += 1

@@ -16,6 +16,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from glovecal_service.cli import demo, serve
+from glovecal_service.cli.camera import cameras
 from glovecal_service.cli.effect import catalogue, changes, detectability, diagnosis, improvement
 from glovecal_service.cli.glove import (
     capture,
@@ -49,6 +50,7 @@ app = typer.Typer(
 app.command("demo")(demo.demo)
 app.command("serve")(serve.serve)
 app.command("capture", cls=capture.WithDeviceOptions)(capture.capture)
+app.add_typer(cameras.app, name="camera")
 app.command("find-port")(find_port.find_port)
 app.command("emulate", cls=emulate.WithFaults)(emulate.emulate)
 app.command("card")(card_session.card)

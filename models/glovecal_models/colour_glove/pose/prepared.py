@@ -10,7 +10,7 @@ from glovecal_models.colour_glove.codes.pca import pca_code
 from glovecal_models.colour_glove.database import ENTRIES, DatabaseSettings, pose_database
 from glovecal_models.colour_glove.lookup import PoseLookup
 from glovecal_models.colour_glove.pattern import Pattern, glove_pattern
-from glovecal_models.colour_glove.pose.error_learning import learned_errors
+from glovecal_models.colour_glove.pose.error_learning import CLIPS, learned_errors
 from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.pose_set import PAPER_COUNT, generated_poses
@@ -25,6 +25,7 @@ def prepared_tracker(
     skin: HandSkin | None = None,
     pattern: Pattern | None = None,
     entries: int = ENTRIES,
+    clips: int = CLIPS,
     stage: str = "dense",
     follows: bool = True,
     workers: int | None = None,
@@ -45,6 +46,12 @@ def prepared_tracker(
     )  # fmt: skip
     hand, lookup = PrintedHand(skin, pattern), PoseLookup(database, pca_code(database.transforms))
     errors = learned_errors(
-        hand, lookup, cameras, workers=workers, report=part(report, 0.3, 1.0), cancelled=cancelled
+        hand,
+        lookup,
+        cameras,
+        clips=clips,
+        workers=workers,
+        report=part(report, 0.3, 1.0),
+        cancelled=cancelled,
     )
     return HandTracker(hand, lookup, cameras, errors, stage=stage, follows=follows)
