@@ -19,6 +19,8 @@ LATE = 1.6
 """Of the usual interval: a picture so much after the one before says that others are missing between."""
 EARLY = 0.5
 """A picture that follows so soon after a late one tells that it was only late."""
+USUAL = 0.75
+"""Of the nominal interval: pictures closer together are a burst."""
 LEAST_INTERVALS = 10
 
 
@@ -31,7 +33,7 @@ class MissingPictures:
     def __init__(self) -> None:
         self.dropped = 0
         self.rate_hz = 30.0
-        """Nominal: pictures that come in a burst are not the usual ones."""
+        """Nominal."""
         self._intervals: deque[int] = deque(maxlen=61)
         self._last_ns: int | None = None
         self._perhaps = 0
@@ -40,7 +42,7 @@ class MissingPictures:
         if self._last_ns is not None:
             interval = monotonic_ns - self._last_ns
             if len(self._intervals) >= LEAST_INTERVALS:
-                usual = max(statistics.median(self._intervals), EARLY * 1e9 / self.rate_hz)
+                usual = max(statistics.median(self._intervals), USUAL * 1e9 / self.rate_hz)
                 if interval >= EARLY * usual:
                     self.dropped += self._perhaps
                 self._perhaps = round(interval / usual) - 1 if interval > LATE * usual else 0

@@ -38,7 +38,7 @@ def track(
     source: Annotated[
         str,
         typer.Argument(
-            help="camera:NUMBER (0 is the first), video:FILE.mkv, labels:FILE.labels, or rendered: simulated.",
+            help="camera:NUMBER (0 is the first), video:FILE.mkv, labels:FILE.labels, rendered (simulated).",
             show_default=False,
         ),
     ],
