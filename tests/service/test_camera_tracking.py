@@ -302,6 +302,24 @@ def test_pictures_that_a_camera_dropped_are_told_from_late_ones(stamps_ms: list[
     assert missing.dropped == dropped
 
 
+def test_a_process_ends_with_its_standard_input_or_its_problem(settings: CameraSettings) -> None:
+    with camera_process(replace(settings, source="camera:63")) as process:
+        _, said = process.communicate(timeout=60)
+        assert process.returncode == 1
+    assert (
+        said.decode()
+        .strip()
+        .endswith("camera:63 cannot be opened: is it plugged in, and free of other programs?")
+    )
+    with camera_process(replace(settings, source="rendered", glove="ended")) as process:
+        assert process.stderr is not None
+        while b"rendered is open" not in process.stderr.readline():
+            pass
+        _, said = process.communicate(timeout=60)
+        assert process.returncode == 0
+    assert b"; stopped" in said
+
+
 def test_the_command_says_how_it_ended(settings: CameraSettings, tmp_path: Path) -> None:
     import sys
 

@@ -37,6 +37,7 @@ class CameraHealth:
         self._spent_ms: deque[float] = deque(maxlen=LAST_POSES)
         self._poses_at: deque[float] = deque(maxlen=LAST_POSES)
         self._accepted: deque[np.ndarray] = deque(maxlen=LAST_POSES)
+        self._disagreeing: deque[float] = deque(maxlen=LAST_POSES)
         self._newest: PoseEstimate | None = None
 
     @property
@@ -47,7 +48,9 @@ class CameraHealth:
     def forget_poses(self) -> None:
         """Another stage tracks from now on: latencies and shares are its own."""
         with self._lock:
-            for each in (self._latencies_ms, self._spent_ms, self._poses_at, self._accepted):
+            for each in (
+                self._latencies_ms, self._spent_ms, self._poses_at, self._accepted, self._disagreeing
+            ):  # fmt: skip
                 each.clear()
 
     def note_findings(self, found: Iterable[str]) -> None:
@@ -64,6 +67,7 @@ class CameraHealth:
             self._spent_ms.append(spent_ms)
             self._poses_at.append(time.monotonic())
             self._accepted.append(estimate.accepted)
+            self._disagreeing.append(estimate.disagreeing)
             self._newest = estimate
 
     def note_no_hand(self) -> None:
@@ -94,7 +98,7 @@ class CameraHealth:
                 "latency_ms": _percentiles(self._latencies_ms),
                 "computing_ms": _percentiles(self._spent_ms),
                 "accepted_share": round(float(share.mean()), 3) if len(accepted) else None,
-                "disagreeing": None if newest is None else round(newest.disagreeing, 3),
+                "disagreeing": round(float(np.mean(self._disagreeing)), 3) if self._disagreeing else None,
                 "position_mm": None if newest is None else newest.state.position_mm.round(1).tolist(),
                 "position_sd_mm": None
                 if newest is None

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+from glovecal_client.errors import BadName
 from glovecal_client.keys import GloveKeys
 from glovecal_models.colour_glove.pose_estimate import STAGES
 from glovecal_models.errors import BadInput
@@ -21,7 +22,7 @@ HANDS = ("right", "left")
 
 @dataclass(frozen=True)
 class CameraSettings:
-    """Raises BadInput and BadName for what no camera can be started with."""
+    """Raises BadInput for what no camera can be started with."""
 
     source: str
     """``camera:0``, ``video:FILE.mkv``, ``labels:FILE.labels`` or ``rendered``."""
@@ -44,7 +45,10 @@ class CameraSettings:
     """Rendered ones of other hands, from which the tracker's errors are learned."""
 
     def __post_init__(self) -> None:
-        GloveKeys(self.site, self.glove)
+        try:
+            GloveKeys(self.site, self.glove)
+        except BadName as error:
+            raise BadInput(str(error)) from error
         for name, value, known in (
             ("stage", self.stage, STAGES),
             ("keep", self.keep, KEEPS),

@@ -103,8 +103,10 @@ class CameraTracking:
             self._track_until_stopped()
         except Cancelled:
             pass
-        finally:
-            self._end()
+        except Exception as error:
+            self._end(str(error))
+            raise
+        self._end("stopped" if stop.is_set() else self._status.sentence)
         return self._summary()
 
     def _prepare(self, source: PictureSource | None) -> None:
@@ -206,10 +208,9 @@ class CameraTracking:
         self._stale_s = now
         self._link.publish_pose(encode_pose(replace(self._last, flags=self._last.flags | PoseFlag.STALE)))
 
-    def _end(self) -> None:
-        sentence = "stopped" if self._stop.is_set() else self._status.sentence
+    def _end(self, sentence: str) -> None:
         if self._reader and not self._reader.stop():
-            sentence = "stopped; the camera's driver hangs"
+            sentence += "; the camera's driver hangs"
         self._newest.end()
         self._kept.close()
         self._ended_with = sentence

@@ -6,16 +6,20 @@ is also when the program that started it dies.
 
 from __future__ import annotations
 
+import os
 import sys
 import threading
+from typing import TYPE_CHECKING
 
 from glovecal_client.capture.command import stopped_by_signals, tell
-from glovecal_client.errors import ClientError
+from glovecal_client.errors import ClientError, DeviceError
 from glovecal_client.private_files import keep_private
 from glovecal_models.errors import GlovecalError
 from glovecal_models.threads import pin_blas_to_one_thread
 from glovecal_service.camera.camera_settings import CameraSettings
-from glovecal_service.camera.camera_tracking import CameraSummary, CameraTracking
+
+if TYPE_CHECKING:
+    from glovecal_service.camera.camera_tracking import CameraSummary
 
 GIL_SWITCH_S = 0.0005
 """Longest time that tracking keeps the thread waiting that stamps pictures."""
@@ -23,6 +27,10 @@ GIL_SWITCH_S = 0.0005
 
 def run_camera(settings: CameraSettings, stop: threading.Event) -> CameraSummary:
     """Until ``stop`` is set or a file is over. Raises BadInput, DeviceError, CaptureRefused."""
+    try:
+        from glovecal_service.camera.camera_tracking import CameraTracking
+    except ModuleNotFoundError as error:
+        raise DeviceError(f"a camera needs {error.name}: pip install 'glovecal-service[camera]'") from error
     keep_private()
     pin_blas_to_one_thread()
     sys.setswitchinterval(GIL_SWITCH_S)
@@ -34,7 +42,8 @@ def main(text: str) -> int:
     stop = threading.Event()
 
     def wait_for_the_end() -> None:
-        sys.stdin.buffer.read()
+        while os.read(0, 4096):  # not sys.stdin: its lock must be free when the process ends otherwise
+            pass
         stop.set()
 
     threading.Thread(target=wait_for_the_end, daemon=True).start()

@@ -10,7 +10,6 @@ from typing import Annotated
 
 import typer
 
-from glovecal_client.errors import DeviceError
 from glovecal_service.cli.glove.capture import GloveOption
 from glovecal_service.cli.terminal.options import DEFAULT_ZENOH, Site, Zenoh, subject_named
 from glovecal_service.cli.terminal.printing import out
@@ -79,12 +78,9 @@ def track(
 
     The first start builds the pose database and takes a minute or two.
     """
-    try:
-        from glovecal_service.camera.process import run_camera
-    except ModuleNotFoundError as error:
-        raise DeviceError(f"a camera needs {error.name}: pip install 'glovecal-service[camera]'") from error
     from glovecal_client.capture.command import stopped_by_signals
     from glovecal_service.camera.camera_settings import CameraSettings
+    from glovecal_service.camera.process import run_camera
 
     settings = CameraSettings(
         source, glove, data, site, connect, subject, hand.value, stage.value, keep.value, colours,
