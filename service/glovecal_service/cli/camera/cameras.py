@@ -1,0 +1,11 @@
+"""``glovecal camera``: a file for each verb."""
+
+from __future__ import annotations
+
+import typer
+
+from glovecal_service.cli.camera import patterns, sheets
+
+app = typer.Typer(help="A camera and the printed colour glove.", no_args_is_help=True)
+app.command("sheets")(sheets.sheets)
+app.command("patterns")(patterns.patterns)
