@@ -19,7 +19,7 @@ from glovecal_models.colour_glove.codes.pca import pca_code
 from glovecal_models.colour_glove.database import DatabaseSettings, pose_database
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM
 from glovecal_models.colour_glove.lookup import PoseLookup
-from glovecal_models.colour_glove.pattern import glove_pattern
+from glovecal_models.colour_glove.pattern import printed_pattern
 from glovecal_models.colour_glove.pose.error_learning import _digest, _no_scales
 from glovecal_models.colour_glove.pose.learned_errors import LearnedErrors
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
@@ -39,7 +39,7 @@ def ready_folder(data: Path) -> RenderedGlove:
     Learning errors takes half a minute; here the posterior deviations stand as they are.
     """
     skin = hand_skin()
-    hand, settings = PrintedHand(skin, glove_pattern(skin)), DatabaseSettings(entries=SMALL["entries"])
+    hand, settings = PrintedHand(skin, printed_pattern()), DatabaseSettings(entries=SMALL["entries"])
     folder = CameraSettings("rendered", "any", data).folder
     database = pose_database(skin, hand.pattern, generated_poses(), folder, settings, workers=1)
     lookup = PoseLookup(database, pca_code(database.transforms))

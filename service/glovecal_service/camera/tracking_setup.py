@@ -11,7 +11,7 @@ import numpy as np
 
 from glovecal_client.pictures.source import PictureSource
 from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.pattern import glove_pattern
+from glovecal_models.colour_glove.pattern import printed_pattern
 from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
 from glovecal_models.colour_glove.pose.prepared import prepared_tracker
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
@@ -81,7 +81,7 @@ def tracking_setup(
     Raises DeviceLost where no picture comes, BadInput for files that cannot be used, Cancelled.
     """
     skin = hand_skin(hand_skeleton(hand="left" if settings.hand == "left" else "right"))
-    hand = PrintedHand(skin, glove_pattern(skin))
+    hand = PrintedHand(skin, printed_pattern())
     if source is None:
         source = camera_source(settings.source, lambda: RenderedGlove(hand, ASSUMED))
     camera = _assumed(_size(source))

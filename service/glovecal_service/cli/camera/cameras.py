@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import typer
 
-from glovecal_service.cli.camera import track
+from glovecal_service.cli.camera import patterns, sheets, track
 
 app = typer.Typer(help="A camera and the printed colour glove.", no_args_is_help=True)
+app.command("sheets")(sheets.sheets)
+app.command("patterns")(patterns.patterns)
 app.command("track")(track.track)
