@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import typer
 
-from glovecal_service.cli.camera import patterns, sheets
+from glovecal_service.cli.camera import calibrate, patterns, sheets
 
 app = typer.Typer(help="A camera and the printed colour glove.", no_args_is_help=True)
 app.command("sheets")(sheets.sheets)
+app.command("calibrate")(calibrate.calibrate)
 app.command("patterns")(patterns.patterns)
