@@ -5,11 +5,23 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pypdfium2
+import pytest
+from board_pictures import BoardRoom, board_poses
 from cli_running import Run
 
+from glovecal_client.pictures.source import Picture
+from glovecal_client.pictures.video_file import VideoWriter
+from glovecal_models.colour_glove.camera_file import read_cameras
+from glovecal_models.colour_glove.camera_model import Camera
+from glovecal_models.colour_glove.sheets.calibration_board import CalibrationBoard
+
+SMALL = Camera(400, 300, (333.0, 333.0), (199.5, 149.5))
 WITHOUT = """
 import sys
 class Missing:
@@ -51,3 +63,59 @@ def test_without_the_extra_it_says_how_to_install_it(tmp_path: Path) -> None:
     assert found.returncode == 1
     assert "needs numba" in found.stderr
     assert "pip install 'glovecal-service[camera]'" in found.stderr
+
+
+def drawn(folder: Path, room: BoardRoom, poses: list[tuple[np.ndarray, np.ndarray]], seed: int) -> Path:
+    folder.mkdir()
+    rng = np.random.default_rng(seed)
+    for number, pose in enumerate(poses):
+        cv2.imwrite(str(folder / f"{number:02}.png"), room.picture(*pose, rng))
+    return folder
+
+
+def test_two_cameras_are_calibrated_from_folders_and_pictures_that_do_not_serve_are_named(
+    run: Run, tmp_path: Path
+) -> None:
+    board, true = CalibrationBoard(), replace(SMALL, distortion=(-0.1, 0.05, 0.0, 0.0, 0.0))
+    beside = replace(true, translation_mm=(-80.0, 0.0, 0.0))
+    poses = board_poses(board, 10, np.random.default_rng(1), aside=0.15)
+    left = drawn(tmp_path / "left", BoardRoom(true), poses, 1)
+    right = drawn(tmp_path / "right", BoardRoom(beside), poses, 2)
+    cv2.imwrite(str(left / "wall.png"), np.full((300, 400, 3), 90, np.uint8))
+    (left / "broken.png").write_bytes(b"no picture")
+    file = tmp_path / "camera.json"
+    done = run("camera", "calibrate", "--pictures", left, "--second", right, "--out", file, "--json")
+    assert done.code == 0, done.err
+    assert [sentence.split()[0].strip(":") for sentence in done.json["refused"]] == ["broken.png", "wall.png"]
+    first, second = read_cameras(file)
+    assert first.focal_px == pytest.approx(true.focal_px, rel=0.01)
+    assert first.translation_mm == (0.0, 0.0, 0.0)
+    assert second.translation_mm == pytest.approx(beside.translation_mm, abs=6.0)
+    assert done.json["cameras"][1]["placement"]["views"] == 10
+
+    again = run("camera", "calibrate", "--pictures", left, "--out", file, "--square-mm", 34)
+    assert "focal length (px)" in again.out
+    assert "Not used: wall.png: no board is seen" in again.err
+    for number in range(5):
+        (left / f"{number:02}.png").unlink()
+    few = run("camera", "calibrate", "--pictures", left, "--out", tmp_path / "few.json")
+    assert (few.code, "5 good views of the board; at least 8" in few.said) == (1, True)
+    assert not (tmp_path / "few.json").exists()
+    both = run("camera", "calibrate", "--pictures", left, "--camera", "camera:0", "--out", file)
+    assert (both.code, "either --pictures FOLDER or --camera" in both.said) == (2, True)
+
+
+def test_a_camera_is_calibrated_from_a_video(run: Run, tmp_path: Path) -> None:
+    board, rng = CalibrationBoard(), np.random.default_rng(1)
+    room = BoardRoom(SMALL)
+    video = VideoWriter(tmp_path / "board.mkv", 30.0)
+    for pose in board_poses(board, 9, rng):
+        for _ in range(2):  # held still
+            video.write(Picture.now(room.picture(*pose, rng)))
+    video.close()
+    file = tmp_path / "camera.json"
+    done = run("camera", "calibrate", "--camera", f"video:{tmp_path / 'board.mkv'}", "--out", file)
+    assert done.code == 0, done.err
+    assert "9 of 20 views: taken" in done.err
+    (found,) = read_cameras(file)
+    assert found.focal_px == pytest.approx(SMALL.focal_px, rel=0.01)
