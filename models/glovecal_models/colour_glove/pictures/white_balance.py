@@ -2,7 +2,8 @@
 
 A camera that was not balanced for its light multiplies red, green and blue by other numbers. A white
 reference tells them; without one, those gains of red and blue are searched for with which the glove's tiny
-images come nearest to the database (ours; relearning the colours from the tracker's own answers collapses).
+images come near to the database while most of the glove is labelled (ours; relearning the colours from the
+tracker's own answers collapses).
 """
 
 from __future__ import annotations
@@ -22,7 +23,12 @@ from glovecal_models.errors import BadInput
 
 WEAKEST, STRONGEST = 0.3, 3.0
 """Gains that are believed."""
-_SEARCHED = np.exp(np.linspace(-0.5, 0.5, 11))
+_COARSE = np.linspace(-0.6, 0.6, 5)
+_STEPS = (0.15, 0.15, 0.075, 0.075)
+"""Logarithms of the gains searched through, and how they are refined."""
+_PIXELS_WEIGH = 3.0
+"""Of the logarithm of the glove's pixels, against that of the distance. By the distance alone gains win that
+lose pixels on patches' edges: a thinner glove looks the same."""
 _WHITE_LEVEL = (60.0, 250.0)
 """Of a white reference: darker is no white, brighter is cut off."""
 _MISSING = 150.0
@@ -81,7 +87,7 @@ def white_gains(picture: np.ndarray, white: np.ndarray) -> Gains:
 def blind_gains(
     pictures: Sequence[np.ndarray], table: ColourTable, lookup: PoseLookup
 ) -> tuple[Gains, float, float]:
-    """Gains of red and blue with which a few pictures of the glove come nearest to the database.
+    """Gains of red and blue with which a few pictures show much glove, near to the database.
 
     Returns them, and the mean image distance (squared pixels) with and without. Raises BadInput for no
     picture, and when no gains show a glove.
@@ -89,36 +95,39 @@ def blind_gains(
     if not pictures:
         raise BadInput("gains are searched for in at least one picture; none was given")
 
-    def distance(gains: Gains) -> float:
-        found = []
+    def seen(gains: Gains) -> tuple[float, float]:
+        """Score, the less the better, and mean image distance."""
+        scores, found = [], []
         for picture in pictures:
             labels = table.labels(gains.corrected(picture))
             window = glove_window(labels)
             tiny = None if window is None else tiny_image(labels, window)
-            seen = tiny is not None and np.count_nonzero(tiny) > 0.1 * tiny.size
-            found.append(
-                float(lookup.neighbours(tiny, 1).distances[0]) if tiny is not None and seen else _MISSING
-            )
-        return float(np.mean(found))
+            if tiny is None or np.count_nonzero(tiny) <= 0.1 * tiny.size:
+                distance, pixels = _MISSING, 1
+            else:
+                distance = float(lookup.neighbours(tiny, 1).distances[0])
+                pixels = np.count_nonzero(labels)
+            found.append(distance)
+            scores.append(np.log(distance + 1.0) - _PIXELS_WEIGH * np.log(pixels))
+        return float(np.mean(scores)), float(np.mean(found))
 
-    # First every other gain, then around the best of them.
-    tried: dict[tuple[int, int], float] = {}
+    tried: dict[tuple[float, float], tuple[float, float]] = {}
 
-    def at(red: int, blue: int) -> float:
-        if (red, blue) not in tried:
-            tried[red, blue] = distance(Gains(float(_SEARCHED[red]), 1.0, float(_SEARCHED[blue])))
-        return tried[red, blue]
+    def best_of(places: list[tuple[float, float]]) -> tuple[float, float]:
+        for red, blue in places:
+            place = (round(red, 4), round(blue, 4))
+            if place not in tried:
+                tried[place] = seen(_gains(place))
+        return min(tried, key=lambda place: tried[place][0])
 
-    count = len(_SEARCHED)
-    best = min(
-        ((red, blue) for red in range(1, count, 2) for blue in range(1, count, 2)), key=lambda p: at(*p)
-    )
-    around = [
-        (red, blue)
-        for red in range(max(0, best[0] - 1), min(count, best[0] + 2))
-        for blue in range(max(0, best[1] - 1), min(count, best[1] + 2))
-    ]
-    red, blue = min(around, key=lambda place: at(*place))
-    if at(red, blue) >= _MISSING:
+    best = best_of([(red, blue) for red in _COARSE for blue in _COARSE])
+    for step in _STEPS:
+        around = (-step, 0.0, step)
+        best = best_of([(best[0] + red, best[1] + blue) for red in around for blue in around])
+    if tried[best][1] >= _MISSING:
         raise BadInput("no gains show a glove in these pictures: is the hand in view?")
-    return Gains(float(_SEARCHED[red]), 1.0, float(_SEARCHED[blue])), at(red, blue), distance(Gains())
+    return _gains(best), tried[best][1], seen(Gains())[1]
+
+
+def _gains(place: tuple[float, float]) -> Gains:
+    return Gains(float(np.exp(place[0])), 1.0, float(np.exp(place[1])))
