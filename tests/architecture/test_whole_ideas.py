@@ -63,6 +63,8 @@ def test_no_module_of_the_mathematics_is_imported_by_nobody() -> None:
     entered |= {f"glovecal_models.colour_glove.{name}" for name in ("codes.boosted", "pose.prepared")}
     # What is wrong with a camera's picture is asked by the service.
     entered.add("glovecal_models.colour_glove.pictures.picture_check")
+    entered.add("glovecal_models.colour_glove.pictures.white_balance")
+    entered.add("glovecal_models.simulation.colour_glove.examples")
     alone = [
         name
         for name, file in modules().items()

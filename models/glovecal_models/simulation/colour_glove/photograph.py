@@ -1,0 +1,195 @@
+"""Photographs of a hand in the colour glove, drawn: light, cloth, a lens that blurs, a sensor with noise.
+
+Light is added up linearly: the printed colour times the shading of a lamp and of the room, cloth with a weave
+and folds, an arm behind the wrist, a background; several moments of one exposure; then the lens's blur, the
+camera's gains (a colour cast), photon and read noise, and eight bits of sRGB. Glossy prints, shadows cast on
+the hand, rolling shutter and JPEG are not drawn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+
+from glovecal_models.colour_glove.camera_model import Camera
+from glovecal_models.colour_glove.hand_state import HandState
+from glovecal_models.colour_glove.palette import PRINTED_SRGB, encoded_light, linear_light
+from glovecal_models.colour_glove.pattern import Pattern
+from glovecal_models.colour_glove.rasterise import rasterise
+from glovecal_models.colour_glove.skin import HandSkin, posed
+from glovecal_models.errors import BadInput
+from glovecal_models.simulation.colour_glove.background import SKIN_SRGB, background
+
+ARMS = ("skin", "sleeve", "none")
+MOMENTS = 5
+"""Of an exposure during which the hand moves."""
+_AROUND, _ALONG = 24, 8
+_ARM_MM = (-25.0, -300.0)
+_ARM_RADII_MM = (25.0, 40.0)
+
+
+@dataclass(frozen=True)
+class Photography:
+    """How pictures are taken. Raises BadInput for what no camera or room does."""
+
+    gains: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    """Of red, green and blue: the cast of light that the camera was not balanced for."""
+    exposure: float = 1.0
+    shading: float = 0.6
+    """Share of the light that comes from one lamp; the rest comes from everywhere."""
+    weave: float = 0.05
+    """Standard deviation of the cloth's brightness from pixel to pixel, relative."""
+    folds: float = 0.3
+    """How far folds turn the cloth, root mean square, radians."""
+    blur_px: float = 0.8
+    """Standard deviation of the lens's blur."""
+    noise: float = 1.0
+    """1: a webcam indoors, about 4 of 255 in the middle of the range; 0: none."""
+    clutter: bool = True
+    face: bool = True
+    arm: str = "skin"
+
+    def __post_init__(self) -> None:
+        amounts = (*self.gains, self.exposure, self.shading, self.weave, self.folds, self.blur_px, self.noise)
+        if not (np.isfinite(amounts).all() and min(amounts) >= 0 and min(*self.gains, self.exposure) > 0):
+            raise BadInput(f"a photograph needs gains and exposure above 0, and no negative amount: {self}")
+        if self.shading > 1 or self.arm not in ARMS:
+            raise BadInput(
+                f"shading {self.shading} (0 to 1), arm {self.arm!r} (one of {', '.join(ARMS)}): impossible"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Photograph:
+    picture: np.ndarray
+    """(H, W, 3) uint8 blue, green, red."""
+    labels: np.ndarray
+    """(H, W) uint8: the colour truly there in the middle of the exposure."""
+
+
+@dataclass(frozen=True, eq=False)
+class Photographer:
+    """One hand, camera, room and light. The same arguments and calls give the same pictures."""
+
+    skin: HandSkin
+    pattern: Pattern
+    camera: Camera
+    photography: Photography
+    seed: int
+
+    def photograph(self, state: HandState, until: HandState | None = None, *, number: int = 0) -> Photograph:
+        """The picture of ``state``; with ``until`` the exposure goes on while the hand moves there.
+
+        ``number``: of the picture, for its own noise.
+        """
+        rng = np.random.default_rng([self.seed, 1, number])
+        states = [state]
+        if until is not None:
+            step = until.step_from(state)
+            states = [state.moved(share * step) for share in np.linspace(0.0, 1.0, MOMENTS)]
+        drawn = [self._light(moment) for moment in states]
+        light = np.mean([moment for moment, _ in drawn], axis=0) if len(drawn) > 1 else drawn[0][0]
+        look = self.photography
+        if look.blur_px:
+            light = cv2.GaussianBlur(light, (0, 0), look.blur_px)
+        light = light * (np.float32(look.exposure) * np.array(look.gains, np.float32))
+        if look.noise:
+            spread = np.sqrt(np.maximum(light, 0.0) * 4e-4 + 4e-6) * np.float32(look.noise)
+            light = light + spread * rng.standard_normal(light.shape, dtype=np.float32)
+        picture = np.ascontiguousarray(_ENCODED[_codes(light)][..., ::-1])
+        return Photograph(picture, drawn[len(drawn) // 2][1])
+
+    @cached_property
+    def _room(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Linear background (H, W, 3), direction to the lamp (3,), weave (H, W), folds of the skin (V, 3)."""
+        rng, look = np.random.default_rng([self.seed, 0]), self.photography
+        height, width = self.camera.height, self.camera.width
+        behind = background(width, height, rng, clutter=look.clutter, face=look.face)
+        lamp = np.array([rng.uniform(-0.8, 0.8), rng.uniform(-1.0, -0.2), -1.0])
+        weave = 1.0 + look.weave * rng.standard_normal((height, width), dtype=np.float32)
+        # Waves through the cloth, a few centimetres long: what turns the normals is their gradient.
+        places, folds = self.skin.vertices_mm, np.zeros_like(self.skin.vertices_mm)
+        for _ in range(6):
+            direction = rng.normal(size=3)
+            direction *= 2 * np.pi / rng.uniform(12.0, 45.0) / np.linalg.norm(direction)
+            wave = np.cos(places @ direction + rng.uniform(0, 2 * np.pi))
+            folds += wave[:, None] * direction / np.linalg.norm(direction)
+        folds *= look.folds / max(np.sqrt((folds**2).sum(axis=1).mean()), 1e-9)
+        return linear_light(behind), lamp / np.linalg.norm(lamp), weave, folds
+
+    @cached_property
+    def _surface(self) -> tuple[np.ndarray, np.ndarray]:
+        """Triangles of hand and arm, and their linear colours."""
+        rng = np.random.default_rng([self.seed, 2])
+        sleeve = rng.uniform(30, 200, 3) if self.photography.arm == "sleeve" else None
+        arm = sleeve if sleeve is not None else np.array(SKIN_SRGB[rng.integers(len(SKIN_SRGB))])
+        triangles, colours = self.skin.triangles, linear_light(PRINTED_SRGB)[self.pattern.colour - 1]
+        if self.photography.arm != "none":
+            triangles = np.concatenate([triangles, _arm_triangles() + len(self.skin.vertices_mm)])
+            extra = len(triangles) - len(colours)
+            colours = np.concatenate([colours, np.tile(linear_light(arm), (extra, 1))])
+        return np.ascontiguousarray(triangles, dtype=np.int32), colours
+
+    def _light(self, state: HandState) -> tuple[np.ndarray, np.ndarray]:
+        """Linear light (H, W, 3) float32 of one moment, and its labels."""
+        behind, lamp, weave, folds = self._room
+        triangles, colours = self._surface
+        placed = posed(self.skin, state)
+        if self.photography.arm != "none":
+            placed = np.concatenate([placed, _arm_vertices() @ state.rotation.T + state.position_mm])
+        shown = rasterise(placed, triangles, self.camera).triangle
+        v, u = np.nonzero(shown >= 0)
+        which = shown[v, u]
+        normals = _vertex_normals(placed, triangles)
+        normals[: len(folds)] += folds @ state.rotation.T
+        facing = normals[triangles[which]].mean(axis=1)
+        facing /= np.linalg.norm(facing, axis=1, keepdims=True) + 1e-9
+        lit = 0.5 + 0.5 * (facing @ lamp)  # light wraps around cloth
+        share = self.photography.shading
+        brightness = (1.0 - share) * (0.75 - 0.25 * facing[:, 1]) + share * 1.2 * np.clip(
+            lit, 0.0, 1.0
+        ) ** 1.5
+        light = behind.copy()
+        light[v, u] = colours[which] * (brightness * weave[v, u])[:, None]
+        glove = np.append(self.pattern.colour, np.zeros(len(triangles) - len(self.pattern.colour) + 1))
+        return light, glove.astype(np.uint8)[shown]
+
+
+_ENCODED = encoded_light(np.linspace(0.0, 1.0, 4096))
+"""By 4095 times the light."""
+
+
+def _codes(light: np.ndarray) -> np.ndarray:
+    return np.clip(light * 4095.0 + 0.5, 0.0, 4095.0).astype(np.uint16)
+
+
+def _vertex_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
+    across = np.cross(b - a, c - a)
+    found = np.empty_like(vertices)
+    for axis in range(3):
+        found[:, axis] = np.bincount(
+            triangles.ravel(), np.repeat(across[:, axis], 3), minlength=len(vertices)
+        )
+    return found / (np.linalg.norm(found, axis=1, keepdims=True) + 1e-9)
+
+
+def _arm_vertices() -> np.ndarray:
+    """(R A, 3) in the palm's frame: rings from behind the wrist to the elbow's side."""
+    along = np.linspace(*_ARM_MM, _ALONG)
+    radii = np.linspace(*_ARM_RADII_MM, _ALONG)
+    turn = np.linspace(0.0, 2 * np.pi, _AROUND, endpoint=False)
+    ring = np.column_stack([np.zeros(_AROUND), 1.15 * np.cos(turn), 0.85 * np.sin(turn)])
+    return np.concatenate([ring * radius + (x, 0.0, 0.0) for x, radius in zip(along, radii, strict=True)])
+
+
+def _arm_triangles() -> np.ndarray:
+    found = []
+    for ring in range(_ALONG - 1):
+        for index in range(_AROUND):
+            here, beside = ring * _AROUND + index, ring * _AROUND + (index + 1) % _AROUND
+            found += [(here, here + _AROUND, beside), (beside, here + _AROUND, beside + _AROUND)]
+    return np.array(found, dtype=np.int32)
