@@ -82,8 +82,10 @@ class ScriptedCamera:
 
 
 @contextmanager
-def running(settings: CameraSettings, source: Any = None) -> Iterator[tuple[CameraTracking, list[Any]]]:
-    """A camera in a thread; the list gets its summary, or what it raised, at the end."""
+def running(
+    settings: CameraSettings, source: Any = None
+) -> Iterator[tuple[CameraTracking, list[Any], list[str]]]:
+    """A camera in a thread; a list that gets its summary, or what it raised, at the end; what it said."""
     said: list[str] = []
     tracking, ended, stop = CameraTracking(settings, said.append), [], threading.Event()
 
@@ -96,7 +98,7 @@ def running(settings: CameraSettings, source: Any = None) -> Iterator[tuple[Came
     thread = threading.Thread(target=run)
     thread.start()
     try:
-        yield tracking, ended
+        yield tracking, ended, said
     finally:
         stop.set()
         thread.join(60)
@@ -105,7 +107,7 @@ def running(settings: CameraSettings, source: Any = None) -> Iterator[tuple[Came
 
 def ran_to_the_end(settings: CameraSettings, source: Any = None) -> CameraSummary:
     """Of a source that ends by itself."""
-    with running(settings, source) as (_, ended):
+    with running(settings, source) as (_, ended, _):
         until = time.monotonic() + 60
         while not ended and time.monotonic() < until:
             time.sleep(0.02)

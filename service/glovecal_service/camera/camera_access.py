@@ -24,7 +24,7 @@ class CameraAccess:
         self._kept = ExitStack()
         self._session: zenoh.Session | None = None
 
-    def ask(self, selector: str) -> list[zenoh.Sample]:
+    def ask(self, selector: str, *, timeout_s: float = ANSWER_WITHIN_S) -> list[zenoh.Sample]:
         """Raises NoAnswer, QueryRefused."""
         with self._lock:
             if self._session is None:
@@ -32,7 +32,7 @@ class CameraAccess:
                     open_client((self._endpoint,), wait_s=ROUTER_WITHIN_S)
                 )
             session = self._session
-        return ask(session, selector, timeout_s=ANSWER_WITHIN_S)
+        return ask(session, selector, timeout_s=timeout_s)
 
     def close(self) -> None:
         """End the cameras that were started here."""

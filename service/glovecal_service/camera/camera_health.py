@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Iterable
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -29,9 +29,9 @@ class CameraHealth:
         self.problem = ""
         """Why the last picture could not be used; empty where it could."""
         self.findings: Counter[str] = Counter()
-        """Pictures in which each was found."""
-        self.present: tuple[str, ...] = ()
-        """Findings of the newest picture."""
+        """Pictures checked in which each kind was found."""
+        self.present: dict[str, str] = {}
+        """Sentences of the newest picture that was checked, by kind."""
         self._lock = threading.Lock()
         self._latencies_ms: deque[float] = deque(maxlen=LAST_POSES)
         self._spent_ms: deque[float] = deque(maxlen=LAST_POSES)
@@ -46,21 +46,27 @@ class CameraHealth:
         return self.tracked + self.without_hand + self.unusable
 
     def forget_poses(self) -> None:
-        """Another stage tracks from now on: latencies and shares are its own."""
+        """What latencies and shares are told from begins anew."""
         with self._lock:
-            for each in (
-                self._latencies_ms, self._spent_ms, self._poses_at, self._accepted, self._disagreeing
-            ):  # fmt: skip
-                each.clear()
+            self._forget_poses()
 
-    def note_findings(self, found: Iterable[str]) -> None:
+    def _forget_poses(self) -> None:
+        for each in (
+            self._latencies_ms, self._spent_ms, self._poses_at, self._accepted, self._disagreeing
+        ):  # fmt: skip
+            each.clear()
+
+    def note_findings(self, found: Mapping[str, str]) -> None:
+        """Sentences by kind."""
         with self._lock:
-            self.present = tuple(found)
-            self.findings.update(self.present)
+            self.present = dict(found)
+            self.findings.update(self.present.keys())
 
     def note_pose(self, estimate: PoseEstimate, latency_ms: float, spent_ms: float) -> None:
         """``latency_ms`` from the picture's stamp to publication, ``spent_ms`` of it on labels and pose."""
         with self._lock:
+            if self._newest is not None and estimate.stage != self._newest.stage:
+                self._forget_poses()
             self.tracked += 1
             self.sees, self.problem = HAND, ""
             self._latencies_ms.append(latency_ms)
@@ -92,7 +98,7 @@ class CameraHealth:
                 "tracked": self.tracked,
                 "without_hand": self.without_hand,
                 "unusable": self.unusable,
-                "findings": list(self.present),
+                "findings": dict(self.present),
                 "findings_counted": dict(self.findings),
                 "pose_rate_hz": self._pose_rate_hz(),
                 "latency_ms": _percentiles(self._latencies_ms),

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -41,6 +42,8 @@ class CameraSettings:
     """The camera's focal length, centre and distortion; None: those of an assumed camera, which is said."""
     entries: int = 20_000
     """Of the pose database."""
+    sizes_mm: Mapping[str, float] = field(default_factory=dict)
+    """Of the subject's hand, as measured; what is missing follows from them, or is assumed."""
     clips: int = 36
     """Rendered ones of other hands, from which the tracker's errors are learned."""
 

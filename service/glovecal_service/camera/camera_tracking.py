@@ -9,8 +9,9 @@ from __future__ import annotations
 import secrets
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from glovecal_client.errors import CaptureRefused
 from glovecal_client.pictures.source import PictureSource
 from glovecal_client.wire.pose import Pose, PoseFlag, RotationFlag, encode_pose
 from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS
+from glovecal_models.colour_glove.pictures.white_balance import Gains, blind_gains
 from glovecal_models.colour_glove.pose_estimate import STAGES, PoseEstimate
 from glovecal_models.errors import BadInput, Cancelled
 from glovecal_service.camera.camera_health import HAND, NO_HAND, CameraHealth
@@ -36,9 +38,16 @@ from glovecal_service.camera.tracking_setup import Tracker, TrackingSetup, track
 
 TURN_S = 0.1
 STATUS_EVERY_S = 1.0
+CHECK_EVERY_S = 0.2
 STALE_AFTER_S, STALE_AGAIN_S = 0.5, 1.0
 """As of a glove that is silent."""
-COMMANDS = {"stage": f"how far each picture is followed: {', '.join(STAGES)}", "stop": "end this camera"}
+BALANCED_ON, APART_S = 4, 0.3
+"""Pictures from which the light's gains are told, and how far apart they are at least."""
+COMMANDS = {
+    "stage": f"how far each picture is followed: {', '.join(STAGES)}",
+    "balance": "tell the light's gains from the last pictures of the glove",
+    "stop": "end this camera",
+}
 
 
 @dataclass(frozen=True)
@@ -83,8 +92,11 @@ class CameraTracking:
         self._tracker: Tracker | None = None
         self._reader: PictureReader | None = None
         self._seen: SeenPicture | None = None
+        self._gains = Gains()
+        self._of_glove: deque[np.ndarray] = deque(maxlen=BALANCED_ON)
+        self._of_glove_s = 0.0
         self._last: Pose | None = None
-        self._last_s = self._stale_s = self._status_s = 0.0
+        self._last_s = self._stale_s = self._status_s = self._checked_s = 0.0
         self._no_pose = 0
 
     def run(self, stop: threading.Event, source: PictureSource | None = None) -> CameraSummary:
@@ -151,11 +163,12 @@ class CameraTracking:
         pixels, tracker = taken.picture.pixels, self._tracker
         try:
             self._check_size(pixels)
-            labels = pixels if pixels.ndim == 2 else self._setup.colours.labels(pixels)
+            labels = self._labels(pixels)
             self._kept.keep_labels(labels, self._source, taken.picture.monotonic_ns, taken.picture.wall_ns)
-            if pixels.ndim == 3:
-                self.health.note_findings(self._setup.findings(pixels, labels))
+            self._check(pixels, labels)
             estimate = tracker.track([labels], taken.monotonic_ns / 1e9)
+            if estimate is not None and self.health.present:
+                estimate = replace(estimate, accepted=np.zeros_like(estimate.accepted))
         except (BadInput, ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
             self.health.note_unusable(str(error))
             self._no_pose += 1
@@ -169,6 +182,26 @@ class CameraTracking:
         spent_ms = 1000 * (time.perf_counter() - began)
         latency_ms = self._publish(taken, estimate)
         self.health.note_pose(estimate, latency_ms, spent_ms)
+
+    def _labels(self, pixels: np.ndarray) -> np.ndarray:
+        assert self._setup is not None
+        if pixels.ndim == 2:
+            return pixels
+        now = time.monotonic()
+        if now - self._of_glove_s >= APART_S:
+            self._of_glove_s = now
+            self._of_glove.append(pixels)
+        return self._setup.colours.labels(self._gains.corrected(pixels))
+
+    def _check(self, pixels: np.ndarray, labels: np.ndarray) -> None:
+        """Now and then: it takes as long as looking the hand up."""
+        assert self._setup is not None
+        now = time.monotonic()
+        if pixels.ndim != 3 or now - self._checked_s < CHECK_EVERY_S:
+            return
+        self._checked_s = now
+        found = self._setup.check.findings(pixels, labels)
+        self.health.note_findings({each.kind: each.sentence for each in found})
 
     def _check_size(self, pixels: np.ndarray) -> None:
         assert self._setup is not None
@@ -221,13 +254,22 @@ class CameraTracking:
         if name == "stop":
             self._stop.set()
             return {"stopping": True}
-        if name != "stage":
+        if name not in COMMANDS:
             raise BadInput(f"a camera has no command {name!r}; there are {', '.join(COMMANDS)}")
         if self._setup is None:
             raise BadInput(f"the camera is not ready yet: {self._status.sentence}")
-        self._tracker = self._setup.tracker(argument)
-        self._stage = argument
+        return self._balance(self._setup) if name == "balance" else self._choose_stage(self._setup, argument)
+
+    def _balance(self, setup: TrackingSetup) -> dict[str, Any]:
+        pictures = list(self._of_glove)
+        self._gains, distance, before = blind_gains(pictures, setup.colours, setup.first.lookup)
         self.health.forget_poses()
+        self._link.publish_status()
+        return {**asdict(self._gains), "distance_px2": distance, "distance_before_px2": before}
+
+    def _choose_stage(self, setup: TrackingSetup, argument: str) -> dict[str, Any]:
+        self._tracker = setup.tracker(argument)
+        self._stage = argument
         self._link.publish_metas()
         self._link.publish_status()
         return {"stage": argument}
@@ -268,6 +310,7 @@ class CameraTracking:
             "stamped_twice": self._status.duplicates,
             "dropped": missing,
             "reconnects": self._status.reconnects,
+            "gains": asdict(self._gains),
             "calibrated": self._setup is not None and self._setup.is_calibrated,
             "kept": settings.keep,
             "kept_pictures": self._kept.pictures,
@@ -348,5 +391,5 @@ _KEPT = {
 
 def _view(health: Mapping[str, Any]) -> str:
     if health["findings"]:
-        return "; ".join(health["findings"])
+        return " ".join(health["findings"].values())
     return "the hand is tracked" if health["sees"] == HAND else "no hand in view"

@@ -10,12 +10,12 @@ import numpy as np
 from glovecal_client.errors import BadOption
 from glovecal_client.pictures.source import opencv
 from glovecal_models.colour_glove.camera_model import Camera
+from glovecal_models.colour_glove.palette import PRINTED_SRGB
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.pose_estimate import PoseEstimate
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import posed
 from glovecal_models.errors import BadInput
-from glovecal_service.camera.rendered_glove import INKS
 
 LAYERS = ("picture", "labels", "model")
 USUAL_WIDTH, WIDEST = 640, 1920
@@ -26,6 +26,8 @@ DIM = 0.55
 """Of the picture below other layers."""
 MODEL_COLOUR, EDGE_COLOUR = (255, 255, 255), (20, 20, 20)
 BANNER = "SIMULATED"
+_FLAT = np.concatenate([np.zeros((1, 3), np.uint8), PRINTED_SRGB[:, ::-1]])
+"""Blue, green, red of each label."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +72,7 @@ def drawn_view(seen: SeenPicture, hand: PrintedHand, camera: Camera, asked: Mapp
         drawn = np.full((height, wide, 3), 40, np.uint8)
     if "labels" in layers:
         glove = seen.labels > 0
-        flat = INKS[np.minimum(seen.labels[glove], len(INKS) - 1)]
+        flat = _FLAT[np.minimum(seen.labels[glove], len(_FLAT) - 1)]
         drawn[glove] = (LABEL_SHARE * flat + (1 - LABEL_SHARE) * drawn[glove]).astype(np.uint8)
     if "model" in layers and seen.estimate is not None:
         placed = posed(hand.skin, seen.estimate.state)

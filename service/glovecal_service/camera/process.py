@@ -57,4 +57,6 @@ def main(text: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:]))
+    code = main(*sys.argv[1:])
+    sys.stderr.flush()
+    os._exit(code)  # all is closed; a driver's thread that hangs must not turn this into a crash

@@ -13,8 +13,7 @@ from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.hand_state import HandState
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.pose_set import hand_shapes
-from glovecal_models.colour_glove.rasterise import rasterise
-from glovecal_models.colour_glove.skin import posed
+from glovecal_models.simulation.colour_glove.photograph import Photographer, Photography
 
 ROUND_S, RATE_HZ = 4.0, 30.0
 SHAPES = ("B", "5", "A", "L")
@@ -22,23 +21,16 @@ SHAPES = ("B", "5", "A", "L")
 DISTANCE_MM = 480.0
 _UPRIGHT = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """Fingers upwards in the picture, the palm towards the camera."""
-NOISE = 4.0
-BACKGROUND = (96, 104, 110)
-INKS = np.array(
-    [
-        (0, 0, 0), (40, 40, 200), (40, 130, 240), (40, 220, 230), (60, 160, 40), (190, 190, 40),
-        (200, 90, 30), (150, 40, 110), (170, 100, 230), (30, 60, 110), (70, 230, 140),
-    ],
-    np.uint8,
-)  # fmt: skip
-"""Blue, green, red of each label."""
+LOOK = Photography(clutter=True, face=True, arm="sleeve")
+ROOM = 3
+"""Seed of what is behind the hand, and of the lamp."""
 
 
 class RenderedGlove:
     """Pictures of a hand by the seconds since it began."""
 
     def __init__(self, hand: PrintedHand, camera: Camera) -> None:
-        self._skin, self._pattern, self._camera = hand.skin, hand.pattern, camera
+        self._photographer = Photographer(hand.skin, hand.pattern, camera, LOOK, ROOM)
         shapes = hand_shapes()
         self._shapes = np.array([shapes[name] for name in SHAPES])
         self._drawn: dict[int, np.ndarray] = {}
@@ -60,12 +52,6 @@ class RenderedGlove:
         """(H, W, 3) uint8, blue, green, red."""
         number = round(time_s * RATE_HZ) % round(ROUND_S * RATE_HZ)
         if number not in self._drawn:
-            self._drawn[number] = self._photograph(number)
+            state = self.state(number / RATE_HZ)
+            self._drawn[number] = self._photographer.photograph(state, number=number).picture
         return self._drawn[number]
-
-    def _photograph(self, number: int) -> np.ndarray:
-        drawn = rasterise(posed(self._skin, self.state(number / RATE_HZ)), self._skin.triangles, self._camera)
-        labels = drawn.painted(self._pattern.colour)
-        pixels = np.where(labels[..., None] > 0, INKS[labels], np.array(BACKGROUND, np.uint8)).astype(float)
-        pixels += np.random.default_rng(number).normal(0.0, NOISE, pixels.shape)
-        return np.clip(np.rint(pixels), 0, 255).astype(np.uint8)

@@ -45,11 +45,19 @@ class CameraHealthView(BaseModel):
     stamped_twice: int = Field(description="Not later than the one before; not tracked.")
     dropped: int = Field(description="By the camera, as the times of its pictures tell.")
     reconnects: int
+    gains: dict[str, float] = Field(
+        description="Of red, green and blue: a picture's light is multiplied by them first."
+    )
     calibrated: bool = Field(description="Whether focal length and distortion are known, not assumed.")
     sees: str = Field(description="hand, no hand, or nothing yet.")
     problem: str = Field(description="Why the last picture was unusable; empty where it was not.")
-    findings: list[str] = Field(description="What is wrong with the view now.")
-    findings_counted: dict[str, int] = Field(description="Pictures in which each was found.")
+    findings: dict[str, str] = Field(
+        description="What is wrong with the view now: sentences by kind, such as `two hands`. While there is "
+        "any, no rotation is accepted."
+    )
+    findings_counted: dict[str, int] = Field(
+        description="Pictures in which each kind was found; five a second are checked."
+    )
     pose_rate_hz: float
     latency_ms: Percentiles | None = Field(
         description="From the picture's stamp to publication, last 300 poses. A camera stamps a picture when "

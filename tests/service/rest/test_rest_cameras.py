@@ -57,13 +57,16 @@ def test_a_camera_from_its_start_to_its_end(client: RestClient, settings: Settin
         assert len(health["rotations"]) == 20
         chosen = client.put("/cameras/right/stage", {"stage": "nearest"})
         assert chosen["health"]["stage"] == "nearest"
+        balanced = client.post("/cameras/right/balance")
+        assert set(balanced["health"]["gains"]) == {"red", "green", "blue"}
         with pytest.raises(Refused, match="stage"):
             client.put("/cameras/right/stage", {"stage": "best"})
         picture = client.download("/cameras/right/picture", {"layers": "model", "width": 64})
         assert picture.startswith(b"\xff\xd8\xff")
         ended = client.post("/cameras/right/stop")
         assert ended["state"] == "stopped"
-        assert "stopped" in ended["sentence"]
+        assert ended["sentence"].startswith("run ")
+        assert ended["sentence"].endswith("; stopped")
         assert client.get("/cameras/right")["health"] is None
         with pytest.raises(Refused, match="no camera of glove right answers"):
             client.download("/cameras/right/picture")

@@ -66,6 +66,7 @@ ROUTES = [
     ("GET", "/cameras/{}"),
     ("POST", "/cameras/{}/stop"),
     ("PUT", "/cameras/{}/stage"),
+    ("POST", "/cameras/{}/balance"),
     ("GET", "/cameras/{}/picture"),
     ("GET", "/jobs/{}"),
     ("GET", "/jobs/{}/events"),

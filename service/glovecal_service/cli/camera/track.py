@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from glovecal_service.cli.glove.capture import GloveOption
+from glovecal_service.cli.terminal import connection
 from glovecal_service.cli.terminal.options import DEFAULT_ZENOH, Site, Zenoh, subject_named
 from glovecal_service.cli.terminal.printing import out
 
@@ -54,13 +55,18 @@ def track(
     ] = Kept.labels,
     colours: Annotated[
         Path | None,
-        typer.Option(help="Colour table of this glove and light, as glovecal camera calibrate makes it."),
+        typer.Option(help="Colour table of this glove and light. Default: learned on rendered photographs."),
     ] = None,
     calibration: Annotated[
         Path | None, typer.Option(help="The camera, as glovecal camera calibrate makes it.")
     ] = None,
-    subject: Annotated[str | None, typer.Option(help="Who wears it.", callback=subject_named)] = None,
-    hand: Annotated[Hand, typer.Option(help="The hand that wears it.")] = Hand.right,
+    subject: Annotated[
+        str | None,
+        typer.Option(help="Who wears it: with the sizes that were measured.", callback=subject_named),
+    ] = None,
+    hand: Annotated[
+        Hand | None, typer.Option(help="The hand that wears it. Default: the subject's, else the right one.")
+    ] = None,
     entries: Annotated[
         int, typer.Option(min=300, max=1_000_000, help="Of the pose database; the paper has 100,000.")
     ] = 20_000,
@@ -82,12 +88,22 @@ def track(
     from glovecal_service.camera.camera_settings import CameraSettings
     from glovecal_service.camera.process import run_camera
 
+    sizes_mm, own_hand = _worn_by(subject)
     settings = CameraSettings(
-        source, glove, data, site, connect, subject, hand.value, stage.value, keep.value, colours,
-        calibration, entries, clips,
+        source, glove, data, site, connect, subject, own_hand if hand is None else hand.value, stage.value,
+        keep.value, colours, calibration, entries=entries, clips=clips, sizes_mm=sizes_mm,
     )  # fmt: skip
     stop = threading.Event()
     with stopped_by_signals(stop):
         summary = run_camera(settings, stop)
     sys.stderr.flush()
     out.print(str(summary))
+
+
+def _worn_by(subject: str | None) -> tuple[dict[str, float], str]:
+    """What was measured of the subject's hand, mm, and which hand it is."""
+    if subject is None:
+        return {}, Hand.right.value
+    with connection.connect() as client:
+        known = client.get(f"/subjects/{subject}")
+    return known["dimensions"], known["hand"]

@@ -22,13 +22,20 @@ router = APIRouter(prefix="/cameras", tags=["cameras"])
 Source = Annotated[str, Field(pattern=r"^(camera:[0-9]{1,2}|rendered)$")]
 
 
+BALANCED_WITHIN_S = 60.0
+
+
 class NewCamera(StrictBody):
     glove: Identifier
     source: Source = Field(description="camera:0 is the first; rendered draws a moving glove, to try.")
     stage: Stage = "dense"
     keep: Kept = Field("labels", description="pictures: as they came (FFV1); labels: of those tracked.")
-    hand: Literal["right", "left"] = "right"
-    subject: SubjectName | None = None
+    subject: SubjectName | None = Field(
+        None, description="Whose hand it is: with its sizes where they were measured."
+    )
+    hand: Literal["right", "left"] | None = Field(
+        None, description="Null: the subject's, else the right one."
+    )
     entries: Annotated[int, Field(ge=300, le=1_000_000)] = Field(20_000, description="Of the pose database.")
     clips: Annotated[int, Field(ge=3, le=1000)] = Field(
         36, description="Rendered, from which the stated deviations are learned."
@@ -49,9 +56,11 @@ def start_camera(body: NewCamera, parts: PartsNeeded) -> CameraView:
     known = _cameras(parts)
     if body.glove in known and known[body.glove].state != "stopped":
         raise Conflict(f"a camera publishes glove {body.glove} already; stop it first")
+    worn_by = None if body.subject is None else parts.store.subjects.get(body.subject)
     asked = CameraSettings(
-        body.source, body.glove, settings.data, settings.site, settings.zenoh, body.subject, body.hand,
-        body.stage, body.keep, entries=body.entries, clips=body.clips,
+        body.source, body.glove, settings.data, settings.site, settings.zenoh, body.subject,
+        body.hand or ("right" if worn_by is None else worn_by.hand), body.stage, body.keep,
+        entries=body.entries, clips=body.clips, sizes_mm={} if worn_by is None else worn_by.dimensions,
     )  # fmt: skip
     return silent(parts.cameras.started.start(asked))
 
@@ -85,6 +94,20 @@ def choose_stage(glove: NameInPath, body: NewStage, parts: PartsNeeded) -> Camer
     """From the next picture on. 409 while the camera is not ready."""
     _camera(parts, glove)
     _command(parts, glove, "stage", body.stage)
+    return _camera(parts, glove)
+
+
+@router.post(
+    "/{glove}/balance",
+    response_model=CameraView,
+    summary="Balance the colours",
+    responses=change_problems(409),
+)
+def balance_colours(glove: NameInPath, parts: PartsNeeded) -> CameraView:
+    """Gains of red and blue are searched for with which the last pictures come nearest to the database: for
+    light that the colours were not learned in. A hand in the glove has to be in view. 409 where it is not."""
+    _camera(parts, glove)
+    _command(parts, glove, "balance", "", timeout_s=BALANCED_WITHIN_S)
     return _camera(parts, glove)
 
 
@@ -144,10 +167,10 @@ def _camera(parts: Parts, glove: str) -> CameraView:
     return found
 
 
-def _command(parts: Parts, glove: str, name: str, argument: str) -> None:
+def _command(parts: Parts, glove: str, name: str, argument: str, *, timeout_s: float = 2.0) -> None:
     key = GloveKeys(parts.settings.site, glove).control
     try:
-        parts.cameras.ask(f"{key}?do={name};with={argument}")
+        parts.cameras.ask(f"{key}?do={name};with={argument}", timeout_s=timeout_s)
     except QueryRefused as refused:
         raise Conflict(str(refused).partition(": ")[2]) from refused
     except NoAnswer as error:

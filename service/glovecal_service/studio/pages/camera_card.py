@@ -102,6 +102,9 @@ class CameraCard:
         with ui.element("div").classes("camera-parts"):
             with ui.element("div").classes("camera-left"):
                 self._view = CameraView(self._glove)
+                ui.button("Balance colours", on_click=self._balance).props("outline no-caps").classes(
+                    "studio-target"
+                ).tooltip("For light in which the colours are told badly; hold the hand in view")
                 heading(3, "Stage")
                 with (
                     ui.element("div")
@@ -137,6 +140,12 @@ class CameraCard:
         except Refusal as refusal:
             ui.notify(str(refusal), type="warning")
 
+    async def _balance(self) -> None:
+        try:
+            self.show(await self._studio.service.post(f"/cameras/{quote(self._glove)}/balance"))
+        except Refusal as refusal:
+            ui.notify(str(refusal), type="warning")
+
     async def _end(self) -> None:
         try:
             self.show(await self._studio.service.post(f"/cameras/{quote(self._glove)}/stop"))
@@ -146,9 +155,11 @@ class CameraCard:
     def _show_findings(self, health: Mapping[str, Any] | None) -> None:
         """What is wrong with the view now, and what was, with the number of pictures."""
         counted = {} if health is None else health["findings_counted"]
-        now = [] if health is None else health["findings"]
-        told = [f"{as_sentence(each)[:-1]}, in {count} pictures{'; now' if each in now else ''}."
-                for each, count in counted.items()]  # fmt: skip
+        now = {} if health is None else health["findings"]
+        told = [
+            f"{as_sentence(kind)[:-1]}: {'now; ' if kind in now else ''}in {count} of the pictures checked."
+            for kind, count in counted.items()
+        ]
         if told == getattr(self, "_told", []):
             return
         self._told = told
@@ -203,7 +214,7 @@ def state_word(camera: Mapping[str, Any]) -> str:
     health = camera["health"]
     if camera["state"] != "streaming" or health is None:
         return "opening" if camera["state"] == "streaming" else camera["state"]
-    if health["problem"]:
+    if health["problem"] or (health["findings"] and health["sees"] == "hand"):
         return "check"
     return {"hand": "tracking", "no hand": "no hand"}.get(health["sees"], "opening")
 
