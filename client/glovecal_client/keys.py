@@ -8,7 +8,7 @@ from glovecal_client.errors import BadName
 from glovecal_client.names import check_identifier
 
 ROOT = "glovecal"
-PLANES = ("raw", "pose", "pose/meta", "pose/explain", "status", "meta", "alive", "log", "control")
+PLANES = ("raw", "pose", "pose/meta", "pose/explain", "status", "meta", "alive", "log", "control", "picture")
 _RESERVED_GLOVES = frozenset({"service"})
 JSON_ENCODING = "application/json"
 
@@ -73,6 +73,11 @@ class GloveKeys:
     def control(self) -> str:
         """Queryable: what a glove can be asked beside its stream."""
         return self._key("control")
+
+    @property
+    def picture(self) -> str:
+        """Queryable by a camera: the newest picture with what was found in it."""
+        return self._key("picture")
 
 
 def all_gloves(site: str, plane: str) -> str:

@@ -18,6 +18,11 @@ from glovecal_client.pictures.video_file import VideoFilePictures, VideoWriter, 
 pytest.importorskip("cv2")
 
 
+def read_to_the_end(source: VideoFilePictures) -> None:
+    while True:
+        source.read()
+
+
 def test_a_video_gives_back_every_pixel_and_stamp(tmp_path: Path) -> None:
     random = np.random.default_rng(0)
     pictures = [
@@ -91,3 +96,19 @@ def test_a_camera_that_is_not_there_is_said() -> None:
     camera = build_source("camera:63")
     with pytest.raises(DeviceLost, match="camera:63 cannot be opened"):
         camera.open()
+
+
+def test_a_video_that_ends_in_the_middle_says_how_much_there_is_and_that_it_was_drawn(tmp_path: Path) -> None:
+    with VideoRecording(RenderedPictures(rate_hz=100.0), tmp_path / "a.mkv") as video:
+        about = json.loads((tmp_path / "a.json").read_text())
+        assert about["simulated"] is True
+        assert "not ended" in about["problem"]
+        time.sleep(0.5)
+    content = (tmp_path / "a.mkv").read_bytes()
+    (tmp_path / "a.mkv").write_bytes(content[: len(content) * 2 // 3])
+    source = VideoFilePictures(tmp_path / "a.mkv")
+    source.open()
+    assert source.simulated
+    with pytest.raises(DeviceFinished, match=rf"ends in the middle: \d+ of {video.pictures} pictures"):
+        read_to_the_end(source)
+    source.close()

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self  # the client runs on Python 3.10
 
 STOPS_WITHIN_S = 10.0
+NOT_ENDED = "the recording was not ended; its pictures up to then are there"
 
 
 class VideoRecording:
@@ -38,6 +39,7 @@ class VideoRecording:
         except BaseException:
             self._source.close()
             raise
+        describe_video(self._path, self._source, 0, NOT_ENDED)
         self._thread.start()
         return self
 
@@ -61,13 +63,7 @@ class VideoRecording:
     def describe(self, **facts: Any) -> Path:
         """End it and write ``NAME.json`` beside it: what it is of, whose clock its stamps are; its path."""
         self.stop()
-        path = self._path.with_suffix(".json")
-        document = {
-            "video": self._path.name, "source": self._source.name, "simulated": self._source.simulated,
-            "pictures": self.pictures, "computer": computer_id(), "problem": self.problem, **facts,
-        }  # fmt: skip
-        path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
-        return path
+        return describe_video(self._path, self._source, self.pictures, self.problem, **facts)
 
     def _run(self) -> None:
         assert self._writer is not None
@@ -76,3 +72,15 @@ class VideoRecording:
                 self._writer.write(self._source.read())
         except (ClientError, OSError) as error:
             self.problem = str(error)
+
+
+def describe_video(video: Path, source: PictureSource, pictures: int, problem: str, **facts: Any) -> Path:
+    """Write ``NAME.json`` beside ``NAME.mkv``; its path. First when the video begins: a killed one says too
+    that it was drawn."""
+    path = video.with_suffix(".json")
+    document = {
+        "video": video.name, "source": source.name, "simulated": source.simulated,
+        "pictures": pictures, "computer": computer_id(), "problem": problem, **facts,
+    }  # fmt: skip
+    path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    return path

@@ -1,12 +1,13 @@
 """Videos on disk: every pixel as it came (FFV1 in Matroska), and beside it a table of time stamps.
 
 ``NAME.mkv`` and ``NAME.times.csv`` (``picture``, ``monotonic_ns``, ``wall_ns``): a container's own stamps are
-rounded, and say nothing of the computer's clock.
+rounded, and say nothing of the computer's clock. ``NAME.json`` says what it is of.
 """
 
 from __future__ import annotations
 
 import csv
+import json
 from pathlib import Path
 from typing import Any
 
@@ -75,10 +76,11 @@ class VideoWriter:
 class VideoFilePictures:
     """A video that was written here, with its stamps; one without a table has none and is refused."""
 
-    simulated = False
-
     def __init__(self, path: Path) -> None:
         self.name, self._path = f"video:{path}", path
+        self.about: dict[str, Any] = {}
+        """What was said of it when it was recorded; empty where nothing is."""
+        self.simulated = False
         self.rate_hz = 30.0
         self._cv2 = opencv()
         self._video: Any = None
@@ -87,6 +89,8 @@ class VideoFilePictures:
     def open(self) -> None:
         self.close()
         self._stamps = read_times(self._path)
+        self.about = read_about(self._path)
+        self.simulated = self.about.get("simulated") is True
         if len(self._stamps) > 1:
             span_s = (self._stamps[-1][0] - self._stamps[0][0]) / 1e9
             self.rate_hz = (len(self._stamps) - 1) / max(span_s, 1e-3)
@@ -99,6 +103,10 @@ class VideoFilePictures:
         if self._video is None:
             raise DeviceLost(f"{self.name} is not open")
         is_there, pixels = self._video.read()
+        if not is_there and self._number < len(self._stamps):
+            raise DeviceFinished(
+                f"{self.name} ends in the middle: {self._number} of {len(self._stamps)} pictures can be read"
+            )
         if not is_there or self._number >= len(self._stamps):
             raise DeviceFinished(f"{self.name} is over after {self._number} pictures")
         monotonic_ns, wall_ns = self._stamps[self._number]
@@ -124,3 +132,12 @@ def read_times(video: Path) -> list[tuple[int, int]]:
         raise DeviceLost(
             f"{path} must have the columns {', '.join(COLUMNS)}, whole nanoseconds ({error})"
         ) from error
+
+
+def read_about(video: Path) -> dict[str, Any]:
+    """What ``NAME.json`` says; empty where it is missing or says nothing."""
+    try:
+        about = json.loads(video.with_suffix(".json").read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return about if isinstance(about, dict) else {}

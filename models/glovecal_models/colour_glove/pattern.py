@@ -8,12 +8,13 @@ patches of one colour are farthest apart (ours): then a colour's two places are 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
 
-from glovecal_models.colour_glove.skin import HandSkin
+from glovecal_models.colour_glove.skin import HandSkin, hand_skin
 from glovecal_models.errors import BadInput
 
 PATCHES, COLOURS = 20, 10
@@ -64,6 +65,15 @@ def glove_pattern(
     best = max((rng.permutation(dealt) for _ in range(draws)), key=lambda drawn: _closest(between, drawn))
     patch = (np.argmin(distance.distances, axis=0) + 1).astype(np.uint8)
     return Pattern(patch, best.astype(np.uint8), between)
+
+
+@cache
+def printed_pattern() -> Pattern:
+    """The pattern that is printed: the assumed hand's, on the same triangles of every hand, right or left.
+
+    A pattern drawn anew for other bones would have its borders elsewhere, up to 20 mm.
+    """
+    return glove_pattern(hand_skin())
 
 
 @dataclass(frozen=True)

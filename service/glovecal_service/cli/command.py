@@ -16,6 +16,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from glovecal_service.cli import demo, serve
+from glovecal_service.cli.camera import cameras
 from glovecal_service.cli.effect import catalogue, changes, detectability, diagnosis, improvement
 from glovecal_service.cli.glove import (
     capture,
@@ -57,6 +58,7 @@ app.command("watch")(watch.watch)
 app.command("doctor")(doctor.doctor)
 app.command("record")(recordings.record)
 app.command("shapes")(shapes.shapes)
+app.add_typer(cameras.app, name="camera")
 app.add_typer(samplings.app, name="sample")
 app.add_typer(subjects.app, name="subject")
 app.add_typer(layouts.app, name="glove")

@@ -127,7 +127,8 @@ class ModelWatcher:
         except (BadInput, StoreDamaged) as error:
             _log.warning("glove %s: its meta cannot be used: %s", glove, error)
         self._unnoted.discard(glove)
-        self._to_choose.add(glove)
+        if (self._metas.of(glove) or {}).get("makes_poses") is not True:  # a camera says itself what they are
+            self._to_choose.add(glove)
 
     def _choose(self, store: Store, glove: str) -> None:
         try:

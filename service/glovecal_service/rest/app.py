@@ -20,7 +20,7 @@ from glovecal_service.rest.effect import (
     picture,
     trial,
 )
-from glovecal_service.rest.glove import commands, films, layouts, live, recordings
+from glovecal_service.rest.glove import cameras, commands, films, layouts, live, recordings
 from glovecal_service.rest.http import front, health
 from glovecal_service.rest.http.answers import install_openapi
 from glovecal_service.rest.http.body_guard import BodyGuard
@@ -70,7 +70,7 @@ JSON_LIMIT_BYTES = 8_000_000
 """Enough for 20,000 frames of 18 sensors to predict."""
 BODY_PATIENCE_S = 30.0
 ROUTERS = (
-    *(subjects, usual_hand, layouts, live, commands, recordings, films, samplings),
+    *(subjects, usual_hand, layouts, live, commands, recordings, films, cameras, samplings),
     *(
         clocks,
         hands,
@@ -138,6 +138,7 @@ def create_app(
             yield
         finally:
             await run_in_threadpool(app.state.parts.filming.close)
+            await run_in_threadpool(app.state.parts.cameras.close)
             await run_in_threadpool(dispatcher.stop)
             if store is None:
                 opened.close()

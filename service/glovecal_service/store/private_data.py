@@ -8,7 +8,9 @@ from pathlib import Path
 
 from glovecal_client.private_files import make_private
 
-FOLDERS = frozenset({"artifacts", "capture", "films", "fits", "owners", "recordings", "uploads", "videos"})
+FOLDERS = frozenset(
+    {"artifacts", "cameras", "capture", "films", "fits", "owners", "recordings", "uploads", "videos"}
+)
 _log = logging.getLogger("glovecal.store")
 
 

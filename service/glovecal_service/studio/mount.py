@@ -25,7 +25,7 @@ from glovecal_client.errors import ClientError
 from glovecal_service.settings import Settings
 from glovecal_service.studio.live_feed import GloveFeed, LiveFeeds
 from glovecal_service.studio.page_policy import PagePolicy
-from glovecal_service.studio.pages import capture, compare, diagnose, effects, fall, live, models
+from glovecal_service.studio.pages import cameras, capture, compare, diagnose, effects, fall, live, models
 from glovecal_service.studio.service import Service
 from glovecal_service.studio.studio import Studio
 
@@ -33,7 +33,7 @@ _log = logging.getLogger("glovecal.studio")
 
 PATH = "/studio"
 FRAME_S = 1.0 / 30.0
-PAGES = (live, capture, compare, diagnose, fall, models, effects)
+PAGES = (live, capture, cameras, compare, diagnose, fall, models, effects)
 
 
 def mount_studio(app: FastAPI, settings: Settings) -> None:

@@ -14,6 +14,7 @@ from glovecal_service.studio.studio import Studio
 NAVIGATION = (
     ("live", "Live"),
     ("capture", "Capture"),
+    ("cameras", "Cameras"),
     ("compare", "Compare"),
     ("diagnose", "Diagnose"),
     ("fall", "Error fall"),

@@ -10,6 +10,7 @@ pytestmark = pytest.mark.needs_chromium
 PAGES = {
     "live": "Live",
     "capture": "Capture",
+    "cameras": "Cameras",
     "compare": "Compare",
     "diagnose": "Diagnose",
     "fall": "Error fall",

@@ -73,7 +73,8 @@ class ColourTable:
             own = points[label == colour]
             if len(own) < _LEAST_OF_A_COLOUR:
                 raise BadInput(
-                    f"{len(own)} pixels of colour {colour} in the labelled pictures; at least {_LEAST_OF_A_COLOUR}"
+                    f"{len(own)} pixels of colour {colour} in the labelled pictures; "
+                    f"at least {_LEAST_OF_A_COLOUR} are needed"
                 )
             own = own[rng.permutation(len(own))[:_MOST_PIXELS]]
             mixture = _Mixture.fitted(own, COMPONENTS if colour else BACKGROUND_COMPONENTS, rng)

@@ -9,8 +9,8 @@ from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.codes.pca import pca_code
 from glovecal_models.colour_glove.database import ENTRIES, DatabaseSettings, pose_database
 from glovecal_models.colour_glove.lookup import PoseLookup
-from glovecal_models.colour_glove.pattern import Pattern, glove_pattern
-from glovecal_models.colour_glove.pose.error_learning import learned_errors
+from glovecal_models.colour_glove.pattern import Pattern, printed_pattern
+from glovecal_models.colour_glove.pose.error_learning import CLIPS, learned_errors
 from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.pose_set import PAPER_COUNT, generated_poses
@@ -25,6 +25,7 @@ def prepared_tracker(
     skin: HandSkin | None = None,
     pattern: Pattern | None = None,
     entries: int = ENTRIES,
+    clips: int = CLIPS,
     stage: str = "dense",
     follows: bool = True,
     workers: int | None = None,
@@ -32,19 +33,25 @@ def prepared_tracker(
     cancelled: Cancel | None = None,
 ) -> HandTracker:
     """``skin``: the hand to be seen; without one the assumed right hand. ``pattern``: what its glove shows;
-    without one our own.
+    without one what ``glovecal camera sheets`` prints.
 
     The database takes about half a minute on two cores, what is learned of its errors a minute; afterwards
     both are read. Raises BadInput, Cancelled.
     """
     skin = hand_skin() if skin is None else skin
-    pattern = glove_pattern(skin) if pattern is None else pattern
+    pattern = printed_pattern() if pattern is None else pattern
     database = pose_database(
         skin, pattern, generated_poses(PAPER_COUNT), folder, DatabaseSettings(entries=entries),
         workers=workers, report=part(report, 0.0, 0.3), cancelled=cancelled,
     )  # fmt: skip
     hand, lookup = PrintedHand(skin, pattern), PoseLookup(database, pca_code(database.transforms))
     errors = learned_errors(
-        hand, lookup, cameras, workers=workers, report=part(report, 0.3, 1.0), cancelled=cancelled
+        hand,
+        lookup,
+        cameras,
+        clips=clips,
+        workers=workers,
+        report=part(report, 0.3, 1.0),
+        cancelled=cancelled,
     )
     return HandTracker(hand, lookup, cameras, errors, stage=stage, follows=follows)

@@ -62,7 +62,7 @@ def add(
     hand: Hand = None,
 ) -> None:
     """Add a subject; with hand sizes, errors are also given in mm."""
-    measured = _measured_dimensions(hand_length_mm, dimensions)
+    measured = measured_dimensions(hand_length_mm, dimensions)
     body = {"name": name, "title": title, "dimensions": measured, "hand": hand or "right"}
     with connect() as service:
         service.post("/subjects", body)
@@ -79,7 +79,7 @@ def measure(
     """Set the measured sizes of a subject's hand; earlier ones are replaced."""
     if hand_length_mm is None and dimensions is None:
         raise typer.BadParameter("give --hand-length-mm or --dimensions")
-    measured = _measured_dimensions(hand_length_mm, dimensions)
+    measured = measured_dimensions(hand_length_mm, dimensions)
     with connect() as service:
         hand = hand or service.get(f"/subjects/{name}")["hand"]
         service.put(f"/subjects/{name}/hand", {"dimensions": measured, "hand": hand})
@@ -193,7 +193,7 @@ def _remove_takes(service: RestClient, subject: str) -> None:
         out.print(f"Removed take {row['name']} ({row['id']}).")
 
 
-def _measured_dimensions(length_mm: float | None, file: Path | None) -> dict[str, float]:
+def measured_dimensions(length_mm: float | None, file: Path | None) -> dict[str, float]:
     """What was measured, in mm; the length given by itself counts. Raises Refusal that names the file."""
     try:
         measured = {} if file is None else tomllib.loads(file.read_text(encoding="utf-8"))

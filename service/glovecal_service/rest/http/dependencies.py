@@ -14,6 +14,7 @@ from fastapi import Depends, Request
 from glovecal_models.calibration import artifact
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
+from glovecal_service.camera.camera_access import CameraAccess
 from glovecal_service.filming import Filming
 from glovecal_service.rest.http.metrics import Metrics
 from glovecal_service.rest.http.upload_folder import UploadFolder
@@ -68,6 +69,10 @@ class Parts:
     @cached_property
     def filming(self) -> Filming:
         return Filming(self.settings.films_folder)
+
+    @cached_property
+    def cameras(self) -> CameraAccess:
+        return CameraAccess(self.settings.zenoh)
 
     @property
     def videos(self) -> Videos:

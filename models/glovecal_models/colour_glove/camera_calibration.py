@@ -1,0 +1,216 @@
+"""A camera from pictures of the calibration board: focal length, centre, lens distortion; where others stand.
+
+Z. Zhang 2000, "A flexible new technique for camera calibration", IEEE PAMI 22(11), 1330-1334, as OpenCV
+does it, with Brown's distortion. Standard deviations are those that the spread of the corners' errors
+implies. Another camera's place comes from moments in which both saw the board; its deviation is found by
+leaving each moment out once (the jackknife).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from glovecal_models.colour_glove.board_views import BoardView
+from glovecal_models.colour_glove.camera_model import Camera
+from glovecal_models.colour_glove.sheets.calibration_board import CalibrationBoard
+from glovecal_models.errors import BadInput
+
+FEWEST_VIEWS, GOOD_VIEWS = 8, 20
+FEWEST_SHARED_VIEWS, FEWEST_SHARED_CORNERS = 5, 6
+LEAST_SURE_FOCAL = 0.01
+"""Standard deviation of the focal length over the focal length; above, the views do not fix it."""
+WORST_RMS_PX = 2.0
+FEWEST_TILTED, TILTED_DEPTH = 4, 0.08
+"""Views whose board reaches away by this share of its distance. Without such the focal length is anything,
+and its standard deviation does not show it."""
+
+
+@dataclass(frozen=True)
+class CameraCalibration:
+    """A camera and how well it is known."""
+
+    camera: Camera
+    rms_px: float
+    """Of the corners, between picture and camera."""
+    focal_sd_px: tuple[float, float]
+    centre_sd_px: tuple[float, float]
+    distortion_sd: tuple[float, ...]
+    view_rms_px: tuple[tuple[str, float], ...]
+    """Of each view by name, worst first."""
+    covered: float
+    """Share of the picture inside the convex hull of all corners: outside, distortion is extrapolated."""
+
+
+@dataclass(frozen=True)
+class CameraPlacement:
+    """A camera with its pose relative to the first one."""
+
+    camera: Camera
+    rms_px: float
+    turn_sd_deg: float
+    place_sd_mm: float
+    views: int
+    """That both cameras saw."""
+
+
+def calibrate_camera(views: Sequence[BoardView], board: CalibrationBoard) -> CameraCalibration:
+    """From about ``GOOD_VIEWS`` views, tilted and all over the picture. The camera stands at the origin.
+
+    Raises BadInput, which says what to do, for too few views, views of several sizes, and views that leave
+    the focal length open.
+    """
+    if len(views) < FEWEST_VIEWS:
+        raise BadInput(
+            f"{len(views)} good views of the board; at least {FEWEST_VIEWS} are needed, {GOOD_VIEWS} are good"
+        )
+    size = views[0].size
+    for view in views:
+        if view.size != size:
+            raise BadInput(
+                f"{view.name} has {view.size[0]} x {view.size[1]} pixels, {views[0].name} "
+                f"{size[0]} x {size[1]}; a camera is calibrated at one size"
+            )
+    tilted = sum(_depth_share(view, board) > TILTED_DEPTH for view in views)
+    if tilted < FEWEST_TILTED:
+        raise BadInput(
+            f"the board is tilted in {tilted} of {len(views)} views, at least {FEWEST_TILTED} are "
+            f"needed. {_TILT}"
+        )
+    solid = [_solid(board, view.ids) for view in views]
+    flat = [view.corners_px.astype(np.float32).reshape(-1, 1, 2) for view in views]
+    start = np.array(
+        [[size[0], 0, (size[0] - 1) / 2], [0, size[0], (size[1] - 1) / 2], [0, 0, 1]], dtype=float
+    )
+    try:
+        rms, matrix, distortion, _, _, deviations, _, of_view = cv2.calibrateCameraExtended(
+            solid, flat, size, start, np.zeros(5), flags=cv2.CALIB_USE_INTRINSIC_GUESS
+        )
+    except cv2.error as error:
+        raise BadInput(f"these views make no camera ({error.err}). {_TILT}") from error
+    deviation = np.ravel(deviations)[:9]
+    focal = (float(matrix[0, 0]), float(matrix[1, 1]))
+    unsure = float(np.max(deviation[:2] / focal)) if np.isfinite(deviation).all() else float("inf")
+    if not unsure < LEAST_SURE_FOCAL:
+        raise BadInput(
+            f"these views leave the focal length open by {unsure:.1%} (standard deviation; at most "
+            f"{LEAST_SURE_FOCAL:.0%}). {_TILT}"
+        )
+    order = np.argsort(-np.ravel(of_view))
+    worst = views[int(order[0])].name
+    if rms > WORST_RMS_PX:
+        raise BadInput(
+            f"corners are off by {rms:.1f} pixels (RMS; at most {WORST_RMS_PX:g}), most in {worst}. Is the "
+            "board flat, and was neither zoom nor focus changed between pictures?"
+        )
+    camera = Camera(
+        width=size[0],
+        height=size[1],
+        focal_px=focal,
+        centre_px=(float(matrix[0, 2]), float(matrix[1, 2])),
+        distortion=_five(np.ravel(distortion)),
+    )
+    hull = cv2.convexHull(np.concatenate(flat))
+    return CameraCalibration(
+        camera,
+        float(rms),
+        (float(deviation[0]), float(deviation[1])),
+        (float(deviation[2]), float(deviation[3])),
+        _five(deviation[4:]),
+        tuple((views[index].name, float(np.ravel(of_view)[index])) for index in order),
+        float(cv2.contourArea(hull) / (size[0] * size[1])),
+    )
+
+
+def place_camera(
+    first: Camera,
+    first_views: Sequence[BoardView],
+    other: Camera,
+    other_views: Sequence[BoardView],
+    board: CalibrationBoard,
+) -> CameraPlacement:
+    """Where ``other`` stands, from views of the same name that both cameras took at one moment.
+
+    Both lenses are taken as they are: deviations of turn and place leave out that they may be wrong.
+
+    Raises BadInput when too few moments show the board to both.
+    """
+    by_name = {view.name: view for view in other_views}
+    pairs = []
+    for view in first_views:
+        if view.name in by_name:
+            its = by_name[view.name]
+            ids, mine, theirs = np.intersect1d(view.ids, its.ids, return_indices=True)
+            if len(ids) >= FEWEST_SHARED_CORNERS:
+                points = (view.corners_px[mine], its.corners_px[theirs])
+                pairs.append((_solid(board, ids), *(p.astype(np.float32).reshape(-1, 1, 2) for p in points)))
+    if len(pairs) < FEWEST_SHARED_VIEWS:
+        raise BadInput(
+            f"both cameras saw the board in {len(pairs)} pictures of the same name; at least "
+            f"{FEWEST_SHARED_VIEWS} are needed. Hold the board where both see it, facing between them"
+        )
+    rms, rotation, translation = _placed(pairs, first, other)
+    left_out = [_placed([*pairs[:k], *pairs[k + 1 :]], first, other)[1:] for k in range(len(pairs))]
+    turns = np.array([np.ravel(cv2.Rodrigues(turn @ rotation.T)[0]) for turn, _ in left_out])
+    places = np.array([place for _, place in left_out])
+    camera = replace(
+        other,
+        rotation=tuple(tuple(float(value) for value in row) for row in rotation),
+        translation_mm=(float(translation[0]), float(translation[1]), float(translation[2])),
+    )
+    turn_sd = float(np.degrees(_jackknife_sd(turns)))
+    return CameraPlacement(camera, rms, turn_sd, _jackknife_sd(places), len(pairs))
+
+
+_TILT = (
+    "Tilt the board by 20 to 45 degrees to all four sides, and bring it near enough to fill a third "
+    "of the picture"
+)
+
+
+def _placed(
+    pairs: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], first: Camera, other: Camera
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """RMS in pixels, rotation (3, 3) and translation (3,) of ``other`` from ``first``."""
+    solid, mine, theirs = (list(each) for each in zip(*pairs, strict=True))
+    rms, _, _, _, _, rotation, translation, _, _ = cv2.stereoCalibrate(
+        solid, mine, theirs, _matrix(first), np.array(first.distortion), _matrix(other),
+        np.array(other.distortion), (first.width, first.height), flags=cv2.CALIB_FIX_INTRINSIC,
+    )  # fmt: skip
+    left, _, right = np.linalg.svd(rotation)
+    return float(rms), left @ right, np.ravel(translation)
+
+
+def _depth_share(view: BoardView, board: CalibrationBoard) -> float:
+    """How much farther the board's farthest corner is than its nearest, by the view's homography: the
+    camera need not be known."""
+    homography, _ = cv2.findHomography(_solid(board, view.ids)[:, :2], view.corners_px)
+    if homography is None:
+        return 0.0
+    width, height = board.size_mm
+    depth = homography[2] @ np.array([[0, width, width, 0], [0, 0, height, height], [1, 1, 1, 1]])
+    return float(depth.max() / depth.min() - 1) if depth.min() > 0 else 0.0
+
+
+def _jackknife_sd(values: np.ndarray) -> float:
+    """Of a vector (N, 3): length of its deviation."""
+    count = len(values)
+    return float(np.sqrt((count - 1) / count * ((values - values.mean(axis=0)) ** 2).sum()))
+
+
+def _matrix(camera: Camera) -> np.ndarray:
+    (fx, fy), (cu, cv) = camera.focal_px, camera.centre_px
+    return np.array([[fx, 0, cu], [0, fy, cv], [0, 0, 1]])
+
+
+def _solid(board: CalibrationBoard, ids: np.ndarray) -> np.ndarray:
+    points = np.asarray(board.opencv.getChessboardCorners(), dtype=np.float32).reshape(-1, 3)
+    return points[ids]
+
+
+def _five(values: np.ndarray) -> tuple[float, float, float, float, float]:
+    k1, k2, p1, p2, k3 = (float(value) for value in values[:5])
+    return k1, k2, p1, p2, k3

@@ -1,0 +1,62 @@
+"""A camera as a process of its own: ``python -m glovecal_service.camera.process SETTINGS``.
+
+A camera's driver may hang or crash, and then only this does. It goes on until its standard input ends, which
+is also when the program that started it dies.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from typing import TYPE_CHECKING
+
+from glovecal_client.capture.command import stopped_by_signals, tell
+from glovecal_client.errors import ClientError, DeviceError
+from glovecal_client.private_files import keep_private
+from glovecal_models.errors import GlovecalError
+from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_service.camera.camera_settings import CameraSettings
+
+if TYPE_CHECKING:
+    from glovecal_service.camera.camera_tracking import CameraSummary
+
+GIL_SWITCH_S = 0.0005
+"""Longest time that tracking keeps the thread waiting that stamps pictures."""
+
+
+def run_camera(settings: CameraSettings, stop: threading.Event) -> CameraSummary:
+    """Until ``stop`` is set or a file is over. Raises BadInput, DeviceError, CaptureRefused."""
+    try:
+        from glovecal_service.camera.camera_tracking import CameraTracking
+    except ModuleNotFoundError as error:
+        raise DeviceError(f"a camera needs {error.name}: pip install 'glovecal-service[camera]'") from error
+    keep_private()
+    pin_blas_to_one_thread()
+    sys.setswitchinterval(GIL_SWITCH_S)
+    return CameraTracking(settings, tell).run(stop)
+
+
+def main(text: str) -> int:
+    """0, or 1 with a sentence on standard error."""
+    stop = threading.Event()
+
+    def wait_for_the_end() -> None:
+        while os.read(0, 4096):  # not sys.stdin: its lock must be free when the process ends otherwise
+            pass
+        stop.set()
+
+    threading.Thread(target=wait_for_the_end, daemon=True).start()
+    try:
+        with stopped_by_signals(stop):
+            tell(str(run_camera(CameraSettings.from_text(text), stop)))
+    except (GlovecalError, ClientError, OSError) as error:
+        tell(str(error))
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    code = main(*sys.argv[1:])
+    sys.stderr.flush()
+    os._exit(code)  # all is closed; a driver's thread that hangs must not turn this into a crash

@@ -1,0 +1,1 @@
+"""A camera and the printed colour glove: ``glovecal camera``."""

@@ -1,0 +1,177 @@
+"""``cameras``: cameras before a colour glove, whose poses are published like any glove's."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Response
+from pydantic import Field
+
+from glovecal_client.errors import BadName, NoAnswer, QueryRefused
+from glovecal_client.keys import GloveKeys, all_gloves, parse_glove_key
+from glovecal_client.queries import json_object
+from glovecal_service.camera.camera_settings import CameraSettings
+from glovecal_service.rest.http.answers import change_problems, problems
+from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
+from glovecal_service.rest.http.request_types import Identifier, NameInPath, StrictBody, SubjectName
+from glovecal_service.store.errors import Conflict, NotFound
+from glovecal_service.views.cameras import CameraView, Kept, Stage, said_of_itself, silent
+
+router = APIRouter(prefix="/cameras", tags=["cameras"])
+
+Source = Annotated[str, Field(pattern=r"^(camera:[0-9]{1,2}|rendered)$")]
+
+
+BALANCED_WITHIN_S = 60.0
+
+
+class NewCamera(StrictBody):
+    glove: Identifier
+    source: Source = Field(description="camera:0 is the first; rendered draws a moving glove, to try.")
+    stage: Stage = "dense"
+    keep: Kept = Field("labels", description="pictures: as they came (FFV1); labels: of those tracked.")
+    subject: SubjectName | None = Field(
+        None, description="Whose hand it is: with its sizes where they were measured."
+    )
+    hand: Literal["right", "left"] | None = Field(
+        None, description="Null: the subject's, else the right one."
+    )
+    entries: Annotated[int, Field(ge=300, le=1_000_000)] = Field(20_000, description="Of the pose database.")
+    clips: Annotated[int, Field(ge=3, le=1000)] = Field(
+        36, description="Rendered, from which the stated deviations are learned."
+    )
+
+
+class NewStage(StrictBody):
+    stage: Stage
+
+
+@router.post(
+    "", status_code=201, response_model=CameraView, summary="Start a camera", responses=change_problems(409)
+)
+def start_camera(body: NewCamera, parts: PartsNeeded) -> CameraView:
+    """Answers at once; ``state`` tells how far it is. The first time it builds the pose database, which takes
+    a minute or two. 409 where that glove is published already, or too many cameras are on."""
+    settings = parts.settings
+    known = _cameras(parts)
+    if body.glove in known and known[body.glove].state != "stopped":
+        raise Conflict(f"a camera publishes glove {body.glove} already; stop it first")
+    worn_by = None if body.subject is None else parts.store.subjects.get(body.subject)
+    asked = CameraSettings(
+        body.source, body.glove, settings.data, settings.site, settings.zenoh, body.subject,
+        body.hand or ("right" if worn_by is None else worn_by.hand), body.stage, body.keep,
+        entries=body.entries, clips=body.clips, sizes_mm={} if worn_by is None else worn_by.dimensions,
+    )  # fmt: skip
+    return silent(parts.cameras.started.start(asked))
+
+
+@router.get("", response_model=list[CameraView], summary="Cameras", responses=problems())
+def list_cameras(parts: PartsNeeded) -> list[CameraView]:
+    """Those that answer, wherever they were started, and those that this service started and that ended."""
+    return [view for _, view in sorted(_cameras(parts).items())]
+
+
+@router.get("/{glove}", response_model=CameraView, summary="One camera", responses=problems())
+def get_camera(glove: NameInPath, parts: PartsNeeded) -> CameraView:
+    return _camera(parts, glove)
+
+
+@router.post("/{glove}/stop", response_model=CameraView, summary="Stop a camera", responses=change_problems())
+def stop_camera(glove: NameInPath, parts: PartsNeeded) -> CameraView:
+    """Also one that was started on a command line."""
+    camera = _camera(parts, glove)
+    ended = parts.cameras.started.stop(glove)
+    if ended is not None:
+        return silent(ended)
+    _command(parts, glove, "stop", "")
+    return camera.model_copy(update={"state": "stopped", "sentence": "stopped", "health": None})
+
+
+@router.put(
+    "/{glove}/stage", response_model=CameraView, summary="Choose the stage", responses=change_problems(409)
+)
+def choose_stage(glove: NameInPath, body: NewStage, parts: PartsNeeded) -> CameraView:
+    """From the next picture on. 409 while the camera is not ready."""
+    _camera(parts, glove)
+    _command(parts, glove, "stage", body.stage)
+    return _camera(parts, glove)
+
+
+@router.post(
+    "/{glove}/balance",
+    response_model=CameraView,
+    summary="Balance the colours",
+    responses=change_problems(409),
+)
+def balance_colours(glove: NameInPath, parts: PartsNeeded) -> CameraView:
+    """Gains of red and blue are searched for with which the last pictures come nearest to the database: for
+    light that the colours were not learned in. A hand in the glove has to be in view. 409 where it is not."""
+    _camera(parts, glove)
+    _command(parts, glove, "balance", "", timeout_s=BALANCED_WITHIN_S)
+    return _camera(parts, glove)
+
+
+@router.get(
+    "/{glove}/picture",
+    summary="The newest picture",
+    responses=problems(409) | {200: {"content": {"image/jpeg": {}}}},
+    response_class=Response,
+)
+def get_picture(
+    glove: NameInPath,
+    parts: PartsNeeded,
+    layers: Annotated[
+        str,
+        Query(
+            pattern=r"^((picture|labels|model)(,(picture|labels|model)){0,2})?$",
+            description="picture, labels, model, with commas; empty: all.",
+        ),
+    ] = "",
+    width: Annotated[int, Query(ge=16, le=1920)] = 640,
+) -> Response:
+    """A JPEG of the picture tracked last, with its labels and the model that was found drawn over. What was
+    drawn, not seen by a camera, says so in the picture. 409 before the first."""
+    try:
+        key = GloveKeys(parts.settings.site, glove).picture
+        (sample, *_) = parts.cameras.ask(f"{key}?layers={layers};width={width}")
+    except QueryRefused as refused:
+        raise Conflict(str(refused).partition(": ")[2]) from refused
+    except (NoAnswer, BadName) as error:
+        raise NotFound(f"no camera of glove {glove} answers") from error
+    return Response(sample.payload.to_bytes(), media_type="image/jpeg", headers={"Cache-Control": "no-store"})
+
+
+def _cameras(parts: Parts) -> dict[str, CameraView]:
+    started = parts.cameras.started.states()
+    found = {glove: silent(camera) for glove, camera in started.items()}
+    try:
+        samples = parts.cameras.ask(all_gloves(parts.settings.site, "status"))
+    except NoAnswer:
+        return found
+    for sample in samples:
+        try:
+            glove = parse_glove_key(str(sample.key_expr))[0].glove
+        except BadName:
+            continue
+        status = json_object(sample.payload.to_bytes()) or {}
+        view = said_of_itself(glove, status, started_here=glove in started and started[glove].is_on)
+        if view is not None:
+            found[glove] = view
+    return found
+
+
+def _camera(parts: Parts, glove: str) -> CameraView:
+    found = _cameras(parts).get(glove)
+    if found is None:
+        raise NotFound(f"no camera of glove {glove}; start it: glovecal camera track SOURCE --glove {glove}")
+    return found
+
+
+def _command(parts: Parts, glove: str, name: str, argument: str, *, timeout_s: float = 2.0) -> None:
+    key = GloveKeys(parts.settings.site, glove).control
+    try:
+        parts.cameras.ask(f"{key}?do={name};with={argument}", timeout_s=timeout_s)
+    except QueryRefused as refused:
+        raise Conflict(str(refused).partition(": ")[2]) from refused
+    except NoAnswer as error:
+        raise NotFound(f"the camera of glove {glove} does not answer") from error

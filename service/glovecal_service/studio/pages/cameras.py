@@ -1,0 +1,96 @@
+"""Cameras: what a camera sees of the colour glove, what is made of it, and how sure that is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from nicegui import ui
+
+from glovecal_service.studio.heading import heading
+from glovecal_service.studio.pages.camera_card import STAGES, CameraCard
+from glovecal_service.studio.service import Refusal
+from glovecal_service.studio.shell import shell
+from glovecal_service.studio.studio import Studio
+
+EVERY_S = 0.5
+SOURCES = {
+    "camera:0": "Camera 0 of the service's computer",
+    "camera:1": "Camera 1",
+    "rendered": "A drawn glove (simulated)",
+}
+KEPT = {
+    "labels": "Labels of the pictures tracked (0.5 GB an hour, no face)",
+    "pictures": "Every picture as it came (tens of GB an hour)",
+    "nothing": "Nothing",
+}
+
+
+def add(studio: Studio) -> None:
+    """``/studio/cameras``."""
+
+    @ui.page("/cameras")
+    async def cameras() -> None:
+        with shell(studio, "cameras", "Cameras"):
+            ui.add_head_html('<link rel="stylesheet" href="/studio/static/compare.css">')
+            ui.add_head_html('<link rel="stylesheet" href="/studio/static/camera.css">')
+            await CamerasPage(studio).build()
+
+
+class CamerasPage:
+    """One open page; cameras come and go."""
+
+    def __init__(self, studio: Studio) -> None:
+        self._studio = studio
+        self._cards: dict[str, CameraCard] = {}
+
+    async def build(self) -> None:
+        self._notice = ui.label("").classes("studio-notice").props('role="status"')
+        self._cameras = ui.element("div").classes("cameras")
+        self._form()
+        await self._look()
+        ui.timer(EVERY_S, self._look)
+
+    def _form(self) -> None:
+        with ui.element("section").classes("card capture-form").props('aria-label="New camera"'):
+            heading(2, "Start a camera")
+            ui.label(
+                "A cloth glove with the printed pattern, and one camera: poses go out like any glove's. "
+                "The first start builds the pose database, a minute or two."
+            )
+            with ui.element("div").classes("capture-fields"):
+                self._source = ui.select(SOURCES, value="camera:0", label="Pictures of").classes("choice")
+                self._glove = ui.input("Name of the glove", value="colour-glove").classes("choice")
+                self._stage = ui.select(list(STAGES), value="dense", label="Stage").classes("choice")
+                self._keep = ui.select(KEPT, value="labels", label="Keep").classes("choice")
+            ui.button("Start", on_click=self._start).props("unelevated no-caps color=indigo-8").classes(
+                "studio-main-act"
+            )
+
+    async def _start(self) -> None:
+        body = {
+            "source": self._source.value, "glove": str(self._glove.value).strip(),
+            "stage": self._stage.value, "keep": self._keep.value,
+        }  # fmt: skip
+        try:
+            await self._studio.service.post("/cameras", body)
+        except Refusal as refusal:
+            ui.notify(str(refusal), type="warning", timeout=10_000)
+            return
+        await self._look()
+
+    async def _look(self) -> None:
+        try:
+            found: list[Mapping[str, Any]] = await self._studio.service.get("/cameras")
+        except Refusal as refusal:
+            self._notice.set_text(str(refusal))
+            return
+        self._notice.set_text("" if found else "No camera is on.")
+        here = {each["glove"]: each for each in found}
+        for gone in self._cards.keys() - here.keys():
+            self._cards.pop(gone).delete()
+        for glove, camera in here.items():
+            if glove not in self._cards:
+                with self._cameras:
+                    self._cards[glove] = CameraCard(self._studio, glove)
+            self._cards[glove].show(camera)

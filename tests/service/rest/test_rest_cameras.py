@@ -1,0 +1,85 @@
+"""Cameras over REST: started in processes of their own, listed wherever they were started, ended."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+pytest.importorskip("cv2")
+pytest.importorskip("numba")
+
+from camera_support import SMALL, ready_folder
+from realtime_support import eventually, free_endpoint
+
+from glovecal_client.keys import GloveKeys
+from glovecal_client.rest import Refused, RestClient
+from glovecal_client.session import open_router
+from glovecal_service.rest.in_process import in_process_client
+from glovecal_service.settings import Settings
+from glovecal_service.views.cameras import said_of_itself
+
+
+@pytest.fixture(scope="module")
+def settings(tmp_path_factory: pytest.TempPathFactory) -> Settings:
+    return Settings(data=tmp_path_factory.mktemp("cameras") / "data", zenoh=free_endpoint())
+
+
+@pytest.fixture(scope="module")
+def client(settings: Settings) -> Iterator[RestClient]:
+    with in_process_client(settings) as client:
+        yield client
+
+
+def test_a_camera_from_its_start_to_its_end(client: RestClient, settings: Settings) -> None:
+    ready_folder(settings.data)
+    assert client.get("/cameras") == []
+    with open_router([settings.zenoh]):
+        body: dict[str, Any] = {"glove": "right", "source": "rendered", "stage": "ik", "keep": "nothing"}
+        begun = client.post("/cameras", body | SMALL)
+        assert (begun["state"], begun["is_simulated"], begun["started_here"]) == ("opening", True, True)
+        with pytest.raises(Refused, match="publishes glove right already"):
+            client.post("/cameras", body)
+
+        def tracking() -> dict[str, Any] | None:
+            found = client.get("/cameras/right")
+            return found if found["health"] and found["health"]["tracked"] >= 3 else None
+
+        camera = eventually(tracking, "it tracks")
+        assert client.get("/cameras")[0]["glove"] == "right"
+        health = camera["health"]
+        assert health["simulated"]
+        assert health["latency_ms"]["p95"] >= health["latency_ms"]["p50"] > 0
+        assert len(health["rotations"]) == 20
+        chosen = client.put("/cameras/right/stage", {"stage": "nearest"})
+        assert chosen["health"]["stage"] == "nearest"
+        balanced = client.post("/cameras/right/balance")
+        assert set(balanced["health"]["gains"]) == {"red", "green", "blue"}
+        with pytest.raises(Refused, match="stage"):
+            client.put("/cameras/right/stage", {"stage": "best"})
+        picture = client.download("/cameras/right/picture", {"layers": "model", "width": 64})
+        assert picture.startswith(b"\xff\xd8\xff")
+        ended = client.post("/cameras/right/stop")
+        assert ended["state"] == "stopped"
+        assert ended["sentence"].startswith("run ")
+        assert ended["sentence"].endswith("; stopped")
+        assert client.get("/cameras/right")["health"] is None
+        with pytest.raises(Refused, match="no camera of glove right answers"):
+            client.download("/cameras/right/picture")
+    with pytest.raises(Refused, match="no camera of glove other"):
+        client.post("/cameras/other/stop")
+    for source in ("video:/etc/passwd", "labels:/etc/passwd", "camera:100"):
+        with pytest.raises(Refused):
+            client.post("/cameras", {"glove": "x", "source": source})
+    with pytest.raises(Refused, match="reserved"):
+        client.post("/cameras", {"glove": "service", "source": "rendered"})
+
+
+@pytest.mark.parametrize("camera", [None, 3, {}, {"source": 5}, {"rotations": [{}]}])
+def test_what_is_no_camera_is_left_out(camera: Any) -> None:
+    status = {"state": "streaming", "sentence": "", "camera": camera}
+    assert said_of_itself(GloveKeys("lab", "g").glove, status, started_here=False) is None
