@@ -58,7 +58,9 @@ def _attach(parts: Parts, id: str, named: tuple[str, Path], clock: ReferenceCloc
             422, "bad-take-table", f"{path.name} holds no rows for take {record.name!r}", file=path.name
         )
     time_s = _on_take_clock(rows.time_s, clock, record)
-    return parts.store.takes.attach_reference(id, time_s, rows.rotations, rows.reference, rows.poses)
+    return parts.store.takes.attach_reference(
+        id, time_s, rows.rotations, rows.reference, rows.poses, reference_sd=rows.reference_sd
+    )
 
 
 def _on_take_clock(time_s: np.ndarray, clock: ReferenceClock, record: TakeRecord) -> np.ndarray:
