@@ -237,6 +237,7 @@ def task_for(
         sensors=correspondence.inputs,
         settings=settings,
         known_gain=known_gain,
+        variance=None if samples.variance is None else samples.variance[index],
     )
 
 
