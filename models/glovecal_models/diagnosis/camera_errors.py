@@ -23,6 +23,8 @@ from glovecal_models.effects.base.assessment import (
     over_joints,
     squared_in_blocks,
 )
+from glovecal_models.takes.camera_reference.covered_range import CoveredRange, covered_ranges
+from glovecal_models.takes.take import Take
 
 CAMERA = "camera"
 """Name of the finding: not an effect of the catalogue, as nothing of a glove is the cause."""
@@ -36,6 +38,8 @@ class CameraErrors:
     """Of the columns, beside their control; on the joints of ``stated_deg``."""
     stated_deg: dict[str, float]
     """RMS of the stated deviations of each joint, degrees."""
+    ranges: tuple[CoveredRange, ...] = ()
+    """Which angles it accepted."""
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -55,8 +59,8 @@ class CameraErrors:
         )
 
 
-def camera_errors(problem: DiagnosisProblem) -> CameraErrors | None:
-    """None where no reference states deviations."""
+def camera_errors(problem: DiagnosisProblem, takes: Sequence[Take]) -> CameraErrors | None:
+    """None where no reference states deviations; ``takes`` are those of ``problem``."""
     if problem.is_sparse or not problem.has_camera:
         return None
     without, with_it, control = (problem.design(camera=kind) for kind in ("none", "varying", "control"))
@@ -66,7 +70,7 @@ def camera_errors(problem: DiagnosisProblem) -> CameraErrors | None:
     names = tuple(without.rotations[joint] for joint in chosen)
     nothing = tuple(np.empty(0) for _ in names)
     found = Assessment(CAMERA, names, errors, nothing, nothing, limits=problem.limits)
-    return CameraErrors(found, {name: stated[name] for name in names})
+    return CameraErrors(found, {name: stated[name] for name in names}, covered_ranges(takes, names))
 
 
 def beside_camera(

@@ -85,7 +85,7 @@ def diagnose(
     judged = [item for item in tried if item not in waiting]
     found, impossible = assessed(design, judged, np.random.default_rng(seed), has, progress)
     saved = problem.saved_by_known(design)
-    seen = camera_errors(problem) if problem.has_camera else None
+    seen = camera_errors(problem, takes) if problem.has_camera else None
     found = beside_known(found, saved)
     if seen is not None:
         found = beside_camera(found, seen, problem, design)

@@ -13,6 +13,7 @@ from sqlalchemy.exc import IntegrityError
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 from glovecal_models.names import check_identifier
+from glovecal_models.takes.camera_reference.camera_reference import CAMERA_PATCHES
 from glovecal_models.takes.clock_scan import aligned
 from glovecal_models.takes.take import Take, poses_at_frames
 from glovecal_service.store import tables
@@ -134,11 +135,13 @@ class Takes:
         poses: Sequence[str] | None = None,
         *,
         reference_sd: np.ndarray | None = None,
+        context: Mapping[str, np.ndarray] | None = None,
         facts: Mapping[str, Any] | None = None,
     ) -> TakeRecord:
         """Give a take its reference angles, (R,) seconds and (R, len(rotations)) degrees.
 
-        ``reference_sd``: their standard deviations where stated; ``facts`` tell where they come from.
+        ``reference_sd``: their standard deviations where stated; ``context``: columns at the frames that come
+        with them; ``facts`` tell where they come from.
 
         ``poses`` (R,) names the pose at each reference row; None leaves the take's own names as they are.
 
@@ -153,6 +156,8 @@ class Takes:
             rotations=tuple(rotations),
             reference=reference,
             reference_sd=reference_sd,
+            context={name: take.context[name] for name in take.context if name != CAMERA_PATCHES}
+            | dict(context or {}),
             poses=take.poses if poses is None else poses_at_frames(take.time_s, time_s, poses),
         )
         stale = {CLOCK_OFFSET: 0.0, CLOCK_UNKNOWN: False, CAMERA_REFERENCE: None}

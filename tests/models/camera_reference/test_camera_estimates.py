@@ -126,3 +126,18 @@ def test_a_file_of_a_later_version_is_refused(tmp_path: Path):
     (tmp_path / "e.npz").write_bytes(stream.getvalue())
     with pytest.raises(BadInput, match="another version"):
         read_estimates(tmp_path / "e.npz")
+
+
+def test_poses_of_a_camera_become_estimates():
+    from glovecal_models.colour_glove.hand_state import HandState
+    from glovecal_models.colour_glove.pose_estimate import PoseEstimate, camera_estimates
+
+    state = HandState(np.arange(20.0), np.eye(3), np.array([0.0, 0.0, 400.0]))
+    sure = np.arange(20) < 5
+    pose = PoseEstimate(state, np.full(26, 2.0), sure, (1, 2, 7), 0.1, "dense")
+    found = camera_estimates([0.0, 0.03, 0.03, 0.1], [pose, None, pose, pose], simulated=True)
+    np.testing.assert_array_equal(found.time_s, [0.0, 0.03, 0.1])
+    np.testing.assert_array_equal(found.accepted, [sure, np.zeros(20, bool), sure])
+    np.testing.assert_array_equal(found.patches, [3, 0, 3])
+    assert np.isnan(found.angles_deg[1]).all()
+    np.testing.assert_array_equal(found.angles_deg[2], state.angles_deg)
