@@ -122,7 +122,8 @@ def test_a_file_of_a_later_version_is_refused(tmp_path: Path):
     with np.load(tmp_path / "e.npz") as archive:
         arrays: dict[str, Any] = dict(archive)
     stream = io.BytesIO()
-    np.savez(stream, **(arrays | {"version": np.array(2)}))
+    later: dict[str, Any] = arrays | {"version": np.array(2)}
+    np.savez(stream, **later)
     (tmp_path / "e.npz").write_bytes(stream.getvalue())
     with pytest.raises(BadInput, match="another version"):
         read_estimates(tmp_path / "e.npz")
