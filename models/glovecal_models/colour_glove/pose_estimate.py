@@ -53,7 +53,7 @@ def camera_estimates(
     kept = np.flatnonzero(without_repeats(time))
     angles, deviations = np.full((2, len(kept), len(FINGER_ROTATIONS)), np.nan)
     accepted, patches = np.zeros(angles.shape, dtype=bool), np.zeros(len(kept), dtype=int)
-    for row, place in enumerate(kept):
+    for row, place in enumerate(kept.tolist()):
         pose = poses[place]
         if pose is not None:
             angles[row] = pose.state.angles_deg

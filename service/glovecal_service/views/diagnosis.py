@@ -148,7 +148,11 @@ def _of_camera(diagnosis: Diagnosis) -> list[FindingView]:
     camera = diagnosis.camera
     if camera is None or not camera.joints:
         return []
-    return [FindingView(effect=CAMERA, kind="deviation", where=list(camera.joints), sentence=camera.sentence)]
+    return [
+        FindingView(
+            effect=CAMERA, kind="deviation", where=list(camera.joints), sentence=camera.sentence, stretches=[]
+        )
+    ]
 
 
 class AssociationView(View):
