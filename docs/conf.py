@@ -55,6 +55,7 @@ NAVIGATION = {
         "Add your glove <docs/own-glove>",
         "Two gloves <docs/two-gloves>",
         "docs/references",
+        "The colour glove <docs/colour-glove>",
         "Train <docs/train>",
         "Template calibration <docs/template-calibration>",
         "The colour glove <docs/colour-glove>",

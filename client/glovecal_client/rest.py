@@ -146,6 +146,15 @@ class RestClient:
         query = {"clock": clock, "filename": file.name}
         return self._send_file("PUT", f"/takes/{quote(take, safe='')}/reference", file, query)
 
+    def attach_camera_reference(
+        self, take: str, file: Path, *, near_s: float = 0.0, within_s: float = 3.0
+    ) -> dict[str, Any]:
+        """Give a take what a camera measured meanwhile (a file of estimates, .npz); its clock is found within
+        ``within_s`` of ``near_s``, seconds (camera time less glove time)."""
+        query = {"near_s": f"{near_s:.9g}", "within_s": f"{within_s:.9g}", "filename": file.name}
+        path = f"/takes/{quote(take, safe='')}/camera-reference"
+        return self._send_file("PUT", path, file, query, ARTIFACT)
+
     def import_model(
         self, file: Path, *, subject: str | None = None, create_subject: bool = False
     ) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.takes.take import Take
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.take_file import dump_take, load_take
+from glovecal_service.store.takes import CAMERA_REFERENCE
 
 
 def same(one: Take, other: Take) -> bool:
@@ -51,6 +52,26 @@ def test_a_take_comes_back_bit_for_bit(anna, begins_s):
     assert record.has_reference
     assert record.accounting == {"sent": 300, "recorded": 300, "missing": []}
     assert (record.frames, record.duration_s) == (300, pytest.approx(299 / 60))
+
+
+def test_stated_deviations_come_back_and_older_takes_read_as_they_did(anna):
+    plain = make_take(1)
+    stated = dataclasses.replace(plain, reference_sd=np.full(plain.reference.shape, 1.5))
+    assert same(load_take(dump_take(stated)), stated)
+    assert b"reference_sd" not in dump_take(plain)  # the bytes, and so the name, of what was stored before
+    assert load_take(dump_take(plain)).reference_sd is None
+    record = add(anna, plain)
+    attached = anna.takes.attach_reference(
+        record.id, plain.reference_time_s, plain.rotations, plain.reference,
+        reference_sd=stated.reference_sd, facts={CAMERA_REFERENCE: {"clock_offset_s": 0.1}},
+    )  # fmt: skip
+    assert same(anna.takes.load(record.id), stated)
+    assert attached.facts[CAMERA_REFERENCE] == {"clock_offset_s": 0.1}
+    replaced = anna.takes.attach_reference(
+        record.id, plain.reference_time_s, plain.rotations, plain.reference
+    )
+    assert anna.takes.load(record.id).reference_sd is None
+    assert replaced.facts[CAMERA_REFERENCE] is None
 
 
 def test_the_takes_of_a_file_are_kept_all_or_none(anna):

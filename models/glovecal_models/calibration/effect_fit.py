@@ -23,7 +23,7 @@ from glovecal_models.calibration.fitted_effects import fitted_effects
 from glovecal_models.calibration.model import CalibrationModel, restore_regressor
 from glovecal_models.calibration.own_signal import OwnSignal
 from glovecal_models.calibration.prepared_takes import PreparedTakes
-from glovecal_models.calibration.samples import Samples
+from glovecal_models.calibration.samples import Samples, joined_variances, sampled_rows
 from glovecal_models.calibration.template import palm_samples
 from glovecal_models.calibration.training_plan import correspondence_by, task_for
 from glovecal_models.calibration.training_settings import LINEAR_METHODS, TrainingSettings
@@ -150,7 +150,11 @@ def _trained(
     targets, inputs = takes.target(correspondence.rotation), takes.inputs(correspondence)
     if correction is not None:
         targets = [target - part for target, part in zip(targets, correction, strict=True)]
-    known = [np.isfinite(target) for target in targets]
+    found = [
+        sampled_rows(take, correspondence.rotation, target)
+        for take, target in zip(takes.takes, targets, strict=True)
+    ]
+    known = [rows for rows, _ in found]
     poses = [
         np.array(take.poses if take.poses is not None else [""] * len(take.time_s), dtype=object)
         for take in takes.takes
@@ -158,8 +162,9 @@ def _trained(
     samples = Samples(
         np.concatenate([part[rows] for part, rows in zip(inputs, known, strict=True)]),
         np.concatenate([part[rows] for part, rows in zip(targets, known, strict=True)]),
-        np.concatenate([np.full(int(rows.sum()), i) for i, rows in enumerate(known)]),
+        np.concatenate([np.full(len(rows), i) for i, rows in enumerate(known)]),
         np.concatenate([part[rows] for part, rows in zip(poses, known, strict=True)]),
+        joined_variances([variance for _, variance in found], [len(rows) for rows in known]),
     )
     palm = palm_samples(takes.takes, correspondence) if settings.method == "template" else None
     return KNOWN_FITS.fit(task_for(correspondence, samples, None, settings, palm=palm), cancelled=cancelled)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,7 +42,7 @@ def best_shape(
     products = {
         name: BaseProducts(
             [
-                Rows(np.column_stack([unit.base, *(parts[u] for parts in extra[name])]), unit.target)
+                replace(unit, base=np.column_stack([unit.base, *(parts[u] for parts in extra[name])]))
                 for u, unit in enumerate(bases[name])
             ]
         )

@@ -22,8 +22,9 @@ from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.progress import Cancel, Report
 from glovecal_models.regression.kernel_candidates import CHOOSING
 from glovecal_models.regression.known_line import fit_beside
-from glovecal_models.regression.linear_regressor import fit_linear, rescale_readings
+from glovecal_models.regression.linear_regressor import rescale_readings
 from glovecal_models.regression.regressor import Regressor
+from glovecal_models.regression.sample_noise import fit_linear_with_variance
 from glovecal_models.regression.spgp import fit_spgp
 
 
@@ -48,6 +49,8 @@ class FitTask:
     """Wearings that were left out whole."""
     known_gain: float | None = None
     """Degrees a count of the second of two inputs, where an equation of a template gives it."""
+    variance: np.ndarray | None = None
+    """Stated variance of each sample's reference, degrees squared; None: all alike."""
     key: str = field(default="")
 
     def __post_init__(self) -> None:
@@ -95,11 +98,13 @@ def _fit(task: FitTask, cancelled: Cancel | None, report: Report | None) -> Regr
     if task.known_gain is not None:
         return fit_beside(task.inputs, task.target, task.known_gain, sensor_names=task.sensors)
     if settings.method in LINEAR_METHODS:
-        return fit_linear(task.inputs, task.target, sensor_names=task.sensors, cancelled=cancelled)
+        return fit_linear_with_variance(
+            task.inputs, task.target, task.variance, sensor_names=task.sensors, cancelled=cancelled
+        )
     plane = plane_for(task.rotation, settings.prior) if settings.prior else None
     if plane is not None:
         return fit_on_plane(task.inputs, task.target, task.sensors, plane, cancelled=cancelled, report=report)
-    samples = Recorded(task.inputs, task.target, task.take, task.position)
+    samples = Recorded(task.inputs, task.target, task.take, task.position, task.variance)
     if settings.method in CHOOSING:
         thorough = task.fold is None  # what a user is shown; a fold only repeats the choice
         return fit_best_kernel(
@@ -138,7 +143,8 @@ def _key(task: FitTask) -> str:
         facts["known_gain"] = task.known_gain
     digest.update(json.dumps(facts, sort_keys=True).encode())
     samples = (task.inputs, task.target, task.take, task.position)
-    for array in (*samples, task.held_out_inputs, task.held_out_target):
+    stated = () if task.variance is None else (task.variance,)
+    for array in (*samples, task.held_out_inputs, task.held_out_target, *stated):
         digest.update(repr(array.shape).encode())
         digest.update(np.ascontiguousarray(array, dtype=np.float64).tobytes())
     return digest.hexdigest()

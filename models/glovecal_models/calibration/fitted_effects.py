@@ -15,7 +15,13 @@ from glovecal_models.calibration.added_effect import CURVES, FORM, AddedEffect, 
 from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.effect_shape import REFINEMENTS, EffectGroup, best_shape
 from glovecal_models.calibration.form_choice import FormRows, chosen_columns, chosen_form
-from glovecal_models.calibration.held_out import BaseFeatures, Rows, WeightPosterior, weight_posterior
+from glovecal_models.calibration.held_out import (
+    BaseFeatures,
+    Rows,
+    WeightPosterior,
+    weight_posterior,
+    with_precision,
+)
 from glovecal_models.calibration.own_signal import OwnSignal
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.effects.base.facts import Settings
@@ -209,10 +215,16 @@ def _base(
 ) -> list[Rows]:
     inputs = takes.inputs(correspondence)
     features = BaseFeatures.fit_constants(inputs, linear=linear)
-    return [
+    units = [
         Rows(features.columns(part[index]), target[index])
         for part, target, index in zip(inputs, takes.target(correspondence.rotation), rows, strict=True)
     ]
+    stated = [take.reference_sd_at_frames([correspondence.rotation]) for take in takes.takes]
+    variance = [
+        None if part is None or not np.isfinite(part[index, 0]).all() else part[index, 0] ** 2
+        for part, index in zip(stated, rows, strict=True)
+    ]
+    return with_precision(units, variance)
 
 
 def _weights(

@@ -12,7 +12,7 @@ missing product is mistaken for another effect.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
 from math import comb
 
@@ -20,6 +20,7 @@ import numpy as np
 
 from glovecal_models.calibration.sample_weight import effective_sample_ratio
 from glovecal_models.effects.base.assessment import saved_share
+from glovecal_models.regression.sample_noise import sample_noise
 
 BASE_RIDGE = 1e-6
 ALIKE_ROWS = 100.0
@@ -43,11 +44,24 @@ class Rows:
     """(N, P)."""
     target: np.ndarray
     """(N,), degrees."""
+    weight: np.ndarray | None = None
+    """(N,), relative precision of each row, 1 on average over all units; None: all alike."""
+
+    def weighted(self, columns: np.ndarray) -> np.ndarray:
+        """Columns (N, ...) times the weights: products with others are then those of weighted least
+        squares."""
+        if self.weight is None:
+            return columns
+        return columns * self.weight.reshape(-1, *(1,) * (columns.ndim - 1))
+
+    def rooted(self, residual: np.ndarray) -> np.ndarray:
+        """Residuals (N,) times the root of the weights: all of one size where the weights are right."""
+        return residual if self.weight is None else residual * np.sqrt(self.weight)
 
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Squared errors on units left out."""
+    """Squared errors on units left out; weighted where rows have weights."""
 
     base: np.ndarray
     """(U,) sum of squared errors without the columns."""
@@ -62,7 +76,7 @@ class HeldOut:
     fitted: float
     """Sum of squared errors over all units at that shape, nothing left out."""
     residual: tuple[np.ndarray, ...]
-    """For each unit (N,): held-out error without the columns, degrees."""
+    """For each unit (N,): held-out error without the columns, degrees, as ``Rows.rooted``."""
     residual_added: tuple[np.ndarray, ...]
 
     @property
@@ -71,15 +85,36 @@ class HeldOut:
         return saved_share(self.base, self.added)
 
 
+def with_precision(units: Sequence[Rows], variance: Sequence[np.ndarray | None]) -> list[Rows]:
+    """The units with weights from stated variances (N,) of their rows, degrees squared: 0 where a unit states
+    none. Unchanged where no unit states any, or all state the same.
+
+    What the base leaves beside the stated variances is added to each (``regression.sample_noise``).
+    """
+    if all(part is None for part in variance):
+        return list(units)
+    counts = [len(rows.target) for rows in units]
+    stated = np.concatenate(
+        [np.zeros(n) if part is None else part for n, part in zip(counts, variance, strict=True)]
+    )
+    alike = BaseProducts(units)
+    left = [rows.target - alike.fitted(rows.base) for rows in units]
+    noise = sample_noise(stated, np.concatenate(left)) if len(stated) else None
+    if noise is None:
+        return list(units)
+    weights = np.split(noise.precision / noise.precision.mean(), np.cumsum(counts)[:-1])
+    return [replace(rows, weight=part) for rows, part in zip(units, weights, strict=True)]
+
+
 class BaseProducts:
     """The part that all candidates share."""
 
     def __init__(self, units: Sequence[Rows], prior_sd: np.ndarray | None = None) -> None:
         """``prior_sd`` (P,) of the coefficients, infinite (default) for those that are free."""
         self.units = units
-        self.gram = np.array([rows.base.T @ rows.base for rows in units])
-        self.right = np.array([rows.base.T @ rows.target for rows in units])
-        self.square = np.array([rows.target @ rows.target for rows in units])
+        self.gram = np.array([rows.weighted(rows.base).T @ rows.base for rows in units])
+        self.right = np.array([rows.base.T @ rows.weighted(rows.target) for rows in units])
+        self.square = np.array([rows.target @ rows.weighted(rows.target) for rows in units])
         self.count = np.array([len(rows.target) for rows in units])
         total, ridge = self.gram.sum(axis=0), BASE_RIDGE * np.trace(self.gram.sum(axis=0))
         self.ridge = ridge / len(total) * np.eye(len(total))
@@ -90,7 +125,7 @@ class BaseProducts:
         self.residual = tuple(
             rows.target - rows.base @ beta for rows, beta in zip(units, self.coefficients, strict=True)
         )
-        self.error = np.array([r @ r for r in self.residual])
+        self.error = np.array([rows.weighted(r) @ r for rows, r in zip(units, self.residual, strict=True)])
         self.whole = np.linalg.solve(total + self.ridge, self.right.sum(axis=0))
 
     def _held_by(self, prior_sd: np.ndarray) -> np.ndarray:
@@ -169,12 +204,13 @@ def held_out(
         joint[unit, :, :size, :size] = products.gram[unit]
         right[unit, :, :size] = products.right[unit]
         flat = extra.reshape(len(extra), shapes * added)
-        joint[unit, :, size:, :size] = (flat.T @ rows.base).reshape(shapes, added, size)
+        counted = rows.weighted(flat)
+        joint[unit, :, size:, :size] = (counted.T @ rows.base).reshape(shapes, added, size)
         joint[unit, :, :size, size:] = joint[unit, :, size:, :size].swapaxes(1, 2)
-        right[unit, :, size:] = (flat.T @ rows.target).reshape(shapes, added)
+        right[unit, :, size:] = (counted.T @ rows.target).reshape(shapes, added)
         for g in range(shapes):
-            own = flat[:, g * added : (g + 1) * added]
-            joint[unit, g, size:, size:] = own.T @ own
+            own = slice(g * added, (g + 1) * added)
+            joint[unit, g, size:, size:] = counted[:, own].T @ flat[:, own]
     total, total_right = joint.sum(axis=0), right.sum(axis=0)
     ridge = np.zeros((shapes, size + added, size + added))
     ridge[:, :size, :size] = products.ridge
@@ -191,7 +227,7 @@ def held_out(
     best = np.argmin(training, axis=1)
     chosen = beta[np.arange(len(columns)), best]
     residual = tuple(
-        rows.target - rows.base @ b[:size] - extra[:, g, :] @ b[size:]
+        rows.rooted(rows.target - rows.base @ b[:size] - extra[:, g, :] @ b[size:])
         for rows, extra, g, b in zip(products.units, columns, best, chosen, strict=True)
     )
     whole = _solved(total + ridge, total_right)
@@ -204,7 +240,9 @@ def held_out(
         shape=shape,
         weights=whole[shape, size:],
         fitted=float(fit[shape]),
-        residual=products.residual,
+        residual=tuple(
+            rows.rooted(part) for rows, part in zip(products.units, products.residual, strict=True)
+        ),
         residual_added=residual,
     )
 
@@ -228,9 +266,10 @@ def weight_posterior(
 ) -> WeightPosterior:
     """``columns``: for each unit (N, C); ``prior_sd`` (C,) of their weights."""
     both = [np.column_stack([rows.base, extra]) for rows, extra in zip(units, columns, strict=True)]
-    gram = np.sum([part.T @ part for part in both], axis=0)
-    right = np.sum([part.T @ rows.target for part, rows in zip(both, units, strict=True)], axis=0)
-    square = float(sum(rows.target @ rows.target for rows in units))
+    pairs = list(zip(both, units, strict=True))
+    gram = np.sum([rows.weighted(part).T @ part for part, rows in pairs], axis=0)
+    right = np.sum([part.T @ rows.weighted(rows.target) for part, rows in pairs], axis=0)
+    square = float(sum(rows.target @ rows.weighted(rows.target) for rows in units))
     count = max(sum(len(rows.target) for rows in units), 1)
     size = units[0].base.shape[1]
     base = np.arange(len(gram)) < size
@@ -249,7 +288,7 @@ def weight_posterior(
     own, pull = held[size:, size:], ridge[size:]
     scale = np.sqrt(np.diagonal(own))
     inverse = np.linalg.inv(own / (scale[:, None] * scale)) / (scale[:, None] * scale)
-    error = [rows.target - part @ beta for part, rows in zip(both, units, strict=True)]
+    error = [rows.rooted(rows.target - part @ beta) for part, rows in pairs]
     # What is held against chance is held against ``ALIKE_ROWS``; what is left unknown is as it is: the noise
     # of the rows that count as independent, and the prior's share of what the ridge pulls towards zero.
     alike = min(1 / _effective_ratio(error), ALIKE_ROWS)

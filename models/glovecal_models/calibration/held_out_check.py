@@ -130,6 +130,7 @@ def _cut(takes: PreparedTakes) -> tuple[PreparedTakes, np.ndarray]:
     """Each take in pieces, as takes of their own; and each piece's number within its take."""
     found, reference, place = [], [], []
     for take, measured in zip(takes.takes, takes.reference, strict=True):
+        deviations = take.reference_sd_at_frames(takes.layout.rotations)
         for number, rows in enumerate(pieces(take.time_s, measured)):
             place.append(number)
             reference.append(measured[rows])
@@ -142,6 +143,7 @@ def _cut(takes: PreparedTakes) -> tuple[PreparedTakes, np.ndarray]:
                     rotations=takes.layout.rotations,
                     reference_time_s=take.time_s[rows],
                     reference=measured[rows],
+                    reference_sd=None if deviations is None else deviations[rows],
                     context={name: values[rows] for name, values in take.context.items()},
                     poses=None if take.poses is None else take.poses[rows],
                 )

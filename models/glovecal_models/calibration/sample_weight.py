@@ -26,6 +26,7 @@ from glovecal_models.progress import Cancel, Report, part
 from glovecal_models.regression.fast_lmc import finish_search, fit_lmc_gpr
 from glovecal_models.regression.lmc_search import LmcOptimum, LmcSearch, fit_roughly
 from glovecal_models.regression.process_regressor import ProcessRegressor
+from glovecal_models.regression.sample_noise import with_stated_variance
 from glovecal_models.regression.training_samples import check_samples
 
 WEIGHTS = (0.4, 0.2, 0.08, 0.03)
@@ -55,6 +56,8 @@ class Recorded:
     """Index of the take, shape (N,)."""
     position: np.ndarray
     """Number of the frame, counted through all takes, shape (N,), increasing."""
+    variance: np.ndarray | None = None
+    """Stated variance of each target, shape (N,), degrees squared; None: all alike."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,24 @@ class Weighted:
 
 
 def fit_weighted(
+    samples: Recorded,
+    *,
+    known: LmcOptimum | None = None,
+    seed: int = 0,
+    cancelled: Cancel | None = None,
+    report: Report | None = None,
+) -> Weighted:
+    """As ``_fit_alike``; where variances are stated the process is trained anew with these, from there."""
+    found = _fit_alike(samples, known=known, seed=seed, cancelled=cancelled, report=report)
+    if samples.variance is None:
+        return found
+    process = with_stated_variance(
+        found.regressor, samples.inputs, samples.target, samples.variance, seed=seed, cancelled=cancelled
+    )
+    return replace(found, regressor=replace(process, evidence=found.regressor.evidence | process.evidence))
+
+
+def _fit_alike(
     samples: Recorded,
     *,
     known: LmcOptimum | None = None,

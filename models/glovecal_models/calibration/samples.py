@@ -18,6 +18,7 @@ import numpy as np
 
 from glovecal_models.errors import LayoutMismatch
 from glovecal_models.layout import Correspondence, Layout
+from glovecal_models.takes.camera_reference.covered_range import thinned
 from glovecal_models.takes.take import Take
 
 KEY_POSES = ("flat", "spread", "fist", "overbend")
@@ -40,12 +41,16 @@ class Samples:
     """Index of the take each sample comes from, shape (N,)."""
     poses: np.ndarray
     """Pose name of each sample, "" for none, shape (N,)."""
+    variance: np.ndarray | None = None
+    """Stated variance of each target, shape (N,), degrees squared; 0 where its take states none; None where
+    no take does."""
 
     def __len__(self) -> int:
         return len(self.target)
 
     def select(self, index: np.ndarray) -> Samples:
-        return Samples(self.inputs[index], self.target[index], self.take[index], self.poses[index])
+        variance = None if self.variance is None else self.variance[index]
+        return Samples(self.inputs[index], self.target[index], self.take[index], self.poses[index], variance)
 
 
 def require_layout(take: Take, layout: Layout) -> None:
@@ -59,21 +64,46 @@ def require_layout(take: Take, layout: Layout) -> None:
 
 
 def gather_samples(takes: Sequence[Take], correspondence: Correspondence) -> Samples:
-    """All frames of ``takes`` at which the rotation was measured."""
-    inputs, targets, owners, poses = [], [], [], []
+    """All frames of ``takes`` at which the rotation was measured (``sampled_rows``)."""
+    inputs, targets, owners, poses, variances = [], [], [], [], []
     for index, take in enumerate(takes):
         target = take.reference_at_frames([correspondence.rotation])[:, 0]
-        measured = np.isfinite(target)
+        measured, variance = sampled_rows(take, correspondence.rotation, target)
         inputs.append(correspondence.input_columns(take.readings[measured], take.sensors))
         targets.append(target[measured])
-        owners.append(np.full(int(measured.sum()), index))
-        names = np.array(take.poses if take.poses is not None else [""] * len(measured), dtype=object)
+        owners.append(np.full(len(measured), index))
+        names = np.array(take.poses if take.poses is not None else [""] * len(target), dtype=object)
         poses.append(names[measured])
+        variances.append(variance)
     return Samples(
         np.concatenate(inputs) if inputs else np.empty((0, len(correspondence.inputs))),
         np.concatenate(targets) if targets else np.empty(0),
         np.concatenate(owners) if owners else np.empty(0, dtype=int),
         np.concatenate(poses) if poses else np.empty(0, dtype=object),
+        joined_variances(variances, [len(part) for part in targets]),
+    )
+
+
+def sampled_rows(take: Take, rotation: str, target: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+    """The frames whose ``target`` (N,) is a sample, and the variance of each, degrees squared.
+
+    All that were measured; where deviations are stated only those that lie ``ALIKE_S`` apart: the errors of
+    a camera last so long, and samples within count as one. None where the take states none.
+    """
+    measured = np.flatnonzero(np.isfinite(target))
+    stated = take.reference_sd_at_frames([rotation])
+    if stated is None or not np.isfinite(stated[measured, 0]).any():
+        return measured, None
+    measured = thinned(take.time_s, measured)
+    return measured, stated[measured, 0] ** 2
+
+
+def joined_variances(parts: Sequence[np.ndarray | None], counts: Sequence[int]) -> np.ndarray | None:
+    """Of all takes after one another: 0 where a take states none, None where no take does."""
+    if all(part is None for part in parts):
+        return None
+    return np.concatenate(
+        [np.zeros(count) if part is None else part for part, count in zip(parts, counts, strict=True)]
     )
 
 

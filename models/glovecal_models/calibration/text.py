@@ -14,6 +14,9 @@ from glovecal_models.calibration.unseen_wearing import UnseenWearing
 from glovecal_models.calibration.usable_sensors import UsableSensors
 from glovecal_models.effects.catalogue import wearing_effect
 
+COUNTED_BY = ("lmc_gpr", "linear", "two_shapes")
+"""Methods in which a stated deviation is a sample's noise."""
+
 
 def plan_sentences(plan: TrainingPlan) -> list[str]:
     """How the samples were chosen, and which rotations the model does not have."""
@@ -34,7 +37,22 @@ def plan_sentences(plan: TrainingPlan) -> list[str]:
     ]
     if plan.unshown:
         sentences.append(f"Not in both shapes, not in the model: {', '.join(plan.unshown)}.")
+    sentences += _camera_sentences(plan)
     return [*sentences, *dead_sensor_sentences(plan.usable, plan.unreadable)]
+
+
+def _camera_sentences(plan: TrainingPlan) -> list[str]:
+    """Which angles a camera saw, and what it adds to the held-out errors."""
+    stated = [item.deviation_deg for item in plan.camera_ranges if item.effective_samples]
+    if not stated:
+        return [item.sentence() for item in plan.camera_ranges]
+    rms = sum(sd**2 for sd in stated) ** 0.5 / len(stated) ** 0.5
+    start = (
+        f"A camera measured {len(stated)} rotations; samples count by its stated deviation"
+        f"{'' if plan.settings.method in COUNTED_BY else f' (not by method {plan.settings.method})'}. "
+        f"Held-out errors contain its own, {rms:.1f} degrees (RMS)."
+    )
+    return [start, *(item.sentence() for item in plan.camera_ranges)]
 
 
 def dead_sensor_sentences(usable: UsableSensors, rotations: Sequence[str]) -> list[str]:

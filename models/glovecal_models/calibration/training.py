@@ -66,6 +66,11 @@ def assemble(
         estimate["rmse_deg"] = float(np.sqrt(squared / count))
     if unseen.rmse_deg is not None:
         estimate["rmse_unseen_wearing_deg"] = unseen.rmse_deg
+    if plan.camera_ranges:
+        estimate["camera_ranges"] = [
+            {"rotation": item.rotation, "ranges_deg": [list(pair) for pair in item.ranges_deg]}
+            for item in plan.camera_ranges
+        ]
     return CalibrationModel(
         layout=plan.layout,
         subject=plan.subject,

@@ -36,6 +36,7 @@ from glovecal_models.errors import NotTrainable
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.regression.regressor import RuleRegressor
 from glovecal_models.regression.training_samples import check_samples
+from glovecal_models.takes.camera_reference.covered_range import CoveredRange, covered_ranges
 from glovecal_models.takes.take import Take
 
 
@@ -66,6 +67,8 @@ class TrainingPlan:
     """Of each take."""
     samples: Mapping[str, Samples] = field(default_factory=dict)
     """All samples of each trained rotation, where a wearing is left out."""
+    camera_ranges: tuple[CoveredRange, ...] = ()
+    """Of the trained rotations whose reference states deviations."""
 
 
 def plan_training(
@@ -155,6 +158,11 @@ def plan_training(
         simulated=any(take.simulated for take in takes),
         wearings=wearings,
         samples=gathered,
+        camera_ranges=(
+            covered_ranges(takes, tuple(chosen))
+            if any(take.reference_sd is not None for take in takes)
+            else ()
+        ),
     )
 
 
@@ -237,6 +245,7 @@ def task_for(
         sensors=correspondence.inputs,
         settings=settings,
         known_gain=known_gain,
+        variance=None if samples.variance is None else samples.variance[index],
     )
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, FINGER_ROTATIONS, HandState
 from glovecal_models.errors import BadInput
+from glovecal_models.takes.camera_reference.estimates import CameraEstimates, without_repeats
 
 STAGES = ("nearest", "blend", "ik", "dense")
 """The nearest entry of the database; ten of them blended (section 4.5); inverse kinematics on the patches'
@@ -37,3 +39,26 @@ class PoseEstimate:
             raise BadInput(f"accept flags have shape {self.accepted.shape}, expected (20,)")
         if self.stage not in STAGES:
             raise BadInput(f"stage {self.stage!r} is none of {', '.join(STAGES)}")
+
+
+def camera_estimates(
+    seconds: Sequence[float], poses: Sequence[PoseEstimate | None], *, simulated: bool
+) -> CameraEstimates:
+    """Estimates over time as a take's reference asks for them; ``seconds`` (F,): the middle of each exposure.
+
+    Where no hand was found (None) there are no angles. Frames that are stamped no later than one before are
+    left out. ``simulated``: the pictures were rendered. Raises BadInput where nothing is left.
+    """
+    time = np.asarray(seconds, dtype=float)
+    kept = np.flatnonzero(without_repeats(time))
+    angles, deviations = np.full((2, len(kept), len(FINGER_ROTATIONS)), np.nan)
+    accepted, patches = np.zeros(angles.shape, dtype=bool), np.zeros(len(kept), dtype=int)
+    for row, place in enumerate(kept.tolist()):
+        pose = poses[place]
+        if pose is not None:
+            angles[row] = pose.state.angles_deg
+            deviations[row] = pose.standard_deviation[: len(FINGER_ROTATIONS)]
+            accepted[row], patches[row] = pose.accepted, len(pose.patches)
+    return CameraEstimates(
+        time[kept], FINGER_ROTATIONS, angles, deviations, accepted, patches, simulated=simulated
+    )

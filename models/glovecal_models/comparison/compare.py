@@ -13,6 +13,7 @@ from glovecal_models.comparison.floor_estimate import NoiseFloor, joined
 from glovecal_models.comparison.noise_floor import RotationNoise, rotation_noise
 from glovecal_models.comparison.residuals import Residuals, residuals
 from glovecal_models.hand.dimensions import HandDimensions
+from glovecal_models.takes.camera_reference.covered_range import CoveredRange, covered_ranges
 from glovecal_models.takes.take import Take
 
 WITHIN_ONE_SD = 0.6827
@@ -74,6 +75,8 @@ class Comparison:
     seen_wearings: tuple[str, ...] = ()
     excluded: dict[str, int] = field(default_factory=dict)
     """Measured frames, by rotation, that are not compared: faulty sensors, repeated frames."""
+    camera_ranges: tuple[CoveredRange, ...] = ()
+    """Of the rotations whose reference states deviations: angles outside were not compared."""
 
 
 def compare(
@@ -114,6 +117,7 @@ def summed_up(
         unseen_wearings=_wearings_where(found, is_seen=False),
         seen_wearings=_wearings_where(found, is_seen=True),
         excluded=found.excluded,
+        camera_ranges=covered_ranges([item.take for item in found.takes], measured),
     )
 
 

@@ -8,9 +8,11 @@ from typing import Literal
 
 import numpy as np
 
-How = Literal["still hand", "still joint", "repeated poses", "spectrum", "frame to frame", "near readings"]
+How = Literal[
+    "still hand", "still joint", "repeated poses", "spectrum", "frame to frame", "near readings", "stated",
+]  # fmt: skip
 ORDER: tuple[How, ...] = (
-    "still hand", "still joint", "repeated poses", "spectrum", "frame to frame", "near readings",
+    "still hand", "still joint", "repeated poses", "spectrum", "frame to frame", "near readings", "stated",
 )  # fmt: skip
 """The best first; ``noise_floor.py`` says why."""
 LOWER_BOUNDS: tuple[How, ...] = ("spectrum", "frame to frame")
@@ -33,6 +35,8 @@ class NoiseFloor:
     """Why it is not reliable, each as the end of a sentence; none where it is."""
     estimate_deg: float | None = None
     """The estimate itself, where it lies above the error beside which the floor stands."""
+    reference_deg: float | None = None
+    """RMS of the standard deviations that the reference states; None where it states none."""
     is_lower_bound: bool = field(init=False)
     """Noise with a memory is not in it."""
     is_reliable: bool = field(init=False)
@@ -40,6 +44,15 @@ class NoiseFloor:
     def __post_init__(self) -> None:
         object.__setattr__(self, "is_lower_bound", self.how in LOWER_BOUNDS)
         object.__setattr__(self, "is_reliable", not self.reasons)
+
+    def with_stated(self, reference_deg: float) -> NoiseFloor:
+        """The floor of angles whose reference states ``reference_deg``: never below it. Errors of a camera
+        last too long for a hold to show them whole."""
+        if self.floor_deg >= reference_deg:
+            return replace(self, reference_deg=reference_deg)
+        return replace(
+            stated_floor(reference_deg, self.pieces), prediction_deg=self.prediction_deg, reasons=self.reasons
+        )
 
     def beside(self, rmse_deg: float) -> NoiseFloor:
         """The floor of an error of ``rmse_deg``, never above it: not its value, not its interval.
@@ -75,6 +88,13 @@ def pooled(
     return NoiseFloor(floor, float(low), float(high), jitter_deg, how, len(squares))
 
 
+def stated_floor(reference_deg: float, pieces: int) -> NoiseFloor:
+    """What a reference states of itself, where nothing was estimated, or less."""
+    return NoiseFloor(
+        reference_deg, reference_deg, reference_deg, 0.0, "stated", pieces, reference_deg=reference_deg
+    )
+
+
 def joined(floors: Sequence[NoiseFloor], weights: Sequence[float]) -> NoiseFloor:
     """The floor of several rotations taken together, each weighted by its frames.
 
@@ -89,6 +109,9 @@ def joined(floors: Sequence[NoiseFloor], weights: Sequence[float]) -> NoiseFloor
     how = ORDER[max(ORDER.index(one.how) for one in floors)]
     pieces = min(one.pieces for one in floors)
     reasons = tuple(dict.fromkeys(reason for one in floors for reason in one.reasons))
+    stated = [one.reference_deg or 0.0 for one in floors]
+    reference = float(np.sqrt(shares @ np.array(stated) ** 2)) if any(stated) else None
     return NoiseFloor(
-        root("floor_deg"), root("low_deg"), root("high_deg"), root("prediction_deg"), how, pieces, reasons
-    )
+        root("floor_deg"), root("low_deg"), root("high_deg"), root("prediction_deg"), how, pieces, reasons,
+        reference_deg=reference,
+    )  # fmt: skip

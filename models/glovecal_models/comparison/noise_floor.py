@@ -15,6 +15,8 @@ that holds the least a better model could still take away:
   the reference differs between frames with nearly the same readings, the half of all frames with the nearest
   neighbours. Rough, and from above: what the readings still differ by is included.
 
+Where the reference states standard deviations, as a camera does, a floor is never below them: "stated".
+
 The floor belongs to the takes and not to a model: errors are those of a plain additive map of all sensors
 (``additive_fit``), so that every verb tells the same floor for the same takes. Only the jitter beside it is
 of the model at hand. ``floor_doubts`` says when a floor is not reliable.
@@ -30,7 +32,7 @@ import numpy as np
 from glovecal_models.comparison.additive_fit import additive_fit
 from glovecal_models.comparison.error_spectrum import ErrorSpectrum, error_spectrum
 from glovecal_models.comparison.floor_doubts import clock_doubts, hold_doubts, slow_sampling
-from glovecal_models.comparison.floor_estimate import How, NoiseFloor, pooled
+from glovecal_models.comparison.floor_estimate import How, NoiseFloor, pooled, stated_floor
 from glovecal_models.comparison.holds import Hold, from_repeated_poses, holds
 from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
 from glovecal_models.comparison.near_readings import from_near_readings
@@ -204,6 +206,7 @@ def rotation_noise(
     doubts = clock_doubts(found.takes, limits)
     for rotation in found.measured_rotations:
         floors = _estimates(plain, rotation, doubts, _generator(rotation), limits)
+        floors = tuple(filter(None, (_with_stated(one, plain, rotation) for one in floors or (None,))))
         result[rotation] = RotationNoise(
             floors, error_spectrum(found, rotation, _generator(rotation), limits)
         )
@@ -226,9 +229,17 @@ def _best_floors(plain: Residuals, limits: ComparisonLimits) -> dict[str, NoiseF
     doubts, floors = clock_doubts(plain.takes, limits), {}
     for rotation in plain.measured_rotations:
         best = next(_each_estimate(plain, rotation, doubts, _generator(rotation), limits), None)
+        best = _with_stated(best, plain, rotation)
         if best is not None:
             floors[rotation] = best
     return floors
+
+
+def _with_stated(floor: NoiseFloor | None, found: Residuals, rotation: str) -> NoiseFloor | None:
+    stated = found.stated_deg(rotation)
+    if stated is None:
+        return floor
+    return stated_floor(stated, len(found.takes)) if floor is None else floor.with_stated(stated)
 
 
 def _generator(rotation: str) -> np.random.Generator:

@@ -60,6 +60,18 @@ class Residuals:
                 counts[name] += count
         return {name: count for name, count in counts.items() if count}
 
+    def stated_deg(self, rotation: str) -> float | None:
+        """RMS of the standard deviations that the reference states at the compared frames of one rotation,
+        degrees; None where it states none."""
+        column, parts = self.column(rotation), []
+        for item in self.takes:
+            stated = item.take.reference_sd_at_frames([rotation])
+            if stated is not None:
+                known = np.isfinite(stated[:, 0]) & np.isfinite(item.measured[:, column])
+                parts.append(stated[known, 0])
+        squares = np.concatenate([np.empty(0), *parts]) ** 2
+        return float(np.sqrt(squares.mean())) if len(squares) else None
+
     def column(self, rotation: str) -> int:
         return self.rotations.index(rotation)
 
@@ -90,7 +102,7 @@ def residuals(model: CalibrationModel, takes: Sequence[Take]) -> Residuals:
             TakeResiduals(
                 take,
                 angles.mean,
-                angles.sd,
+                _of_measurement(angles.sd, take, names),
                 take.reference_at_frames(names),
                 model.has_seen(take.wearing),
                 excluded,
@@ -102,6 +114,12 @@ def residuals(model: CalibrationModel, takes: Sequence[Take]) -> Residuals:
             "none of the takes measured a rotation of this model; compare needs r.ROTATION columns"
         )
     return result
+
+
+def _of_measurement(sd: np.ndarray, take: Take, rotations: Sequence[str]) -> np.ndarray:
+    """Claimed standard deviations (N, R) with what the reference states of itself."""
+    stated = take.reference_sd_at_frames(rotations)
+    return sd if stated is None else np.sqrt(sd**2 + np.nan_to_num(stated) ** 2)
 
 
 def _excluded(given: Take, kept: Take, rotations: Sequence[str]) -> tuple[int, ...]:

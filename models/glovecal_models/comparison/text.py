@@ -126,6 +126,18 @@ def wearing_error_sentences(found: Comparison) -> list[str]:
     ]
 
 
+def camera_sentences(found: Comparison) -> list[str]:
+    """How much of the error a reference accounts for that states deviations, and which angles it saw."""
+    errors = {"all rotations together": found.overall, **found.rotations}
+    told = [
+        f"{name}: the camera accounts for {min(floor.reference_deg, item.rmse_deg):.1f} of these "
+        f"{item.rmse_deg:.1f} degrees (its stated deviation, RMS)."
+        for name, item in errors.items()
+        if (floor := item.floor) is not None and floor.reference_deg is not None
+    ]
+    return [*told, *(item.sentence() for item in found.camera_ranges)]
+
+
 MOST_REGIONS = 3
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.noise_floor import takes_noise
 from glovecal_models.diagnosis.actions import Action, actions_for
+from glovecal_models.diagnosis.camera_errors import beside_camera, camera_errors
 from glovecal_models.diagnosis.candidates import assessed
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.forward_design import ForwardDesign
@@ -84,7 +85,10 @@ def diagnose(
     judged = [item for item in tried if item not in waiting]
     found, impossible = assessed(design, judged, np.random.default_rng(seed), has, progress)
     saved = problem.saved_by_known(design)
+    seen = camera_errors(problem, takes) if problem.has_camera else None
     found = beside_known(found, saved)
+    if seen is not None:
+        found = beside_camera(found, seen, problem, design)
     naming, beside, screened = named(found, limits), problem, design
     undecided = exceeding_named(impossible, naming)
     if undecided:
@@ -94,6 +98,8 @@ def diagnose(
         screened = beside.design()
         found, _ = assessed(screened, others, np.random.default_rng(seed), has, progress)
         found = beside_known(found, saved)
+        if seen is not None:
+            found = beside_camera(found, seen, beside, screened)
         naming = named(found, limits)
     impossible += [NotIdentifiable(item.name, SINGLE_POSES) for item in waiting]
     naming = _with_alikes_ordered(naming, beside, screened, by_name)
@@ -117,8 +123,9 @@ def diagnose(
         rest = after.design()
         likely = [item.effect for item in impossible if item.saves_much]
         residual = unexplained_residual(
-            rest, problem.even, layout, seed, floors=noise_floors, undecided=likely
-        )
+            rest, problem.even, layout, seed, floors=noise_floors, undecided=likely,
+            stated_deg={} if seen is None else seen.stated_deg,
+        )  # fmt: skip
         there = {(item.effect.name, joint) for item in after.known for joint in item.joints}
         actions = actions_for(residual.associations, rest, layout, there, linear=linear, seed=seed)
     progress("done", 1.0)
@@ -137,6 +144,7 @@ def diagnose(
         effects=by_name,
         linear=linear,
         limits=limits,
+        camera=seen,
     )
 
 

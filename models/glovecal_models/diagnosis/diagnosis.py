@@ -8,6 +8,7 @@ from typing import Literal
 
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.diagnosis.actions import Action
+from glovecal_models.diagnosis.camera_errors import CameraErrors
 from glovecal_models.diagnosis.hold_drift import HoldDrift
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.naming import Naming
@@ -77,6 +78,8 @@ class Diagnosis:
     linear: bool = False
     """Whether the base is a straight line."""
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS
+    camera: CameraErrors | None = None
+    """What is the reference's own, where it states deviations; None where it states none."""
 
     @property
     def signature(self) -> tuple[Finding, ...]:

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from glovecal_models.calibration.folds import are_short, first_measured, pieces
-from glovecal_models.calibration.held_out import BaseFeatures, BaseProducts, Rows
+from glovecal_models.calibration.held_out import BaseFeatures, BaseProducts, Rows, with_precision
+from glovecal_models.diagnosis.camera_columns import CameraPart, camera_columns, without_visibility
 from glovecal_models.diagnosis.known_effect import KnownEffect, one_lane
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.resampled import ResampledTake
@@ -79,15 +80,21 @@ def forward(
     known: Sequence[KnownEffect] = (),
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
     every: int = EVERY,
+    camera: CameraPart = "varying",
 ) -> ForwardDesign:
     """Own sensor, scaled to degrees, from the measured angles; ``known`` effects belong to the base.
 
-    One measured row in ``every`` is fitted.
+    One measured row in ``every`` is fitted. Where deviations of the reference are stated, rows count by them,
+    and ``camera`` says whether the errors of such a reference belong to the base (``camera_errors``).
     """
-    names = list(rotations)
+    names, is_seen = list(rotations), any(take.reference_sd is not None for take in takes)
     sensor = [_own_sensor(takes, layout, rotation, column) for column, rotation in enumerate(rotations)]
     filled = [
-        _filled(take.reference, np.column_stack([item.values[number] for item in sensor]))
+        _filled(
+            take.reference,
+            np.column_stack([item.values[number] for item in sensor]),
+            has_long_gaps=take.reference_sd is not None,
+        )
         for number, take in enumerate(takes)
     ]
     everything = np.concatenate(filled)
@@ -100,7 +107,7 @@ def forward(
             angles,
             {name: (angles[:, i] - centre[i]) / max(spread[i], 1e-9) for i, name in enumerate(names)}
             | {name: values[:, i] for name, i in spare.items()},
-            take.context,
+            (without_visibility(take) if is_seen else take).context,
             take.wearing,
             take.name,
             np.array([item.zero_deg for item in sensor]),
@@ -125,6 +132,9 @@ def forward(
         ]
         without = [_without(take, frozenset({rotation, *neighbours, *item.sensors})) for take in signals]
         extra = [found for each in known if (found := each.columns(without, column, rotation)) is not None]
+        if is_seen and camera != "none":
+            of_camera = camera_columns(takes, filled, column, camera)
+            extra += [] if of_camera is None else [of_camera]
         bases = [
             np.column_stack([features.columns(part[:, columns]), *(found.parts[number] for found in extra)])
             for number, part in enumerate(filled)
@@ -133,6 +143,9 @@ def forward(
             Rows(bases[take][rows], sensor[column].values[take][rows])
             for take, rows in zip(unit_take, index, strict=True)
         ]
+        units = with_precision(
+            units, [_variance(takes[take], rows, column) for take, rows in zip(unit_take, index, strict=True)]
+        )
         read.append(frozenset({rotation, *neighbours, *item.sensors}))
         used.append(tuple(index))
         of_known = [found.prior_sd for found in extra]
@@ -141,6 +154,15 @@ def forward(
     return ForwardDesign(
         tuple(rotations), signals, tuple(read), unit_take, tuple(used), tuple(products), limits
     )
+
+
+def _variance(take: ResampledTake, rows: np.ndarray, column: int) -> np.ndarray | None:
+    """(N,) stated variances, degrees squared; None where the take states none."""
+    if take.reference_sd is None or not np.isfinite(take.reference_sd[:, column]).any():
+        return None
+    stated = take.reference_sd[rows, column]
+    # Smoothing reaches past the last accepted sample by less than half its width.
+    return np.where(np.isfinite(stated), stated, np.nanmax(take.reference_sd[:, column])) ** 2
 
 
 def _read_beside(item: Correspondence, names: Sequence[str], layout: Layout) -> list[str]:
@@ -191,11 +213,15 @@ def _own_sensor(takes: Sequence[ResampledTake], layout: Layout, rotation: str, c
     return _OwnSensor(values, float(-x.mean(axis=0) @ slope))
 
 
-def _filled(reference: np.ndarray, read: np.ndarray) -> np.ndarray:
+def _filled(reference: np.ndarray, read: np.ndarray, *, has_long_gaps: bool = False) -> np.ndarray:
     """Straight lines across rows that were not measured; only the operators' states pass through them.
 
-    Before the first measured row the hand moved as its sensors say: ``read`` (N, R), degrees of any zero.
+    Before the first measured row the hand moved as its sensors say: ``read`` (N, R), degrees of any zero. So
+    it did within ``has_long_gaps``, those of a camera that accepts some of what it sees: the line is of what
+    the reference differs by, as a neighbour's angle is read there too.
     """
+    if has_long_gaps:
+        return read + _filled(reference - read, np.zeros_like(read))
     result = reference.copy()
     rows = np.arange(len(reference))
     for column in range(reference.shape[1]):

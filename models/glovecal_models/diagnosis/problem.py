@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from glovecal_models.diagnosis.camera_columns import CameraPart
 from glovecal_models.diagnosis.form_inputs import FormInputs
 from glovecal_models.diagnosis.forward_design import EVERY, ForwardDesign, forward
 from glovecal_models.diagnosis.known_effect import KnownEffect
@@ -59,7 +60,7 @@ class DiagnosisProblem:
                 f"no reference lasts for {SMOOTHING / RATE_HZ:.2g} s without a gap; a diagnosis needs"
                 " references that are measured several times a second"
             )
-        even = tuple(replace(take, reference=take.reference[:, fitted]) for take in even)
+        even = tuple(_with_joints(take, fitted) for take in even)
         joints = tuple(name for name, is_fitted in zip(joints, fitted, strict=True) if is_fitted)
         return cls(even, layout, joints, linear, tuple(known), limits)
 
@@ -68,7 +69,14 @@ class DiagnosisProblem:
         """Whether the frames are single poses."""
         return all(take.is_sparse for take in self.even)
 
-    def design(self, smoothing: int = SMOOTHING, every: int = EVERY) -> ForwardDesign:
+    @property
+    def has_camera(self) -> bool:
+        """Whether a reference states deviations."""
+        return any(take.reference_sd is not None for take in self.even)
+
+    def design(
+        self, smoothing: int = SMOOTHING, every: int = EVERY, camera: CameraPart = "varying"
+    ) -> ForwardDesign:
         """Readings from angles, on signals smoothed over so many rows; one row in ``every`` is fitted."""
         even = [smoothed(take, smoothing) for take in self.even]
         return forward(
@@ -77,6 +85,7 @@ class DiagnosisProblem:
             known=self.known,
             limits=self.limits,
             every=every,
+            camera=camera,
         )
 
     def saved_by_known(self, design: ForwardDesign) -> dict[str, float]:
@@ -111,6 +120,11 @@ class DiagnosisProblem:
         where = tuple(first.joints[i] for i in first.significant_joints)
         shapes = tuple(first.shapes[i] for i in first.significant_joints)
         return self.beside(_with_learned_terms(KnownEffect(effects[first.effect], where, shapes), design))
+
+
+def _with_joints(take: ResampledTake, kept: np.ndarray) -> ResampledTake:
+    deviations = None if take.reference_sd is None else take.reference_sd[:, kept]
+    return replace(take, reference=take.reference[:, kept], reference_sd=deviations)
 
 
 def _with_learned_terms(known: KnownEffect, design: ForwardDesign) -> KnownEffect:

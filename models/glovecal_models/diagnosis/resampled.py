@@ -49,6 +49,8 @@ class ResampledTake:
     is_sparse: bool = False
     """Single frames, too far apart for anything between them to be known: left as they are."""
     glove_latency: KnownLatency | None = None
+    reference_sd: np.ndarray | None = None
+    """(N, R), stated standard deviations, degrees; NaN where none is stated. None: the take states none."""
 
 
 def bridge_s(takes: Sequence[Take]) -> float:
@@ -90,6 +92,7 @@ def resampled(
     index = [take.sensors.index(name) for name in sensors]
     readings = _windowed(time, take.time_s, take.readings[:, index], bridge_s)
     reference = np.full((count, len(rotations)), np.nan)
+    deviations = None if take.reference_sd is None else np.full_like(reference, np.nan)
     for column, rotation in enumerate(rotations):
         if rotation in take.rotations:
             values = take.reference[:, take.rotations.index(rotation)]
@@ -97,6 +100,11 @@ def resampled(
             if known.sum() > 1:
                 at = take.reference_time_s[known]
                 reference[:, column] = _windowed(time, at, values[known, None], bridge_s)[:, 0]
+            if deviations is not None and take.reference_sd is not None:
+                # What was seen and not accepted is a gap, however short: nothing is drawn across it.
+                reference[np.isnan(take.reference_between(time, values)), column] = np.nan
+                stated = take.reference_sd[:, take.rotations.index(rotation)]
+                deviations[:, column] = take.reference_between(time, stated)
     if take.begins_s is not None:
         reference[time < take.begins_s] = np.nan
     context = {name: _carried(time, take.time_s, values) for name, values in take.context.items()}
@@ -104,6 +112,7 @@ def resampled(
     return ResampledTake(
         take.name, take.wearing, time[read], readings[read], reference[read],
         {name: values[read] for name, values in context.items()}, glove_latency=take.glove_latency,
+        reference_sd=None if deviations is None else deviations[read],
     )  # fmt: skip
 
 
@@ -111,15 +120,20 @@ def _sparse(take: Take, sensors: Sequence[str], rotations: Sequence[str]) -> Res
     readings = take.readings[:, [take.sensors.index(name) for name in sensors]]
     reference = take.reference_at_frames(rotations)
     return ResampledTake(
-        take.name, take.wearing, take.time_s, readings, reference, dict(take.context), is_sparse=True
-    )
+        take.name, take.wearing, take.time_s, readings, reference, dict(take.context), is_sparse=True,
+        reference_sd=take.reference_sd_at_frames(rotations),
+    )  # fmt: skip
 
 
 def shifted(take: ResampledTake, delay_s: float) -> ResampledTake:
     """The take with its reference ``delay_s`` later, as readings that come so late ask for."""
     at = take.time_s - delay_s
-    moved = [np.interp(at, take.time_s, column, np.nan, np.nan) for column in take.reference.T]
-    return replace(take, reference=np.column_stack(moved))
+
+    def moved(table: np.ndarray) -> np.ndarray:
+        return np.column_stack([np.interp(at, take.time_s, column, np.nan, np.nan) for column in table.T])
+
+    deviations = None if take.reference_sd is None else moved(take.reference_sd)
+    return replace(take, reference=moved(take.reference), reference_sd=deviations)
 
 
 def smoothed(take: ResampledTake, width: int) -> ResampledTake:

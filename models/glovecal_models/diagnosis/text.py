@@ -22,7 +22,8 @@ UNITS = "The reference only names poses: errors are shares of the step from 0 to
 
 def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
     """What a mocap engineer should know, the most important first."""
-    sentences = [*diagnosis.reference_problems, *(item.sentence for item in diagnosis.findings)]
+    sentences = [*diagnosis.reference_problems, *camera_sentences(diagnosis)]
+    sentences += [item.sentence for item in diagnosis.findings]
     if diagnosis.naming.ranked:
         sentences.append(ranked_sentence(diagnosis))
     elif diagnosis.hold_drift is not None:
@@ -34,6 +35,22 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
         sentences.append(next_take_sentence(diagnosis.next_take))
     sentences.append(residual_sentence(diagnosis.residual))
     return sentences + not_identifiable_sentences(diagnosis.not_identifiable)
+
+
+def camera_sentences(diagnosis: Diagnosis) -> list[str]:
+    """What is the camera's: its errors, effects that it may explain as well, and the angles it did not
+    see."""
+    camera = diagnosis.camera
+    if camera is None:
+        return []
+    within = [item for item in diagnosis.assessments if item.within_camera]
+    sentences = [camera.sentence] if camera.joints else []
+    sentences += [
+        f"{item.effect} on {', '.join(item.joints[i] for i in item.within_camera)} is not named: the camera's"
+        " own errors may explain as much."
+        for item in within
+    ]
+    return [*sentences, *(item.sentence() for item in camera.ranges)]
 
 
 def named_sentence(diagnosis: Diagnosis) -> str | None:

@@ -49,6 +49,9 @@ class SlowExcess:
     """Whether each take's mean and straight line were taken out."""
 
 
+NOTHING_STATED: Mapping[str, float] = {}
+
+
 @dataclass(frozen=True)
 class UnexplainedResidual:
     """Whether held-out residuals exceed a healthy glove's, and the evidence."""
@@ -95,8 +98,12 @@ def unexplained_residual(
     *,
     floors: Mapping[str, NoiseFloor] | None = None,
     undecided: Sequence[str] = (),
+    stated_deg: Mapping[str, float] = NOTHING_STATED,
 ) -> UnexplainedResidual:
     """Judge the held-out residuals of ``design``, known effects included in its base.
+
+    ``stated_deg``: of each joint whose reference states deviations, degrees. What a camera gets wrong lasts:
+    a slow error no larger than them is the camera's, and what joints share too, as it sees one hand.
 
     ``even``: its takes, for their readings; ``floors``: of each joint where it is known. ``undecided``:
     effects that save much and that these takes cannot decide; they are not in the base.
@@ -120,9 +127,10 @@ def unexplained_residual(
     found = replace(found, shared=shared_error(means, generator, limits))
     ratios = [_ratio(*items, limits) for items in zip(slow, within, strict=True)]
     exceeding = sorted((i for i, ratio in enumerate(ratios) if ratio > 1), key=lambda i: -ratios[i])
-    is_shared = _is_shared(found)
+    exceeding = [i for i in exceeding if slow[i].lower_bound_deg > stated_deg.get(design.rotations[i], 0.0)]
+    is_shared = _is_shared(found) and not stated_deg
     if not exceeding and not is_shared and not above:
-        possible = _possible_excess(found)
+        possible = None if stated_deg else _possible_excess(found)
         return replace(found, excess=possible, obstacle="wide interval") if possible else found
     farthest = [design.rotations.index(name) for name in above]
     chosen = (list(dict.fromkeys([*exceeding, *farthest])) or list(range(len(slow))))[:MOST_JOINTS]

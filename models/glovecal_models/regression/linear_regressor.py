@@ -100,6 +100,7 @@ def fit_linear(
     target: np.ndarray,
     *,
     sensor_names: Sequence[str] | None = None,
+    precision: np.ndarray | None = None,
     cancelled: Cancel | None = None,
     report: Report | None = None,
 ) -> LinearRegressor:
@@ -107,16 +108,20 @@ def fit_linear(
 
     The mean has no ridge. The variance is the posterior of the plane under a slope prior so wide that it
     only shows in directions the samples never moved in: there the plane is unknown, and says so.
+    ``precision`` (N,): relative, of each sample; ``noise_variance`` is that of a sample of precision 1.
     Raises NotTrainable (at least D + 2 samples), Cancelled.
     """
     stop_if(cancelled, "training")
     dimensions = np.shape(inputs)[1] if np.ndim(inputs) == 2 else 1
     working = standardise(*check_samples(inputs, target, sensor_names, least=dimensions + 2))
-    basis = np.column_stack([working.x, np.ones(len(working.y))])
-    solution = lstsq(basis, working.y, cond=1e-10)
+    basis, goal = np.column_stack([working.x, np.ones(len(working.y))]), working.y
+    if precision is not None:
+        root = np.sqrt(precision)
+        basis, goal = root[:, None] * basis, root * goal
+    solution = lstsq(basis, goal, cond=1e-10)
     assert solution is not None
     coefficients, rank = solution[0], int(solution[2])
-    residual = working.y - basis @ coefficients
+    residual = goal - basis @ coefficients
     noise = float(residual @ residual) / max(len(residual) - rank, 1)
     scale = working.target_scale
     if report is not None:

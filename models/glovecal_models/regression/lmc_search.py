@@ -60,6 +60,8 @@ class LmcSearch:
     standard: Standardised
     samples: MergedSamples
     sample_weight: float
+    precision: np.ndarray | None
+    """(N,) of each sample's noise, relative; None: all alike."""
     found: tuple[Candidate, ...]
     """Distinct optima, best first, roughly located."""
     account: list[dict[str, Any]]
@@ -75,24 +77,28 @@ class LmcSearch:
         target: np.ndarray,
         *,
         sample_weight: float = 1.0,
+        precision: np.ndarray | None = None,
         start: Sequence[float] = (),
         seed: int = 0,
         cancelled: Cancel | None = None,
     ) -> LmcSearch:
         """From ``inputs`` (N, D), counts, and ``target`` (N,), degrees. ``start``: ``LmcOptimum.parameters``,
-        where it is known; else several are tried. Raises NotTrainable, Cancelled."""
+        where it is known; else several are tried. ``precision`` (N,): as ``MergedSamples.of`` takes it.
+        Raises NotTrainable, Cancelled."""
         standard = standardise(*check_samples(inputs, target))
-        samples = MergedSamples.of(standard.x, standard.y, sample_weight)
+        samples = MergedSamples.of(standard.x, standard.y, sample_weight, precision)
         generator = np.random.default_rng(seed)
         distinct, on_nodes = len(samples.inputs), None
         if len(start) == standard.x.shape[1] + 1:
             found, account = screen_one(samples, np.array(start), cancelled)
         else:
-            found, account = screen(samples, standard.x, standard.y, generator, cancelled, sample_weight)
+            found, account = screen(
+                samples, standard.x, standard.y, generator, cancelled, sample_weight, precision
+            )
         if distinct > FEW:
             nodes = min(MOST_NODES, distinct // 2)
             on_nodes = descend(samples, found[0].parameters, fine=True, most_nodes=nodes, cancelled=cancelled)
-        return cls(standard, samples, sample_weight, tuple(found), account, on_nodes, generator)
+        return cls(standard, samples, sample_weight, precision, tuple(found), account, on_nodes, generator)
 
     @property
     def is_expensive(self) -> bool:
@@ -120,13 +126,13 @@ class LmcSearch:
         They start from the optimum of a subset, where an evaluation costs a fifteenth.
         """
         samples, rough, standard = self.samples, self.found[0], self.standard
-        distinct, weight = len(samples.inputs), self.sample_weight
+        distinct, weight, precision = len(samples.inputs), self.sample_weight, self.precision
         if distinct <= FEW:
             return search_exactly(samples, rough.parameters, tolerance=1e-6, cancelled=cancelled) or rough
         if distinct > MOST_EXACT:
-            samples = some_samples(standard.x, standard.y, 2000, self.generator, weight)
+            samples = some_samples(standard.x, standard.y, 2000, self.generator, weight, precision)
         if len(samples.inputs) > 2 * SCREENED:
-            subset = some_samples(standard.x, standard.y, SCREENED, self.generator, weight)
+            subset = some_samples(standard.x, standard.y, SCREENED, self.generator, weight, precision)
             rough = search_exactly(subset, rough.parameters, tolerance=0.05, cancelled=cancelled) or rough
         return search_exactly(samples, rough.parameters, tolerance=1e-3, cancelled=cancelled) or rough
 

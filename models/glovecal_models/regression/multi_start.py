@@ -142,15 +142,17 @@ def screen(
     generator: np.random.Generator,
     cancelled: Cancel | None = None,
     weight: float = 1.0,
+    precision: np.ndarray | None = None,
 ) -> tuple[list[Candidate], list[dict[str, object]]]:
     """Distinct optima over all starts, best first, roughly located; and a JSON-able account of every start.
 
     ``merged``: all of the standardised samples ``x`` (N, D), ``y`` (N,). Where these have many distinct
-    inputs, a random ``SCREENED`` of them are used. ``weight``: what each sample counts in ``merged``.
+    inputs, a random ``SCREENED`` of them are used. ``weight``: what each sample counts in ``merged``;
+    ``precision`` (N,): its noise's there.
     """
     dimensions = x.shape[1]
     few = len(merged.inputs) <= FEW
-    samples = merged if few else some_samples(x, y, SCREENED, generator, weight)
+    samples = merged if few else some_samples(x, y, SCREENED, generator, weight, precision)
     found: list[Candidate] = []
     account: list[dict[str, object]] = []
     for start in long_starts(dimensions):
@@ -161,7 +163,7 @@ def screen(
             found.append(candidate)
     found.sort(key=lambda candidate: candidate.nlml)
     if dimensions > 1 or not found:
-        subset = some_samples(x, y, SUBSET, generator, weight)
+        subset = some_samples(x, y, SUBSET, generator, weight, precision)
         short = _short_optimum(subset, found, cancelled)
         _note(account, short_start(dimensions), short)
         if short is not None:
@@ -184,7 +186,12 @@ def screen_one(
 
 
 def some_samples(
-    x: np.ndarray, y: np.ndarray, most: int, generator: np.random.Generator, weight: float = 1.0
+    x: np.ndarray,
+    y: np.ndarray,
+    most: int,
+    generator: np.random.Generator,
+    weight: float = 1.0,
+    precision: np.ndarray | None = None,
 ) -> MergedSamples:
     """A random ``most`` of the samples, or all where there are fewer.
 
@@ -194,7 +201,8 @@ def some_samples(
         rows = generator.choice(len(y), most, replace=False)
         weight = min(1.0, weight * len(y) / most)
         x, y = x[rows], y[rows]
-    return MergedSamples.of(x, y, weight)
+        precision = None if precision is None else precision[rows]
+    return MergedSamples.of(x, y, weight, precision)
 
 
 def _short_optimum(

@@ -16,11 +16,13 @@ import numpy as np
 from glovecal_models.errors import BadInput, BadTakeTable
 from glovecal_models.names import check_channel_name
 
-ColumnKind = Literal["time", "take", "wearing", "pose", "sensor", "rotation", "context"]
+ColumnKind = Literal["time", "take", "wearing", "pose", "sensor", "rotation", "deviation", "context"]
 MOST_COLUMNS = 1000
 _PLAIN: dict[str, ColumnKind] = {"time_s": "time", "take": "take", "wearing": "wearing", "pose": "pose"}
-_PREFIXED: dict[str, ColumnKind] = {"s": "sensor", "r": "rotation", "c": "context"}
-_ALLOWED = "time_s, take, wearing, pose, s.<SENSOR>, r.<ROTATION> and c.<CONTEXT>"
+_PREFIXED: dict[str, ColumnKind] = {
+    "s": "sensor", "r": "rotation", "sd": "deviation", "c": "context",
+}  # fmt: skip
+_ALLOWED = "time_s, take, wearing, pose, s.<SENSOR>, r.<ROTATION>, sd.<ROTATION> and c.<CONTEXT>"
 _TIME_LIKE = {"time", "t", "timestamp", "seconds", "second", "time_sec", "times", "time_ms", "ms", "time(s)"}
 
 
@@ -38,8 +40,8 @@ class Column:
 
     @property
     def may_be_empty(self) -> bool:
-        """Angles and context may be missing in a row; times and readings may not."""
-        return self.kind in ("rotation", "context")
+        """Angles, their deviations and context may be missing in a row; times and readings may not."""
+        return self.kind in ("rotation", "deviation", "context")
 
 
 def parse_header(headers: Sequence[str], file: str) -> list[Column]:
@@ -54,6 +56,14 @@ def parse_header(headers: Sequence[str], file: str) -> list[Column]:
                 "this column stands twice; remove or rename one", file=file, line=1, column=column.header
             )
         seen.add(column.header)
+    for column in columns:
+        if column.kind == "deviation" and f"r.{column.name}" not in seen:
+            raise BadTakeTable(
+                f"there is no r.{column.name} beside it, whose standard deviation it would be",
+                file=file,
+                line=1,
+                column=column.header,
+            )
     if "time_s" not in seen:
         raise BadTakeTable(f"there is no column time_s; columns are {_ALLOWED}", file=file, line=1)
     return columns
@@ -70,7 +80,7 @@ def _parse_column(header: str, place: int, file: str) -> Column:
             f"unknown column; {_what_was_meant(header)}", file=file, line=1, column=header[:80]
         )
     try:
-        check_channel_name(name, _PREFIXED[prefix])
+        check_channel_name(name, "rotation" if prefix == "sd" else _PREFIXED[prefix])
     except BadInput as error:
         raise BadTakeTable(str(error), file=file, line=1, column=header[:80]) from error
     return Column(header, _PREFIXED[prefix], name)
@@ -146,6 +156,8 @@ class RawTable:
 def unusable_number(column: Column, values: np.ndarray) -> int | None:
     """Index of the first number the column must not hold, None if all are fine."""
     bad = ~(np.abs(values) <= _largest(column))
+    if column.kind == "deviation":
+        bad |= values <= 0
     if column.may_be_empty:
         bad &= ~np.isnan(values)
     return int(np.argmax(bad)) if bad.any() else None
@@ -159,6 +171,9 @@ def what_is_wrong(column: Column, value: float, shown: str) -> str:
     if column.kind == "rotation":
         limit = f"{LARGEST_ANGLE_DEG:g} either way"
         return f"{shown} is impossible for an angle in degrees (limit {limit}); {right}"
+    if column.kind == "deviation":
+        limit = f"above 0, at most {LARGEST_ANGLE_DEG:g}"
+        return f"{shown} is impossible for a standard deviation ({limit}); {right}"
     if column.kind == "time":
         limit = f"{LATEST_TIME_S:g}: {LATEST_TIME_S / YEAR_S:.0f} years"
         divide = "divide milliseconds by 1e3, microseconds by 1e6, nanoseconds by 1e9"
@@ -174,13 +189,15 @@ def what_is_right(column: Column) -> str:
         return "every frame needs a finite reading, as the glove sends it"
     if column.kind == "rotation":
         return "write the angle in degrees, or leave it empty where nothing was measured"
+    if column.kind == "deviation":
+        return "write the angle's standard deviation in degrees, or leave it empty where nothing was measured"
     return "write a number, or leave it empty where nothing was measured"
 
 
 def _largest(column: Column) -> float:
     if column.kind == "time":
         return LATEST_TIME_S
-    return LARGEST_ANGLE_DEG if column.kind == "rotation" else LARGEST_VALUE
+    return LARGEST_ANGLE_DEG if column.kind in ("rotation", "deviation") else LARGEST_VALUE
 
 
 def unusable_text(column: Column, texts: Sequence[str]) -> tuple[int, str] | None:

@@ -2,7 +2,8 @@
 
 A table has the column ``time_s`` (seconds of any origin, increasing within a take), optional ``take``,
 ``wearing`` and ``pose`` (text), ``s.<SENSOR>`` raw readings, ``r.<ROTATION>`` reference angles in degrees
-(empty where not measured) and ``c.<NAME>`` context numbers. The reference may stand in a table of its own
+(empty where not measured), ``sd.<ROTATION>`` their standard deviations in degrees where their source states
+them, and ``c.<NAME>`` context numbers. The reference may stand in a table of its own
 with a time column of its own; of two files ``X.frames.csv`` and ``X.reference.csv`` the second is found
 by itself. ``c.simulated`` other than 0 marks a simulated take.
 """
@@ -19,7 +20,7 @@ from glovecal_models.errors import BadTakeTable
 from glovecal_models.takes.frame_times import spread_equal_times, unit_hint
 from glovecal_models.takes.raw_table import LONGEST_TAKE_S, YEAR_S, ColumnKind, RawTable
 from glovecal_models.takes.read_table import MAGIC, read_csv_table, read_parquet_table
-from glovecal_models.takes.take import Take, poses_at_frames
+from glovecal_models.takes.take import Take, deviation_problem, poses_at_frames
 from glovecal_models.takes.write_table import SIMULATED_CONTEXT
 
 EqualTimes = Literal["refuse", "spread"]
@@ -36,6 +37,8 @@ class ReferenceRows:
     reference: np.ndarray
     """Shape (N, len(rotations)), degrees; NaN where not measured."""
     poses: tuple[str, ...] | None
+    reference_sd: np.ndarray | None = None
+    """Stated standard deviations as ``Take`` holds them."""
 
 
 def read_takes(
@@ -116,7 +119,7 @@ def _read_reference_table(path: Path) -> RawTable:
     for column in table.columns:
         if column.kind in refused:
             raise table.error(
-                "a reference table holds time_s, take, pose and r. columns only; readings, context and "
+                "a reference table holds time_s, take, pose, r. and sd. columns only; readings, context and "
                 "wearing belong to the frames",
                 column=column.header,
             )
@@ -198,7 +201,25 @@ def _match_references(
 
 def _reference_rows(table: RawTable, rows: np.ndarray) -> ReferenceRows:
     rotations, reference = _only_measured(table.names("rotation"), table.matrix("rotation", rows))
-    return ReferenceRows(table.time_s[rows], rotations, reference, _poses(table, rows))
+    deviations = _deviations(table, rows, rotations, reference)
+    return ReferenceRows(table.time_s[rows], rotations, reference, _poses(table, rows), deviations)
+
+
+def _deviations(
+    table: RawTable, rows: np.ndarray, rotations: tuple[str, ...], reference: np.ndarray
+) -> np.ndarray | None:
+    stated = [name for name in table.names("deviation") if name in rotations]
+    if not stated:
+        return None
+    found = np.full_like(reference, np.nan)
+    for name in stated:
+        column = rotations.index(name)
+        values = table.numbers[f"sd.{name}"][rows]
+        found[:, column] = np.where(np.isfinite(reference[:, column]), values, np.nan)
+        problem = deviation_problem([name], reference[:, [column]], found[:, [column]])
+        if problem is not None:
+            raise table.error(problem[1], row=int(rows[problem[0]]), column=f"sd.{name}")
+    return found if np.isfinite(found).any() else None
 
 
 def _only_measured(names: tuple[str, ...], values: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
@@ -260,7 +281,7 @@ def _build_take(
     poses = _poses(table, rows)
     if own is None:
         rotations, reference = _only_measured(table.names("rotation"), table.matrix("rotation", rows))
-        own = ReferenceRows(time, rotations, reference, None)
+        own = ReferenceRows(time, rotations, reference, None, _deviations(table, rows, rotations, reference))
     elif poses is None and own.poses is not None:
         poses = poses_at_frames(time, own.time_s, own.poses)
     measured = len(own.rotations) > 0
@@ -276,6 +297,7 @@ def _build_take(
         rotations=own.rotations,
         reference_time_s=own.time_s if measured else np.empty(0),
         reference=own.reference if measured else np.empty((0, 0)),
+        reference_sd=own.reference_sd if measured else None,
         context=context,
         poses=poses,
         simulated=bool((np.nan_to_num(simulated) != 0).any()),

@@ -45,11 +45,19 @@ class Take:
     frames are asked for."""
     glove_latency: KnownLatency | None = None
     """How late the glove's frames are known to be, against the hand; ``time_s`` is as they were stamped."""
+    reference_sd: np.ndarray | None = None
+    """Standard deviation of each reference angle as its source states it, shape (R, len(rotations)), degrees;
+    NaN where no angle was measured, and in whole columns that state none. None: nothing is stated."""
 
     def __post_init__(self) -> None:
         frames, rows = len(self.time_s), len(self.reference_time_s)
         _require_shape("readings", self.readings, (frames, len(self.sensors)), self.name)
         _require_shape("reference", self.reference, (rows, len(self.rotations)), self.name)
+        if self.reference_sd is not None:
+            _require_shape("reference_sd", self.reference_sd, (rows, len(self.rotations)), self.name)
+            problem = deviation_problem(self.rotations, self.reference, self.reference_sd)
+            if problem is not None:
+                raise BadInput(f"take {self.name!r}: {problem[1]}")
         for name, column in self.context.items():
             _require_shape(f"context {name}", column, (frames,), self.name)
         if self.poses is not None and len(self.poses) != frames:
@@ -83,29 +91,41 @@ class Take:
         """Reference angles at the frame times, shape (N, len(rotations)), NaN where none was measured.
 
         With a time column of its own the reference is interpolated linearly, never extrapolated and
-        never across a gap longer than ``LONGEST_INTERPOLATED_GAP_S``, and never in the pre-roll.
+        never across a gap longer than ``LONGEST_INTERPOLATED_GAP_S``, and never in the pre-roll. Where
+        standard deviations are stated, a row without an angle is a gap, too: it was seen and not accepted.
         """
+        return self._at_frames(self.reference, rotations)
+
+    def reference_sd_at_frames(self, rotations: Sequence[str]) -> np.ndarray | None:
+        """Stated standard deviations at the frame times, shape (N, len(rotations)), degrees; NaN where none
+        is stated. None where the take states none at all."""
+        return None if self.reference_sd is None else self._at_frames(self.reference_sd, rotations)
+
+    def reference_between(self, at: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """A column of the reference (R,), or of its deviations, at times (M,): as ``reference_at_frames``."""
+        measured = np.flatnonzero(np.isfinite(values))
+        if len(measured) < 2:
+            return np.full(len(at), np.nan)
+        time = self.reference_time_s[measured]
+        after = np.clip(np.searchsorted(time, at), 1, len(time) - 1)
+        usable = (at >= time[0]) & (at <= time[-1])
+        usable &= time[after] - time[after - 1] <= LONGEST_INTERPOLATED_GAP_S
+        if self.reference_sd is not None:
+            usable &= measured[after] - measured[after - 1] == 1
+        return np.where(usable, np.interp(at, time, values[measured]), np.nan)
+
+    def _at_frames(self, table: np.ndarray, rotations: Sequence[str]) -> np.ndarray:
+        """Columns of ``table``, rows of the reference, as ``reference_at_frames`` reads it."""
         result = np.full((len(self.time_s), len(rotations)), np.nan)
         for column, rotation in enumerate(rotations):
             if rotation not in self.rotations:
                 continue
-            values = self.reference[:, self.rotations.index(rotation)]
+            values = table[:, self.rotations.index(rotation)]
             if self.has_own_reference_clock:
-                values = _interpolate(self.time_s, self.reference_time_s, values)
+                values = self.reference_between(self.time_s, values)
             result[:, column] = values
         result[: self.pre_roll_frames] = np.nan
         return result
-
-
-def _interpolate(at: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    measured = np.isfinite(values)
-    time, values = time[measured], values[measured]
-    if len(time) < 2:
-        return np.full(len(at), np.nan)
-    after = np.clip(np.searchsorted(time, at), 1, len(time) - 1)
-    usable = (at >= time[0]) & (at <= time[-1])
-    usable &= time[after] - time[after - 1] <= LONGEST_INTERPOLATED_GAP_S
-    return np.where(usable, np.interp(at, time, values), np.nan)
 
 
 def _require_shape(what: str, array: np.ndarray, shape: tuple[int, ...], take: str) -> None:
@@ -123,6 +143,27 @@ def _require_increasing(what: str, time: np.ndarray, take: str) -> None:
             f"take {take!r}: {what} must increase, "
             f"but row {row + 1} is {time[row + 1]:g} s after {time[row]:g} s"
         )
+
+
+def deviation_problem(
+    rotations: Sequence[str], reference: np.ndarray, deviations: np.ndarray
+) -> tuple[int, str] | None:
+    """Row and sentence of the first stated deviation (R, rotations) that cannot be, None if all can.
+
+    A column states the deviation of each of its angles, or of none.
+    """
+    for column, rotation in enumerate(rotations):
+        stated = deviations[:, column]
+        if np.isnan(stated).all():
+            continue
+        bad = np.isfinite(reference[:, column]) & ~((stated > 0) & np.isfinite(stated))
+        if bad.any():
+            row = int(np.argmax(bad))
+            return row, (
+                f"the standard deviation of {rotation} is {stated[row]:g} in row {row + 1}; where an angle "
+                "is measured it must be positive degrees, in all of its rows or in none"
+            )
+    return None
 
 
 def poses_at_frames(

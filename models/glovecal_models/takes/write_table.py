@@ -100,24 +100,39 @@ def _without_reference_of_pre_roll(take: Take) -> Take:
     if take.begins_s is None:
         return take
     kept = take.reference_time_s >= take.begins_s
-    return replace(take, reference_time_s=take.reference_time_s[kept], reference=take.reference[kept])
+    return replace(
+        take,
+        reference_time_s=take.reference_time_s[kept],
+        reference=take.reference[kept],
+        reference_sd=None if take.reference_sd is None else take.reference_sd[kept],
+    )
 
 
 def _rotation_columns(takes: Sequence[Take], rows: Callable[[Take], int]) -> dict[str, TableColumn]:
     columns: dict[str, TableColumn] = {}
     for name in _union(take.rotations for take in takes):
-        parts = [
-            _measured(take, name)
-            if name in take.rotations and len(take.reference_time_s)
-            else np.full(rows(take), np.nan)
-            for take in takes
-        ]
-        columns[f"r.{name}"] = np.concatenate(parts)
+        for prefix, table in (("r", _angles), ("sd", _deviations)):
+            parts = [
+                _measured(take, table(take), name)
+                if name in take.rotations and len(take.reference_time_s)
+                else np.full(rows(take), np.nan)
+                for take in takes
+            ]
+            if prefix == "r" or any(np.isfinite(part).any() for part in parts):
+                columns[f"{prefix}.{name}"] = np.concatenate(parts)
     return columns
 
 
-def _measured(take: Take, rotation: str) -> np.ndarray:
-    values = take.reference[:, take.rotations.index(rotation)]
+def _angles(take: Take) -> np.ndarray:
+    return take.reference
+
+
+def _deviations(take: Take) -> np.ndarray:
+    return np.full_like(take.reference, np.nan) if take.reference_sd is None else take.reference_sd
+
+
+def _measured(take: Take, table: np.ndarray, rotation: str) -> np.ndarray:
+    values = table[:, take.rotations.index(rotation)]
     return (
         values if take.begins_s is None else np.where(take.reference_time_s < take.begins_s, np.nan, values)
     )

@@ -25,6 +25,7 @@ from glovecal_service.jobs.job_kind import JobPlan, Step, Task, TaskResult
 from glovecal_service.jobs.training_takes import TrainingTakes
 from glovecal_service.store import Store
 from glovecal_service.store.records import JobRecord, TakeRecord
+from glovecal_service.views.camera_range import camera_range_views
 
 _OWN_KEYS = {"subject", "layout", "takes", "activate", "parent", "prior"}
 _SETTINGS = {field.name for field in fields(TrainingSettings)} - {"kernels", "prior"}
@@ -36,7 +37,7 @@ class TrainJob:
 
     Result: ``model``, ``held_out_rmse_deg``, ``rmse_unseen_wearing_deg``, ``per_rotation`` (held-out
     degrees, None for a rule), ``sentences``, ``confounded_order`` (rotations of wearings in which posture
-    goes with time), ``active``.
+    goes with time), ``camera_ranges`` (angles that a camera saw, where one measured), ``active``.
     """
 
     def plan(self, store: Store, job: JobRecord) -> JobPlan:
@@ -169,6 +170,7 @@ def _facts(
         "per_rotation": {item.rotation: item.held_out_rmse_deg for item in model.rotations},
         "sentences": [*said, *plan_sentences(plan), *_kernel_sentences(model), *_weight_sentences(model)],
         "simulated": model.simulated,
+        "camera_ranges": camera_range_views(plan.camera_ranges),
     }
 
 
@@ -204,7 +206,10 @@ def _keep(
     )
     if activate:
         store.models.activate(record.id)
-    names = ("held_out_rmse_deg", "rmse_unseen_wearing_deg", "per_rotation", "sentences", "confounded_order")
+    names = (
+        "held_out_rmse_deg", "rmse_unseen_wearing_deg", "per_rotation", "sentences", "confounded_order",
+        "camera_ranges",
+    )  # fmt: skip
     said = {name: facts[name] for name in names}
     return {"model": record.id, **said, "active": activate}
 

@@ -26,6 +26,8 @@ def dump_take(take: Take) -> bytes:
         "reference": np.asarray(take.reference, np.float64),
         **{f"context.{name}": np.asarray(column, np.float64) for name, column in take.context.items()},
     }
+    if take.reference_sd is not None:  # absent in takes stored before: those read as they did
+        arrays["reference_sd"] = np.asarray(take.reference_sd, np.float64)
     description: dict[str, Any] = {
         "version": VERSION,
         "name": take.name,
@@ -65,6 +67,7 @@ def load_take(content: bytes) -> Take:
             rotations=tuple(description["rotations"]),
             reference_time_s=arrays["reference_time_s"],
             reference=arrays["reference"],
+            reference_sd=arrays.get("reference_sd"),
             context={name: arrays[f"context.{name}"] for name in description["context"]},
             poses=poses,
             simulated=bool(description["simulated"]),

@@ -13,6 +13,7 @@ from sqlalchemy.exc import IntegrityError
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 from glovecal_models.names import check_identifier
+from glovecal_models.takes.camera_reference.camera_reference import CAMERA_PATCHES
 from glovecal_models.takes.clock_scan import aligned
 from glovecal_models.takes.take import Take, poses_at_frames
 from glovecal_service.store import tables
@@ -29,6 +30,10 @@ from glovecal_service.store.texts import check_text
 
 CLOCK_OFFSET = "clock_offset_s"
 """Fact of a take: by how much its reference clock was ahead of the frames' before it was repaired."""
+
+CAMERA_REFERENCE = "camera_reference"
+"""Fact of a take whose reference a camera measured: its clock offset with its standard deviation, in seconds,
+and the range of each rotation that it saw; None where another reference came after."""
 
 
 class Takes:
@@ -128,8 +133,15 @@ class Takes:
         rotations: Sequence[str],
         reference: np.ndarray,
         poses: Sequence[str] | None = None,
+        *,
+        reference_sd: np.ndarray | None = None,
+        context: Mapping[str, np.ndarray] | None = None,
+        facts: Mapping[str, Any] | None = None,
     ) -> TakeRecord:
         """Give a take its reference angles, (R,) seconds and (R, len(rotations)) degrees.
+
+        ``reference_sd``: their standard deviations where stated; ``context``: columns at the frames that come
+        with them; ``facts`` tell where they come from.
 
         ``poses`` (R,) names the pose at each reference row; None leaves the take's own names as they are.
 
@@ -143,10 +155,14 @@ class Takes:
             reference_time_s=time_s,
             rotations=tuple(rotations),
             reference=reference,
+            reference_sd=reference_sd,
+            context={name: take.context[name] for name in take.context if name != CAMERA_PATCHES}
+            | dict(context or {}),
             poses=take.poses if poses is None else poses_at_frames(take.time_s, time_s, poses),
         )
-        stale = {CLOCK_OFFSET: 0.0, CLOCK_UNKNOWN: False}
-        return self._replace(earlier, take, {name: stale[name] for name in stale if name in earlier.facts})
+        stale = {CLOCK_OFFSET: 0.0, CLOCK_UNKNOWN: False, CAMERA_REFERENCE: None}
+        stale = {name: stale[name] for name in stale if name in earlier.facts}
+        return self._replace(earlier, take, stale | dict(facts or {}))
 
     def shift_reference(self, id: str, seconds: float) -> TakeRecord:
         """Move a take's reference in time, later by ``seconds``; ``facts`` keep the sum of all shifts.
@@ -186,6 +202,7 @@ class Takes:
             rotations=before.rotations,
             reference_time_s=before.reference_time_s,
             reference=before.reference,
+            reference_sd=before.reference_sd,
             poses=before.poses and poses_at_frames(frames.time_s, before.time_s, before.poses),
         )
         found = {"accounting": dict(accounting), "frames_sha256": frames_hash(take)}

@@ -10,8 +10,13 @@ from pydantic import BaseModel, Field
 
 from glovecal_models.comparison.compare import Comparison
 from glovecal_models.comparison.fingertips import FingertipErrors
-from glovecal_models.comparison.text import fingertips_sentence, wearing_error_sentences
+from glovecal_models.comparison.text import (
+    camera_sentences,
+    fingertips_sentence,
+    wearing_error_sentences,
+)
 from glovecal_service.plain import plain
+from glovecal_service.views.camera_range import CameraRangeView, camera_range_views
 from glovecal_service.views.ceiling import CeilingView, ceiling_view
 from glovecal_service.views.noise_floor import NoiseFloorView
 
@@ -100,7 +105,9 @@ class ComparisonView(BaseModel):
     seen_wearing: ErrorsView | None = Field(description="Overall, in wearings that it knows.")
     unseen_wearings: list[str]
     seen_wearings: list[str]
-    sentences: list[str] = Field(description="The errors in wearings not seen, and in those seen.")
+    sentences: list[str] = Field(
+        description="Errors in wearings not seen and seen; what a camera accounts for."
+    )
     poses: list[PoseErrorsView]
     not_measured: list[str]
     not_predicted: list[str]
@@ -109,6 +116,10 @@ class ComparisonView(BaseModel):
     )
     excluded: dict[str, int] = Field(
         description="Measured frames, by rotation, that are not compared: faulty sensors, repeated frames."
+    )
+    camera_ranges: list[CameraRangeView] = Field(
+        [],
+        description="Of rotations that a camera measured: angles outside of these ranges were not compared.",
     )
     trained_on: list[str] = Field(description="Takes among those given that the model was trained on.")
     ceiling: CeilingView | None = Field(
@@ -127,7 +138,8 @@ def comparison_view(
     unseen = found.unseen_wearing
     facts |= {
         "rmse_unseen_wearing_deg": None if unseen is None else plain(unseen.rmse_deg),
-        "sentences": wearing_error_sentences(found),
+        "sentences": [*wearing_error_sentences(found), *camera_sentences(found)],
+        "camera_ranges": camera_range_views(found.camera_ranges),
     }
     facts |= {"fingertips": _fingertips(found.fingertips), "model": model, "trained_on": list(trained_on)}
     facts["ceiling"] = ceiling_view(ceiling)

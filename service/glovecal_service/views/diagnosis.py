@@ -8,6 +8,7 @@ from pydantic import Field
 
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.diagnosis.actions import Action
+from glovecal_models.diagnosis.camera_errors import CAMERA
 from glovecal_models.diagnosis.diagnosis import Diagnosis, Verdict
 from glovecal_models.diagnosis.floor_ratio import FloorRatio
 from glovecal_models.diagnosis.text import (
@@ -21,6 +22,7 @@ from glovecal_models.diagnosis.text import (
 from glovecal_models.diagnosis.unexplained_residual import UnexplainedResidual
 from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.signature_effect import Finding
+from glovecal_service.views.camera_range import CameraRangeView, camera_range_views
 from glovecal_service.views.ceiling import CeilingView
 from glovecal_service.views.hold_drift import HoldDriftView
 from glovecal_service.views.next_take import NextTakeView
@@ -141,6 +143,18 @@ class FindingView(View):
         )
 
 
+def _of_camera(diagnosis: Diagnosis) -> list[FindingView]:
+    """An error that is the camera's, first of all: no effect of the glove."""
+    camera = diagnosis.camera
+    if camera is None or not camera.joints:
+        return []
+    return [
+        FindingView(
+            effect=CAMERA, kind="deviation", where=list(camera.joints), sentence=camera.sentence, stretches=[]
+        )
+    ]
+
+
 class AssociationView(View):
     """A recorded column that the residual depends on."""
 
@@ -240,6 +254,9 @@ class DiagnosisView(View):
     candidates: list[CandidateView] = Field(description="Every effect that was compared, the best first.")
     not_identifiable: list[NotIdentifiableView]
     findings: list[FindingView] = Field([])
+    camera_ranges: list[CameraRangeView] = Field(
+        [], description="Of rotations that a camera measured: angles outside of these ranges are not judged."
+    )
     reference_problems: list[str] = Field([])
     hold_drift: HoldDriftView | None = None
     unexplained_residual: UnexplainedResidualView | None
@@ -260,7 +277,11 @@ class DiagnosisView(View):
             not_identifiable=[
                 NotIdentifiableView(effect=item.effect, why=item.why) for item in diagnosis.not_identifiable
             ],
-            findings=[FindingView.of(item) for item in diagnosis.findings],
+            findings=[*_of_camera(diagnosis), *(FindingView.of(item) for item in diagnosis.findings)],
+            camera_ranges=[
+                CameraRangeView.model_validate(item)
+                for item in camera_range_views(() if diagnosis.camera is None else diagnosis.camera.ranges)
+            ],
             reference_problems=list(diagnosis.reference_problems),
             hold_drift=None if held is None else HoldDriftView.of(held),
             unexplained_residual=UnexplainedResidualView.of(diagnosis.residual),

@@ -17,7 +17,7 @@ class NoiseFloorView(BaseModel):
     prediction_deg: float | None = Field(description="The part that is the prediction's own jitter.")
     how: str = Field(
         description="still hand, still joint, repeated poses, spectrum, frame to frame or near readings; the "
-        "best first."
+        "best first. stated: what the reference states of itself is larger than any of these."
     )
     pieces: int = Field(description="Holds, repeats or blocks of time that it was pooled from.")
     is_lower_bound: bool = Field(description="Autocorrelated noise is not included.")
@@ -25,6 +25,10 @@ class NoiseFloorView(BaseModel):
     reasons: list[str] = Field([], description="Why it is not reliable, each as the end of a sentence.")
     estimate_deg: float | None = Field(
         None, description="The estimate itself, where it lies above the error; a floor is never above it."
+    )
+
+    reference_deg: float | None = Field(
+        None, description="RMS of the standard deviations that a camera states; null: none are stated."
     )
 
     @classmethod

@@ -87,6 +87,8 @@ class Assessment:
     limits: SignificanceLimits = SIGNIFICANCE_LIMITS
     known_saved_square: tuple[float, ...] = ()
     """Squared degrees per row that the effects of the model save on each joint; empty where it has none."""
+    within_camera: tuple[int, ...] = ()
+    """Joints on which what it saves may as well be an error of the camera that measured the angles."""
 
     def shape_described(self, joint: int) -> dict[str, float]:
         """The shape of one joint by its numbers' names."""
@@ -94,9 +96,10 @@ class Assessment:
 
     @cached_property
     def significant_joints(self) -> tuple[int, ...]:
-        """Joints on which the effect beats its control significantly, and saves more than the effects of the
-        model may have left there."""
-        return tuple(i for i in self._beyond_control if not self._is_within_known(i))
+        """Joints on which the effect beats its control significantly, saves more than the effects of the
+        model may have left there, and is not the camera's."""
+        mine = (i for i in self._beyond_control if i not in self.within_camera)
+        return tuple(i for i in mine if not self._is_within_known(i))
 
     @cached_property
     def within_known(self) -> tuple[int, ...]:

@@ -49,7 +49,10 @@ class ClockWander:
         moved = np.where(before, take.reference_time_s - (seen[0] - fine[0]), moved)
         moved = np.where(after, take.reference_time_s - (seen[-1] - fine[-1]), moved)
         later = np.diff(moved, prepend=-np.inf) > 0
-        return replace(take, reference_time_s=moved[later], reference=take.reference[later])
+        deviations = None if take.reference_sd is None else take.reference_sd[later]
+        return replace(
+            take, reference_time_s=moved[later], reference=take.reference[later], reference_sd=deviations
+        )
 
 
 def clock_wander(take: Take, rotations: Sequence[str], predicted: np.ndarray) -> ClockWander | None:

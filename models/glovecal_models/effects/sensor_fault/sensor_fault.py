@@ -226,7 +226,8 @@ def _without_faults(take: Take, found: Sequence[Finding]) -> Take:
     if not failed.any():
         return take
     reference[failed] = np.nan
-    return replace(take, reference_time_s=take.time_s, reference=reference)
+    deviations = take.reference_sd_at_frames(take.rotations)
+    return replace(take, reference_time_s=take.time_s, reference=reference, reference_sd=deviations)
 
 
 def _between_levels(item: Finding, takes: Sequence[Take], sensor_of: Mapping[str, str]) -> Finding:

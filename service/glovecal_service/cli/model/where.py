@@ -22,6 +22,7 @@ FLOORS = {
     "spectrum": "> spectrum",
     "frame to frame": "> frame to frame",
     "near readings": "near readings",
+    "stated": "stated by the camera",
     "slow": "slow",
 }
 FLOORS_LEGEND = (

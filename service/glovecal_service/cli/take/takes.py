@@ -118,6 +118,29 @@ def reference(
         err.print(sentence, style="yellow")
 
 
+@app.command("camera")
+def camera(
+    take: Take,
+    file: Annotated[
+        Path,
+        typer.Argument(exists=True, dir_okay=False, help="A camera's estimates (.npz), as it wrote them."),
+    ],
+    near: Annotated[
+        float, typer.Option(help="Camera time less glove time, about; seconds.", show_default=True)
+    ] = 0.0,
+    within: Annotated[float, typer.Option(help="Search so far on both sides of it; seconds.")] = 3.0,
+    as_json: AsJson = False,
+) -> None:
+    """Attach what a camera measured while the glove recorded as the take's reference."""
+    with connect() as service:
+        answer = service.attach_camera_reference(_id(service, take), file, near_s=near, within_s=within)
+    if as_json:
+        print_json(answer)
+        return
+    for sentence in answer["sentences"]:
+        out.print(sentence)
+
+
 @app.command("export")
 def export(
     take: Take,

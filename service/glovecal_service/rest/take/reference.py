@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import anyio.to_thread
 import numpy as np
 from fastapi import APIRouter, Query, Request
+from pydantic import BaseModel, Field
 
+from glovecal_models.errors import BadInput
+from glovecal_models.takes.camera_reference.camera_reference import CAMERA_PATCHES, reference_from_camera
+from glovecal_models.takes.camera_reference.estimates import read_estimates
 from glovecal_models.takes.table import read_reference
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
@@ -18,8 +22,16 @@ from glovecal_service.rest.http.request_types import IdInPath
 from glovecal_service.rest.take.takes import Take
 from glovecal_service.rest.take.uploads import TABLE_BODY, FileName, file_name, keep_table
 from glovecal_service.store.records import TakeRecord
+from glovecal_service.store.takes import CAMERA_REFERENCE
+from glovecal_service.views.camera_range import CameraRangeView, camera_range_views
 
 router = APIRouter(prefix="/takes", tags=["takes"])
+ESTIMATES_BODY: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
 
 ReferenceClock = Literal["take", "wall"]
 """``take``: seconds as in the take's own ``time_s``; ``wall``: Unix seconds."""
@@ -58,7 +70,9 @@ def _attach(parts: Parts, id: str, named: tuple[str, Path], clock: ReferenceCloc
             422, "bad-take-table", f"{path.name} holds no rows for take {record.name!r}", file=path.name
         )
     time_s = _on_take_clock(rows.time_s, clock, record)
-    return parts.store.takes.attach_reference(id, time_s, rows.rotations, rows.reference, rows.poses)
+    return parts.store.takes.attach_reference(
+        id, time_s, rows.rotations, rows.reference, rows.poses, reference_sd=rows.reference_sd
+    )
 
 
 def _on_take_clock(time_s: np.ndarray, clock: ReferenceClock, record: TakeRecord) -> np.ndarray:
@@ -74,3 +88,68 @@ def _on_take_clock(time_s: np.ndarray, clock: ReferenceClock, record: TakeRecord
             "the service do. Give the reference in the take's own time_s with clock=take.",
         )
     return time_s - float(offset)
+
+
+class CameraReferenceView(BaseModel):
+    take: Take
+    clock_offset_s: float = Field(description="Camera time less glove time; the reference is moved by it.")
+    clock_offset_sd_s: float = Field(description="Its standard deviation.")
+    accepted_share: float = Field(description="Of the camera's estimates.")
+    camera_ranges: list[CameraRangeView] = Field(description="Angles outside of them are not judged.")
+    sentences: list[str]
+
+
+@router.put(
+    "/{id}/camera-reference",
+    response_model=CameraReferenceView,
+    summary="Attach what a camera measured as the reference",
+    responses=change_problems(409, 415),
+    openapi_extra=ESTIMATES_BODY,
+)
+async def put_camera_reference(
+    id: IdInPath,
+    request: Request,
+    parts: PartsNeeded,
+    near_s: Annotated[
+        float, Query(ge=-1e11, le=1e11, description="Camera time less glove time, about; seconds.")
+    ] = 0.0,
+    within_s: Annotated[
+        float, Query(gt=0, le=30.0, description="How far it is searched on both sides.")
+    ] = 3.0,
+    filename: FileName = "estimates.npz",
+) -> dict[str, Any]:
+    """The body is a file of a camera's estimates (.npz). Its clock is found by the movement, and only what
+    the camera accepted becomes the reference, each angle with its standard deviation. The reference that was
+    there stays on file; where the clock is not found nothing is changed."""
+    await asyncio.to_thread(parts.store.takes.get, id)
+    upload = await keep_table(request, parts)
+    search = (near_s, within_s)
+    named = (filename, upload.path)
+    return await anyio.to_thread.run_sync(
+        _attach_camera, parts, id, named, search, limiter=parts.import_slots
+    )
+
+
+def _attach_camera(
+    parts: Parts, id: str, named: tuple[str, Path], search: tuple[float, float]
+) -> dict[str, Any]:
+    with parts.uploads.under_names(named) as (path,):
+        estimates = read_estimates(path)
+    take = parts.store.takes.load(id)
+    if estimates.simulated and not take.simulated:
+        raise BadInput(f"{named[0]} was simulated or rendered; take {take.name!r} was recorded")
+    found = reference_from_camera(take, estimates, near_s=search[0], within_s=search[1])
+    seen, document = found.take, found.to_document()
+    patches = {name: seen.context[name] for name in seen.context if name == CAMERA_PATCHES}
+    record = parts.store.takes.attach_reference(
+        id, seen.reference_time_s, seen.rotations, seen.reference,
+        reference_sd=seen.reference_sd, context=patches, facts={CAMERA_REFERENCE: document},
+    )  # fmt: skip
+    return {
+        "take": record,
+        "clock_offset_s": document["clock_offset_s"],
+        "clock_offset_sd_s": document["clock_offset_sd_s"],
+        "accepted_share": document["accepted_share"],
+        "camera_ranges": camera_range_views(found.ranges),
+        "sentences": found.sentences(),
+    }

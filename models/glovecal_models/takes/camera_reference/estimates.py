@@ -1,0 +1,180 @@
+"""What a camera says about a hand over time, and the file that holds it.
+
+The file is a NumPy archive (.npz) without pickled objects, written by the live source of a camera:
+
+| array | shape | holds |
+|---|---|---|
+| ``version`` | () | 1 |
+| ``time_s`` | (F,) | seconds of the camera's own clock, the middle of the exposure |
+| ``rotations`` | (K,) | names of rotations, text |
+| ``angles_deg``, ``sd_deg`` | (F, K) | estimates and their standard deviations; NaN: no hand found |
+| ``accepted`` | (F, K) | whether each is sure enough to be a reference |
+| ``patches`` | (F,) | how many patches of the glove were seen; -1 where that is not known |
+| ``simulated`` | () | whether no camera saw this: simulated or rendered |
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import struct
+import zipfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from glovecal_models.errors import BadInput
+from glovecal_models.names import check_channel_name
+
+VERSION = 1
+MOST_FRAMES = 1_000_000
+"""Nine hours at 30 frames a second."""
+MOST_ROTATIONS = 64
+MOST_BYTES = 1 << 30
+"""Of all arrays, unpacked."""
+_SHAPES = {"time_s": "F", "angles_deg": "FK", "sd_deg": "FK", "accepted": "FK", "patches": "F"}
+_UNREADABLE = (
+    zipfile.BadZipFile, zlib.error, struct.error, ValueError, EOFError, OSError, KeyError, RuntimeError,
+    MemoryError, OverflowError, SyntaxError,
+)  # fmt: skip
+"""What reading a damaged archive raises."""
+_PLAIN = ("version", "rotations", "simulated")
+
+
+@dataclass(frozen=True, eq=False)
+class CameraEstimates:
+    """F frames of a camera and K rotations. Raises BadInput for arrays that cannot be."""
+
+    time_s: np.ndarray
+    """(F,), seconds of the camera's clock, increasing: the middle of each exposure."""
+    rotations: tuple[str, ...]
+    angles_deg: np.ndarray
+    """(F, K); NaN where the hand was not found."""
+    sd_deg: np.ndarray
+    """(F, K), standard deviations."""
+    accepted: np.ndarray
+    """(F, K) bool: sure enough to be a reference."""
+    patches: np.ndarray
+    """(F,) int, how many patches of the glove were seen; -1: not known."""
+    simulated: bool = False
+    """Whether no camera saw this: simulated or rendered."""
+
+    def __post_init__(self) -> None:
+        frames, columns = len(self.time_s), len(self.rotations)
+        if not 0 < frames <= MOST_FRAMES or not 0 < columns <= MOST_ROTATIONS:
+            raise BadInput(
+                f"{frames} frames of {columns} rotations; 1 to {MOST_FRAMES} frames of 1 to {MOST_ROTATIONS} "
+                "rotations are kept"
+            )
+        for name in self.rotations:
+            check_channel_name(name, "rotation")
+        if len(set(self.rotations)) != columns:
+            raise BadInput("a rotation stands twice among the camera's estimates; each is given once")
+        for name, letters in _SHAPES.items():
+            shape = tuple({"F": frames, "K": columns}[letter] for letter in letters)
+            if getattr(self, name).shape != shape:
+                raise BadInput(f"{name} has shape {getattr(self, name).shape}, expected {shape}")
+        back = np.flatnonzero(~(np.diff(self.time_s) > 0))
+        if not np.isfinite(self.time_s).all() or len(back):
+            row = int(back[0]) + 1 if len(back) else int(np.argmax(~np.isfinite(self.time_s)))
+            raise BadInput(f"frame {row} of the camera is stamped {self.time_s[row]:g} s; time must increase")
+        known = self.accepted & ~((self.sd_deg > 0) & np.isfinite(self.sd_deg) & np.isfinite(self.angles_deg))
+        if known.any():
+            row, column = np.argwhere(known)[0]
+            angle, deviation = self.angles_deg[row, column], self.sd_deg[row, column]
+            raise BadInput(
+                f"frame {row} of the camera accepts {self.rotations[column]} at {angle:g} with a standard "
+                f"deviation of {deviation:g}; both must be finite degrees, and the deviation positive"
+            )
+        if (np.abs(self.angles_deg[self.accepted]) > 360.0).any():
+            raise BadInput("an accepted angle of the camera exceeds 360 degrees; they are wanted in degrees")
+
+    @property
+    def interval_s(self) -> float:
+        """Usual time between frames; 0 for a single one."""
+        return float(np.median(np.diff(self.time_s))) if len(self.time_s) > 1 else 0.0
+
+
+def without_repeats(time_s: np.ndarray) -> np.ndarray:
+    """(F,) which frames are stamped later than all before them: others were stamped twice, or out of
+    order."""
+    latest = np.maximum.accumulate(np.concatenate([[-np.inf], time_s[:-1]]))
+    return time_s > latest
+
+
+def write_estimates(estimates: CameraEstimates, path: Path) -> None:
+    """Write the file; one already there is replaced only when the new one is complete."""
+    part = path.with_name(f"{path.name}.part")
+    arrays: dict[str, Any] = {name: np.ascontiguousarray(getattr(estimates, name)) for name in _SHAPES}
+    try:
+        with part.open("wb") as stream:
+            np.savez_compressed(
+                stream,
+                version=np.array(VERSION),
+                rotations=np.array(estimates.rotations, dtype=np.str_),
+                simulated=np.array(estimates.simulated),
+                **arrays,
+            )
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def read_estimates(path: Path) -> CameraEstimates:
+    """The file's estimates; frames stamped twice are left out. Nothing is unpickled. Raises BadInput."""
+    try:
+        content = path.read_bytes() if path.stat().st_size <= MOST_BYTES else b""
+    except OSError as error:
+        raise BadInput(f"{path.name} cannot be read: {error.strerror or error}") from error
+    if not content:
+        raise BadInput(f"{path.name} is empty, or larger than {MOST_BYTES} bytes")
+    return _checked(_arrays(content, path.name), path.name)
+
+
+def _arrays(content: bytes, name: str) -> dict[str, np.ndarray]:
+    wanted = {*_SHAPES, *_PLAIN}
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            sizes = {item.filename.removesuffix(".npy"): item.file_size for item in archive.infolist()}
+        arrays = {}
+        if set(sizes) == wanted and sum(sizes.values()) <= MOST_BYTES:
+            with np.load(io.BytesIO(content), allow_pickle=False) as archive:
+                arrays = {key: archive[key] for key in wanted}
+    except _UNREADABLE as error:
+        raise BadInput(
+            f"{name} is no whole file of a camera's estimates (.npz): {str(error)[:120]}"
+        ) from error
+    if not arrays:
+        raise BadInput(
+            f"{name} holds {', '.join(sorted(sizes))[:200]}; a camera's estimates are "
+            f"{', '.join(sorted(wanted))}, of {MOST_BYTES} bytes at most"
+        )
+    return arrays
+
+
+def _checked(arrays: dict[str, np.ndarray], name: str) -> CameraEstimates:
+    version = arrays["version"]
+    if version.shape != () or version.dtype.kind not in "iu" or int(version) != VERSION:
+        raise BadInput(f"{name} has another version than {VERSION}, which this software reads")
+    kinds = {"rotations": "U", "accepted": "b", "simulated": "b", "patches": "iu"}
+    for key, array in arrays.items():
+        if array.dtype.kind not in kinds.get(key, "fiu"):
+            raise BadInput(f"{name}: {key} holds {array.dtype}; numbers, names and yes or no are expected")
+        if array.ndim != {"F": 1, "FK": 2}.get(_SHAPES.get(key, ""), 1 if key == "rotations" else 0):
+            raise BadInput(f"{name}: {key} has shape {array.shape}")
+    frames = len(arrays["time_s"])
+    if any(len(arrays[key]) != frames for key in _SHAPES):
+        raise BadInput(f"{name}: its arrays tell of different numbers of frames")
+    kept = without_repeats(arrays["time_s"]) & np.isfinite(arrays["time_s"])
+    return CameraEstimates(
+        time_s=arrays["time_s"][kept].astype(float),
+        rotations=tuple(map(str, arrays["rotations"])),
+        angles_deg=arrays["angles_deg"][kept].astype(float),
+        sd_deg=arrays["sd_deg"][kept].astype(float),
+        accepted=arrays["accepted"][kept],
+        patches=arrays["patches"][kept].astype(int),
+        simulated=bool(arrays["simulated"]),
+    )
