@@ -57,6 +57,7 @@ NAVIGATION = {
         "docs/references",
         "Train <docs/train>",
         "Template calibration <docs/template-calibration>",
+        "The colour glove <docs/colour-glove>",
         "Compare <docs/compare>",
         "docs/effects",
         "An effect of your own <docs/own-effect>",
