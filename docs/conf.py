@@ -58,7 +58,6 @@ NAVIGATION = {
         "The colour glove <docs/colour-glove>",
         "Train <docs/train>",
         "Template calibration <docs/template-calibration>",
-        "The colour glove <docs/colour-glove>",
         "Compare <docs/compare>",
         "docs/effects",
         "An effect of your own <docs/own-effect>",

@@ -126,15 +126,16 @@ def calibrate_camera(views: Sequence[BoardView], board: CalibrationBoard) -> Cam
 
 
 def place_camera(
-    first: Camera,
+    first: CameraCalibration,
     first_views: Sequence[BoardView],
-    other: Camera,
+    other: CameraCalibration,
     other_views: Sequence[BoardView],
     board: CalibrationBoard,
 ) -> CameraPlacement:
     """Where ``other`` stands, from views of the same name that both cameras took at one moment.
 
-    Both lenses are taken as they are: deviations of turn and place leave out that they may be wrong.
+    Deviations of turn and place are from leaving out moments, and from lenses that differ from the calibrated
+    ones as their deviations say; most comes from the lenses' centres.
 
     Raises BadInput when too few moments show the board to both.
     """
@@ -152,19 +153,28 @@ def place_camera(
             f"both cameras saw the board in {len(pairs)} pictures of the same name; at least "
             f"{FEWEST_SHARED_VIEWS} are needed. Hold the board where both see it, facing between them"
         )
-    rms, rotation, translation = _placed(pairs, first, other)
-    left_out = [_placed([*pairs[:k], *pairs[k + 1 :]], first, other)[1:] for k in range(len(pairs))]
-    turns = np.array([np.ravel(cv2.Rodrigues(turn @ rotation.T)[0]) for turn, _ in left_out])
-    places = np.array([place for _, place in left_out])
+    lenses = (first.camera, other.camera)
+    rms, rotation, translation = _placed(pairs, *lenses)
+    rest = [[*pairs[:k], *pairs[k + 1 :]] for k in range(len(pairs))]
+    rng = np.random.default_rng(1)
+    left_out = [_placed(each, *lenses)[1:] for each in rest]
+    redrawn = [_placed(pairs, _redrawn(first, rng), _redrawn(other, rng))[1:] for _ in range(_DRAWS)]
+    turn_sd, place_sd = (
+        float(np.hypot(_jackknife_sd(moments), np.sqrt((drawn**2).sum(axis=1).mean())))
+        for moments, drawn in zip(
+            _away(left_out, rotation, translation), _away(redrawn, rotation, translation), strict=True
+        )
+    )
     camera = replace(
-        other,
+        other.camera,
         rotation=tuple(tuple(float(value) for value in row) for row in rotation),
         translation_mm=(float(translation[0]), float(translation[1]), float(translation[2])),
     )
-    turn_sd = float(np.degrees(_jackknife_sd(turns)))
-    return CameraPlacement(camera, rms, turn_sd, _jackknife_sd(places), len(pairs))
+    return CameraPlacement(camera, rms, float(np.degrees(turn_sd)), place_sd, len(pairs))
 
 
+_DRAWS = 20
+"""Of lenses, for the deviations of another camera's pose."""
 _TILT = (
     "Tilt the board by 20 to 45 degrees to all four sides, and bring it near enough to fill a third "
     "of the picture"
@@ -182,6 +192,23 @@ def _placed(
     )  # fmt: skip
     left, _, right = np.linalg.svd(rotation)
     return float(rms), left @ right, np.ravel(translation)
+
+
+def _redrawn(known: CameraCalibration, rng: np.random.Generator) -> Camera:
+    """A lens as it may be as well. Both focal lengths err together: so does the board's distance."""
+    scale, across, down = rng.normal(size=3)
+    (fx, fy), (cu, cv) = known.camera.focal_px, known.camera.centre_px
+    (sx, sy), (su, sv) = known.focal_sd_px, known.centre_sd_px
+    focal, centre = (fx + scale * sx, fy + scale * sy), (cu + across * su, cv + down * sv)
+    return replace(known.camera, focal_px=focal, centre_px=centre)
+
+
+def _away(
+    found: Sequence[tuple[np.ndarray, np.ndarray]], rotation: np.ndarray, translation: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Turns (N, 3) in radians and shifts (N, 3) in mm from the pose given."""
+    turns = np.array([np.ravel(cv2.Rodrigues(turn @ rotation.T)[0]) for turn, _ in found])
+    return turns, np.array([place for _, place in found]) - translation
 
 
 def _depth_share(view: BoardView, board: CalibrationBoard) -> float:

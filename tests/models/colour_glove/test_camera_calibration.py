@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from glovecal_models.colour_glove.board_views import ViewCollector, board_view, board_views
-from glovecal_models.colour_glove.camera_calibration import calibrate_camera, place_camera
+from glovecal_models.colour_glove.camera_calibration import CameraCalibration, calibrate_camera, place_camera
 from glovecal_models.colour_glove.camera_file import (
     camera_document,
     camera_from_document,
@@ -95,15 +95,22 @@ def test_another_camera_is_placed(room: BoardRoom) -> None:
         )
     mine, theirs = (list(each) for each in zip(*seen, strict=True))
     plain = replace(BESIDE, rotation=Camera().rotation, translation_mm=(0.0, 0.0, 0.0))
-    found = place_camera(TRUE, mine, plain, theirs, BOARD)
+    known = [
+        CameraCalibration(camera, 0.1, (0.5, 0.5), (0.7, 0.7), (0.0,) * 5, (), 1.0)
+        for camera in (TRUE, plain)
+    ]
+    found = place_camera(known[0], mine, known[1], theirs, BOARD)
     turn = Rotation.from_matrix(np.array(found.camera.rotation) @ TURN.T).magnitude()
     assert found.rms_px < 0.3
     assert np.degrees(turn) < 0.1
     assert found.camera.translation_mm == pytest.approx(BESIDE.translation_mm, abs=1.0)
-    assert 0 < found.turn_sd_deg < 0.1
-    assert 0 < found.place_sd_mm < 1.0
+    # A centre known to 0.7 pixels of 533 alone turns each camera by 0.075 degrees, at 450 mm by 0.6 mm.
+    assert 0.05 < found.turn_sd_deg < 0.3
+    assert 0.4 < found.place_sd_mm < 2.5
+    sure = [replace(each, focal_sd_px=(0.0, 0.0), centre_sd_px=(0.0, 0.0)) for each in known]
+    assert place_camera(sure[0], mine, sure[1], theirs, BOARD).turn_sd_deg < 0.5 * found.turn_sd_deg
     with pytest.raises(BadInput, match="in 3 pictures of the same name; at least 5"):
-        place_camera(TRUE, mine[:3], plain, theirs, BOARD)
+        place_camera(known[0], mine[:3], known[1], theirs, BOARD)
 
 
 def test_pictures_that_do_not_serve_are_named(room: BoardRoom) -> None:

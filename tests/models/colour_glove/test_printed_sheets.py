@@ -161,10 +161,8 @@ def test_opencv_finds_the_printed_board_and_its_squares(paper: str, tmp_path: Pa
     assert len(ids) == board.corners
     assert len(markers) == len(board.opencv.getIds())
     box = board_box(sheet)
-    expected = np.array(board.opencv.getChessboardCorners(), dtype=float).reshape(-1, 3)[ids.ravel(), :2] + (
-        box.left,
-        box.top,
-    )
+    inner: list = np.array(board.opencv.getChessboardCorners()).reshape(-1, 3)[:, :2].tolist()
+    expected = np.add([inner[int(index)] for index in np.ravel(ids)], (box.left, box.top))
     found = (corners.reshape(-1, 2) + 0.5) * (sheet.width_mm, sheet.height_mm) / page.shape[1::-1]
     assert np.abs(found - expected).max() < 0.1
 

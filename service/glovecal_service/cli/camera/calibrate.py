@@ -70,7 +70,7 @@ def calibrate(
         err.print(f"Not used: {sentence}.")
     alone = [calibrate_camera(each, board) for each in seen]
     placed = [
-        place_camera(alone[0].camera, seen[0], other.camera, its, board)
+        place_camera(alone[0], seen[0], other, its, board)
         for other, its in zip(alone[1:], seen[1:], strict=True)
     ]
     write_cameras(file, [alone[0].camera, *(each.camera for each in placed)])
