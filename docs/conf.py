@@ -63,6 +63,7 @@ NAVIGATION = {
         "In a notebook <docs/notebook>",
         "docs/studio",
         "docs/live",
+        "docs/applications",
         "docs/deploy",
     ],
     "Reference": [

@@ -53,6 +53,7 @@ class SimulatedHand:
     def __init__(
         self, session: zenoh.Session, site: str, glove: str, script: Script, *, sd_deg: float = 0.0,
         stated_sd_deg: float | None = None, rotations: tuple[str, ...] = HAND_ROTATIONS, seed: int = 1,
+        rate_hz: float = RATE_HZ,
     ) -> None:  # fmt: skip
         """``sd_deg``: of the errors; the poses state it unless ``stated_sd_deg`` is given."""
         self._session, self._keys, self._script = session, GloveKeys(site, glove), script
@@ -60,14 +61,14 @@ class SimulatedHand:
         stated = max(sd_deg, 0.5) if stated_sd_deg is None else stated_sd_deg
         self._deviations = np.full(len(rotations), stated, np.float32)
         self._model = hashlib.sha256("\n".join(rotations).encode()).hexdigest()
-        self._run, self._sequence = time.time_ns(), 0
+        self._run, self._sequence, self._rate_hz = time.time_ns(), 0, rate_hz
         self._queryable = session.declare_queryable(self._keys.pose_meta, self._answer)
 
     def publish(self) -> float:
         """The next pose; returns its time in seconds from the start, which is that of the script."""
-        seconds = self._sequence / RATE_HZ
+        seconds = self._sequence / self._rate_hz
         angles = self._script(seconds)
-        degrees = np.array([angles[name] for name in self._names]) + self._errors.next(1 / RATE_HZ)
+        degrees = np.array([angles[name] for name in self._names]) + self._errors.next(1 / self._rate_hz)
         time_ns = round(seconds * 1e9)
         pose = Pose(
             self._sequence, self._run, time_ns, time_ns, degrees.astype(np.float32), self._deviations,
