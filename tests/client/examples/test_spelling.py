@@ -55,7 +55,7 @@ def test_an_uncertain_joint_counts_less(letter: int, joint: int, error: float) -
     assert nearest_letter(hand, unsure, ALL).distance <= nearest_letter(hand, sure, ALL).distance + 1e-12
 
 
-@pytest.mark.parametrize("text", ["HELLO WORLD", "BANK SUM TO FEE"])
+@pytest.mark.parametrize("text", ["HELLO WORLD", "SUM TO FEE"])
 def test_text_comes_out_of_a_stream(text: str) -> None:
     assert spelled(text, sd_deg=1.0) == text
 
@@ -74,14 +74,14 @@ def test_what_cannot_be_spelled_is_refused() -> None:
 
 
 def test_confusion_adds_up_and_the_hidden_thumb_makes_the_hard_letters_hard() -> None:
-    glove = simulated_confusion(5.0)
-    camera = simulated_confusion(8.0, 20.0)
+    glove = simulated_confusion(5.0, signers=12)
+    camera = simulated_confusion(8.0, 20.0, signers=12)
     np.testing.assert_allclose(camera.rates.sum(axis=2), 1.0)
     rate, low, high = camera.right()
     assert low < rate < high <= 1
     assert glove.right(HARD)[1] > camera.right(HARD)[2]
     assert camera.right(HARD)[2] < camera.right("".join(set(LETTERS) - set(HARD)))[1]
-    no_wrist = simulated_confusion(5.0, wrist=False).mean
+    no_wrist = simulated_confusion(5.0, wrist=False, signers=12).mean
     for first, second in SAME_SHAPE:
         pair = [LETTERS.index(first), LETTERS.index(second)]
         assert no_wrist[pair, pair].sum() < 1.1

@@ -38,7 +38,7 @@ def slip_mm(moments: list[tuple[Leg, Leg]]) -> float:
     return max(moved)
 
 
-@pytest.mark.parametrize(("steps", "sd_deg"), [(0, 2.0), (1, 0.0), (6, 0.0), (7, 2.0)])
+@pytest.mark.parametrize(("steps", "sd_deg"), [(0, 2.0), (1, 0.0), (5, 2.0)])
 def test_steps_are_counted_and_planted_feet_stay(steps: int, sd_deg: float) -> None:
     figure, moments = walked(steps, sd_deg=sd_deg, seed=3)
     assert figure.steps == steps
