@@ -64,6 +64,7 @@ NAVIGATION = {
         "In a notebook <docs/notebook>",
         "docs/studio",
         "docs/live",
+        "docs/applications",
         "docs/deploy",
     ],
     "Reference": [

@@ -19,6 +19,8 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 OF_DO_PY = {"--smoke": "do.py", "--quick": "tests/paper/paper.py", "--part": "tests/paper/paper.py"}
 OF_DO_PY |= {"--set-aside": "tests/study/study.py", "--gloves": "tests/bench/streaming_bench.py"}
 OF_DO_PY |= dict.fromkeys(("--limits", "--minutes", "--page"), "tests/study/study.py")
+OF_DO_PY["--simulated"] = "client/examples/stream/hand_stream.py"
+OF_DO_PY["--confusion"] = "client/examples/spell.py"
 COMMAND = typer.main.get_command(app)
 
 

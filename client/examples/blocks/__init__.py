@@ -1,0 +1,1 @@
+"""Blocks on a desk: the physics, the script of a hand that builds a pyramid, and the picture."""

@@ -1,0 +1,1 @@
+"""Finger spelling: the letters as angles, the nearest letter, text from a stream, and the confusion table."""

@@ -1,0 +1,1 @@
+"""What the examples share: the hand from the pose stream, a simulated hand, drawings and the live page."""
