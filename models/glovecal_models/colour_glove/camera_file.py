@@ -16,7 +16,7 @@ from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.errors import BadInput
 
 FORMAT = "glovecal cameras 1"
-MOST_CAMERAS, MOST_BYTES = 16, 100_000
+MOST_CAMERAS, LARGEST_CAMERA_FILE = 16, 100_000
 _NAMES = tuple(field.name for field in fields(Camera))
 _LENGTHS = {"focal_px": 2, "centre_px": 2, "distortion": 5, "translation_mm": 3}
 
@@ -54,8 +54,8 @@ def write_cameras(file: Path, cameras: Sequence[Camera]) -> None:
 def read_cameras(file: Path) -> tuple[Camera, ...]:
     """At least one. Raises BadInput that names the file, OSError."""
     size = file.stat().st_size
-    if size > MOST_BYTES:
-        raise BadInput(f"{file}: {size} bytes; cameras take at most {MOST_BYTES}")
+    if size > LARGEST_CAMERA_FILE:
+        raise BadInput(f"{file}: {size} bytes; cameras take at most {LARGEST_CAMERA_FILE}")
     try:
         document = json.loads(file.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:

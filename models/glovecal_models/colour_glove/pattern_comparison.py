@@ -23,8 +23,8 @@ from glovecal_models.colour_glove.skin import HandSkin, hand_skin, posed
 from glovecal_models.errors import BadInput
 from glovecal_models.progress import Report
 
-ENTRIES, QUERIES = 2000, 200
-MOST_BYTES = 100_000
+COMPARED_ENTRIES, COMPARED_VIEWS = 2000, 200
+LARGEST_PATTERN = 100_000
 _EVERY = 20
 """Of the vertices, for distances between hands."""
 _CONE_DEG = 75.0
@@ -53,8 +53,8 @@ def ambiguities(
     patterns: Mapping[str, Pattern],
     skin: HandSkin | None = None,
     *,
-    entries: int = ENTRIES,
-    queries: int = QUERIES,
+    entries: int = COMPARED_ENTRIES,
+    queries: int = COMPARED_VIEWS,
     seed: int = 1,
     report: Report | None = None,
 ) -> dict[str, PatternAmbiguity]:
@@ -110,8 +110,8 @@ def read_pattern(file: Path) -> Pattern:
     """The printed patches in colours of one's own: JSON, ``{"colours": [4, 3, ...]}``, 20 numbers of 1 to 10
     for patch 1 and so on. Raises BadInput that names the file."""
     try:
-        if file.stat().st_size > MOST_BYTES:
-            raise BadInput(f"{file}: {file.stat().st_size} bytes; a pattern has at most {MOST_BYTES}")
+        if file.stat().st_size > LARGEST_PATTERN:
+            raise BadInput(f"{file}: {file.stat().st_size} bytes; a pattern has at most {LARGEST_PATTERN}")
         document = json.loads(file.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
         if isinstance(error, BadInput):

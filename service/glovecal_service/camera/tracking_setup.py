@@ -26,7 +26,7 @@ from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.progress import Cancel, Report
-from glovecal_models.simulation.colour_glove.examples import labelled_photographs
+from glovecal_models.simulation.colour_glove.photograph import labelled_photographs
 from glovecal_service.camera.camera_settings import CameraSettings
 from glovecal_service.camera.rendered_glove import RenderedGlove
 from glovecal_service.camera.sources import RENDERED, camera_source

@@ -84,7 +84,7 @@ def test_other_files_are_refused_and_nothing_is_unpickled(tmp_path: Path, kind: 
 def test_an_archive_that_would_unpack_too_large_is_refused_before_it_is_unpacked(tmp_path, monkeypatch):
     write_estimates(estimates(2000), tmp_path / "e.npz")
     size = (tmp_path / "e.npz").stat().st_size
-    monkeypatch.setattr("glovecal_models.takes.camera_reference.estimates.MOST_BYTES", size)
+    monkeypatch.setattr("glovecal_models.takes.camera_reference.estimates.LARGEST_ESTIMATES", size)
     monkeypatch.setattr("numpy.load", lambda *_, **__: pytest.fail("unpacked"))
     with pytest.raises(BadInput, match=f"of {size} bytes at most"):
         read_estimates(tmp_path / "e.npz")

@@ -19,8 +19,12 @@ from glovecal_models.colour_glove.pose.error_learning import other_hand
 from glovecal_models.colour_glove.pose.hand_motion import hand_motion
 from glovecal_models.colour_glove.skin import hand_skin
 from glovecal_models.errors import BadInput
-from glovecal_models.simulation.colour_glove.examples import labelled_photographs
-from glovecal_models.simulation.colour_glove.photograph import Photograph, Photographer, Photography
+from glovecal_models.simulation.colour_glove.photograph import (
+    Photograph,
+    Photographer,
+    Photography,
+    labelled_photographs,
+)
 
 SKIN = hand_skin()
 PATTERN = glove_pattern(SKIN)

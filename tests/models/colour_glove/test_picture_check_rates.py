@@ -26,8 +26,12 @@ from glovecal_models.colour_glove.pose.hand_motion import hand_motion
 from glovecal_models.colour_glove.pose_set import PAPER_COUNT, generated_poses
 from glovecal_models.colour_glove.skin import hand_skin
 from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.simulation.colour_glove.examples import labelled_photographs
-from glovecal_models.simulation.colour_glove.photograph import Photograph, Photographer, Photography
+from glovecal_models.simulation.colour_glove.photograph import (
+    Photograph,
+    Photographer,
+    Photography,
+    labelled_photographs,
+)
 
 SKIN = hand_skin()
 LEFT = hand_skin(hand_skeleton(hand="left"))

@@ -18,6 +18,7 @@ from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.hand_state import HandState
 from glovecal_models.colour_glove.palette import PRINTED_SRGB, encoded_light, linear_light
 from glovecal_models.colour_glove.pattern import Pattern
+from glovecal_models.colour_glove.pose.hand_motion import hand_motion
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import HandSkin, posed
 from glovecal_models.errors import BadInput
@@ -26,6 +27,8 @@ from glovecal_models.simulation.colour_glove.background import SKIN_SRGB, backgr
 ARMS = ("skin", "sleeve", "none")
 MOMENTS = 5
 """Of an exposure during which the hand moves."""
+EXAMPLES = 8
+"""As many as the paper labelled by hand (section 5.1)."""
 _AROUND, _ALONG = 24, 8
 _ARM_MM = (-25.0, -300.0)
 _ARM_RADII_MM = (25.0, 40.0)
@@ -193,3 +196,19 @@ def _arm_triangles() -> np.ndarray:
             here, beside = ring * _AROUND + index, ring * _AROUND + (index + 1) % _AROUND
             found += [(here, here + _AROUND, beside), (beside, here + _AROUND, beside + _AROUND)]
     return np.array(found, dtype=np.int32)
+
+
+def labelled_photographs(
+    skin: HandSkin, pattern: Pattern, camera: Camera, *, count: int = EXAMPLES, seed: int = 1
+) -> list[Photograph]:
+    """To learn the glove's colours from, where nobody has labelled real ones.
+
+    Each is of another pose, in another room, with another arm, of slightly different exposure.
+    """
+    rng = np.random.default_rng([seed, 8])
+    found = []
+    for index, state in enumerate(hand_motion(skin, 2.0 * count, 0.5, seed=seed)[:count]):
+        look = Photography(exposure=float(rng.uniform(0.75, 1.15)), arm=("skin", "sleeve")[index % 2])
+        room = int(rng.integers(2**31))
+        found.append(Photographer(skin, pattern, camera, look, room).photograph(state))
+    return found

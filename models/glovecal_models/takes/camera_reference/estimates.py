@@ -33,7 +33,7 @@ VERSION = 1
 MOST_FRAMES = 1_000_000
 """Nine hours at 30 frames a second."""
 MOST_ROTATIONS = 64
-MOST_BYTES = 1 << 30
+LARGEST_ESTIMATES = 1 << 30
 """Of all arrays, unpacked."""
 _SHAPES = {"time_s": "F", "angles_deg": "FK", "sd_deg": "FK", "accepted": "FK", "patches": "F"}
 _UNREADABLE = (
@@ -126,11 +126,11 @@ def write_estimates(estimates: CameraEstimates, path: Path) -> None:
 def read_estimates(path: Path) -> CameraEstimates:
     """The file's estimates; frames stamped twice are left out. Nothing is unpickled. Raises BadInput."""
     try:
-        content = path.read_bytes() if path.stat().st_size <= MOST_BYTES else b""
+        content = path.read_bytes() if path.stat().st_size <= LARGEST_ESTIMATES else b""
     except OSError as error:
         raise BadInput(f"{path.name} cannot be read: {error.strerror or error}") from error
     if not content:
-        raise BadInput(f"{path.name} is empty, or larger than {MOST_BYTES} bytes")
+        raise BadInput(f"{path.name} is empty, or larger than {LARGEST_ESTIMATES} bytes")
     return _checked(_arrays(content, path.name), path.name)
 
 
@@ -140,7 +140,7 @@ def _arrays(content: bytes, name: str) -> dict[str, np.ndarray]:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             sizes = {item.filename.removesuffix(".npy"): item.file_size for item in archive.infolist()}
         arrays = {}
-        if set(sizes) == wanted and sum(sizes.values()) <= MOST_BYTES:
+        if set(sizes) == wanted and sum(sizes.values()) <= LARGEST_ESTIMATES:
             with np.load(io.BytesIO(content), allow_pickle=False) as archive:
                 arrays = {key: archive[key] for key in wanted}
     except _UNREADABLE as error:
@@ -150,7 +150,7 @@ def _arrays(content: bytes, name: str) -> dict[str, np.ndarray]:
     if not arrays:
         raise BadInput(
             f"{name} holds {', '.join(sorted(sizes))[:200]}; a camera's estimates are "
-            f"{', '.join(sorted(wanted))}, of {MOST_BYTES} bytes at most"
+            f"{', '.join(sorted(wanted))}, of {LARGEST_ESTIMATES} bytes at most"
         )
     return arrays
 
