@@ -65,7 +65,7 @@ def test_no_module_of_the_mathematics_is_imported_by_nobody() -> None:
     # What is wrong with a camera's picture is asked by the service.
     entered.add("glovecal_models.colour_glove.pictures.picture_check")
     entered.add("glovecal_models.colour_glove.pictures.white_balance")
-    entered.add("glovecal_models.simulation.colour_glove.photograph")
+    entered.add("glovecal_models.colour_glove.drawn.photograph")
     alone = [
         name
         for name, file in modules().items()

@@ -49,12 +49,11 @@ def refine_by_labels(
 ) -> DenseFit:
     """The state of least cost that at most ``iterations`` steps from ``start`` find."""
     channels = int(hand.colour_of.max()) + 1
-    targets = [seen_shares(view, channels, _BLURS) for view in views]
 
     def measured(state: HandState) -> tuple[float, list[_Drawn]]:
         placed = posed(hand.skin, state)
         drawn = [_Drawn(hand, view, placed, channels, _BLURS) for view in views]
-        apart = sum(float(np.square(t - d.shares).sum()) for t, d in zip(targets, drawn, strict=True))
+        apart = sum(float(np.square(each.apart).sum()) for each in drawn)
         return 0.5 * apart / SHARE_SD**2 + cost(state, beliefs), drawn
 
     state = start
@@ -62,10 +61,10 @@ def refine_by_labels(
     for _ in range(iterations):
         hessian = np.zeros((DEGREES_OF_FREEDOM,) * 2)
         gradient = np.zeros(DEGREES_OF_FREEDOM)
-        for target, drawn in zip(targets, here, strict=True):
+        for drawn in here:
             jacobian = drawn.jacobian(state) / np.float32(SHARE_SD)
             hessian += jacobian.T @ jacobian
-            gradient += jacobian.T @ ((target - drawn.shares).ravel() / np.float32(SHARE_SD))
+            gradient += jacobian.T @ (drawn.apart.ravel() / np.float32(SHARE_SD))
         before = best
         for _ in range(4):
             moved = damped_step(state, beliefs, hessian, gradient, damping)
@@ -89,10 +88,6 @@ def label_equations(hand: PrintedHand, views: Sequence[WindowView], state: HandS
     return found
 
 
-def seen_shares(view: WindowView, channels: int, blurs: int) -> np.ndarray:
-    return colour_shares(view.labels, np.arange(channels, dtype=np.uint8), channels, SEEN_POINTS, blurs)
-
-
 class _Drawn:
     """A state drawn into one view."""
 
@@ -104,6 +99,9 @@ class _Drawn:
         )  # fmt: skip
         self.shown = view.shown(hand, placed_mm)
         self.shares = colour_shares(hand.patch_of[self.shown], hand.colour_of, channels, DRAWN_POINTS, blurs)
+        seen, plain = view.seen_beside(hand, self.shown), np.arange(channels, dtype=np.uint8)
+        self.apart = colour_shares(seen, plain, channels, SEEN_POINTS, blurs) - self.shares
+        """(cells, cells, channels) float32, as ``shares``: seen less drawn."""
 
     def jacobian(self, state: HandState) -> np.ndarray:
         """(cells * cells * channels, 26) float32."""

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.crop import glove_window, tiny_image
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, HandState
 from glovecal_models.colour_glove.lookup import PoseLookup
+from glovecal_models.colour_glove.pictures.sighting import Sighting
 from glovecal_models.colour_glove.pose.centroid_ik import (
     FULL_NOISE_CELLS,
     centroid_equations,
@@ -32,6 +32,7 @@ from glovecal_models.colour_glove.pose.window_view import (
     WindowView,
 )
 from glovecal_models.colour_glove.pose_estimate import STAGES, PoseEstimate
+from glovecal_models.colour_glove.skin import posed
 from glovecal_models.errors import BadInput
 
 LONGEST_UNSEEN_S = 0.5
@@ -139,12 +140,11 @@ class HandTracker:
         return Answer(state, posterior, disagreeing, followed, self._patches(views, state))
 
     def glimpse(self, labels: np.ndarray, camera: Camera) -> Glimpse | None:
-        window = glove_window(labels)
-        tiny = None if window is None else tiny_image(labels, window)
-        if window is None or tiny is None or not tiny.any():
+        seen = Sighting.of(labels, self.lookup)
+        if seen is None:
             return None
-        neighbours = self.lookup.neighbours(tiny)
-        blend = self.lookup.placed(neighbours, window, camera)
+        neighbours = seen.neighbours
+        blend = self.lookup.placed(neighbours, seen.window, camera)
         first = neighbours.entries[0]
         # The nearest entry alone keeps the blend's place: the paper's look-up gives none.
         nearest = HandState(
@@ -157,7 +157,7 @@ class HandTracker:
             carried[20:23, 20:23] = carried[23:, 23:] = turn.T
             covariance = carried @ covariance @ carried.T
         belief = Belief(_in_first(blend, camera), covariance)
-        return Glimpse(WindowView.of(labels, window, camera), _in_first(nearest, camera), belief)
+        return Glimpse(WindowView.of(seen.labels, seen.window, camera), _in_first(nearest, camera), belief)
 
     def _alone(self, glimpses: Sequence[Glimpse], stage: str) -> HandState:
         if stage == "nearest":
@@ -209,8 +209,9 @@ class HandTracker:
         different = either = 0
         finer = SEEN_POINTS // DRAWN_POINTS
         for view in views:
-            drawn = self.hand.colour_of[view.drawn(self.hand, state)]
-            seen = view.labels[finer // 2 :: finer, finer // 2 :: finer]
+            shown = view.shown(self.hand, posed(self.hand.skin, state))
+            drawn = self.hand.colour_of[self.hand.patch_of[shown]]
+            seen = view.seen_beside(self.hand, shown)[finer // 2 :: finer, finer // 2 :: finer]
             either += int(np.count_nonzero(drawn | seen))
             different += int(np.count_nonzero(drawn != seen))
         return different / max(either, 1)
