@@ -39,7 +39,7 @@ LONGEST_UNSEEN_S = 0.5
 """Without a picture of the glove: after more, nothing is expected of the next."""
 _CLEARLY_FEWER = 0.9
 """Of the followed answer's disagreeing points: then the picture alone knows better."""
-ACCEPTED_SD_DEG = 4.5
+ACCEPTED_SD_DEG = 5.0
 """A joint that is known as well as this may serve as a reference."""
 
 
