@@ -88,6 +88,23 @@ def label_equations(hand: PrintedHand, views: Sequence[WindowView], state: HandS
     return found
 
 
+def joint_equations(
+    hand: PrintedHand, views: Sequence[WindowView], state: HandState, motion_mm: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """J' J and J' r over the square of ``SHARE_SD`` for the pose and P other parameters: (26 + P, 26 + P),
+    (26 + P,). ``motion_mm`` (V, 3, P): how they move the vertices as they are posed."""
+    placed, channels = posed(hand.skin, state), int(hand.colour_of.max()) + 1
+    size = DEGREES_OF_FREEDOM + motion_mm.shape[2]
+    hessian, gradient = np.zeros((size, size)), np.zeros(size)
+    for view in views:
+        drawn = _Drawn(hand, view, placed, channels, _BLURS)
+        both = [drawn.jacobian(state), drawn.jacobian(state, motion_mm)]
+        jacobian = np.concatenate(both, axis=1).astype(float) / SHARE_SD
+        hessian += jacobian.T @ jacobian
+        gradient += jacobian.T @ (drawn.apart.ravel() / SHARE_SD)
+    return hessian, gradient
+
+
 class _Drawn:
     """A state drawn into one view."""
 
@@ -103,18 +120,34 @@ class _Drawn:
         self.apart = colour_shares(seen, plain, channels, SEEN_POINTS, blurs) - self.shares
         """(cells, cells, channels) float32, as ``shares``: seen less drawn."""
 
-    def jacobian(self, state: HandState) -> np.ndarray:
-        """(cells * cells * channels, 26) float32."""
+    def jacobian(self, state: HandState, motion_mm: np.ndarray | None = None) -> np.ndarray:
+        """(cells * cells * channels, 26) float32; with ``motion_mm`` (V, 3, P) one by other parameters, P."""
         depth = self.view.projected(self.placed_mm)[1]
         colour = self.hand.colour_of[self.hand.patch_of[self.shown]]
         vertices, which, cells, before, after, across = boundaries(
             self.shown, colour, self.hand.skin.triangles, depth, DRAWN_POINTS
         )
-        moving = pixel_motion(self.hand.skin, state, vertices, self.placed_mm[vertices], self.view.camera)
+        places = self.placed_mm[vertices]
+        if motion_mm is None:
+            moving = pixel_motion(self.hand.skin, state, vertices, places, self.view.camera)
+        else:
+            moving = _projected_motion(self.view, places, motion_mm[vertices])
         moving *= 1.0 / (DRAWN_POINTS * self.view.cell_px)  # one point's row of a boundary, in cells
         return moved_shares(
             moving, which, cells, before, after, across, CELLS, self.channels, self.blurs
-        ).reshape(-1, DEGREES_OF_FREEDOM)
+        ).reshape(-1, moving.shape[2])
+
+
+def _projected_motion(view: WindowView, places_mm: np.ndarray, motion_mm: np.ndarray) -> np.ndarray:
+    """(K, 2, P) pixels, from (K, 3) and (K, 3, P) mm."""
+    by_place = np.stack(
+        [
+            (view.projected(places_mm + step)[0] - view.projected(places_mm - step)[0]) / 2
+            for step in np.eye(3)
+        ],
+        axis=2,
+    )
+    return by_place @ motion_mm
 
 
 @numba.njit(cache=True)

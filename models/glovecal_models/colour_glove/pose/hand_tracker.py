@@ -130,7 +130,7 @@ class HandTracker:
         views = [glimpse.view for glimpse in glimpses]
         if self.stage in ("nearest", "blend") or before is None or not self.follows:
             state = self._alone(glimpses, self.stage)
-            disagreeing, followed = self._disagreeing(views, state), False
+            disagreeing, followed = self.disagreeing(views, state), False
         else:
             state, disagreeing, followed = self._followed(glimpses, before, seconds)
         beliefs = tuple(glimpse.blend for glimpse in glimpses)
@@ -186,10 +186,10 @@ class HandTracker:
         if self.stage == "dense":
             followed = refine_by_labels(self.hand, views, followed, beliefs, self.iterations).state
         alone = self._alone(glimpses, "ik")
-        left, left_alone = self._disagreeing(views, followed), self._disagreeing(views, alone)
+        left, left_alone = self.disagreeing(views, followed), self.disagreeing(views, alone)
         if self.stage == "dense" and left_alone < 1.5 * left:
             alone = refine_by_labels(self.hand, views, alone, beliefs[:-1], self.iterations).state
-            left_alone = self._disagreeing(views, alone)
+            left_alone = self.disagreeing(views, alone)
         if left_alone < _CLEARLY_FEWER * left:
             return alone, left_alone, False
         return followed, left, True
@@ -205,13 +205,17 @@ class HandTracker:
             information = information + label_equations(self.hand, views, state)
         return np.sqrt(np.diag(np.linalg.inv(information)))
 
-    def _disagreeing(self, views: Sequence[WindowView], state: HandState) -> float:
+    def disagreeing(
+        self, views: Sequence[WindowView], state: HandState, hand: PrintedHand | None = None
+    ) -> float:
+        """Share of the points, seen or drawn, whose colours differ, 0 to 1; ``hand``: in place of the own."""
+        hand = self.hand if hand is None else hand
         different = either = 0
         finer = SEEN_POINTS // DRAWN_POINTS
         for view in views:
-            shown = view.shown(self.hand, posed(self.hand.skin, state))
-            drawn = self.hand.colour_of[self.hand.patch_of[shown]]
-            seen = view.seen_beside(self.hand, shown)[finer // 2 :: finer, finer // 2 :: finer]
+            shown = view.shown(hand, posed(hand.skin, state))
+            drawn = hand.colour_of[hand.patch_of[shown]]
+            seen = view.seen_beside(hand, shown)[finer // 2 :: finer, finer // 2 :: finer]
             either += int(np.count_nonzero(drawn | seen))
             different += int(np.count_nonzero(drawn != seen))
         return different / max(either, 1)
