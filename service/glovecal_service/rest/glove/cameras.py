@@ -58,9 +58,10 @@ def start_camera(body: NewCamera, parts: PartsNeeded) -> CameraView:
         raise Conflict(f"a camera publishes glove {body.glove} already; stop it first")
     worn_by = None if body.subject is None else parts.store.subjects.get(body.subject)
     asked = CameraSettings(
-        body.source, body.glove, settings.data, settings.site, settings.zenoh, body.subject,
-        body.hand or ("right" if worn_by is None else worn_by.hand), body.stage, body.keep,
-        entries=body.entries, clips=body.clips, sizes_mm={} if worn_by is None else worn_by.dimensions,
+        body.source, body.glove, settings.site, settings.zenoh, body.subject, body.keep,
+        data=settings.data, hand=body.hand or ("right" if worn_by is None else worn_by.hand),
+        stage=body.stage, entries=body.entries, clips=body.clips,
+        sizes_mm={} if worn_by is None else worn_by.dimensions,
     )  # fmt: skip
     return silent(parts.cameras.started.start(asked))
 
