@@ -26,8 +26,8 @@ from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.progress import Cancel, Report
-from glovecal_models.simulation.colour_glove.photograph import labelled_photographs
 from glovecal_service.camera.camera_settings import TrackingSettings
+from glovecal_service.camera.learned_colours import drawn_table
 from glovecal_service.camera.rendered_glove import RenderedGlove
 from glovecal_service.camera.sources import RENDERED, camera_source
 
@@ -143,15 +143,14 @@ def _colours(settings: TrackingSettings, hand: PrintedHand) -> ColourTable:
     """The table named, else one that was learned from rendered photographs of the printed colours."""
     if settings.colours is not None:
         return ColourTable.load(settings.colours)
-    told = repr((LEARNED, labelled_photographs.__module__, hand.pattern.colour_of_patch.tolist()))
+    told = repr((LEARNED, hand.pattern.colour_of_patch.tolist()))
     file = settings.folder / f"colours-{hashlib.sha256(told.encode()).hexdigest()[:20]}.npz"
     if file.exists():
         try:
             return ColourTable.load(file)
         except BadInput:
             file.unlink()
-    photographs = labelled_photographs(hand.skin, hand.pattern, ASSUMED)
-    table = ColourTable.trained([each.picture for each in photographs], [each.labels for each in photographs])
+    table = drawn_table(hand.skin, hand.pattern)
     unfinished = file.with_suffix(f".{os.getpid()}")
     table.save(unfinished)
     unfinished.replace(file)
