@@ -49,7 +49,14 @@ class DeviceLost(DeviceError):
 
 
 class DeviceFinished(DeviceError):
-    """The device has no more to give, as at the end of a replayed file; capture stops cleanly."""
+    """The device has no more to give, as at the end of a replayed file; capture stops cleanly.
+
+    ``is_early``: the file ends in the middle, or is damaged from there on.
+    """
+
+    def __init__(self, message: str, *, is_early: bool = False) -> None:
+        super().__init__(message)
+        self.is_early = is_early
 
 
 class DamagedLog(ClientError):

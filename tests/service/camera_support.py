@@ -15,17 +15,18 @@ import numpy as np
 
 from glovecal_client.errors import DeviceFinished
 from glovecal_client.pictures.source import Picture
+from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.codes.pca import pca_code
 from glovecal_models.colour_glove.database import DatabaseSettings, pose_database
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM
 from glovecal_models.colour_glove.lookup import PoseLookup
 from glovecal_models.colour_glove.pattern import printed_pattern
-from glovecal_models.colour_glove.pose.error_learning import _digest, _no_scales
+from glovecal_models.colour_glove.pose.error_learning import errors_file
 from glovecal_models.colour_glove.pose.learned_errors import LearnedErrors
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.pose_set import generated_poses
 from glovecal_models.colour_glove.skin import hand_skin
-from glovecal_service.camera.camera_settings import CameraSettings
+from glovecal_service.camera.camera_settings import CameraSettings, TrackingSettings
 from glovecal_service.camera.camera_tracking import CameraSummary, CameraTracking
 from glovecal_service.camera.rendered_glove import RATE_HZ, RenderedGlove
 from glovecal_service.camera.tracking_setup import ASSUMED
@@ -33,19 +34,21 @@ from glovecal_service.camera.tracking_setup import ASSUMED
 SMALL: dict[str, Any] = {"entries": 300, "clips": 3}
 
 
-def ready_folder(data: Path) -> RenderedGlove:
+def ready_folder(data: Path, *others: tuple[Camera, ...]) -> RenderedGlove:
     """Put a small database and plain errors where a camera keeps them; the glove that ``rendered`` draws.
 
-    Learning errors takes half a minute; here the posterior deviations stand as they are.
+    Learning errors takes half a minute; here the posterior deviations stand as they are. ``others``: cameras
+    beside the assumed one that the hand is to be tracked by.
     """
     skin = hand_skin()
     hand, settings = PrintedHand(skin, printed_pattern()), DatabaseSettings(entries=SMALL["entries"])
-    folder = CameraSettings("rendered", "any", data).folder
+    folder = TrackingSettings(data=data).folder
     database = pose_database(skin, hand.pattern, generated_poses(), folder, settings, workers=1)
     lookup = PoseLookup(database, pca_code(database.transforms))
     deviation = np.array([15.0] * 20 + [15.0] * 3 + [20.0, 20.0, 60.0])
-    errors = LearnedErrors(np.diag(deviation**2), np.full(DEGREES_OF_FREEDOM, 60.0), _no_scales())
-    errors.save(database.folder / f"errors-{_digest(hand, lookup, (ASSUMED,), SMALL['clips'])}.npz")
+    errors = LearnedErrors.as_posterior(np.diag(deviation**2), np.full(DEGREES_OF_FREEDOM, 60.0))
+    for cameras in ((ASSUMED,), *others):
+        errors.save(errors_file(hand, lookup, cameras, SMALL["clips"]))
     return RenderedGlove(hand, ASSUMED)
 
 

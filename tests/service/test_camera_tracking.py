@@ -61,7 +61,9 @@ def router() -> Iterator[tuple[zenoh.Session, str]]:
 
 @pytest.fixture
 def settings(data: Path, glove: RenderedGlove, router: tuple[zenoh.Session, str]) -> CameraSettings:
-    return CameraSettings("camera:0", "right", data, zenoh=router[1], stage="ik", keep="nothing", **SMALL)
+    return CameraSettings(
+        "camera:0", "right", zenoh=router[1], keep="nothing", data=data, stage="ik", **SMALL
+    )
 
 
 def status_of(session: zenoh.Session, glove: str) -> dict[str, Any]:

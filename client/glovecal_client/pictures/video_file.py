@@ -105,7 +105,8 @@ class VideoFilePictures:
         is_there, pixels = self._video.read()
         if not is_there and self._number < len(self._stamps):
             raise DeviceFinished(
-                f"{self.name} ends in the middle: {self._number} of {len(self._stamps)} pictures can be read"
+                f"{self.name} ends in the middle: {self._number} of {len(self._stamps)} pictures can be read",
+                is_early=True,
             )
         if not is_there or self._number >= len(self._stamps):
             raise DeviceFinished(f"{self.name} is over after {self._number} pictures")

@@ -1,9 +1,9 @@
-"""What a camera is started with, on the command line and over REST alike."""
+"""What pictures are tracked with, and what a camera is started with: on the command line and over REST."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -21,25 +21,18 @@ DEFAULT_STAGE = "dense"
 HANDS = ("right", "left")
 
 
-@dataclass(frozen=True)
-class CameraSettings:
-    """Raises BadInput for what no camera can be started with."""
+@dataclass(frozen=True, kw_only=True)
+class TrackingSettings:
+    """What a hand is tracked with, live or in recordings. Raises BadInput for what is none of the known."""
 
-    source: str
-    """``camera:0``, ``video:FILE.mkv``, ``labels:FILE.labels`` or ``rendered``."""
-    glove: str
-    """Under which its poses are published."""
     data: Path
-    site: str = "lab"
-    zenoh: str = "tcp/127.0.0.1:7447"
-    subject: str | None = None
     hand: str = "right"
     stage: str = DEFAULT_STAGE
-    keep: Keep = DEFAULT_KEEP
     colours: Path | None = None
-    """Colour table; None: that of the rendered glove, for pictures that were rendered."""
+    """Colour table; None: one that is learned on rendered photographs of the printed colours."""
     calibration: Path | None = None
-    """The camera's focal length, centre and distortion; None: those of an assumed camera, which is said."""
+    """Each camera's focal length, centre and distortion, and where the second stands; None: those of an
+    assumed camera, which is said."""
     entries: int = 20_000
     """Of the pose database."""
     sizes_mm: Mapping[str, float] = field(default_factory=dict)
@@ -48,22 +41,35 @@ class CameraSettings:
     """Rendered ones of other hands, from which the tracker's errors are learned."""
 
     def __post_init__(self) -> None:
-        try:
-            GloveKeys(self.site, self.glove)
-        except BadName as error:
-            raise BadInput(str(error)) from error
-        for name, value, known in (
-            ("stage", self.stage, STAGES),
-            ("keep", self.keep, KEEPS),
-            ("hand", self.hand, HANDS),
-        ):
-            if value not in known:
-                raise BadInput(f"{name} {value!r} is none of {', '.join(known)}")
+        _require("stage", self.stage, STAGES)
+        _require("hand", self.hand, HANDS)
 
     @property
     def folder(self) -> Path:
         """Of everything that cameras keep."""
         return self.data / "cameras"
+
+
+@dataclass(frozen=True)
+class CameraSettings(TrackingSettings):
+    """Raises BadInput for what no camera can be started with."""
+
+    source: str
+    """``camera:0``, ``video:FILE.mkv``, ``labels:FILE.labels`` or ``rendered``."""
+    glove: str
+    """Under which its poses are published."""
+    site: str = "lab"
+    zenoh: str = "tcp/127.0.0.1:7447"
+    subject: str | None = None
+    keep: Keep = DEFAULT_KEEP
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        try:
+            GloveKeys(self.site, self.glove)
+        except BadName as error:
+            raise BadInput(str(error)) from error
+        _require("keep", self.keep, KEEPS)
 
     @property
     def keys(self) -> GloveKeys:
@@ -80,3 +86,8 @@ class CameraSettings:
         for name in ("data", "colours", "calibration"):
             given[name] = None if given[name] is None else Path(given[name])
         return cls(**given)
+
+
+def _require(name: str, value: str, known: Sequence[str]) -> None:
+    if value not in known:
+        raise BadInput(f"{name} {value!r} is none of {', '.join(known)}")

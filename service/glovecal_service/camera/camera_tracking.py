@@ -123,8 +123,9 @@ class CameraTracking:
 
     def _prepare(self, source: PictureSource | None) -> None:
         self._change("opening", "preparing the hand, its pattern and the pose database")
-        setup = tracking_setup(self._settings, self._say_progress, self._stop.is_set, source)
-        source = setup.source
+        pictures = [self._settings.source if source is None else source]
+        setup = tracking_setup(self._settings, pictures, self._say_progress, self._stop.is_set)
+        source = setup.sources[0]
         self._tracker = setup.tracker(self._stage)
         self._change("opening", "compiling, once a computer")
         setup.tracker(self._stage).track([setup.example()], 0.0)
@@ -205,7 +206,7 @@ class CameraTracking:
 
     def _check_size(self, pixels: np.ndarray) -> None:
         assert self._setup is not None
-        camera = self._setup.camera
+        camera = self._setup.cameras[0]
         if pixels.shape[:2] != (camera.height, camera.width):
             raise BadInput(
                 f"the picture is {pixels.shape[1]} x {pixels.shape[0]}, the camera is calibrated for "
@@ -278,7 +279,7 @@ class CameraTracking:
         seen, setup = self._seen, self._setup
         if seen is None or setup is None:
             raise BadInput(f"no picture yet: {self._status.sentence}")
-        return drawn_view(seen, setup.hand, setup.camera, asked)
+        return drawn_view(seen, setup.hand, setup.cameras[0], asked)
 
     def _say_progress(self, sentence: str, fraction: float) -> None:
         self._change("opening", f"{sentence}, {100 * fraction:.0f} %")

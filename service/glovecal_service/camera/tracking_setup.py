@@ -1,4 +1,4 @@
-"""Everything that a camera's pictures are tracked with: built once, or taken from the data folder."""
+"""Everything that cameras' pictures are tracked with: built once, or taken from the data folder."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ import numpy as np
 from glovecal_client.pictures.source import PictureSource
 from glovecal_models.colour_glove.camera_file import read_cameras
 from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.drawn.photograph import labelled_photographs
 from glovecal_models.colour_glove.pattern import printed_pattern
 from glovecal_models.colour_glove.pictures.classify import ColourTable
 from glovecal_models.colour_glove.pictures.picture_check import PictureCheck
@@ -27,7 +26,8 @@ from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.progress import Cancel, Report
-from glovecal_service.camera.camera_settings import CameraSettings
+from glovecal_service.camera.camera_settings import TrackingSettings
+from glovecal_service.camera.learned_colours import drawn_table
 from glovecal_service.camera.rendered_glove import RenderedGlove
 from glovecal_service.camera.sources import RENDERED, camera_source
 
@@ -42,12 +42,13 @@ class Tracker(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class TrackingSetup:
-    """For one hand before one camera."""
+    """For one hand before one camera or more."""
 
-    source: PictureSource
+    sources: tuple[PictureSource, ...]
     """Not open."""
     hand: PrintedHand
-    camera: Camera
+    cameras: tuple[Camera, ...]
+    """One for each source."""
     is_calibrated: bool
     """Whether focal length and distortion are known, not assumed."""
     colours: ColourTable
@@ -62,9 +63,9 @@ class TrackingSetup:
         return HandTracker(first.hand, first.lookup, first.cameras, first.errors, stage=stage)
 
     def example(self) -> np.ndarray:
-        """Labels of a hand before this camera: what kernels are compiled with before pictures wait."""
-        skin, glove = self.hand.skin, RenderedGlove(self.hand, self.camera)
-        drawn = rasterise(posed(skin, glove.state(0.0)), skin.triangles, self.camera)
+        """Labels of a hand before the first camera: what kernels are compiled with before pictures wait."""
+        skin, glove = self.hand.skin, RenderedGlove(self.hand, self.cameras[0])
+        drawn = rasterise(posed(skin, glove.state(0.0)), skin.triangles, self.cameras[0])
         return drawn.painted(self.hand.pattern.colour)
 
     def name(self, stage: str) -> str:
@@ -73,30 +74,32 @@ class TrackingSetup:
 
 
 def tracking_setup(
-    settings: CameraSettings,
+    settings: TrackingSettings,
+    sources: Sequence[str | PictureSource],
     report: Report | None = None,
     cancelled: Cancel | None = None,
-    source: PictureSource | None = None,
 ) -> TrackingSetup:
-    """``source``: in place of the one that the settings name.
+    """``sources``: of pictures, as they are written or not yet open, one for each camera.
 
     Raises DeviceLost where no picture comes, BadInput for files that cannot be used, Cancelled.
     """
     sizes = HandDimensions.from_measured(settings.sizes_mm)
     skin = hand_skin(hand_skeleton(sizes, "left" if settings.hand == "left" else "right"))
     hand = PrintedHand(skin, printed_pattern())
-    if source is None:
-        source = camera_source(settings.source, lambda: RenderedGlove(hand, ASSUMED))
-    camera = _camera(settings, _size(source))
+    built = tuple(
+        camera_source(source, lambda: RenderedGlove(hand, ASSUMED)) if isinstance(source, str) else source
+        for source in sources
+    )
+    cameras = _cameras(settings, built)
     first = prepared_tracker(
-        settings.folder, (camera,), skin=skin, pattern=hand.pattern, entries=settings.entries,
+        settings.folder, cameras, skin=skin, pattern=hand.pattern, entries=settings.entries,
         clips=settings.clips, report=report, cancelled=cancelled,
     )  # fmt: skip
-    made_from = repr((first.lookup.database.folder.name, camera, settings.clips))
+    made_from = repr((first.lookup.database.folder.name, cameras, settings.clips))
     check = PictureCheck(first.lookup)
     _ = check.distance_limit_px2  # takes a moment: not while pictures wait
-    is_known = settings.calibration is not None or source.name == RENDERED
-    return TrackingSetup(source, hand, camera, is_known, _colours(settings, hand), check, first, made_from)
+    is_known = settings.calibration is not None or built[0].name == RENDERED
+    return TrackingSetup(built, hand, cameras, is_known, _colours(settings, hand), check, first, made_from)
 
 
 def _size(source: PictureSource) -> tuple[int, int]:
@@ -109,34 +112,45 @@ def _size(source: PictureSource) -> tuple[int, int]:
         source.close()
 
 
-def _camera(settings: CameraSettings, size: tuple[int, int]) -> Camera:
-    """The calibrated one, else the view of the assumed camera in a picture of this size."""
-    height, width = size
-    if settings.calibration is not None:
-        camera = read_cameras(settings.calibration)[0]
+def _cameras(settings: TrackingSettings, sources: Sequence[PictureSource]) -> tuple[Camera, ...]:
+    """The calibrated ones, else the view of the assumed camera in a picture of this size."""
+    sizes = [_size(source) for source in sources]
+    if settings.calibration is None:
+        if len(sizes) > 1:
+            raise BadInput(
+                "two cameras are tracked together only with their calibration: "
+                "glovecal camera calibrate --second tells where the second one stands"
+            )
+        height, width = sizes[0]
+        focal = ASSUMED.focal_px[0] * width / ASSUMED.width
+        return (Camera(width, height, (focal, focal), ((width - 1) / 2, (height - 1) / 2)),)
+    cameras = read_cameras(settings.calibration)
+    if len(cameras) < len(sources):
+        raise BadInput(
+            f"{settings.calibration} holds {len(cameras)} camera, {len(sources)} are to be tracked: "
+            "glovecal camera calibrate --second calibrates both"
+        )
+    for camera, source, (height, width) in zip(cameras, sources, sizes, strict=False):
         if (camera.width, camera.height) != (width, height):
             raise BadInput(
-                f"{settings.calibration} is of {camera.width} x {camera.height}, but {settings.source} "
+                f"{settings.calibration} is of {camera.width} x {camera.height}, but {source.name} "
                 f"gives {width} x {height}: calibrate it at this size"
             )
-        return camera
-    focal = ASSUMED.focal_px[0] * width / ASSUMED.width
-    return Camera(width, height, (focal, focal), ((width - 1) / 2, (height - 1) / 2))
+    return cameras[: len(sources)]
 
 
-def _colours(settings: CameraSettings, hand: PrintedHand) -> ColourTable:
+def _colours(settings: TrackingSettings, hand: PrintedHand) -> ColourTable:
     """The table named, else one that was learned from rendered photographs of the printed colours."""
     if settings.colours is not None:
         return ColourTable.load(settings.colours)
-    told = repr((LEARNED, labelled_photographs.__module__, hand.pattern.colour_of_patch.tolist()))
+    told = repr((LEARNED, hand.pattern.colour_of_patch.tolist()))
     file = settings.folder / f"colours-{hashlib.sha256(told.encode()).hexdigest()[:20]}.npz"
     if file.exists():
         try:
             return ColourTable.load(file)
         except BadInput:
             file.unlink()
-    photographs = labelled_photographs(hand.skin, hand.pattern, ASSUMED)
-    table = ColourTable.trained([each.picture for each in photographs], [each.labels for each in photographs])
+    table = drawn_table(hand.skin, hand.pattern)
     unfinished = file.with_suffix(f".{os.getpid()}")
     table.save(unfinished)
     unfinished.replace(file)

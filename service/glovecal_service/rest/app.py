@@ -20,7 +20,7 @@ from glovecal_service.rest.effect import (
     picture,
     trial,
 )
-from glovecal_service.rest.glove import cameras, commands, films, layouts, live, recordings
+from glovecal_service.rest.glove import camera_files, cameras, commands, films, layouts, live, recordings
 from glovecal_service.rest.http import front, health
 from glovecal_service.rest.http.answers import install_openapi
 from glovecal_service.rest.http.body_guard import BodyGuard
@@ -70,7 +70,7 @@ JSON_LIMIT_BYTES = 8_000_000
 """Enough for 20,000 frames of 18 sensors to predict."""
 BODY_PATIENCE_S = 30.0
 ROUTERS = (
-    *(subjects, usual_hand, layouts, live, commands, recordings, films, cameras, samplings),
+    *(subjects, usual_hand, layouts, live, commands, recordings, films, cameras, camera_files, samplings),
     *(
         clocks,
         hands,

@@ -19,6 +19,8 @@ from glovecal_client.pictures.source import Picture
 from glovecal_client.pictures.video_file import VideoWriter
 from glovecal_models.colour_glove.camera_file import read_cameras
 from glovecal_models.colour_glove.camera_model import Camera
+from glovecal_models.colour_glove.palette import PRINTED_SRGB
+from glovecal_models.colour_glove.pictures.classify import ColourTable
 from glovecal_models.colour_glove.sheets.calibration_board import CalibrationBoard
 
 SMALL = Camera(400, 300, (333.0, 333.0), (199.5, 149.5))
@@ -119,3 +121,27 @@ def test_a_camera_is_calibrated_from_a_video(run: Run, tmp_path: Path) -> None:
     assert "9 of 20 views: taken" in done.err
     (found,) = read_cameras(file)
     assert found.focal_px == pytest.approx(SMALL.focal_px, rel=0.01)
+
+
+def test_a_colour_table_is_learned_on_labelled_pictures(run: Run, tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    labels = np.repeat(np.repeat(np.arange(12, dtype=np.uint8).reshape(3, 4) % 11, 40, 0), 40, 1)
+    colours = np.vstack([[90, 90, 90], PRINTED_SRGB[:, ::-1]])[labels]
+    picture = np.clip(colours + rng.normal(0, 4, colours.shape), 0, 255).astype(np.uint8)
+    for name, image in (("hand.png", picture), ("hand.labels.png", labels)):
+        cv2.imwrite(str(tmp_path / name), image)
+    hand, file = tmp_path / "hand.png", tmp_path / "table.npz"
+    done = run("camera", "colours", hand, "--labelled", "--out", file)
+    assert done.code == 0, done.err
+    assert "Learned on 1 labelled pictures" in done.out
+    assert (ColourTable.load(file).labels(picture) == labels).mean() > 0.95
+    kept = run("camera", "store", "desk", "--colours", file, "--json")
+    assert kept.json == {"colours": ["desk"], "calibrations": []}
+    wrong = run("camera", "store", "desk", "--calibration", file)
+    assert (wrong.code, "is no JSON" in wrong.said) == (1, True), wrong.said
+    cv2.imwrite(str(tmp_path / "hand.labels.png"), np.minimum(labels, 9))
+    few = run("camera", "colours", hand, "--labelled", "--out", tmp_path / "no.npz")
+    assert (few.code, "colour 10 is in none of the 1 label images" in few.said) == (1, True)
+    card = run("camera", "colours", hand, "--out", tmp_path / "no.npz")
+    assert (card.code, "page is not found" in card.said or "does not look like" in card.said) == (1, True)
+    assert not (tmp_path / "no.npz").exists()

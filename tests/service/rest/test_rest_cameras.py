@@ -19,6 +19,9 @@ from realtime_support import eventually, free_endpoint
 from glovecal_client.keys import GloveKeys
 from glovecal_client.rest import Refused, RestClient
 from glovecal_client.session import open_router
+from glovecal_models.colour_glove.camera_file import write_cameras
+from glovecal_service.camera.learned_colours import drawn_table
+from glovecal_service.camera.tracking_setup import ASSUMED
 from glovecal_service.rest.in_process import in_process_client
 from glovecal_service.settings import Settings
 from glovecal_service.views.cameras import said_of_itself
@@ -35,11 +38,36 @@ def client(settings: Settings) -> Iterator[RestClient]:
         yield client
 
 
-def test_a_camera_from_its_start_to_its_end(client: RestClient, settings: Settings) -> None:
+def keep_camera_files(client: RestClient, folder: Path) -> None:
+    """A table ``lamp`` and a calibration ``desk``; what is neither is refused and changes nothing."""
+    table, calibration = folder / "table.npz", folder / "camera.json"
+    drawn_table().save(table)
+    write_cameras(calibration, [ASSUMED])
+    known = client.put("/camera-files/colours/lamp", {"upload": client.upload(table)})
+    assert known == {"colours": ["lamp"], "calibrations": []}
+    client.put("/camera-files/calibrations/desk", {"upload": client.upload(calibration)})
+    for kind, file in (("colours", calibration), ("calibrations", table)):
+        with pytest.raises(Refused):
+            client.put(f"/camera-files/{kind}/other", {"upload": client.upload(file)})
+    for name in ("../desk", "Desk", ".desk", "a" * 65):
+        with pytest.raises(Refused):
+            client.put(f"/camera-files/colours/{name}", {"upload": client.upload(table)})
+        with pytest.raises(Refused):
+            client.post("/cameras", {"glove": "x", "source": "rendered", "calibration": name})
+    with pytest.raises(Refused, match="send the file to /v1/uploads first"):
+        client.put("/camera-files/colours/lamp", {"upload": "0" * 64})
+    assert client.get("/camera-files") == {"colours": ["lamp"], "calibrations": ["desk"]}
+
+
+def test_a_camera_from_its_start_to_its_end(client: RestClient, settings: Settings, tmp_path: Path) -> None:
     ready_folder(settings.data)
     assert client.get("/cameras") == []
     with open_router([settings.zenoh]):
         body: dict[str, Any] = {"glove": "right", "source": "rendered", "stage": "ik", "keep": "nothing"}
+        body |= {"colours": "lamp", "calibration": "desk"}
+        with pytest.raises(Refused, match="no colours 'lamp'; there are: none yet"):
+            client.post("/cameras", body)
+        keep_camera_files(client, tmp_path)
         begun = client.post("/cameras", body | SMALL)
         assert (begun["state"], begun["is_simulated"], begun["started_here"]) == ("opening", True, True)
         with pytest.raises(Refused, match="publishes glove right already"):
@@ -53,6 +81,7 @@ def test_a_camera_from_its_start_to_its_end(client: RestClient, settings: Settin
         assert client.get("/cameras")[0]["glove"] == "right"
         health = camera["health"]
         assert health["simulated"]
+        assert health["calibrated"]
         assert health["latency_ms"]["p95"] >= health["latency_ms"]["p50"] > 0
         assert len(health["rotations"]) == 20
         chosen = client.put("/cameras/right/stage", {"stage": "nearest"})

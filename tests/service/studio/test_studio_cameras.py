@@ -28,8 +28,9 @@ def drawn(settings: Settings, address: str) -> Iterator[None]:
     """A camera that was started on a command line."""
     ready_folder(settings.data)
     camera = CameraSettings(
-        "rendered", "drawn", settings.data, settings.site, settings.zenoh, stage="ik", keep="nothing", **SMALL
-    )
+        "rendered", "drawn", settings.site, settings.zenoh, keep="nothing", data=settings.data, stage="ik",
+        **SMALL,
+    )  # fmt: skip
     with camera_process(camera):
         yield
 

@@ -83,6 +83,9 @@ class Photographer:
     camera: Camera
     photography: Photography
     seed: int
+    inks: np.ndarray | None = None
+    """(10, 3) linear light of the glove's colours, red, green, blue, as a card's picture tells it; None: as
+    printed."""
 
     def photograph(self, state: HandState, until: HandState | None = None, *, number: int = 0) -> Photograph:
         """The picture of ``state``; with ``until`` the exposure goes on while the hand moves there.
@@ -124,13 +127,17 @@ class Photographer:
         folds *= look.folds / max(np.sqrt((folds**2).sum(axis=1).mean()), 1e-9)
         return linear_light(behind), lamp / np.linalg.norm(lamp), weave, folds
 
+    @property
+    def _inks(self) -> np.ndarray:
+        return linear_light(PRINTED_SRGB) if self.inks is None else self.inks
+
     @cached_property
     def _surface(self) -> tuple[np.ndarray, np.ndarray]:
         """Triangles of hand and arm, and their linear colours."""
         rng = np.random.default_rng([self.seed, 2])
         sleeve = rng.uniform(30, 200, 3) if self.photography.arm == "sleeve" else None
         arm = sleeve if sleeve is not None else np.array(SKIN_SRGB[rng.integers(len(SKIN_SRGB))])
-        triangles, colours = self.skin.triangles, linear_light(PRINTED_SRGB)[self.pattern.colour - 1]
+        triangles, colours = self.skin.triangles, self._inks[self.pattern.colour - 1]
         if self.photography.arm != "none":
             triangles = np.concatenate([triangles, _arm_triangles() + len(self.skin.vertices_mm)])
             extra = len(triangles) - len(colours)
@@ -201,16 +208,24 @@ def _arm_triangles() -> np.ndarray:
 
 
 def labelled_photographs(
-    skin: HandSkin, pattern: Pattern, camera: Camera, *, count: int = EXAMPLES, seed: int = 1
+    skin: HandSkin,
+    pattern: Pattern,
+    camera: Camera,
+    *,
+    count: int = EXAMPLES,
+    seed: int = 1,
+    inks: np.ndarray | None = None,
+    gains: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> list[Photograph]:
     """To learn the glove's colours from, where nobody has labelled real ones.
 
-    Each is of another pose, in another room, with another arm, of slightly different exposure.
+    Each is of another pose, in another room, with another arm, of slightly different exposure; all in light
+    of ``gains`` (red, green, blue), and with ``inks`` (10, 3) in place of the printed colours.
     """
     rng = np.random.default_rng([seed, 8])
     found = []
     for index, state in enumerate(hand_motion(skin, 2.0 * count, 0.5, seed=seed)[:count]):
-        look = Photography(exposure=float(rng.uniform(0.75, 1.15)), arm=("skin", "sleeve")[index % 2])
-        room = int(rng.integers(2**31))
-        found.append(Photographer(skin, pattern, camera, look, room).photograph(state))
+        exposure, arm = float(rng.uniform(0.75, 1.15)), ("skin", "sleeve")[index % 2]
+        look, room = Photography(gains=gains, exposure=exposure, arm=arm), int(rng.integers(2**31))
+        found.append(Photographer(skin, pattern, camera, look, room, inks).photograph(state))
     return found

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
+from zipfile import BadZipFile, ZipFile
 
 import cv2
 import numba
@@ -21,6 +21,7 @@ from glovecal_models.errors import BadInput
 
 LEVELS = 64
 COMPONENTS, BACKGROUND_COMPONENTS = 3, 12
+_LARGEST_TABLE = LEVELS**3 + 1024
 _LOG_OFFSET = 8.0
 _ROUNDS = 40
 _MOST_PIXELS = 4000
@@ -101,6 +102,9 @@ class ColourTable:
     def load(cls, file: Path) -> ColourTable:
         """Raises BadInput for a file that holds something else."""
         try:
+            with ZipFile(file) as archive:
+                if archive.getinfo("labels_of.npy").file_size > _LARGEST_TABLE:
+                    raise BadInput(f"{file.name} holds more than a table of colours")
             with file.open("rb") as stream, np.load(stream, allow_pickle=False) as held:
                 table = held["labels_of"]
         except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:

@@ -84,7 +84,7 @@ class PictureCheck:
                 Finding(
                     "no hand", count, least,
                     f"No glove in view: {count} pixels of its colours, at least {least} expected. Hold the "
-                    "gloved hand before the camera, not too far away; if it is there, calibrate the colours.",
+                    "gloved hand before the camera, not too far away; if it is there, make a colour table.",
                 ),
             )  # fmt: skip
         seen = None if self.lookup is None else Sighting.of(labels, self.lookup)

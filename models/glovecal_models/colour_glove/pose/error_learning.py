@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from multiprocessing import get_context
+from pathlib import Path
 
 import numpy as np
 
@@ -112,8 +113,7 @@ def learned_errors(
 
     Raises BadInput, Cancelled.
     """
-    name = _digest(hand, lookup, cameras, clips)
-    file = lookup.database.folder / f"errors-{name}.npz"
+    file = errors_file(hand, lookup, cameras, clips)
     if file.exists():
         try:
             return LearnedErrors.load(file)
@@ -124,7 +124,7 @@ def learned_errors(
     blends = np.concatenate(steps)
     covariance = blends.T @ blends / len(blends) + np.eye(DEGREES_OF_FREEDOM)
     speed = _speed(hand.skin, clips)
-    first = LearnedErrors(covariance, speed, _no_scales())
+    first = LearnedErrors.as_posterior(covariance, speed)
     said = part(report, 0.25, 0.6)
     colours = drawn_colours(hand)
     job = partial(_errors_alone, hand, lookup, cameras, colours, first)
@@ -134,7 +134,9 @@ def learned_errors(
         scales[stage] = fitted_scale(*_joined(alone, stage))
     first = replace(
         first,
-        scales=_no_scales() | scales | {scale_name(stage, True): scales[stage] for stage in ("ik", "dense")},
+        scales={**first.scales}
+        | scales
+        | {scale_name(stage, True): scales[stage] for stage in ("ik", "dense")},
     )
     said = part(report, 0.6, 1.0)
     # A followed answer differs from one alone only while a hand is followed: half the clips tell enough.
@@ -149,16 +151,12 @@ def learned_errors(
     return found
 
 
-def _digest(hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], clips: int) -> str:
+def errors_file(hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], clips: int) -> Path:
+    """Where they are kept: beside the database, named after what they were learned with."""
     found = hashlib.sha256(repr((_FORMAT, clips, lookup.database.folder.name, tuple(cameras))).encode())
     for array in (hand.skin.vertices_mm, hand.pattern.colour_of_patch):
         found.update(np.ascontiguousarray(array).tobytes())
-    return found.hexdigest()[:20]
-
-
-def _no_scales() -> dict[str, np.ndarray]:
-    plain = np.tile([0.0, 1.0, 0.0], (DEGREES_OF_FREEDOM, 1))
-    return {scale_name(stage, followed): plain for stage in STAGES for followed in (False, True)}
+    return lookup.database.folder / f"errors-{found.hexdigest()[:20]}.npz"
 
 
 def _over_clips(
@@ -233,7 +231,7 @@ def _at_the_end_of_exposure(states: Sequence[HandState], index: int, rate_hz: fl
 
 
 def _blend_errors(hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], clip: int) -> np.ndarray:
-    plain = LearnedErrors(np.eye(DEGREES_OF_FREEDOM), np.ones(DEGREES_OF_FREEDOM), _no_scales())
+    plain = LearnedErrors.as_posterior(np.eye(DEGREES_OF_FREEDOM), np.ones(DEGREES_OF_FREEDOM))
     tracker = HandTracker(hand, lookup, cameras[:1], plain, stage="blend")
     made = _clip(hand, cameras[:1], None, 1000 + clip, 2 * _APART[0], _APART[1])
     steps = []

@@ -19,6 +19,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM
+from glovecal_models.colour_glove.pose_estimate import STAGES
 from glovecal_models.errors import BadInput
 
 _LEAST_DISAGREEING = 0.02
@@ -38,6 +39,13 @@ class LearnedErrors:
     """P, (26,): how fast a hand departs from where it was, degrees and mm a second, root mean square."""
     scales: Mapping[str, np.ndarray]
     """(26, 3): a, b, c, by "stage" and "stage-followed"."""
+
+    @classmethod
+    def as_posterior(cls, blend_covariance: np.ndarray, speed: np.ndarray) -> LearnedErrors:
+        """Before anything was learned: each stage's posterior deviations stand as they are."""
+        plain = np.tile([0.0, 1.0, 0.0], (DEGREES_OF_FREEDOM, 1))
+        names = [scale_name(stage, followed) for stage in STAGES for followed in (False, True)]
+        return cls(blend_covariance, speed, dict.fromkeys(names, plain))
 
     def deviation(
         self, stage: str, followed: bool, posterior_sd: np.ndarray, disagreeing: float

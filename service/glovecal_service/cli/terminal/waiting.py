@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from rich.progress import BarColumn, Progress, Task, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from glovecal_client.errors import ServiceError
+from glovecal_models.progress import Report
 from glovecal_service.cli.terminal.printing import err
 from glovecal_service.cli.terminal.refusal import Refusal
+from glovecal_service.jobs.time_left import TimeLeft
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
@@ -58,6 +62,20 @@ def wait_seconds(seconds: float, what: str, *, quiet: bool = False) -> None:
         while (left := until - time.monotonic()) > 0:
             time.sleep(min(STEP_S, left))
             progress.update(bar, completed=seconds - max(0.0, until - time.monotonic()))
+
+
+@contextmanager
+def progress_bar(*, quiet: bool = False) -> Iterator[Report]:
+    """For work in this process: what takes a sentence and the fraction done; time left is told from it."""
+    with _bar(quiet) as progress:
+        bar, left = progress.add_task("", total=1.0), TimeLeft(0.0)
+
+        def report(sentence: str, fraction: float) -> None:
+            progress.update(
+                bar, completed=fraction, description=_short(sentence), left=left.seconds(fraction)
+            )
+
+        yield report
 
 
 def _short(sentence: str) -> str:

@@ -10,6 +10,7 @@ from pydantic import Field
 from glovecal_client.errors import BadName, NoAnswer, QueryRefused
 from glovecal_client.keys import GloveKeys, all_gloves, parse_glove_key
 from glovecal_client.queries import json_object
+from glovecal_service.camera.camera_files import CameraFiles
 from glovecal_service.camera.camera_settings import CameraSettings
 from glovecal_service.rest.http.answers import change_problems, problems
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
@@ -30,6 +31,12 @@ class NewCamera(StrictBody):
     source: Source = Field(description="camera:0 is the first; rendered draws a moving glove, to try.")
     stage: Stage = "dense"
     keep: Kept = Field("labels", description="pictures: as they came (FFV1); labels: of those tracked.")
+    colours: Identifier | None = Field(
+        None, description="Colour table, as `camera-files` has it. Null: learned on rendered photographs."
+    )
+    calibration: Identifier | None = Field(
+        None, description="Of the camera, as `camera-files` has it. Null: focal length and lens are assumed."
+    )
     subject: SubjectName | None = Field(
         None, description="Whose hand it is: with its sizes where they were measured."
     )
@@ -51,16 +58,22 @@ class NewStage(StrictBody):
 )
 def start_camera(body: NewCamera, parts: PartsNeeded) -> CameraView:
     """Answers at once; ``state`` tells how far it is. The first time it builds the pose database, which takes
-    a minute or two. 409 where that glove is published already, or too many cameras are on."""
+    a minute or two. 404 for a colour table or calibration that is not kept; 409 where that glove is published
+    already, or too many cameras are on."""
     settings = parts.settings
     known = _cameras(parts)
     if body.glove in known and known[body.glove].state != "stopped":
         raise Conflict(f"a camera publishes glove {body.glove} already; stop it first")
+    files = CameraFiles(settings.data / "cameras")
     worn_by = None if body.subject is None else parts.store.subjects.get(body.subject)
     asked = CameraSettings(
-        body.source, body.glove, settings.data, settings.site, settings.zenoh, body.subject,
-        body.hand or ("right" if worn_by is None else worn_by.hand), body.stage, body.keep,
-        entries=body.entries, clips=body.clips, sizes_mm={} if worn_by is None else worn_by.dimensions,
+        body.source, body.glove, settings.site, settings.zenoh, body.subject, body.keep,
+        data=settings.data, hand=body.hand or ("right" if worn_by is None else worn_by.hand),
+        stage=body.stage,
+        colours=None if body.colours is None else files.path("colours", body.colours),
+        calibration=None if body.calibration is None else files.path("calibrations", body.calibration),
+        entries=body.entries, clips=body.clips,
+        sizes_mm={} if worn_by is None else worn_by.dimensions,
     )  # fmt: skip
     return silent(parts.cameras.started.start(asked))
 

@@ -1,0 +1,42 @@
+"""``glovecal camera store``: colour tables and calibrations by names, for cameras that the service starts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from glovecal_service.cli.terminal.connection import connect
+from glovecal_service.cli.terminal.options import AsJson
+from glovecal_service.cli.terminal.printing import out, print_json
+
+
+def store(
+    name: Annotated[
+        str, typer.Argument(help="Name to keep them under: a-z, 0-9, _ and -.", show_default=False)
+    ],
+    colours: Annotated[
+        Path | None,
+        typer.Option(help="Colour table, as glovecal camera colours makes it.", exists=True, dir_okay=False),
+    ] = None,
+    calibration: Annotated[
+        Path | None,
+        typer.Option(help="As glovecal camera calibrate makes it.", exists=True, dir_okay=False),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Keep a colour table, a calibration or both with the service, for cameras started over REST."""
+    given = {"colours": colours, "calibrations": calibration}
+    if not any(given.values()):
+        raise typer.BadParameter("give --colours FILE, --calibration FILE or both")
+    known = {}
+    with connect() as service:
+        for kind, file in given.items():
+            if file is not None:
+                known = service.put(f"/camera-files/{kind}/{name}", {"upload": service.upload(file)})
+    if as_json:
+        print_json(known)
+        return
+    for kind in given:
+        out.print(f"{kind}: {', '.join(known[kind]) or 'none'}")
