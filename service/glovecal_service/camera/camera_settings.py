@@ -37,6 +37,8 @@ class TrackingSettings:
     """Of the pose database."""
     sizes_mm: Mapping[str, float] = field(default_factory=dict)
     """Of the subject's hand, as measured; what is missing follows from them, or is assumed."""
+    shape: Path | None = None
+    """Of the hand in its glove, as ``glovecal camera shape`` finds it; None: by ``sizes_mm``."""
     clips: int = 36
     """Rendered ones of other hands, from which the tracker's errors are learned."""
 
@@ -83,7 +85,7 @@ class CameraSettings(TrackingSettings):
     def from_text(cls, text: str) -> CameraSettings:
         """From what ``text`` gave."""
         given: dict[str, Any] = json.loads(text)
-        for name in ("data", "colours", "calibration"):
+        for name in ("data", "colours", "calibration", "shape"):
             given[name] = None if given[name] is None else Path(given[name])
         return cls(**given)
 

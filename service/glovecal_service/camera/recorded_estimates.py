@@ -20,6 +20,7 @@ from glovecal_client.pictures.label_file import LabelFilePictures, read_label_ti
 from glovecal_client.pictures.source import Picture, PictureSource
 from glovecal_client.pictures.video_file import SUFFIX as VIDEO
 from glovecal_client.pictures.video_file import VideoFilePictures, read_times
+from glovecal_models.colour_glove.pose.hand_shape_fit import MOST
 from glovecal_models.colour_glove.pose_estimate import PoseEstimate, camera_estimates
 from glovecal_models.errors import BadInput
 from glovecal_models.progress import Cancel, Report, stop_if
@@ -137,6 +138,21 @@ class Recordings:
             sum(pose is not None and not pose.accepted.any() for pose in poses),
             dict(found), time.perf_counter() - began,
         )  # fmt: skip
+
+    def spread_labels(self, setup: TrackingSetup, count: int = MOST) -> list[list[np.ndarray]]:
+        """Label images of ``count`` moments over the whole recording, one of each camera."""
+        wanted = np.unique(np.linspace(0, len(self.rows[0]) - 1, min(count, len(self.rows[0]))).astype(int))
+        readers = [
+            _Reader(source, rows[wanted]) for source, rows in zip(self.sources, self.rows, strict=True)
+        ]
+        try:
+            return [
+                [pixels if pixels.ndim == 2 else setup.colours.labels(pixels) for pixels in pictures]
+                for pictures in zip(*readers, strict=False)
+            ]
+        finally:
+            for source in self.sources:
+                source.close()
 
     def _count(self, number: int, tracked: int, ended: str) -> RecordingCount:
         times = self.times_s[number]

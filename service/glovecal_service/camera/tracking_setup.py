@@ -21,7 +21,8 @@ from glovecal_models.colour_glove.pose.prepared import prepared_tracker
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.pose_estimate import PoseEstimate
 from glovecal_models.colour_glove.rasterise import rasterise
-from glovecal_models.colour_glove.skin import hand_skin, posed
+from glovecal_models.colour_glove.shape_file import read_shape
+from glovecal_models.colour_glove.skin import HandSkin, hand_skin, posed
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import hand_skeleton
@@ -83,8 +84,7 @@ def tracking_setup(
 
     Raises DeviceLost where no picture comes, BadInput for files that cannot be used, Cancelled.
     """
-    sizes = HandDimensions.from_measured(settings.sizes_mm)
-    skin = hand_skin(hand_skeleton(sizes, "left" if settings.hand == "left" else "right"))
+    skin = _skin(settings)
     hand = PrintedHand(skin, printed_pattern())
     built = tuple(
         camera_source(source, lambda: RenderedGlove(hand, ASSUMED)) if isinstance(source, str) else source
@@ -100,6 +100,15 @@ def tracking_setup(
     _ = check.distance_limit_px2  # takes a moment: not while pictures wait
     is_known = settings.calibration is not None or built[0].name == RENDERED
     return TrackingSetup(built, hand, cameras, is_known, _colours(settings, hand), check, first, made_from)
+
+
+def _skin(settings: TrackingSettings) -> HandSkin:
+    if settings.shape is None:
+        return hand_skin(hand_skeleton(HandDimensions.from_measured(settings.sizes_mm), settings.hand))
+    shape = read_shape(settings.shape)
+    if shape.hand != settings.hand:
+        raise BadInput(f"{settings.shape} is of a {shape.hand} hand; the {settings.hand} one wears the glove")
+    return shape.skin()
 
 
 def _size(source: PictureSource) -> tuple[int, int]:

@@ -18,6 +18,7 @@ from glovecal_service.cli.camera.tracking_options import (
     DataOption,
     EntriesOption,
     HandOption,
+    ShapeOption,
     Stage,
     StageOption,
     SubjectOption,
@@ -49,6 +50,7 @@ def estimates(
     stage: StageOption = Stage.dense,
     colours: ColoursOption = None,
     calibration: CalibrationOption = None,
+    shape: ShapeOption = None,
     subject: SubjectOption = None,
     hand: HandOption = None,
     entries: EntriesOption = 20_000,
@@ -73,7 +75,7 @@ def estimates(
         )
     sizes_mm, worn_on = worn_by(subject, hand)
     settings = TrackingSettings(
-        data=data, hand=worn_on, stage=stage.value, colours=colours, calibration=calibration,
+        data=data, hand=worn_on, stage=stage.value, colours=colours, calibration=calibration, shape=shape,
         entries=entries, clips=clips, sizes_mm=sizes_mm,
     )  # fmt: skip
     stop = threading.Event()

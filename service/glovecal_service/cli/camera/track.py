@@ -17,6 +17,7 @@ from glovecal_service.cli.camera.tracking_options import (
     DataOption,
     EntriesOption,
     HandOption,
+    ShapeOption,
     Stage,
     StageOption,
     SubjectOption,
@@ -52,6 +53,7 @@ def track(
     ] = Kept.labels,
     colours: ColoursOption = None,
     calibration: CalibrationOption = None,
+    shape: ShapeOption = None,
     subject: SubjectOption = None,
     hand: HandOption = None,
     entries: EntriesOption = 20_000,
@@ -72,7 +74,7 @@ def track(
     settings = CameraSettings(
         source, glove, site, connect, subject, keep.value, data=data,
         hand=worn_on, stage=stage.value, colours=colours,
-        calibration=calibration, entries=entries, clips=clips, sizes_mm=sizes_mm,
+        calibration=calibration, shape=shape, entries=entries, clips=clips, sizes_mm=sizes_mm,
     )  # fmt: skip
     stop = threading.Event()
     with stopped_by_signals(stop):

@@ -41,6 +41,10 @@ SubjectOption = Annotated[
 HandOption = Annotated[
     Hand | None, typer.Option(help="The hand that wears it. Default: the subject's, else the right one.")
 ]
+ShapeOption = Annotated[
+    Path | None,
+    typer.Option(help="The hand's shape, as glovecal camera shape finds it.", exists=True, dir_okay=False),
+]
 EntriesOption = Annotated[
     int, typer.Option(min=300, max=1_000_000, help="Of the pose database; the paper has 100,000.")
 ]
