@@ -43,6 +43,8 @@ class Hum:
     rms_deg: float
     over_around: float
     """Power over the median around it."""
+    heard_s: float
+    """So long were the pieces together."""
 
 
 def hums(sensors: Sequence[ReadingErrors | None]) -> list[Hum | None]:
@@ -84,13 +86,16 @@ def _tone(sensor: ReadingErrors) -> Hum | None:
     near, far = NARROW_BINS
     padded = np.pad(power, far, mode="reflect")
     beside = np.concatenate([padded[at : at + far - near + 1], padded[at + far + near : at + 2 * far + 1]])
+    heard_s = float(measured.sum()) * PIECE_S
     is_tone = (
         over[at] >= OVER_AROUND
         and mean_square >= LEAST_DEG**2
         and beside.mean() <= NARROW_SHARE * power[at]
         and _spectrum(readings, window)[line].sum() >= IN_READINGS * power[line].sum()
     )
-    return Hum(float(frequency[at]), float(np.sqrt(mean_square)), float(over[at])) if is_tone else None
+    return (
+        Hum(float(frequency[at]), float(np.sqrt(mean_square)), float(over[at]), heard_s) if is_tone else None
+    )
 
 
 def _pieces(values: np.ndarray, frames: int) -> np.ndarray:

@@ -39,21 +39,17 @@ class Leaps:
     count: int
     size_deg: float
     """Their mean height."""
-    away: tuple[np.ndarray, ...]
-    """(N,) for each take: True where the sensor is off the level at which it is most of the time."""
 
 
 @dataclass(frozen=True)
 class _Candidates:
-    frames: list[np.ndarray]
-    """For each take the first frames after a step."""
     heights: list[np.ndarray]
-    """Differences of means, degrees."""
+    """For each take the differences of means, degrees."""
     step_share: float
 
     @property
     def count(self) -> int:
-        return sum(map(len, self.frames))
+        return sum(map(len, self.heights))
 
     @property
     def size_deg(self) -> float:
@@ -80,17 +76,11 @@ def leaps(sensors: Sequence[ReadingErrors | None]) -> list[Leaps | None]:
     found = [None if each is None else _candidates(each) for each in sensors]
     counts = np.array([0 if each is None else each.count for each in found])
     result: list[Leaps | None] = []
-    for place, (each, sensor) in enumerate(zip(found, sensors, strict=True)):
+    for place, each in enumerate(found):
         others = np.delete(counts, place)
-        if (
-            each is None
-            or sensor is None
-            or not each.are_leaps
-            or (others > OTHERS_LEAPS * each.count).sum() > OTHERS_SHARE * len(others)
-        ):
-            result.append(None)
-        else:
-            result.append(Leaps(each.count, each.size_deg, _away(sensor.errors, each)))
+        many = int((others > OTHERS_LEAPS * counts[place]).sum())
+        is_own = each is not None and each.are_leaps and many <= OTHERS_SHARE * len(others)
+        result.append(Leaps(each.count, each.size_deg) if each and is_own else None)
     return result
 
 
@@ -107,12 +97,8 @@ def _candidates(sensor: ReadingErrors) -> _Candidates | None:
     if not len(known):
         return None
     limit = SPREADS * 1.4826 * float(np.median(known))
-    frames, heights, steps = [], [], []
-    for error in sensor.errors:
-        if len(error) < 2 * side:
-            frames.append(np.empty(0, dtype=int))
-            heights.append(np.empty(0))
-            continue
+    heights, steps = [], []
+    for error in long:
         height = np.correlate(error, means, "valid")
         size = np.where(np.isfinite(height), np.abs(height), 0.0)
         peaks = [
@@ -120,31 +106,8 @@ def _candidates(sensor: ReadingErrors) -> _Candidates | None:
             for at in np.flatnonzero(size > limit)
             if size[at] >= size[max(at - side, 0) : at + side + 1].max()
         ]
-        at = np.array(peaks, dtype=int)
-        frames.append(at + side)
-        heights.append(height[at])
-        steps += [
-            float(np.sign(height[first]) * (beside_slope @ error[first : first + 2 * side]))
-            for first in peaks
-        ]
+        heights.append(height[peaks])
+        steps += [float(np.sign(height[at]) * (beside_slope @ error[at : at + 2 * side])) for at in peaks]
     if not steps:
         return None
-    return _Candidates(frames, heights, float(np.mean(steps) / np.mean(np.abs(np.concatenate(heights)))))
-
-
-def _away(errors: Sequence[np.ndarray], found: _Candidates) -> tuple[np.ndarray, ...]:
-    """Pieces between leaps whose level is further than half a leap from the usual one."""
-    levels, lengths = [], []
-    for error, frames in zip(errors, found.frames, strict=True):
-        pieces = np.split(error, frames)
-        known = [piece[np.isfinite(piece)] for piece in pieces]
-        levels.append(np.array([np.median(piece) if len(piece) else np.nan for piece in known]))
-        lengths.append(np.array([len(piece) for piece in pieces]))
-    every, weight = np.concatenate(levels), np.concatenate(lengths)
-    order = np.argsort(np.where(np.isfinite(every), every, np.inf))
-    passed = np.cumsum(np.where(np.isfinite(every), weight, 0)[order])
-    usual = every[order[int(np.searchsorted(passed, passed[-1] / 2))]]
-    return tuple(
-        np.repeat(np.abs(level - usual) > found.size_deg / 2, length)
-        for level, length in zip(levels, lengths, strict=True)
-    )
+    return _Candidates(heights, float(np.mean(steps) / np.mean(np.abs(np.concatenate(heights)))))
