@@ -1,9 +1,10 @@
 """Sensor fault: a broken wire, a loose plug. The stretches concerned should not train anything.
 
-Five signatures: *stuck* (one value while the reference moves), *spikes* (gone after a frame or two),
-*dropouts* (jumps to a constant and back), a *jump* of gain or offset in the middle of a take, and a gain that
-has *changed* from one take to another. What a sensor answered before a change says nothing of what it answers
-now: that is left out.
+Seven signatures: *stuck* (one value while the reference moves), *spikes* (gone after a frame or two),
+*dropouts* (jumps to a constant and back), a *jump* of gain or offset in the middle of a take, a gain that
+has *changed* from one take to another, *leaps* to and fro between levels, and the *hum* of a tone. What a
+sensor answered before a change says nothing of what it answers now: that is left out. Leaps and hum go on in
+use, and no single frame shows them: they stay in training, so that the claimed standard deviation has them.
 """
 
 from __future__ import annotations
@@ -30,7 +31,10 @@ from glovecal_models.effects.base.signature_effect import (
 from glovecal_models.effects.sensor_fault.fault_watch import FaultHold
 from glovecal_models.effects.sensor_fault.gain_change import GainChange, gain_change
 from glovecal_models.effects.sensor_fault.gain_jump import gain_jump
+from glovecal_models.effects.sensor_fault.hum import Hum, hums
+from glovecal_models.effects.sensor_fault.leaps import Leaps, leaps
 from glovecal_models.effects.sensor_fault.live_check import live_check
+from glovecal_models.effects.sensor_fault.reading_errors import ReadingErrors, reading_errors
 from glovecal_models.effects.sensor_fault.short_faults import (
     FEWEST,
     expected_readings,
@@ -45,6 +49,10 @@ REFERENCE_MOVES_DEG = 10.0
 """The reference must travel so far while a sensor stands still."""
 LEAST_SPIKES = 3
 LEAST_OF_RANGE = (0.5, 99.5)
+EXPLAINED_BY = {"leaps": ("spikes", "dropouts", "jump"), "hum": ("spikes",)}
+TIMES_PER_FAULT = 4
+"""A dropout has two leaps; with more than so many leaps, or seconds of a tone, for each other fault it is
+explained by them."""
 
 
 class SensorFault(SignatureEffect):
@@ -53,9 +61,11 @@ class SensorFault(SignatureEffect):
     shown_over: ClassVar = "time in take"
     alike_between_levels: ClassVar = ("nonlinearity",)
     rivals: ClassVar = (Rival("nonlinearity", SHUFFLED),)
-    explanation = "A wire or plug fails: the sensor stands still, spikes, drops out or jumps."
+    explanation = "A wire or plug fails: the sensor stands still, spikes, drops out, jumps, leaps or hums."
     source = "signatures of readings against reference"
-    kinds: ClassVar[tuple[str, ...]] = ("stuck", "spikes", "dropouts", "jump", "changed")
+    kinds: ClassVar[tuple[str, ...]] = (
+        "stuck", "spikes", "dropouts", "jump", "changed", "leaps", "hum",
+    )  # fmt: skip
 
     def find(
         self,
@@ -71,6 +81,7 @@ class SensorFault(SignatureEffect):
         found: list[Finding] = []
         for sensor, rotation in rotation_of.items():
             found += _faults(takes, changes, sensor, rotation, len(rotation_of))
+        found = _with_unsteady(found, _unsteady(takes, rotation_of))
         return tuple(sorted(found, key=lambda item: (-len(item.stretches), item.where)))
 
     def find_between_levels(self, takes: Sequence[Take], sensor_of: Mapping[str, str]) -> tuple[Finding, ...]:
@@ -145,6 +156,73 @@ def _faults(
         for kind in least
         if len(stretches[kind]) >= least[kind]
     ]
+
+
+def _unsteady(takes: Sequence[Take], rotation_of: Mapping[str, str]) -> list[Finding]:
+    """Sensors that leap or hum."""
+    errors = [_errors(takes, sensor, rotation) for sensor, rotation in rotation_of.items()]
+    found: list[Finding] = []
+    for (sensor, rotation), hum, leapt in zip(rotation_of.items(), hums(errors), leaps(errors), strict=True):
+        if hum:
+            found.append(_finding_hum(sensor, hum))
+        elif leapt:
+            found.append(_finding_leaps(sensor, rotation, leapt))
+    return found
+
+
+def _with_unsteady(found: Sequence[Finding], unsteady: Sequence[Finding]) -> list[Finding]:
+    """Crests of a tone look like spikes, and some of many leaps like dropouts or a jump: one name for all."""
+    result = list(found)
+    for item in unsteady:
+        own = [each for each in found if each.where == item.where]
+        often = item.evidence["heard_s"] if item.count is None else item.count
+        few = TIMES_PER_FAULT * sum(each.count or 0 for each in own) < often
+        if few and all(each.kind in EXPLAINED_BY[item.kind] for each in own):
+            result = [each for each in result if each.where != item.where] + [item]
+    return result
+
+
+def _errors(takes: Sequence[Take], sensor: str, rotation: str) -> ReadingErrors | None:
+    """Without frames near the ends of the range: a sensor that saturates leaves its curve there."""
+    readings = [take.readings[:, take.sensors.index(sensor)] for take in takes]
+    low, high = (float(v) for v in np.percentile(np.concatenate(readings), LEAST_OF_RANGE))
+    margin = GRADUAL_SHARE * (high - low)
+    angles = [
+        np.where(
+            (low + margin <= part) & (part <= high - margin),
+            take.reference_at_frames([rotation])[:, 0],
+            np.nan,
+        )
+        for take, part in zip(takes, readings, strict=True)
+    ]
+    return reading_errors([take.time_s for take in takes], readings, angles)
+
+
+def _finding_hum(sensor: str, hum: Hum) -> Finding:
+    sentence = (
+        f"{sensor} hums: a tone of {hum.frequency_hz:.1f} Hz in the frames, {hum.rms_deg:.1f} deg RMS, that"
+        " its joint does not make; look at its shield and at the supply."
+    )
+    evidence = {
+        "frequency_hz": hum.frequency_hz,
+        "power_over_around_1": hum.over_around,
+        "heard_s": hum.heard_s,
+    }
+    return Finding(
+        SensorFault.name, (sensor,), sentence, kind="hum", size_deg=hum.rms_deg, evidence=evidence
+    )  # fmt: skip
+
+
+def _finding_leaps(sensor: str, rotation: str, found: Leaps) -> Finding:
+    sentence = (
+        f"{sensor} leaps {found.count} times to and fro, by {found.size_deg:.1f} deg in the mean, while"
+        f" {rotation} does not; look at its solder joints and plug."
+    )
+    evidence = {"leaps_count": float(found.count)}
+    return Finding(
+        SensorFault.name, (sensor,), sentence, kind="leaps", size_deg=found.size_deg, count=found.count,
+        evidence=evidence,
+    )  # fmt: skip
 
 
 def _finding_changed(sensor: str, rotation: str, change: GainChange, takes: Sequence[Take]) -> Finding:
