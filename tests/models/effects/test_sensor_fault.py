@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from glovecal_models.effects.base.signals import Signals
-from glovecal_models.effects.base.signature_effect import frames_inside
+from glovecal_models.effects.base.signature_effect import Recorded, frames_inside
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.effects.sensor_fault.sensor_fault import SensorFault
 
@@ -245,17 +245,25 @@ def opens_above(time_s, angles, generator):
 
 
 @pytest.mark.parametrize("contact", [three_states, far_states, opens_above])
-def test_a_contact_that_goes_to_and_fro_leaps(glove, contact):
+def test_a_contact_that_goes_to_and_fro_switches(glove, contact):
     takes = with_sensor(glove, contact, count=8)
     [finding] = FAULT.find(takes, glove.sensor_of)
-    assert (finding.where, finding.kind) == (("I_PIP",), "leaps")
-    assert finding.evidence["leaps_count"] > 40
+    assert (finding.where, finding.kind) == (("I_PIP",), "switching")
+    assert finding.evidence["switches_count"] > 40
     assert finding.size_deg == pytest.approx(7.0 if contact is far_states else 3.0, abs=1.0)
     assert all(mended is take for mended, take in zip(FAULT.repaired(takes), takes, strict=True))
 
 
 def vibrates(time_s, angles, generator):
     return 0.8 * np.sin(2 * np.pi * 9.3 * time_s)
+
+
+def in_first(takes, tone):
+    """The tone in the first sensor's readings."""
+    return [
+        replace(take, readings=np.round(take.readings + 2.0 * each * [1.0, 0.0, 0.0]))
+        for take, each in zip(takes, tone, strict=True)
+    ]
 
 
 def test_what_all_sensors_or_the_reference_have_is_no_hum(glove):
@@ -269,15 +277,15 @@ def test_what_all_sensors_or_the_reference_have_is_no_hum(glove):
         replace(take, reference=take.reference + each * [1.0, 0.0, 0.0])
         for take, each in zip(takes, tone, strict=True)
     ]
-    moved = [
-        replace(
-            take,
-            reference=take.reference + each * [1.0, 0.0, 0.0],
-            readings=np.round(take.readings + 2.0 * each * [1.0, 0.0, 0.0]),
-        )
-        for take, each in zip(takes, tone, strict=True)
+    followed_late = [
+        replace(take, reference=take.reference + np.roll(each, -2) * [1.0, 0.0, 0.0])
+        for take, each in zip(in_first(takes, tone), tone, strict=True)
     ]
-    for takes in (every, shaken, moved):
+    moved = [
+        replace(take, reference=take.reference + each * [1.0, 0.0, 0.0])
+        for take, each in zip(in_first(takes, tone), tone, strict=True)
+    ]
+    for takes in (every, shaken, moved, followed_late):
         assert FAULT.find(takes, glove.sensor_of) == ()
 
 
@@ -302,7 +310,48 @@ def quick_lag(time_s, angles, generator):
 
 
 @pytest.mark.parametrize("change", [tremor, slips, quick_lag])
-def test_other_quick_errors_are_neither_hum_nor_leaps(glove, change):
+def test_other_quick_errors_are_neither_hum_nor_switching(glove, change):
     kinds = [item.kind for item in FAULT.find(with_sensor(glove, change, count=6), glove.sensor_of)]
     assert "hum" not in kinds
-    assert "leaps" not in kinds
+    assert "switching" not in kinds
+
+
+def test_a_reference_that_switches_is_no_fault_of_a_sensor(glove):
+    takes, generator = glove.takes(count=8), np.random.default_rng(7)
+    swapped = []
+    for take in takes:
+        away = three_states(take.time_s, None, generator)
+        swapped.append(replace(take, reference=take.reference + away[:, None] * [1.0, 0.0, 0.0]))
+    assert "switching" not in [item.kind for item in FAULT.find(swapped, glove.sensor_of)]
+
+
+def snaps_over(time_s, angles, generator):
+    """A strip that goes over at 52 degrees and back at 38."""
+    decided = np.where(angles > 52, 1.0, np.where(angles < 38, -1.0, 0.0))
+    decided[0] = -1.0 if decided[0] == 0 else decided[0]
+    return 2.0 * decided[np.maximum.accumulate(np.where(decided != 0, np.arange(len(angles)), 0))]
+
+
+def test_a_strip_that_snaps_over_is_no_contact(glove):
+    takes = with_sensor(glove, snaps_over, count=8)
+    assert "switching" not in [item.kind for item in FAULT.find(takes, glove.sensor_of)]
+
+
+def test_large_spikes_of_a_sensor_that_hums_are_left_out(glove):
+    first, *others = with_sensor(glove, railway, rotation=1)
+    readings = first.readings.copy()
+    readings[[200, 700, 1200, 1500], 1] += 60.0
+    takes = [replace(first, readings=readings), *others]
+    found = {item.kind: item for item in FAULT.find(takes, glove.sensor_of)}
+    assert set(found) == {"hum", "spikes"}
+    assert [found[kind].is_only_told for kind in ("hum", "spikes")] == [True, False]
+    mended = FAULT.repaired(takes)
+    assert np.isnan(mended[0].reference_at_frames(["M_PIP"])).sum() == 4
+    assert mended[1] is takes[1]
+
+
+def test_what_is_only_told_is_not_proposed(glove):
+    takes = with_sensor(glove, railway, rotation=1)
+    recorded = Recorded(tuple(takes), glove.sensor_of, list)
+    assert FAULT.find(takes, glove.sensor_of)
+    assert FAULT.proposed(recorded) is None

@@ -16,7 +16,7 @@ from glovecal_models.effects.sensor_fault.fault_watch import (
 from glovecal_models.takes.reading_faults import smallest_step
 from glovecal_models.takes.take import Take
 
-LASTING = ("jump", "changed", "leaps", "hum")
+LASTING = ("jump", "changed", "switching", "hum")
 """Kinds that leave a sound sensor, if another one than before; or that no single frame shows."""
 LEAST_OF_RANGE = (0.5, 99.5)
 JUMP_LAGS = 8

@@ -3,7 +3,9 @@
 A broken shield lets in the mains, or a switching supply, which the frame rate folds down to some hertz. A
 tone is one sharp line in the spectrum; movement, tremor and every other effect are wide. The spectrum of the
 errors is averaged over pieces of takes (Bartlett 1950), and a line must stand out from the median around it.
-It must be in the readings, or else the reference hums, and not in all sensors, or else no sensor fails.
+It must be in the readings, or else the reference hums; not in the joint's angle, or else the joint moves with
+it (a machine, a vibrating tool) and the sensor follows too weakly or too late; and not in other sensors, or
+else no sensor fails.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ SLOWEST_HZ = 4.0
 """Below, hands move."""
 AROUND_BINS = 20
 OVER_AROUND = 8.0
-"""Times the median: noise averaged over four pieces gets there once in 10^10."""
+"""Times the median: noise averaged over four pieces gets there once in 10^9."""
 LINE_BINS = 2
 """To either side: the width of a tone seen through a Hann window."""
 NARROW_BINS = (4, 8)
@@ -30,6 +32,8 @@ NARROW_SHARE = 0.125
 LEAST_DEG = 0.25
 IN_READINGS = 0.5
 """Of the line's power in the errors: the readings must have it."""
+IN_ANGLE = 0.25
+"""Of the line's power in the errors, which the joint's angle may have at most."""
 OTHERS_SHARE = 0.25
 """Of the other sensors, which may have the line too."""
 
@@ -73,8 +77,7 @@ def _tone(sensor: ReadingErrors) -> Hum | None:
     if measured.sum() < FEWEST_PIECES:
         return None
     power = _spectrum(errors[measured], window)
-    padded = np.pad(power, AROUND_BINS, mode="reflect")
-    around = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * AROUND_BINS + 1), axis=1)
+    around = _around(power)
     frequency = np.fft.rfftfreq(frames, 1.0 / sensor.rate_hz)
     over = np.where(frequency >= SLOWEST_HZ, power / np.maximum(around, 1e-12), 0.0)
     at = int(over.argmax())
@@ -82,20 +85,30 @@ def _tone(sensor: ReadingErrors) -> Hum | None:
     # Half of what is at the highest frequency belongs to the other, folded half of the spectrum.
     weight = np.where(frequency[line] == frequency[-1], 1.0, 2.0)
     mean_square = float(np.sum(weight * (power - around)[line])) / (frames * float(np.sum(window**2)))
-    readings = np.concatenate([_pieces(part, frames) for part in sensor.readings])[measured]
+    in_readings, in_angle = (
+        _spectrum(np.concatenate([_pieces(part, frames) for part in parts])[measured], window)
+        for parts in (sensor.readings, sensor.angles)
+    )
     near, far = NARROW_BINS
     padded = np.pad(power, far, mode="reflect")
     beside = np.concatenate([padded[at : at + far - near + 1], padded[at + far + near : at + 2 * far + 1]])
-    heard_s = float(measured.sum()) * PIECE_S
     is_tone = (
         over[at] >= OVER_AROUND
         and mean_square >= LEAST_DEG**2
         and beside.mean() <= NARROW_SHARE * power[at]
-        and _spectrum(readings, window)[line].sum() >= IN_READINGS * power[line].sum()
+        and in_readings[line].sum() >= IN_READINGS * power[line].sum()
+        and (in_angle - _around(in_angle))[line].sum() <= IN_ANGLE * power[line].sum()
     )
-    return (
-        Hum(float(frequency[at]), float(np.sqrt(mean_square)), float(over[at]), heard_s) if is_tone else None
-    )
+    if not is_tone:
+        return None
+    heard_s = float(measured.sum()) * PIECE_S
+    return Hum(float(frequency[at]), float(np.sqrt(mean_square)), float(over[at]), heard_s)
+
+
+def _around(power: np.ndarray) -> np.ndarray:
+    """(F,) median around each frequency."""
+    padded = np.pad(power, AROUND_BINS, mode="reflect")
+    return np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * AROUND_BINS + 1), axis=1)
 
 
 def _pieces(values: np.ndarray, frames: int) -> np.ndarray:

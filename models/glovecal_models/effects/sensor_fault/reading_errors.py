@@ -19,7 +19,9 @@ class ReadingErrors:
     errors: tuple[np.ndarray, ...]
     """(N,) for each take; NaN where there is no reference, or the frame is left out."""
     readings: tuple[np.ndarray, ...]
-    """(N,) for each take."""
+    """(N,) for each take, growing with the angle."""
+    angles: tuple[np.ndarray, ...]
+    """(N,) for each take, measured; NaN as in ``errors``."""
     rate_hz: float
 
 
@@ -46,10 +48,11 @@ def reading_errors(
     height = np.bincount(piece, x[known], len(count))[used] / count[used]
     # Beyond the outer means the sensor goes on in a straight line.
     beyond = np.minimum(y - at[0], 0.0) + np.maximum(y - at[-1], 0.0)
-    error = (x - np.interp(y, at, height) - gain * beyond) / abs(gain)
+    error = (x - np.interp(y, at, height) - gain * beyond) / gain
     ends = np.cumsum([len(part) for part in readings])[:-1]
     return ReadingErrors(
         tuple(np.split(error, ends)),
-        tuple(np.split(x / abs(gain), ends)),
+        tuple(np.split(x / gain, ends)),
+        tuple(angles),
         1.0 / float(np.median(intervals)),
     )

@@ -2,9 +2,10 @@
 
 Seven signatures: *stuck* (one value while the reference moves), *spikes* (gone after a frame or two),
 *dropouts* (jumps to a constant and back), a *jump* of gain or offset in the middle of a take, a gain that
-has *changed* from one take to another, *leaps* to and fro between levels, and the *hum* of a tone. What a
-sensor answered before a change says nothing of what it answers now: that is left out. Leaps and hum go on in
-use, and no single frame shows them: they stay in training, so that the claimed standard deviation has them.
+has *changed* from one take to another, *switching* to and fro between levels, and the *hum* of a tone. What a
+sensor answered before a change says nothing of what it answers now: that is left out. Switching and hum go on
+in use, and no single frame shows them: they are told and stay in training, so that the claimed standard
+deviation has them.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from glovecal_models.effects.sensor_fault.fault_watch import FaultHold
 from glovecal_models.effects.sensor_fault.gain_change import GainChange, gain_change
 from glovecal_models.effects.sensor_fault.gain_jump import gain_jump
 from glovecal_models.effects.sensor_fault.hum import Hum, hums
-from glovecal_models.effects.sensor_fault.leaps import Leaps, leaps
+from glovecal_models.effects.sensor_fault.level_switches import LevelSwitches, level_switches
 from glovecal_models.effects.sensor_fault.live_check import live_check
 from glovecal_models.effects.sensor_fault.reading_errors import ReadingErrors, reading_errors
 from glovecal_models.effects.sensor_fault.short_faults import (
@@ -49,10 +50,12 @@ REFERENCE_MOVES_DEG = 10.0
 """The reference must travel so far while a sensor stands still."""
 LEAST_SPIKES = 3
 LEAST_OF_RANGE = (0.5, 99.5)
-EXPLAINED_BY = {"leaps": ("spikes", "dropouts", "jump"), "hum": ("spikes",)}
+EXPLAINED_BY = {"switching": ("spikes", "dropouts", "jump"), "hum": ("spikes",)}
 TIMES_PER_FAULT = 4
-"""A dropout has two leaps; with more than so many leaps, or seconds of a tone, for each other fault it is
-explained by them."""
+"""A dropout has two switches; with more than so many switches, or seconds of a tone, for each other fault,
+those that are no larger are explained by them."""
+LARGEST = {"switching": 2.0, "hum": 3.0}
+"""Times the mean height of the switches, or the tone's RMS, that a fault so explained reaches at most."""
 
 
 class SensorFault(SignatureEffect):
@@ -61,10 +64,10 @@ class SensorFault(SignatureEffect):
     shown_over: ClassVar = "time in take"
     alike_between_levels: ClassVar = ("nonlinearity",)
     rivals: ClassVar = (Rival("nonlinearity", SHUFFLED),)
-    explanation = "A wire or plug fails: the sensor stands still, spikes, drops out, jumps, leaps or hums."
+    explanation = "A wire or plug fails: the sensor stands still, spikes, drops out, jumps, switches or hums."
     source = "signatures of readings against reference"
     kinds: ClassVar[tuple[str, ...]] = (
-        "stuck", "spikes", "dropouts", "jump", "changed", "leaps", "hum",
+        "stuck", "spikes", "dropouts", "jump", "changed", "switching", "hum",
     )  # fmt: skip
 
     def find(
@@ -81,7 +84,7 @@ class SensorFault(SignatureEffect):
         found: list[Finding] = []
         for sensor, rotation in rotation_of.items():
             found += _faults(takes, changes, sensor, rotation, len(rotation_of))
-        found = _with_unsteady(found, _unsteady(takes, rotation_of))
+        found = _with_unsteady(takes, found, rotation_of)
         return tuple(sorted(found, key=lambda item: (-len(item.stretches), item.where)))
 
     def find_between_levels(self, takes: Sequence[Take], sensor_of: Mapping[str, str]) -> tuple[Finding, ...]:
@@ -158,28 +161,51 @@ def _faults(
     ]
 
 
-def _unsteady(takes: Sequence[Take], rotation_of: Mapping[str, str]) -> list[Finding]:
-    """Sensors that leap or hum."""
+def _with_unsteady(
+    takes: Sequence[Take], found: Sequence[Finding], rotation_of: Mapping[str, str]
+) -> list[Finding]:
+    """``found`` and the sensors that switch or hum.
+
+    Crests of a tone look like spikes, and some of many switches like dropouts or a jump: one name for all of
+    them. A fault that is larger stays.
+    """
     errors = [_errors(takes, sensor, rotation) for sensor, rotation in rotation_of.items()]
-    found: list[Finding] = []
-    for (sensor, rotation), hum, leapt in zip(rotation_of.items(), hums(errors), leaps(errors), strict=True):
-        if hum:
-            found.append(_finding_hum(sensor, hum))
-        elif leapt:
-            found.append(_finding_leaps(sensor, rotation, leapt))
-    return found
-
-
-def _with_unsteady(found: Sequence[Finding], unsteady: Sequence[Finding]) -> list[Finding]:
-    """Crests of a tone look like spikes, and some of many leaps like dropouts or a jump: one name for all."""
     result = list(found)
-    for item in unsteady:
+    for sensor, error, hum, switches in zip(
+        rotation_of, errors, hums(errors), level_switches(errors), strict=True
+    ):
+        if error is None:
+            continue
+        if hum:
+            item = _finding_hum(sensor, hum)
+        elif switches:
+            item = _finding_switches(sensor, switches)
+        else:
+            continue
         own = [each for each in found if each.where == item.where]
         often = item.evidence["heard_s"] if item.count is None else item.count
-        few = TIMES_PER_FAULT * sum(each.count or 0 for each in own) < often
-        if few and all(each.kind in EXPLAINED_BY[item.kind] for each in own):
-            result = [each for each in result if each.where != item.where] + [item]
+        if TIMES_PER_FAULT * sum(each.count or 0 for each in own) < often:
+            result = [
+                each for each in result if each not in own or not _is_explained(each, item, takes, error)
+            ]
+            result.append(item)
     return result
+
+
+def _is_explained(fault: Finding, by: Finding, takes: Sequence[Take], error: ReadingErrors) -> bool:
+    """Whether a fault looks like, and is no larger than, what ``by`` does to the same sensor."""
+    assert by.size_deg is not None
+    if fault.kind not in EXPLAINED_BY[by.kind]:
+        return False
+    size = fault.size_deg
+    if size is None:
+        away = [
+            np.abs(part[frames_inside(take, fault.stretches)])
+            for take, part in zip(takes, error.errors, strict=True)
+        ]
+        # Frames outside the sensor's usual range, or without a reference, are of no known size.
+        size = float(np.median(np.nan_to_num(np.concatenate(away), nan=np.inf)))
+    return size <= LARGEST[by.kind] * by.size_deg
 
 
 def _errors(takes: Sequence[Take], sensor: str, rotation: str) -> ReadingErrors | None:
@@ -209,19 +235,20 @@ def _finding_hum(sensor: str, hum: Hum) -> Finding:
         "heard_s": hum.heard_s,
     }
     return Finding(
-        SensorFault.name, (sensor,), sentence, kind="hum", size_deg=hum.rms_deg, evidence=evidence
+        SensorFault.name, (sensor,), sentence, kind="hum", size_deg=hum.rms_deg, evidence=evidence,
+        is_only_told=True,
     )  # fmt: skip
 
 
-def _finding_leaps(sensor: str, rotation: str, found: Leaps) -> Finding:
+def _finding_switches(sensor: str, found: LevelSwitches) -> Finding:
     sentence = (
-        f"{sensor} leaps {found.count} times to and fro, by {found.size_deg:.1f} deg in the mean, while"
-        f" {rotation} does not; look at its solder joints and plug."
+        f"{sensor} switches {found.count} times to and fro between levels, by {found.size_deg:.1f} deg in the"
+        " mean, which its joint does not do; look at its solder joints and plug."
     )
-    evidence = {"leaps_count": float(found.count)}
+    evidence = {"switches_count": float(found.count)}
     return Finding(
-        SensorFault.name, (sensor,), sentence, kind="leaps", size_deg=found.size_deg, count=found.count,
-        evidence=evidence,
+        SensorFault.name, (sensor,), sentence, kind="switching", size_deg=found.size_deg, count=found.count,
+        evidence=evidence, is_only_told=True,
     )  # fmt: skip
 
 
