@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.base.signature_effect import Recorded, frames_inside
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.effects.sensor_fault.sensor_fault import SensorFault
+from glovecal_models.layout import Layout
 
 FAULT = SensorFault()
 
@@ -355,3 +357,7 @@ def test_what_is_only_told_is_not_proposed(glove):
     recorded = Recorded(tuple(takes), glove.sensor_of, list)
     assert FAULT.find(takes, glove.sensor_of)
     assert FAULT.proposed(recorded) is None
+    layout = Layout.from_columns("plain", takes[0].sensors, takes[0].rotations)
+    named = diagnose(takes, layout).named
+    assert named is not None
+    assert (named.effect, named.where, named.kind) == ("sensor_fault", ("M_PIP",), "finding")

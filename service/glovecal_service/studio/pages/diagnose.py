@@ -171,7 +171,7 @@ class DiagnosePage:
         if named["method"]:
             ui.label(f"To be trained with {named['method']}: a straight line cannot learn it.")
             return
-        if named["kind"] == "finding":
+        if named.get("kind") == "finding":
             ui.label("To be put right at the glove: no version of the model is better for it.")
             return
         ui.button(
