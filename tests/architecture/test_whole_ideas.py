@@ -61,11 +61,12 @@ def test_no_module_of_the_mathematics_is_imported_by_nobody() -> None:
     entered = {"glovecal_models.simulation.session", "glovecal_models.inverse_kinematics.ik_samples"}
     entered.add("glovecal_models.simulation.simulated_camera")
     # The colour glove's tracker and its codes of the paper are asked for by the service and the study.
-    entered |= {f"glovecal_models.colour_glove.{name}" for name in ("codes.boosted", "pose.prepared")}
+    named = ("codes.boosted", "pose.prepared", "pose.hand_shape_fit")
+    entered |= {f"glovecal_models.colour_glove.{name}" for name in named}
     # What is wrong with a camera's picture is asked by the service.
     entered.add("glovecal_models.colour_glove.pictures.picture_check")
     entered.add("glovecal_models.colour_glove.pictures.white_balance")
-    entered.add("glovecal_models.simulation.colour_glove.photograph")
+    entered.add("glovecal_models.colour_glove.drawn.photograph")
     alone = [
         name
         for name, file in modules().items()

@@ -9,10 +9,12 @@ from typing import Any
 
 from colour_glove import SAMPLINGS, CodeRow, CoverageRow, codes, coverage
 from colour_glove import SIZES as DATABASE_SIZES
+from colour_glove_chain import ChainRow, DepthRow, chain
+from colour_glove_motion import MotionRow, motion
 from figure_11 import Figure11Row
 from figure_12 import Figure12Row
 from multiple_wearings import WearingRow
-from paper_job import PaperJob
+from paper_job import PaperJob, Rows
 from paper_page.colour_glove_section import colour_glove_section
 from paper_page.figure_11_section import figure_11_section
 from paper_page.figure_12_section import figure_12_section
@@ -75,23 +77,33 @@ _SIZED = tuple(
 )
 
 
-def _coverage(
-    size: int, sampling: str, seed: int, quick: bool, report: Report
-) -> Mapping[str, Sequence[CoverageRow | CodeRow]]:
-    return {**coverage(size, sampling, seed, quick, report), "codes": []}
+_GLOVE_KINDS = {
+    "coverage": CoverageRow,
+    "codes": CodeRow,
+    "chain": ChainRow,
+    "depth": DepthRow,
+    "motion": MotionRow,
+}
 
 
-def _codes(seed: int, quick: bool, report: Report) -> Mapping[str, Sequence[CoverageRow | CodeRow]]:
-    return {**codes(seed, quick, report), "coverage": []}
+def _of_glove(name: str, rows: Rows, weight: float) -> PaperJob:
+    return PaperJob(name, partial(_glove_rows, rows), weight)
 
 
-_DATABASES = (
+def _glove_rows(rows: Rows, seed: int, quick: bool, report: Report) -> Mapping[str, Sequence[Any]]:
+    """Each job has rows of some kinds, and none of the others."""
+    return {kind: [] for kind in _GLOVE_KINDS} | dict(rows(seed, quick, report))
+
+
+_COLOUR_GLOVE = (
     *(
-        PaperJob(f"colour-glove-{size}-{sampling}", partial(_coverage, size, sampling), weight=size / 100)
+        _of_glove(f"colour-glove-{size}-{sampling}", partial(coverage, size, sampling), size / 100)
         for size in DATABASE_SIZES
         for sampling in SAMPLINGS
     ),
-    PaperJob("colour-glove-codes", _codes, weight=2000),
+    _of_glove("colour-glove-codes", codes, 2000),
+    *(_of_glove(f"colour-glove-poses-{count}", partial(chain, count), 1000 * count) for count in (1, 2)),
+    _of_glove("colour-glove-motion", motion, 1500),
 )
 
 PARTS: dict[str, PaperPart] = {
@@ -132,9 +144,9 @@ PARTS: dict[str, PaperPart] = {
         "Section 8.2: one training, many wearings", _SUBJECTS, {"wearings": WearingRow}, wearings_section
     ),
     "colour-glove": PaperPart(
-        "Wang & Popovic 2009, Figures 8 and 9: the colour glove's database, on rendered images",
-        _DATABASES,
-        {"coverage": CoverageRow, "codes": CodeRow},
+        "Wang & Popovic 2009, Figures 8, 9, 11 and 12: the colour glove, on rendered images",
+        _COLOUR_GLOVE,
+        _GLOVE_KINDS,
         colour_glove_section,
         asked_for=True,
     ),

@@ -10,10 +10,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from glovecal_models.colour_glove.camera_model import Camera
+from glovecal_models.colour_glove.drawn.photograph import Photographer, Photography
 from glovecal_models.colour_glove.hand_state import HandState
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.pose_set import hand_shapes
-from glovecal_models.simulation.colour_glove.photograph import Photographer, Photography
 
 ROUND_S, RATE_HZ = 4.0, 30.0
 SHAPES = ("B", "5", "A", "L")

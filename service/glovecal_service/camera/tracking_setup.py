@@ -13,6 +13,7 @@ import numpy as np
 from glovecal_client.pictures.source import PictureSource
 from glovecal_models.colour_glove.camera_file import read_cameras
 from glovecal_models.colour_glove.camera_model import Camera
+from glovecal_models.colour_glove.drawn.photograph import labelled_photographs
 from glovecal_models.colour_glove.pattern import printed_pattern
 from glovecal_models.colour_glove.pictures.classify import ColourTable
 from glovecal_models.colour_glove.pictures.picture_check import PictureCheck
@@ -26,7 +27,6 @@ from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.progress import Cancel, Report
-from glovecal_models.simulation.colour_glove.photograph import labelled_photographs
 from glovecal_service.camera.camera_settings import CameraSettings
 from glovecal_service.camera.rendered_glove import RenderedGlove
 from glovecal_service.camera.sources import RENDERED, camera_source

@@ -12,10 +12,10 @@ from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.crop import Window
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, RANGE_DEG, HandState
 from glovecal_models.colour_glove.pattern import glove_pattern
-from glovecal_models.colour_glove.pose.dense import label_equations, refine_by_labels, seen_shares
+from glovecal_models.colour_glove.pose.dense import label_equations, refine_by_labels
 from glovecal_models.colour_glove.pose.gaussian_step import Belief, damped_step
 from glovecal_models.colour_glove.pose.vertex_motion import pixel_motion
-from glovecal_models.colour_glove.pose.window_view import PrintedHand, WindowView, colour_shares
+from glovecal_models.colour_glove.pose.window_view import SEEN_POINTS, PrintedHand, WindowView, colour_shares
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import hand_skin, posed
 from glovecal_models.hand.skeleton import hand_skeleton
@@ -75,9 +75,11 @@ def test_the_kernel_projects_as_the_camera():
 def test_shares_of_a_cell_add_up_to_one():
     seen = view(state(2))
     for blurs in (0, 1, 2):
-        assert np.allclose(seen_shares(seen, 11, blurs).sum(axis=2), 1.0, atol=1e-5)
+        shares = colour_shares(seen.labels, np.arange(11, dtype=np.uint8), 11, SEEN_POINTS, blurs)
+        assert np.allclose(shares.sum(axis=2), 1.0, atol=1e-5)
+    by_pixels = colour_shares(seen.labels, np.arange(11, dtype=np.uint8), 11, SEEN_POINTS, 1)
     drawn = colour_shares(seen.drawn(HAND, state(2)), HAND.colour_of, 11, 3, 1)
-    assert np.abs(drawn - seen_shares(seen, 11, 1)).mean() < 0.004  # one hand, once by pixels, once by points
+    assert np.abs(drawn - by_pixels).mean() < 0.004  # one hand, once by pixels, once by points
 
 
 def test_boundaries_move_as_drawings_do():
@@ -133,3 +135,20 @@ def test_labels_lead_back_to_the_truth():
     assert after[:20].mean() < 0.5 * before[:20].mean()
     information = label_equations(HAND, views, truth)
     assert np.allclose(information, information.T, rtol=1e-3, atol=1e-2)
+
+
+def test_an_arm_that_hides_the_cuff_moves_nothing():
+    truth = state(8)
+    whole = view(truth)
+    shown = whole.shown(HAND, posed(SKIN, truth))
+    hidden = np.where(HAND.is_cuff[shown].repeat(2, axis=0).repeat(2, axis=1), np.uint8(0), whole.labels)
+    assert np.count_nonzero(hidden != whole.labels) > 200
+    seen = replace(whole, labels=hidden)
+    assert np.array_equal(seen.seen_beside(HAND, shown) > 0, whole.seen_beside(HAND, shown) > 0)
+    off = truth.moved(np.random.default_rng(9).normal(0.0, 1.0, 26) * ([4.0] * 20 + [3.0] * 3 + [5.0] * 3))
+    wide = (Belief(off, np.diag([100.0] * 20 + [25.0] * 3 + [100.0] * 3)),)
+    errors = [
+        np.abs(truth.step_from(refine_by_labels(HAND, [each], off, wide).state)) for each in (whole, seen)
+    ]
+    assert errors[1][:20].mean() < 1.5 * errors[0][:20].mean() + 0.5
+    assert errors[1][25] < errors[0][25] + 5.0

@@ -15,6 +15,7 @@ from glovecal_models.colour_glove.hand_state import HandState
 from glovecal_models.colour_glove.image_distance import CAP, distance_transform, image_distance
 from glovecal_models.colour_glove.lookup import Neighbours, PoseLookup
 from glovecal_models.colour_glove.pattern import glove_pattern
+from glovecal_models.colour_glove.pictures.sighting import Sighting
 from glovecal_models.colour_glove.pose_set import generated_poses
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import hand_skin, posed
@@ -194,3 +195,26 @@ def test_an_entry_anywhere_before_a_camera_is_placed_there(database: PoseDatabas
     assert centre[2] == pytest.approx(place[2], rel=0.05)
     between = np.trace(found.rotation.T @ state.rotation)
     assert np.degrees(np.arccos(np.clip((between - 1) / 2, -1, 1))) < 2.0
+
+
+def test_a_sleeve_of_a_glove_colour_is_left_out_and_no_part_of_the_glove(database: PoseDatabase):
+    lookup = PoseLookup(database, pca_code(database.transforms))
+    rng = np.random.default_rng(3)
+    taken = 0
+    for entry in rng.choice(len(database), 12, replace=False):
+        labels = np.kron(np.array(database.tiny[entry]), np.ones((4, 4), np.uint8))
+        labels = np.pad(labels, ((40, 120), (40, 40)))
+        alone = Sighting.of(labels, lookup)
+        assert alone is not None
+        assert np.array_equal(alone.labels, labels)
+        lowest = np.nonzero(labels.any(axis=1))[0].max()
+        columns = np.nonzero(labels[lowest])[0]
+        sleeve = labels.copy()
+        sleeve[lowest + 1 :, columns.min() : columns.min() + 50] = labels[lowest, columns[0]]
+        seen = Sighting.of(sleeve, lookup)
+        assert seen is not None
+        if not seen.labels[lowest + 2 :].any():
+            taken += 1
+            assert abs(seen.window.half - alone.window.half) < 0.15 * alone.window.half
+    assert taken >= 11
+    assert Sighting.of(np.zeros((60, 60), np.uint8), lookup) is None

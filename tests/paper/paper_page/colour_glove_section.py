@@ -14,7 +14,10 @@ from colour_glove import (
     CodeRow,
     CoverageRow,
 )
+from colour_glove_chain import ChainRow, DepthRow
+from colour_glove_motion import MotionRow
 from matplotlib.figure import Figure
+from paper_page.colour_glove_poses_section import poses_parts
 from paper_page.section import Demand, Section
 
 from glovecal_service.report.drawing import FLOOR, MODEL, figure_svg
@@ -41,7 +44,23 @@ NOTE = (
 )
 
 
-def colour_glove_section(coverage: Sequence[CoverageRow], codes: Sequence[CodeRow]) -> Section:
+def colour_glove_section(
+    coverage: Sequence[CoverageRow],
+    codes: Sequence[CodeRow],
+    chain: Sequence[ChainRow] = (),
+    depth: Sequence[DepthRow] = (),
+    motion: Sequence[MotionRow] = (),
+) -> Section:
+    """Of what is known: of an interrupted run a part."""
+    known, wanted = poses_parts(chain, depth, motion)
+    searched, asked = _search(coverage, codes) if coverage and codes else ((), ())
+    return Section((*searched, *known), (*asked, *wanted))
+
+
+def _search(
+    coverage: Sequence[CoverageRow], codes: Sequence[CodeRow]
+) -> tuple[tuple[str, ...], tuple[Demand, ...]]:
+    """Figures 8 and 9."""
     rows = sorted(coverage, key=lambda row: (row.entries, row.sampling))
     sizes = [
         (
@@ -72,7 +91,7 @@ def colour_glove_section(coverage: Sequence[CoverageRow], codes: Sequence[CodeRo
     sentence = (
         f"{brute.entries:,} entries, {brute.queries} hands held out; brute force {brute.brute_ms:.0f} ms."
     )
-    return Section(
+    return (
         (
             figure(_sizes(rows), "Figure 8: means over the hands held out, by size of the database."),
             table(COVERAGE_HEADS, sizes),

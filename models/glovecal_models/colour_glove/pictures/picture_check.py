@@ -1,6 +1,6 @@
 """Whether a picture shows what can be tracked: one hand in this glove, whole, in fit light.
 
-Limits were set on drawn photographs (``simulation.colour_glove``) and proved on others:
+Limits were set on drawn photographs (``colour_glove.drawn``) and proved on others:
 tests/models/colour_glove/test_picture_check_rates.py.
 """
 
@@ -12,9 +12,10 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from glovecal_models.colour_glove.crop import glove_window, tiny_image
+from glovecal_models.colour_glove.crop import glove_window
 from glovecal_models.colour_glove.lookup import PoseLookup
 from glovecal_models.colour_glove.pattern import COLOURS, PATCHES
+from glovecal_models.colour_glove.pictures.sighting import Sighting
 from glovecal_models.errors import BadInput
 
 KINDS = ("over-exposed", "under-exposed", "no hand", "two hands", "cut off", "another glove")
@@ -86,18 +87,15 @@ class PictureCheck:
                     "gloved hand before the camera, not too far away; if it is there, calibrate the colours.",
                 ),
             )  # fmt: skip
+        seen = None if self.lookup is None else Sighting.of(labels, self.lookup)
+        if seen is not None:
+            labels = seen.labels
         found = (_second_hand(labels) or _hands_that_touch(labels), _cut_off(labels))
         said = tuple(finding for finding in found if finding is not None)
-        return said or self._of_pattern(labels)
+        return said or (() if seen is None else self._of_pattern(seen))
 
-    def _of_pattern(self, labels: np.ndarray) -> tuple[Finding, ...]:
-        window = glove_window(labels)
-        if self.lookup is None or window is None:
-            return ()
-        tiny = tiny_image(labels, window)
-        if not tiny.any():
-            return ()
-        distance = float(self.lookup.neighbours(tiny, 1).distances[0])
+    def _of_pattern(self, seen: Sighting) -> tuple[Finding, ...]:
+        distance = seen.distance_px2
         if distance <= self.distance_limit_px2:
             return ()
         return (

@@ -49,12 +49,11 @@ def refine_by_labels(
 ) -> DenseFit:
     """The state of least cost that at most ``iterations`` steps from ``start`` find."""
     channels = int(hand.colour_of.max()) + 1
-    targets = [seen_shares(view, channels, _BLURS) for view in views]
 
     def measured(state: HandState) -> tuple[float, list[_Drawn]]:
         placed = posed(hand.skin, state)
         drawn = [_Drawn(hand, view, placed, channels, _BLURS) for view in views]
-        apart = sum(float(np.square(t - d.shares).sum()) for t, d in zip(targets, drawn, strict=True))
+        apart = sum(float(np.square(each.apart).sum()) for each in drawn)
         return 0.5 * apart / SHARE_SD**2 + cost(state, beliefs), drawn
 
     state = start
@@ -62,10 +61,10 @@ def refine_by_labels(
     for _ in range(iterations):
         hessian = np.zeros((DEGREES_OF_FREEDOM,) * 2)
         gradient = np.zeros(DEGREES_OF_FREEDOM)
-        for target, drawn in zip(targets, here, strict=True):
+        for drawn in here:
             jacobian = drawn.jacobian(state) / np.float32(SHARE_SD)
             hessian += jacobian.T @ jacobian
-            gradient += jacobian.T @ ((target - drawn.shares).ravel() / np.float32(SHARE_SD))
+            gradient += jacobian.T @ (drawn.apart.ravel() / np.float32(SHARE_SD))
         before = best
         for _ in range(4):
             moved = damped_step(state, beliefs, hessian, gradient, damping)
@@ -89,8 +88,21 @@ def label_equations(hand: PrintedHand, views: Sequence[WindowView], state: HandS
     return found
 
 
-def seen_shares(view: WindowView, channels: int, blurs: int) -> np.ndarray:
-    return colour_shares(view.labels, np.arange(channels, dtype=np.uint8), channels, SEEN_POINTS, blurs)
+def joint_equations(
+    hand: PrintedHand, views: Sequence[WindowView], state: HandState, motion_mm: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """J' J and J' r over the square of ``SHARE_SD`` for the pose and P other parameters: (26 + P, 26 + P),
+    (26 + P,). ``motion_mm`` (V, 3, P): how they move the vertices as they are posed."""
+    placed, channels = posed(hand.skin, state), int(hand.colour_of.max()) + 1
+    size = DEGREES_OF_FREEDOM + motion_mm.shape[2]
+    hessian, gradient = np.zeros((size, size)), np.zeros(size)
+    for view in views:
+        drawn = _Drawn(hand, view, placed, channels, _BLURS)
+        both = [drawn.jacobian(state), drawn.jacobian(state, motion_mm)]
+        jacobian = np.concatenate(both, axis=1).astype(float) / SHARE_SD
+        hessian += jacobian.T @ jacobian
+        gradient += jacobian.T @ (drawn.apart.ravel() / SHARE_SD)
+    return hessian, gradient
 
 
 class _Drawn:
@@ -104,19 +116,38 @@ class _Drawn:
         )  # fmt: skip
         self.shown = view.shown(hand, placed_mm)
         self.shares = colour_shares(hand.patch_of[self.shown], hand.colour_of, channels, DRAWN_POINTS, blurs)
+        seen, plain = view.seen_beside(hand, self.shown), np.arange(channels, dtype=np.uint8)
+        self.apart = colour_shares(seen, plain, channels, SEEN_POINTS, blurs) - self.shares
+        """(cells, cells, channels) float32, as ``shares``: seen less drawn."""
 
-    def jacobian(self, state: HandState) -> np.ndarray:
-        """(cells * cells * channels, 26) float32."""
+    def jacobian(self, state: HandState, motion_mm: np.ndarray | None = None) -> np.ndarray:
+        """(cells * cells * channels, 26) float32; with ``motion_mm`` (V, 3, P) one by other parameters, P."""
         depth = self.view.projected(self.placed_mm)[1]
         colour = self.hand.colour_of[self.hand.patch_of[self.shown]]
         vertices, which, cells, before, after, across = boundaries(
             self.shown, colour, self.hand.skin.triangles, depth, DRAWN_POINTS
         )
-        moving = pixel_motion(self.hand.skin, state, vertices, self.placed_mm[vertices], self.view.camera)
+        places = self.placed_mm[vertices]
+        if motion_mm is None:
+            moving = pixel_motion(self.hand.skin, state, vertices, places, self.view.camera)
+        else:
+            moving = _projected_motion(self.view, places, motion_mm[vertices])
         moving *= 1.0 / (DRAWN_POINTS * self.view.cell_px)  # one point's row of a boundary, in cells
         return moved_shares(
             moving, which, cells, before, after, across, CELLS, self.channels, self.blurs
-        ).reshape(-1, DEGREES_OF_FREEDOM)
+        ).reshape(-1, moving.shape[2])
+
+
+def _projected_motion(view: WindowView, places_mm: np.ndarray, motion_mm: np.ndarray) -> np.ndarray:
+    """(K, 2, P) pixels, from (K, 3) and (K, 3, P) mm."""
+    by_place = np.stack(
+        [
+            (view.projected(places_mm + step)[0] - view.projected(places_mm - step)[0]) / 2
+            for step in np.eye(3)
+        ],
+        axis=2,
+    )
+    return by_place @ motion_mm
 
 
 @numba.njit(cache=True)

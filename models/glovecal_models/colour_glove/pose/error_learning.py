@@ -1,8 +1,10 @@
 """Learn the tracker's errors on rendered hands that are not the model's: other bones, radii and sizes.
 
 The paper learns R, Q and P on a recorded sequence about local averages of its own answers (section 5.3);
-rendered hands have a truth, and errors that last are errors too. Labels are spoilt as a classifier spoils
-them. Kept beside the database: the same hand, database and cameras are learned once.
+rendered hands have a truth, and errors that last are errors too. Q is learned on rendered labels, spoilt as a
+classifier spoils them; how large errors are for what the tracker says on drawn photographs, with an arm, a
+face and a room, whose colours are classified. Kept beside the database: the same hand, database and cameras
+are learned once.
 """
 
 from __future__ import annotations
@@ -20,9 +22,15 @@ from multiprocessing import get_context
 import numpy as np
 
 from glovecal_models.colour_glove.camera_model import Camera
+from glovecal_models.colour_glove.drawn.hand_motion import hand_motion
+from glovecal_models.colour_glove.drawn.photograph import (
+    Photographer,
+    Photography,
+    labelled_photographs,
+)
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, HandState
 from glovecal_models.colour_glove.lookup import PoseLookup
-from glovecal_models.colour_glove.pose.hand_motion import hand_motion
+from glovecal_models.colour_glove.pictures.classify import ColourTable
 from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
 from glovecal_models.colour_glove.pose.learned_errors import LearnedErrors, fitted_scale, scale_name
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
@@ -43,7 +51,8 @@ _APART, _CLOSE = (20, 1.5), (24, 30.0)
 """States of a clip and how many a second: nearly independent, and a sequence."""
 _WRONG, _CLUTTER = 0.04, 3
 """Share of wrong glove pixels, and little blobs of glove colour beside the hand."""
-_FORMAT = 1
+_EXPOSURE_S = 0.01
+_FORMAT = 2
 _LEAST_PIXELS = 400
 
 
@@ -83,6 +92,12 @@ def spoilt(labels: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return found
 
 
+def drawn_colours(hand: PrintedHand) -> ColourTable:
+    """The table of colours learned from drawn photographs of this hand before the camera assumed."""
+    examples = labelled_photographs(hand.skin, hand.pattern, Camera())
+    return ColourTable.trained([each.picture for each in examples], [each.labels for each in examples])
+
+
 def learned_errors(
     hand: PrintedHand,
     lookup: PoseLookup,
@@ -111,7 +126,9 @@ def learned_errors(
     speed = _speed(hand.skin, clips)
     first = LearnedErrors(covariance, speed, _no_scales())
     said = part(report, 0.25, 0.6)
-    alone = _over_clips(partial(_errors_alone, hand, lookup, cameras, first), clips, workers, said, cancelled)
+    colours = drawn_colours(hand)
+    job = partial(_errors_alone, hand, lookup, cameras, colours, first)
+    alone = _over_clips(job, clips, workers, said, cancelled)
     scales = {}
     for stage in STAGES:
         scales[stage] = fitted_scale(*_joined(alone, stage))
@@ -121,9 +138,8 @@ def learned_errors(
     )
     said = part(report, 0.6, 1.0)
     # A followed answer differs from one alone only while a hand is followed: half the clips tell enough.
-    followed = _over_clips(
-        partial(_errors_followed, hand, lookup, cameras, first), -(-clips // 2), workers, said, cancelled
-    )
+    job = partial(_errors_followed, hand, lookup, cameras, colours, first)
+    followed = _over_clips(job, -(-clips // 2), workers, said, cancelled)
     for stage in ("ik", "dense"):
         scales[scale_name(stage, True)] = fitted_scale(*_joined(followed, stage))
     found = LearnedErrors(covariance, speed, scales)
@@ -178,26 +194,48 @@ class _Clip:
     seconds: np.ndarray
 
 
-def _clip(hand: PrintedHand, cameras: Sequence[Camera], seed: int, frames: int, rate_hz: float) -> _Clip:
+def _clip(
+    hand: PrintedHand, cameras: Sequence[Camera], colours: ColourTable | None, seed: int,
+    frames: int, rate_hz: float,
+) -> _Clip:  # fmt: skip
+    """``colours`` None: labels are rendered and spoilt; else they are classified on photographs."""
     other, rng = other_hand(hand.skin, seed), np.random.default_rng([seed, 4])
     seconds = np.arange(frames) / rate_hz
     states = hand_motion(other, frames / rate_hz, rate_hz, seed=seed)[:frames]
+    look = Photography(exposure=float(rng.uniform(0.8, 1.1)), arm=("skin", "sleeve")[seed % 2])
+    rooms = [
+        Photographer(other, hand.pattern, camera, look, seed + number * 1_000_000)
+        for number, camera in enumerate(cameras)
+    ]
     pictures = []
-    for state in states:
+    for index, state in enumerate(states):
         placed = posed(other, state)
         drawn = [
             rasterise(placed, other.triangles, camera).painted(hand.pattern.colour) for camera in cameras
         ]
-        pictures.append([spoilt(labels, rng) for labels in drawn])
-    seen = [sum(np.count_nonzero(labels) for labels in views) >= _LEAST_PIXELS for views in pictures]
-    kept = [index for index, is_seen in enumerate(seen) if is_seen]
+        if sum(np.count_nonzero(labels) for labels in drawn) < _LEAST_PIXELS:
+            pictures.append(None)
+        elif colours is None:
+            pictures.append([spoilt(labels, rng) for labels in drawn])
+        else:
+            until = _at_the_end_of_exposure(states, index, rate_hz)
+            taken = [room.photograph(state, until, number=index).picture for room in rooms]
+            pictures.append([colours.labels(picture) for picture in taken])
+    kept = [index for index, views in enumerate(pictures) if views is not None]
     return _Clip([states[i] for i in kept], [pictures[i] for i in kept], seconds[kept])
+
+
+def _at_the_end_of_exposure(states: Sequence[HandState], index: int, rate_hz: float) -> HandState | None:
+    """None in clips of few pictures a second: between two of them nobody knows the way."""
+    if rate_hz < _CLOSE[1] or index + 1 == len(states):
+        return None
+    return states[index].moved(_EXPOSURE_S * rate_hz * states[index + 1].step_from(states[index]))
 
 
 def _blend_errors(hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], clip: int) -> np.ndarray:
     plain = LearnedErrors(np.eye(DEGREES_OF_FREEDOM), np.ones(DEGREES_OF_FREEDOM), _no_scales())
     tracker = HandTracker(hand, lookup, cameras[:1], plain, stage="blend")
-    made = _clip(hand, cameras[:1], 1000 + clip, 2 * _APART[0], _APART[1])
+    made = _clip(hand, cameras[:1], None, 1000 + clip, 2 * _APART[0], _APART[1])
     steps = []
     for state, views in zip(made.states, made.pictures, strict=True):
         glimpse = tracker.glimpse(views[0], cameras[0])
@@ -210,23 +248,25 @@ _Errors = dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]
 
 
 def _errors_alone(
-    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], errors: LearnedErrors, clip: int
-) -> _Errors:
-    return _errors(hand, lookup, cameras, errors, clip, STAGES, False, _APART)
+    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], colours: ColourTable,
+    errors: LearnedErrors, clip: int,
+) -> _Errors:  # fmt: skip
+    return _errors(hand, lookup, cameras, colours, errors, clip, STAGES, False, _APART)
 
 
 def _errors_followed(
-    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], errors: LearnedErrors, clip: int
-) -> _Errors:
-    return _errors(hand, lookup, cameras, errors, clip, ("ik", "dense"), True, _CLOSE)
+    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], colours: ColourTable,
+    errors: LearnedErrors, clip: int,
+) -> _Errors:  # fmt: skip
+    return _errors(hand, lookup, cameras, colours, errors, clip, ("ik", "dense"), True, _CLOSE)
 
 
 def _errors(
-    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], errors: LearnedErrors, clip: int,
-    stages: Sequence[str], follows: bool, frames: tuple[int, float],
+    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], colours: ColourTable,
+    errors: LearnedErrors, clip: int, stages: Sequence[str], follows: bool, frames: tuple[int, float],
 ) -> _Errors:  # fmt: skip
     """Per stage: errors (N, 26), posterior deviations (N, 26), disagreeing shares (N,)."""
-    made, found = _clip(hand, cameras, 2000 + clip, *frames), {}
+    made, found = _clip(hand, cameras, colours, 2000 + clip, *frames), {}
     for stage in stages:
         tracker = HandTracker(hand, lookup, cameras, errors, stage=stage, follows=follows)
         rows = defaultdict(list)

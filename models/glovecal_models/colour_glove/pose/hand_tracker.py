@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.crop import glove_window, tiny_image
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, HandState
 from glovecal_models.colour_glove.lookup import PoseLookup
+from glovecal_models.colour_glove.pictures.sighting import Sighting
 from glovecal_models.colour_glove.pose.centroid_ik import (
     FULL_NOISE_CELLS,
     centroid_equations,
@@ -32,13 +32,14 @@ from glovecal_models.colour_glove.pose.window_view import (
     WindowView,
 )
 from glovecal_models.colour_glove.pose_estimate import STAGES, PoseEstimate
+from glovecal_models.colour_glove.skin import posed
 from glovecal_models.errors import BadInput
 
 LONGEST_UNSEEN_S = 0.5
 """Without a picture of the glove: after more, nothing is expected of the next."""
 _CLEARLY_FEWER = 0.9
 """Of the followed answer's disagreeing points: then the picture alone knows better."""
-ACCEPTED_SD_DEG = 4.5
+ACCEPTED_SD_DEG = 5.0
 """A joint that is known as well as this may serve as a reference."""
 
 
@@ -129,7 +130,7 @@ class HandTracker:
         views = [glimpse.view for glimpse in glimpses]
         if self.stage in ("nearest", "blend") or before is None or not self.follows:
             state = self._alone(glimpses, self.stage)
-            disagreeing, followed = self._disagreeing(views, state), False
+            disagreeing, followed = self.disagreeing(views, state), False
         else:
             state, disagreeing, followed = self._followed(glimpses, before, seconds)
         beliefs = tuple(glimpse.blend for glimpse in glimpses)
@@ -139,12 +140,11 @@ class HandTracker:
         return Answer(state, posterior, disagreeing, followed, self._patches(views, state))
 
     def glimpse(self, labels: np.ndarray, camera: Camera) -> Glimpse | None:
-        window = glove_window(labels)
-        tiny = None if window is None else tiny_image(labels, window)
-        if window is None or tiny is None or not tiny.any():
+        seen = Sighting.of(labels, self.lookup)
+        if seen is None:
             return None
-        neighbours = self.lookup.neighbours(tiny)
-        blend = self.lookup.placed(neighbours, window, camera)
+        neighbours = seen.neighbours
+        blend = self.lookup.placed(neighbours, seen.window, camera)
         first = neighbours.entries[0]
         # The nearest entry alone keeps the blend's place: the paper's look-up gives none.
         nearest = HandState(
@@ -157,7 +157,7 @@ class HandTracker:
             carried[20:23, 20:23] = carried[23:, 23:] = turn.T
             covariance = carried @ covariance @ carried.T
         belief = Belief(_in_first(blend, camera), covariance)
-        return Glimpse(WindowView.of(labels, window, camera), _in_first(nearest, camera), belief)
+        return Glimpse(WindowView.of(seen.labels, seen.window, camera), _in_first(nearest, camera), belief)
 
     def _alone(self, glimpses: Sequence[Glimpse], stage: str) -> HandState:
         if stage == "nearest":
@@ -186,10 +186,10 @@ class HandTracker:
         if self.stage == "dense":
             followed = refine_by_labels(self.hand, views, followed, beliefs, self.iterations).state
         alone = self._alone(glimpses, "ik")
-        left, left_alone = self._disagreeing(views, followed), self._disagreeing(views, alone)
+        left, left_alone = self.disagreeing(views, followed), self.disagreeing(views, alone)
         if self.stage == "dense" and left_alone < 1.5 * left:
             alone = refine_by_labels(self.hand, views, alone, beliefs[:-1], self.iterations).state
-            left_alone = self._disagreeing(views, alone)
+            left_alone = self.disagreeing(views, alone)
         if left_alone < _CLEARLY_FEWER * left:
             return alone, left_alone, False
         return followed, left, True
@@ -205,12 +205,17 @@ class HandTracker:
             information = information + label_equations(self.hand, views, state)
         return np.sqrt(np.diag(np.linalg.inv(information)))
 
-    def _disagreeing(self, views: Sequence[WindowView], state: HandState) -> float:
+    def disagreeing(
+        self, views: Sequence[WindowView], state: HandState, hand: PrintedHand | None = None
+    ) -> float:
+        """Share of the points, seen or drawn, whose colours differ, 0 to 1; ``hand``: in place of the own."""
+        hand = self.hand if hand is None else hand
         different = either = 0
         finer = SEEN_POINTS // DRAWN_POINTS
         for view in views:
-            drawn = self.hand.colour_of[view.drawn(self.hand, state)]
-            seen = view.labels[finer // 2 :: finer, finer // 2 :: finer]
+            shown = view.shown(hand, posed(hand.skin, state))
+            drawn = hand.colour_of[hand.patch_of[shown]]
+            seen = view.seen_beside(hand, shown)[finer // 2 :: finer, finer // 2 :: finer]
             either += int(np.count_nonzero(drawn | seen))
             different += int(np.count_nonzero(drawn != seen))
         return different / max(either, 1)

@@ -21,6 +21,9 @@ from glovecal_models.colour_glove.skin import HandSkin, posed
 
 CELLS, DRAWN_POINTS, SEEN_POINTS = 32, 3, 6
 """Cells along a side; points a cell along a side, of a drawn and of a seen window."""
+CUFF_MM = 20.0
+"""From the wrist towards the fingers: a forearm or a sleeve may hide the glove that far. Where this part is
+drawn and no glove is seen, nothing is concluded."""
 MARGIN = 1.15
 """Of the crop's window: a finger that the crop lost is still seen."""
 
@@ -33,12 +36,16 @@ class PrintedHand:
     pattern: Pattern
 
     def __post_init__(self) -> None:
+        behind = self.skin.vertices_mm[self.skin.triangles].mean(axis=1)[:, 0] < CUFF_MM
+        object.__setattr__(self, "is_cuff", np.append(behind, False))
         object.__setattr__(self, "patch_of", np.append(self.pattern.patch, 0).astype(np.uint8))
         object.__setattr__(self, "colour_of", np.append(0, self.pattern.colour_of_patch).astype(np.uint8))
 
     patch_of: np.ndarray = None  # type: ignore[assignment]
     colour_of: np.ndarray = None  # type: ignore[assignment]
     """(T + 1,) and (P + 1,) uint8: of the background 0."""
+    is_cuff: np.ndarray = None  # type: ignore[assignment]
+    """(T + 1,) bool."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +77,12 @@ class WindowView:
     def drawn(self, hand: PrintedHand, state: HandState) -> np.ndarray:
         """(96, 96) uint8: the patch at each point, 0 beside the hand."""
         return hand.patch_of[self.shown(hand, posed(hand.skin, state))]
+
+    def seen_beside(self, hand: PrintedHand, shown: np.ndarray) -> np.ndarray:
+        """(192, 192) uint8: ``labels``, with the cuff that ``shown`` draws where nothing is seen."""
+        finer = SEEN_POINTS // DRAWN_POINTS
+        cuff = np.where(hand.is_cuff[shown], hand.colour_of[hand.patch_of[shown]], np.uint8(0))
+        return np.where(self.labels == 0, cuff.repeat(finer, axis=0).repeat(finer, axis=1), self.labels)
 
     def shown(self, hand: PrintedHand, vertices_mm: np.ndarray) -> np.ndarray:
         """(96, 96) int32: the triangle at each point, -1 beside the hand."""

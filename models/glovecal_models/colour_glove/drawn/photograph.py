@@ -15,14 +15,14 @@ import cv2
 import numpy as np
 
 from glovecal_models.colour_glove.camera_model import Camera
+from glovecal_models.colour_glove.drawn.background import SKIN_SRGB, background
+from glovecal_models.colour_glove.drawn.hand_motion import hand_motion
 from glovecal_models.colour_glove.hand_state import HandState
 from glovecal_models.colour_glove.palette import PRINTED_SRGB, encoded_light, linear_light
 from glovecal_models.colour_glove.pattern import Pattern
-from glovecal_models.colour_glove.pose.hand_motion import hand_motion
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import HandSkin, posed
 from glovecal_models.errors import BadInput
-from glovecal_models.simulation.colour_glove.background import SKIN_SRGB, background
 
 ARMS = ("skin", "sleeve", "none")
 MOMENTS = 5
@@ -31,7 +31,8 @@ EXAMPLES = 8
 """As many as the paper labelled by hand (section 5.1)."""
 _AROUND, _ALONG = 24, 8
 _ARM_MM = (-25.0, -300.0)
-_ARM_RADII_MM = (25.0, 40.0)
+_ARM_RADII_MM = {"skin": (22.0, 40.0), "sleeve": (25.0, 40.0)}
+"""A wrist is inside the glove's cuff, a sleeve may be over it."""
 
 
 @dataclass(frozen=True)
@@ -142,7 +143,8 @@ class Photographer:
         triangles, colours = self._surface
         placed = posed(self.skin, state)
         if self.photography.arm != "none":
-            placed = np.concatenate([placed, _arm_vertices() @ state.rotation.T + state.position_mm])
+            arm = _arm_vertices(self.photography.arm) @ state.rotation.T + state.position_mm
+            placed = np.concatenate([placed, arm])
         shown = rasterise(placed, triangles, self.camera).triangle
         v, u = np.nonzero(shown >= 0)
         which = shown[v, u]
@@ -180,10 +182,10 @@ def _vertex_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return found / (np.linalg.norm(found, axis=1, keepdims=True) + 1e-9)
 
 
-def _arm_vertices() -> np.ndarray:
+def _arm_vertices(arm: str) -> np.ndarray:
     """(R A, 3) in the palm's frame: rings from behind the wrist to the elbow's side."""
     along = np.linspace(*_ARM_MM, _ALONG)
-    radii = np.linspace(*_ARM_RADII_MM, _ALONG)
+    radii = np.linspace(*_ARM_RADII_MM[arm], _ALONG)
     turn = np.linspace(0.0, 2 * np.pi, _AROUND, endpoint=False)
     ring = np.column_stack([np.zeros(_AROUND), 1.15 * np.cos(turn), 0.85 * np.sin(turn)])
     return np.concatenate([ring * radius + (x, 0.0, 0.0) for x, radius in zip(along, radii, strict=True)])

@@ -1,0 +1,1 @@
+"""Hands in the colour glove, their motion and photographs, drawn: simulated, so that their truth is known."""

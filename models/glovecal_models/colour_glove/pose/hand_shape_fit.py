@@ -1,0 +1,192 @@
+"""The hand's own shape from 20 to 50 pictures: bone lengths, radii and size, with the poses unknown.
+
+Poses and shape are refined together on the labels of all pixels (as ``dense``): in each round the poses are
+solved for the shape at hand, then the shape for all poses at once, with each picture's pose eliminated from
+the normal equations (Schur complement). What pictures leave open is held by a prior: hands differ in their
+bones by 4.5 % beside their size, in their radii by 5 %. One camera cannot tell a large hand from a near one,
+and says so by the size's standard deviation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, FINGER_ROTATIONS, HandState
+from glovecal_models.colour_glove.pose.dense import joint_equations, refine_by_labels
+from glovecal_models.colour_glove.pose.error_learning import BONES, RADII
+from glovecal_models.colour_glove.pose.gaussian_step import Belief
+from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
+from glovecal_models.colour_glove.pose.window_view import PrintedHand, WindowView
+from glovecal_models.colour_glove.skin import RADII_MM, HandSkin, hand_skin, posed
+from glovecal_models.errors import BadInput
+from glovecal_models.hand.dimensions import DIMENSIONS, HandDimensions
+from glovecal_models.hand.skeleton import hand_skeleton
+from glovecal_models.progress import Cancel, Report, stop_if
+
+FEWEST, MOST = 20, 50
+"""Pictures that are used."""
+ROUNDS = 4
+SIZE_SD, MEASURED_SIZE_SD = 0.05, 0.02
+"""Relative, of a hand that nobody measured, and of one whose length somebody did."""
+MOST_DISAGREEING = 0.35
+"""Share of a picture's pixels: more, and its pose is not trusted."""
+_WHOLE = ("hand_length", "hand_breadth")
+_BONES = tuple(name for name in DIMENSIONS if name not in _WHOLE)
+PARAMETERS = ("size", *_BONES, *(f"{name} radius" for name in RADII_MM))
+"""Logarithms of what lengths of the starting hand are multiplied by; ``size`` multiplies every length."""
+_WIDER = 1.4
+"""By so much lengths erred more than equal weights for all cells say (four rendered hands, two cameras)."""
+_ANGLES = len(FINGER_ROTATIONS)
+_STEP = 0.02
+_LONGEST = 0.12
+"""Of one round's step in any parameter."""
+
+
+@dataclass(frozen=True, eq=False)
+class HandShape:
+    """What was found. ``values`` (41,) and ``covariance`` (41, 41) in the order of ``PARAMETERS``."""
+
+    skin: HandSkin
+    sizes_mm: dict[str, float]
+    radii_mm: dict[str, tuple[float, float]]
+    values: np.ndarray
+    covariance: np.ndarray
+    used: tuple[int, ...]
+    """Pictures that counted; the others showed no glove, or a pose that explained too little of them."""
+    disagreeing_before: float
+    disagreeing: float
+    """Mean share of the used pictures' pixels whose colour is not that drawn, 0 to 1."""
+
+    @property
+    def size_sd(self) -> float:
+        """Relative standard deviation of the whole hand's size."""
+        return float(np.sqrt(self.covariance[0, 0]))
+
+    @property
+    def bones_sd(self) -> dict[str, float]:
+        """Relative standard deviation of each bone's length, its share of the size's included."""
+        found = {}
+        for name in _BONES:
+            both = [0, PARAMETERS.index(name)]
+            found[name] = float(np.sqrt(self.covariance[np.ix_(both, both)].sum()))
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Frame:
+    views: list[WindowView]
+    beliefs: tuple[Belief, ...]
+    state: HandState
+
+
+def fitted_hand_shape(
+    tracker: HandTracker,
+    pictures: Sequence[Sequence[np.ndarray]],
+    *,
+    size_sd: float = SIZE_SD,
+    rounds: int = ROUNDS,
+    report: Report | None = None,
+    cancelled: Cancel | None = None,
+) -> HandShape:
+    """``tracker``: of the starting hand and the pictures' cameras. ``pictures``: label images (H, W) uint8,
+    one of each camera, of different poses; of more than ``MOST`` every so manieth is used.
+
+    Raises BadInput where fewer than ``FEWEST`` pictures show a hand that is understood; Cancelled.
+    """
+    chosen = np.unique(np.linspace(0, len(pictures) - 1, min(MOST, len(pictures))).astype(int)).tolist()
+    alone = HandTracker(
+        tracker.hand, tracker.lookup, tracker.cameras, tracker.errors, stage="dense", follows=False
+    )
+    frames: dict[int, _Frame] = {}
+    before = []
+    for done, number in enumerate(chosen):
+        stop_if(cancelled, "fitting the hand's shape")
+        answer = alone.answered(pictures[number], float(number))
+        if answer is not None and answer.disagreeing <= MOST_DISAGREEING:
+            glimpses = [
+                found
+                for labels, camera in zip(pictures[number], alone.cameras, strict=True)
+                if (found := alone.glimpse(labels, camera)) is not None
+            ]
+            views, beliefs = [each.view for each in glimpses], tuple(each.blend for each in glimpses)
+            frames[number] = _Frame(views, beliefs, answer.state)
+            before.append(answer.disagreeing)
+        if report:
+            report("tracking", 0.3 * (done + 1) / len(chosen))
+    if len(frames) < FEWEST:
+        raise BadInput(
+            f"{len(frames)} of {len(chosen)} pictures show a hand whose pose is understood; the shape needs "
+            f"at least {FEWEST}, of different poses, the whole glove in view"
+        )
+    prior = np.array([size_sd] + [BONES] * len(_BONES) + [RADII] * len(RADII_MM)) ** -2.0
+    values, hand = np.zeros(len(PARAMETERS)), alone.hand
+    covariance = np.diag(1.0 / prior)
+    for done in range(rounds):
+        stop_if(cancelled, "fitting the hand's shape")
+        information, pull = np.diag(prior), -prior * values
+        beside = _beside(tracker.hand.skin, values)
+        for frame in frames.values():
+            own, gradient = _about_shape(hand, frame, beside)
+            information, pull = information + own, pull + gradient
+        covariance = np.linalg.inv(information)
+        values = values + np.clip(covariance @ pull, -_LONGEST, _LONGEST)
+        hand = PrintedHand(shaped(tracker.hand.skin, values), tracker.hand.pattern)
+        for number, frame in frames.items():
+            fit = refine_by_labels(hand, frame.views, frame.state, frame.beliefs, 5)
+            frames[number] = replace(frame, state=fit.state)
+        if report:
+            report("fitting", 0.3 + 0.7 * (done + 1) / rounds)
+    after = [alone.disagreeing(frame.views, frame.state, hand) for frame in frames.values()]
+    sizes, radii = _lengths(tracker.hand.skin, values)
+    return HandShape(
+        hand.skin, sizes, radii, values, covariance, tuple(frames),
+        float(np.mean(before)), float(np.mean(after)),
+    )  # fmt: skip
+
+
+def shaped(skin: HandSkin, values: np.ndarray) -> HandSkin:
+    """A hand like ``skin``'s, its lengths multiplied by the exponentials of ``values`` (41,)."""
+    sizes, radii = _lengths(skin, values)
+    return hand_skin(hand_skeleton(HandDimensions.from_measured(sizes), skin.skeleton.hand), radii)
+
+
+def _lengths(skin: HandSkin, values: np.ndarray) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
+    by_name = dict(zip(PARAMETERS, np.exp(values).tolist(), strict=True))
+    grown, sizes = by_name["size"], {}
+    for name, size in skin.skeleton.dimensions.sizes_mm.items():
+        sizes[name] = size * grown * (1.0 if name in _WHOLE else by_name[name])
+    assumed = hand_skin().skeleton.dimensions.hand_length_mm
+    share = grown * skin.skeleton.dimensions.hand_length_mm / assumed
+    radii = {
+        name: (low * share * by_name[f"{name} radius"], high * share * by_name[f"{name} radius"])
+        for name, (low, high) in RADII_MM.items()
+    }
+    return sizes, radii
+
+
+def _beside(skin: HandSkin, values: np.ndarray) -> list[tuple[HandSkin, HandSkin]]:
+    """For each parameter a hand with less and one with more of it."""
+    steps = _STEP * np.eye(len(PARAMETERS))
+    return [(shaped(skin, values - step), shaped(skin, values + step)) for step in steps]
+
+
+def _about_shape(
+    hand: PrintedHand, frame: _Frame, beside: Sequence[tuple[HandSkin, HandSkin]]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Information (41, 41) and gradient (41,) of one picture about the shape, its pose eliminated."""
+    motion = np.empty((len(hand.skin.vertices_mm), 3, len(PARAMETERS)))
+    for index, (less, more) in enumerate(beside):
+        motion[:, :, index] = (posed(more, frame.state) - posed(less, frame.state)) / (2 * _STEP)
+    hessian, gradient = joint_equations(hand, frame.views, frame.state, motion)
+    # Of the look-up only angles count: its depths take the hand for the database's size, all alike.
+    for belief in frame.beliefs:
+        known = np.linalg.inv(belief.covariance[:_ANGLES, :_ANGLES])
+        hessian[:_ANGLES, :_ANGLES] += known
+        gradient[:_ANGLES] += known @ belief.state.step_from(frame.state)[:_ANGLES]
+    pose, shape = slice(None, DEGREES_OF_FREEDOM), slice(DEGREES_OF_FREEDOM, None)
+    carried = np.linalg.solve(hessian[pose, pose], hessian[pose, shape]).T
+    information = hessian[shape, shape] - carried @ hessian[pose, shape]
+    return information / _WIDER**2, (gradient[shape] - carried @ gradient[pose]) / _WIDER**2

@@ -1,1 +1,0 @@
-"""Drawn photographs of the colour glove, whose truth is known. They are simulated, and say so."""

@@ -1,0 +1,127 @@
+"""A hand's shape from rendered pictures of it: what is found, what stays open, what is refused."""
+
+import numpy as np
+import pytest
+
+from glovecal_models.colour_glove.camera_model import Camera
+from glovecal_models.colour_glove.codes.pca import pca_code
+from glovecal_models.colour_glove.database import PoseDatabase
+from glovecal_models.colour_glove.drawn.hand_motion import hand_motion
+from glovecal_models.colour_glove.lookup import PoseLookup
+from glovecal_models.colour_glove.pattern import glove_pattern
+from glovecal_models.colour_glove.pose.dense import joint_equations, label_equations
+from glovecal_models.colour_glove.pose.error_learning import other_hand
+from glovecal_models.colour_glove.pose.hand_shape_fit import (
+    PARAMETERS,
+    HandShape,
+    fitted_hand_shape,
+    shaped,
+)
+from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
+from glovecal_models.colour_glove.pose.learned_errors import LearnedErrors, scale_name
+from glovecal_models.colour_glove.pose.window_view import PrintedHand
+from glovecal_models.colour_glove.pose_estimate import STAGES
+from glovecal_models.colour_glove.rasterise import rasterise
+from glovecal_models.colour_glove.skin import hand_skin, posed
+from glovecal_models.errors import BadInput, Cancelled
+
+SKIN = hand_skin()
+HAND = PrintedHand(SKIN, glove_pattern(SKIN))
+OTHER = other_hand(SKIN, 31)
+_TURN = np.array([[0.5, 0.0, -(0.75**0.5)], [0.0, 1.0, 0.0], [0.75**0.5, 0.0, 0.5]])
+_AHEAD = np.array([0.0, 0.0, 470.0])
+CAMERAS = (
+    Camera(),
+    Camera(rotation=tuple(map(tuple, _TURN.tolist())), translation_mm=tuple(_AHEAD - _TURN @ _AHEAD)),
+)
+EMPTY = np.zeros((480, 640), np.uint8)
+
+
+@pytest.fixture(scope="module")
+def tracker(database: PoseDatabase) -> HandTracker:
+    """Two cameras; how the look-up errs is assumed, not learned."""
+    deviation = np.array([15.0] * 20 + [15.0] * 3 + [20.0, 20.0, 60.0])
+    plain = np.tile([0.0, 1.0, 0.0], (26, 1))
+    scales = {scale_name(stage, followed): plain for stage in STAGES for followed in (False, True)}
+    errors = LearnedErrors(np.diag(deviation**2), np.full(26, 60.0), scales)
+    return HandTracker(HAND, PoseLookup(database, pca_code(database.transforms)), CAMERAS, errors)
+
+
+@pytest.fixture(scope="module")
+def pictures() -> list[list[np.ndarray]]:
+    found = []
+    for state in hand_motion(OTHER, 44.0, 0.5, seed=32)[:22]:
+        placed = posed(OTHER, state)
+        found.append(
+            [rasterise(placed, OTHER.triangles, camera).painted(HAND.pattern.colour) for camera in CAMERAS]
+        )
+    return found
+
+
+@pytest.fixture(scope="module")
+def shape(tracker: HandTracker, pictures: list[list[np.ndarray]]) -> HandShape:
+    return fitted_hand_shape(tracker, pictures, rounds=2)
+
+
+def relative(sizes_mm) -> np.ndarray:
+    """Logarithms of the bones' lengths over those of the true hand."""
+    true = OTHER.skeleton.dimensions.sizes_mm
+    bones = [name for name in true if name not in ("hand_length", "hand_breadth")]
+    return np.array([np.log(sizes_mm[name] / true[name]) for name in bones])
+
+
+def test_two_cameras_find_the_bones(shape: HandShape):
+    before, after = (relative(sizes) for sizes in (SKIN.skeleton.dimensions.sizes_mm, shape.sizes_mm))
+    assert np.sqrt((after**2).mean()) < 0.5 * np.sqrt((before**2).mean())
+    deviations = np.array(list(shape.bones_sd.values()))
+    assert np.sqrt(((after / deviations) ** 2).mean()) < 2.0
+    assert deviations.max() < 0.05
+    assert shape.disagreeing < 0.8 * shape.disagreeing_before
+    assert len(shape.used) >= 20
+
+
+def test_one_camera_leaves_the_size_open(tracker: HandTracker, pictures: list[list[np.ndarray]]):
+    alone = HandTracker(HAND, tracker.lookup, CAMERAS[:1], tracker.errors)
+    found = fitted_hand_shape(alone, [views[:1] for views in pictures], rounds=1, size_sd=0.05)
+    assert found.size_sd > 0.045
+    assert abs(found.values[0]) < 0.01
+
+
+def test_skins_of_another_shape_move_as_the_equations_say():
+    """The gradient of half the squared residuals by the shape, against hands drawn a step apart."""
+    from glovecal_models.colour_glove.crop import glove_window
+    from glovecal_models.colour_glove.pose.dense import _Drawn
+    from glovecal_models.colour_glove.pose.window_view import WindowView
+
+    state, values = hand_motion(SKIN, 4.0, 0.5, seed=5)[1], np.zeros(len(PARAMETERS))
+    labels = rasterise(posed(SKIN, state), SKIN.triangles, CAMERAS[0]).painted(HAND.pattern.colour)
+    window = glove_window(labels)
+    assert window is not None
+    view, compared = WindowView.of(labels, window, CAMERAS[0]), 0
+    for index in (0, PARAMETERS.index("M_proximal"), PARAMETERS.index("I_metacarpal radius")):
+        step = np.zeros(len(PARAMETERS))
+        step[index] = 0.06
+        less, more = (shaped(SKIN, values + sign * step) for sign in (-1, 1))
+        motion = ((posed(more, state) - posed(less, state)) / 0.12)[:, :, None]
+        drawn = [
+            _Drawn(PrintedHand(skin, HAND.pattern), view, posed(skin, state), 11, 1).shares.ravel()
+            for skin in (less, more)
+        ]
+        expected = (drawn[1] - drawn[0]) / 0.12
+        here = _Drawn(HAND, view, posed(SKIN, state), 11, 1)
+        found = here.jacobian(state, motion)[:, 0]
+        if np.linalg.norm(expected) < 3.0:
+            continue
+        compared += 1
+        assert expected @ found / np.linalg.norm(expected) / np.linalg.norm(found) > 0.8, PARAMETERS[index]
+        assert 0.7 < expected @ found / (expected @ expected) < 1.3, PARAMETERS[index]
+        hessian, _ = joint_equations(HAND, [view], state, motion)
+        assert np.allclose(hessian[:26, :26], label_equations(HAND, [view], state), rtol=1e-3, atol=1e-2)
+    assert compared >= 2
+
+
+def test_too_few_pictures_are_refused(tracker: HandTracker, pictures: list[list[np.ndarray]]):
+    with pytest.raises(BadInput, match="2 of 3 pictures show a hand"):
+        fitted_hand_shape(tracker, [*pictures[:2], [EMPTY, EMPTY]])
+    with pytest.raises(Cancelled):
+        fitted_hand_shape(tracker, pictures, cancelled=lambda: True)
