@@ -18,6 +18,8 @@ def next_command(model: str, stored: Mapping[str, Any], subject: str = "") -> st
     if found.get("reference_problems"):
         return f"glovecal take check {_take_of(found)}"
     named, following = found.get("named"), found.get("next_take")
+    if named and named.get("kind") == "finding":
+        return f"glovecal record GLOVE after-mending --seconds {LONG_ENOUGH_S}"
     if named and named.get("verdict") == "named":
         if named.get("method"):
             return _train(subject, named["method"])

@@ -34,7 +34,8 @@ class NamedEffect:
     where: tuple[str, ...]
     """Rotations; sensors or takes where it is a fault of those."""
     kind: Kind | None
-    """None where it is named by a drift within held poses: ``where`` are sensors then."""
+    """None where it is named by a drift within held poses: ``where`` are sensors then. ``finding``: no
+    model is better for what was found, whatever kind the effect is."""
     confidence_set: tuple[str, ...]
     """It and all that these takes cannot tell from it."""
     parameters: Mapping[str, Mapping[str, float] | float]
@@ -117,10 +118,11 @@ class Diagnosis:
 
     def _named_by_signature(self) -> NamedEffect:
         first, rivals = self.signature[0], self.naming.confidence_set
+        is_only_told = all(item.is_only_told for item in self.signature)
         return NamedEffect(
             first.effect,
             tuple(sorted({name for item in self.signature for name in item.where})),
-            self.effects[first.effect].kind,
+            "finding" if is_only_told else self.effects[first.effect].kind,
             rivals if first.effect in rivals else (first.effect,),
             dict(first.evidence),
         )

@@ -70,7 +70,9 @@ def proposed(
     if found is None and effect.stage == "compared":
         found = _by_comparison(model, repaired, effect, cancelled, limits)
     if found is None:
-        raise BadInput(f"effect {effect.name!r}: nothing of it is found in these {len(takes)} takes")
+        raise BadInput(
+            f"effect {effect.name!r}: nothing of it is found in these {len(takes)} takes that adding it mends"
+        )
     return found
 
 

@@ -50,7 +50,11 @@ def _rotation(rmse_deg: float, floor: NoiseFloor | None) -> RotationErrorView:
 class NamedEffectView(View):
     effect: str
     where: list[str] = Field(description="Rotations; sensors or takes where it is a fault of those.")
-    kind: str | None = Field(None, description="As in the catalogue; null: named by drift in held poses.")
+    kind: str | None = Field(
+        None,
+        description="As in the catalogue; finding: nothing to add, to be put right at the glove; null: named"
+        " by drift in held poses.",
+    )
     verdict: Verdict
     confidence_set: list[str] = Field(description="It, and all that these takes cannot tell from it.")
     parameters: dict[str, Any] = Field(description="Learned numbers, units in their names.")

@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.effects.base.signals import Signals
-from glovecal_models.effects.base.signature_effect import frames_inside
+from glovecal_models.effects.base.signature_effect import Recorded, frames_inside
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.effects.sensor_fault.sensor_fault import SensorFault
+from glovecal_models.layout import Layout
 
 FAULT = SensorFault()
 
@@ -186,3 +188,176 @@ def test_gains_that_a_wearing_or_a_column_explains_are_no_fault(glove, gains):
         for take, volt in zip(takes, volts, strict=True)
     ]
     assert FAULT.find(takes, glove.sensor_of) == ()
+
+
+def with_sensor(glove, change, rotation=0, **choices):
+    """Takes in whose readings of one sensor ``change(time_s, degrees, generator)`` adds degrees."""
+    generator = np.random.default_rng(7)
+    takes = []
+    for take in glove.takes(**choices):
+        readings = take.readings.copy()
+        added = change(take.time_s, take.reference[:, rotation], generator)
+        readings[:, rotation] = np.clip(np.round(readings[:, rotation] + 2.0 * added), 0, 255)
+        takes.append(replace(take, readings=readings))
+    return takes
+
+
+def railway(time_s, angles, generator):
+    """16.7 Hz, with a second harmonic and a phase that no take shares."""
+    turned = 2 * np.pi * 16.7 * time_s + generator.uniform(0, 7)
+    return 0.8 * np.sin(turned) + 0.3 * np.sin(2 * turned)
+
+
+def folded_switching_supply(time_s, angles, generator):
+    """1 kHz and a little, seen at 60 frames a second; its strength swells and falls."""
+    return (1.0 + 0.3 * np.sin(time_s)) * np.sin(2 * np.pi * 1008.3 * time_s)
+
+
+@pytest.mark.parametrize(("tone", "frequency_hz"), [(railway, 16.7), (folded_switching_supply, 11.7)])
+def test_a_tone_of_one_sensor_is_hum(glove, tone, frequency_hz):
+    takes = with_sensor(glove, tone, rotation=1)
+    [finding] = FAULT.find(takes, glove.sensor_of)
+    assert (finding.where, finding.kind) == (("M_PIP",), "hum")
+    assert finding.evidence["frequency_hz"] == pytest.approx(frequency_hz, abs=0.2)
+    assert finding.size_deg == pytest.approx(0.65, abs=0.15)
+    assert all(mended is take for mended, take in zip(FAULT.repaired(takes), takes, strict=True))
+
+
+def three_states(time_s, angles, generator):
+    """A contact with three resistances, each left after a second or two."""
+    state, now, until = np.zeros(len(time_s)), 0, 0
+    for frame in range(len(time_s)):
+        if frame == 0 or frame >= until:
+            until = frame + generator.integers(50, 120)
+            now = generator.choice([each for each in (0, 1, 2) if each != now]) if now == 0 else 0
+        state[frame] = now
+    return 2.5 * state * np.where(state == 2, -1.0, 1.0)
+
+
+def far_states(time_s, angles, generator):
+    """Twice as far apart: some stays look like dropouts."""
+    return 2.0 * three_states(time_s, angles, generator)
+
+
+def opens_above(time_s, angles, generator):
+    """A track that parts above 55 degrees in every fourth bend, the further the bend the wider."""
+    above = np.convolve(angles > 55, np.ones(15) / 15, mode="same") > 0.5
+    bend = np.cumsum(np.diff(above.astype(int), prepend=0) > 0)
+    return np.where(above & (bend % 4 == 1), 3.5 + 0.04 * (angles - 55), 0.0)
+
+
+@pytest.mark.parametrize("contact", [three_states, far_states, opens_above])
+def test_a_contact_that_goes_to_and_fro_switches(glove, contact):
+    takes = with_sensor(glove, contact, count=8)
+    [finding] = FAULT.find(takes, glove.sensor_of)
+    assert (finding.where, finding.kind) == (("I_PIP",), "switching")
+    assert finding.evidence["switches_count"] > 40
+    assert finding.size_deg == pytest.approx(7.0 if contact is far_states else 3.0, abs=1.0)
+    assert all(mended is take for mended, take in zip(FAULT.repaired(takes), takes, strict=True))
+
+
+def vibrates(time_s, angles, generator):
+    return 0.8 * np.sin(2 * np.pi * 9.3 * time_s)
+
+
+def in_first(takes, tone):
+    """The tone in the first sensor's readings."""
+    return [
+        replace(take, readings=np.round(take.readings + 2.0 * each * [1.0, 0.0, 0.0]))
+        for take, each in zip(takes, tone, strict=True)
+    ]
+
+
+def test_what_all_sensors_or_the_reference_have_is_no_hum(glove):
+    takes = glove.takes()
+    tone = [vibrates(take.time_s, None, None)[:, None] for take in takes]
+    every = [
+        replace(take, readings=np.round(take.readings + 2.0 * each))
+        for take, each in zip(takes, tone, strict=True)
+    ]
+    shaken = [
+        replace(take, reference=take.reference + each * [1.0, 0.0, 0.0])
+        for take, each in zip(takes, tone, strict=True)
+    ]
+    followed_late = [
+        replace(take, reference=take.reference + np.roll(each, -2) * [1.0, 0.0, 0.0])
+        for take, each in zip(in_first(takes, tone), tone, strict=True)
+    ]
+    moved = [
+        replace(take, reference=take.reference + each * [1.0, 0.0, 0.0])
+        for take, each in zip(in_first(takes, tone), tone, strict=True)
+    ]
+    for takes in (every, shaken, moved, followed_late):
+        assert FAULT.find(takes, glove.sensor_of) == ()
+
+
+def tremor(time_s, angles, generator):
+    """2 Hz wide."""
+    noise = generator.normal(size=len(time_s))
+    return (
+        12.0
+        * np.convolve(noise, np.hanning(31) * np.cos(2 * np.pi * 9 * np.arange(31) / 60) / 15, "same")
+        / 4
+    )
+
+
+def slips(time_s, angles, generator):
+    """Steps that stay, each to a side of its own."""
+    moments = generator.random(len(time_s)) < 1 / 90
+    return np.cumsum(moments * generator.normal(0, 1.5, len(time_s)))
+
+
+def quick_lag(time_s, angles, generator):
+    return 0.03 * -np.gradient(angles, time_s)
+
+
+@pytest.mark.parametrize("change", [tremor, slips, quick_lag])
+def test_other_quick_errors_are_neither_hum_nor_switching(glove, change):
+    kinds = [item.kind for item in FAULT.find(with_sensor(glove, change, count=6), glove.sensor_of)]
+    assert "hum" not in kinds
+    assert "switching" not in kinds
+
+
+def test_a_reference_that_switches_is_no_fault_of_a_sensor(glove):
+    takes, generator = glove.takes(count=8), np.random.default_rng(7)
+    swapped = []
+    for take in takes:
+        away = three_states(take.time_s, None, generator)
+        swapped.append(replace(take, reference=take.reference + away[:, None] * [1.0, 0.0, 0.0]))
+    assert "switching" not in [item.kind for item in FAULT.find(swapped, glove.sensor_of)]
+
+
+def snaps_over(time_s, angles, generator):
+    """A strip that goes over at 52 degrees and back at 38."""
+    decided = np.where(angles > 52, 1.0, np.where(angles < 38, -1.0, 0.0))
+    decided[0] = -1.0 if decided[0] == 0 else decided[0]
+    return 2.0 * decided[np.maximum.accumulate(np.where(decided != 0, np.arange(len(angles)), 0))]
+
+
+def test_a_strip_that_snaps_over_is_no_contact(glove):
+    takes = with_sensor(glove, snaps_over, count=8)
+    assert "switching" not in [item.kind for item in FAULT.find(takes, glove.sensor_of)]
+
+
+def test_large_spikes_of_a_sensor_that_hums_are_left_out(glove):
+    first, *others = with_sensor(glove, railway, rotation=1)
+    readings = first.readings.copy()
+    readings[[200, 700, 1200, 1500], 1] += 60.0
+    takes = [replace(first, readings=readings), *others]
+    found = {item.kind: item for item in FAULT.find(takes, glove.sensor_of)}
+    assert set(found) == {"hum", "spikes"}
+    assert [found[kind].is_only_told for kind in ("hum", "spikes")] == [True, False]
+    mended = FAULT.repaired(takes)
+    assert np.isnan(mended[0].reference_at_frames(["M_PIP"])).sum() == 4
+    assert mended[1] is takes[1]
+
+
+def test_what_is_only_told_is_not_proposed(glove):
+    takes = with_sensor(glove, railway, rotation=1)
+    recorded = Recorded(tuple(takes), glove.sensor_of, list)
+    assert FAULT.find(takes, glove.sensor_of)
+    assert FAULT.proposed(recorded) is None
+    layout = Layout.from_columns("plain", takes[0].sensors, takes[0].rotations)
+    named = diagnose(takes, layout).named
+    assert named is not None
+    assert (named.effect, named.where, named.kind) == ("sensor_fault", ("M_PIP",), "finding")

@@ -25,6 +25,14 @@ def test_what_a_straight_line_cannot_learn_is_trained_otherwise_for_its_subject(
     assert next_command(MODEL, without, "pia").startswith("glovecal add-effect 0123456789ab nonlinearity")
 
 
+def test_what_only_the_glove_can_be_mended_for_is_recorded_again():
+    named = {"effect": "sensor_fault", "kind": "finding", "verdict": "named", "where": ["I_MCP"]}
+    command = next_command(MODEL, {"named": named, "next_take": None})
+    assert command == "glovecal record GLOVE after-mending --seconds 60"
+    repaired = {"named": {**named, "kind": "repair"}, "next_take": None}
+    assert next_command(MODEL, repaired) == "glovecal add-effect 0123456789ab sensor_fault"
+
+
 def test_an_association_has_its_command():
     action = {"rotation": "I_MCP", "effect": "column:M_MCP", "method": None, "saves": True}
     residual = {"is_significant": True, "not_identifiable": None}

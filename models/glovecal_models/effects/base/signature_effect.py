@@ -49,6 +49,8 @@ class Finding:
     evidence: Mapping[str, float] = field(default_factory=dict)
     """Numbers whose names end with their unit."""
     stretches: tuple[Stretch, ...] = ()
+    is_only_told: bool = False
+    """Whether no model is better for it: it is to be put right at the glove."""
 
 
 @dataclass(frozen=True)
@@ -148,10 +150,10 @@ class SignatureEffect(ColumnlessEffect):
         return ()
 
     def proposed(self, recorded: Recorded) -> Proposal | None:
-        """What would be added for what is found in takes; None when nothing is."""
+        """What would be added for what is found in takes; None when nothing is, or it is only told."""
         if recorded.only_held_levels or not recorded.sensor_of:
             return None
-        found = self.find(recorded.takes, recorded.sensor_of)
+        found = [item for item in self.find(recorded.takes, recorded.sensor_of) if not item.is_only_told]
         where = sorted({place for item in found for place in item.where})
         return Proposal({"where": where}, None, tuple(item.sentence for item in found)) if found else None
 

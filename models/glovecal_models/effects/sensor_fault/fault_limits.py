@@ -16,8 +16,8 @@ from glovecal_models.effects.sensor_fault.fault_watch import (
 from glovecal_models.takes.reading_faults import smallest_step
 from glovecal_models.takes.take import Take
 
-LASTING = ("jump", "changed")
-"""Kinds that leave a sound sensor, if another one than before."""
+LASTING = ("jump", "changed", "switching", "hum")
+"""Kinds that leave a sound sensor, if another one than before; or that no single frame shows."""
 LEAST_OF_RANGE = (0.5, 99.5)
 JUMP_LAGS = 8
 CHANGE_QUANTILE, CHANGE_MARGIN = 0.9998, 1.3

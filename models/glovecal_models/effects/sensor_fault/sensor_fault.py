@@ -1,9 +1,11 @@
 """Sensor fault: a broken wire, a loose plug. The stretches concerned should not train anything.
 
-Five signatures: *stuck* (one value while the reference moves), *spikes* (gone after a frame or two),
-*dropouts* (jumps to a constant and back), a *jump* of gain or offset in the middle of a take, and a gain that
-has *changed* from one take to another. What a sensor answered before a change says nothing of what it answers
-now: that is left out.
+Seven signatures: *stuck* (one value while the reference moves), *spikes* (gone after a frame or two),
+*dropouts* (jumps to a constant and back), a *jump* of gain or offset in the middle of a take, a gain that
+has *changed* from one take to another, *switching* to and fro between levels, and the *hum* of a tone. What a
+sensor answered before a change says nothing of what it answers now: that is left out. Switching and hum go on
+in use, and no single frame shows them: they are told and stay in training, so that the claimed standard
+deviation has them.
 """
 
 from __future__ import annotations
@@ -30,7 +32,10 @@ from glovecal_models.effects.base.signature_effect import (
 from glovecal_models.effects.sensor_fault.fault_watch import FaultHold
 from glovecal_models.effects.sensor_fault.gain_change import GainChange, gain_change
 from glovecal_models.effects.sensor_fault.gain_jump import gain_jump
+from glovecal_models.effects.sensor_fault.hum import Hum, hums
+from glovecal_models.effects.sensor_fault.level_switches import LevelSwitches, level_switches
 from glovecal_models.effects.sensor_fault.live_check import live_check
+from glovecal_models.effects.sensor_fault.reading_errors import ReadingErrors, reading_errors
 from glovecal_models.effects.sensor_fault.short_faults import (
     FEWEST,
     expected_readings,
@@ -45,6 +50,12 @@ REFERENCE_MOVES_DEG = 10.0
 """The reference must travel so far while a sensor stands still."""
 LEAST_SPIKES = 3
 LEAST_OF_RANGE = (0.5, 99.5)
+EXPLAINED_BY = {"switching": ("spikes", "dropouts", "jump"), "hum": ("spikes",)}
+TIMES_PER_FAULT = 4
+"""A dropout has two switches; with more than so many switches, or seconds of a tone, for each other fault,
+those that are no larger are explained by them."""
+LARGEST = {"switching": 2.0, "hum": 3.0}
+"""Times the mean height of the switches, or the tone's RMS, that a fault so explained reaches at most."""
 
 
 class SensorFault(SignatureEffect):
@@ -53,9 +64,11 @@ class SensorFault(SignatureEffect):
     shown_over: ClassVar = "time in take"
     alike_between_levels: ClassVar = ("nonlinearity",)
     rivals: ClassVar = (Rival("nonlinearity", SHUFFLED),)
-    explanation = "A wire or plug fails: the sensor stands still, spikes, drops out or jumps."
+    explanation = "A wire or plug fails: the sensor stands still, spikes, drops out, jumps, switches or hums."
     source = "signatures of readings against reference"
-    kinds: ClassVar[tuple[str, ...]] = ("stuck", "spikes", "dropouts", "jump", "changed")
+    kinds: ClassVar[tuple[str, ...]] = (
+        "stuck", "spikes", "dropouts", "jump", "changed", "switching", "hum",
+    )  # fmt: skip
 
     def find(
         self,
@@ -71,6 +84,7 @@ class SensorFault(SignatureEffect):
         found: list[Finding] = []
         for sensor, rotation in rotation_of.items():
             found += _faults(takes, changes, sensor, rotation, len(rotation_of))
+        found = _with_unsteady(takes, found, rotation_of)
         return tuple(sorted(found, key=lambda item: (-len(item.stretches), item.where)))
 
     def find_between_levels(self, takes: Sequence[Take], sensor_of: Mapping[str, str]) -> tuple[Finding, ...]:
@@ -145,6 +159,97 @@ def _faults(
         for kind in least
         if len(stretches[kind]) >= least[kind]
     ]
+
+
+def _with_unsteady(
+    takes: Sequence[Take], found: Sequence[Finding], rotation_of: Mapping[str, str]
+) -> list[Finding]:
+    """``found`` and the sensors that switch or hum.
+
+    Crests of a tone look like spikes, and some of many switches like dropouts or a jump: one name for all of
+    them. A fault that is larger stays.
+    """
+    errors = [_errors(takes, sensor, rotation) for sensor, rotation in rotation_of.items()]
+    result = list(found)
+    for sensor, error, hum, switches in zip(
+        rotation_of, errors, hums(errors), level_switches(errors), strict=True
+    ):
+        if error is None:
+            continue
+        if hum:
+            item = _finding_hum(sensor, hum)
+        elif switches:
+            item = _finding_switches(sensor, switches)
+        else:
+            continue
+        own = [each for each in found if each.where == item.where]
+        often = item.evidence["heard_s"] if item.count is None else item.count
+        if TIMES_PER_FAULT * sum(each.count or 0 for each in own) < often:
+            result = [
+                each for each in result if each not in own or not _is_explained(each, item, takes, error)
+            ]
+            result.append(item)
+    return result
+
+
+def _is_explained(fault: Finding, by: Finding, takes: Sequence[Take], error: ReadingErrors) -> bool:
+    """Whether a fault looks like, and is no larger than, what ``by`` does to the same sensor."""
+    assert by.size_deg is not None
+    if fault.kind not in EXPLAINED_BY[by.kind]:
+        return False
+    size = fault.size_deg
+    if size is None:
+        away = [
+            np.abs(part[frames_inside(take, fault.stretches)])
+            for take, part in zip(takes, error.errors, strict=True)
+        ]
+        # Frames outside the sensor's usual range, or without a reference, are of no known size.
+        size = float(np.median(np.nan_to_num(np.concatenate(away), nan=np.inf)))
+    return size <= LARGEST[by.kind] * by.size_deg
+
+
+def _errors(takes: Sequence[Take], sensor: str, rotation: str) -> ReadingErrors | None:
+    """Without frames near the ends of the range: a sensor that saturates leaves its curve there."""
+    readings = [take.readings[:, take.sensors.index(sensor)] for take in takes]
+    low, high = (float(v) for v in np.percentile(np.concatenate(readings), LEAST_OF_RANGE))
+    margin = GRADUAL_SHARE * (high - low)
+    angles = [
+        np.where(
+            (low + margin <= part) & (part <= high - margin),
+            take.reference_at_frames([rotation])[:, 0],
+            np.nan,
+        )
+        for take, part in zip(takes, readings, strict=True)
+    ]
+    return reading_errors([take.time_s for take in takes], readings, angles)
+
+
+def _finding_hum(sensor: str, hum: Hum) -> Finding:
+    sentence = (
+        f"{sensor} hums: a tone of {hum.frequency_hz:.1f} Hz in the frames, {hum.rms_deg:.1f} deg RMS, that"
+        " its joint does not make; look at its shield and at the supply."
+    )
+    evidence = {
+        "frequency_hz": hum.frequency_hz,
+        "power_over_around_1": hum.over_around,
+        "heard_s": hum.heard_s,
+    }
+    return Finding(
+        SensorFault.name, (sensor,), sentence, kind="hum", size_deg=hum.rms_deg, evidence=evidence,
+        is_only_told=True,
+    )  # fmt: skip
+
+
+def _finding_switches(sensor: str, found: LevelSwitches) -> Finding:
+    sentence = (
+        f"{sensor} switches {found.count} times to and fro between levels, by {found.size_deg:.1f} deg in the"
+        " mean, which its joint does not do; look at its solder joints and plug."
+    )
+    evidence = {"switches_count": float(found.count)}
+    return Finding(
+        SensorFault.name, (sensor,), sentence, kind="switching", size_deg=found.size_deg, count=found.count,
+        evidence=evidence, is_only_told=True,
+    )  # fmt: skip
 
 
 def _finding_changed(sensor: str, rotation: str, change: GainChange, takes: Sequence[Take]) -> Finding:

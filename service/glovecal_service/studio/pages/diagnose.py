@@ -171,6 +171,9 @@ class DiagnosePage:
         if named["method"]:
             ui.label(f"To be trained with {named['method']}: a straight line cannot learn it.")
             return
+        if named.get("kind") == "finding":
+            ui.label("To be put right at the glove: no version of the model is better for it.")
+            return
         ui.button(
             f"Add {named['effect']}", on_click=lambda: self._add(named["effect"], named["where"])
         ).props("unelevated no-caps color=indigo-8").classes("studio-main-act")
