@@ -11,7 +11,7 @@ from pathlib import Path
 from glovecal_models.colour_glove.skin import RADII_MM, HandSkin, hand_skin
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import DIMENSIONS, HandDimensions
-from glovecal_models.hand.skeleton import hand_skeleton
+from glovecal_models.hand.skeleton import Handedness, hand_skeleton
 
 FORMAT = "glovecal hand shape 1"
 LARGEST_SHAPE_FILE = 100_000
@@ -19,8 +19,7 @@ LARGEST_SHAPE_FILE = 100_000
 
 @dataclass(frozen=True)
 class ShapeOnFile:
-    hand: str
-    """``right`` or ``left``."""
+    hand: Handedness
     sizes_mm: Mapping[str, float]
     """All of ``DIMENSIONS``."""
     radii_mm: Mapping[str, tuple[float, float]]

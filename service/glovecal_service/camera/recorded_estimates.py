@@ -20,7 +20,7 @@ from glovecal_client.pictures.label_file import LabelFilePictures, read_label_ti
 from glovecal_client.pictures.source import Picture, PictureSource
 from glovecal_client.pictures.video_file import SUFFIX as VIDEO
 from glovecal_client.pictures.video_file import VideoFilePictures, read_times
-from glovecal_models.colour_glove.pose.hand_shape_fit import MOST
+from glovecal_models.colour_glove.pose.hand_shape_fit import MOST_PICTURES
 from glovecal_models.colour_glove.pose_estimate import PoseEstimate, camera_estimates
 from glovecal_models.errors import BadInput
 from glovecal_models.progress import Cancel, Report, stop_if
@@ -139,7 +139,7 @@ class Recordings:
             dict(found), time.perf_counter() - began,
         )  # fmt: skip
 
-    def spread_labels(self, setup: TrackingSetup, count: int = MOST) -> list[list[np.ndarray]]:
+    def spread_labels(self, setup: TrackingSetup, count: int = MOST_PICTURES) -> list[list[np.ndarray]]:
         """Label images of ``count`` moments over the whole recording, one of each camera."""
         wanted = np.unique(np.linspace(0, len(self.rows[0]) - 1, min(count, len(self.rows[0]))).astype(int))
         readers = [

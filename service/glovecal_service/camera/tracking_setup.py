@@ -104,7 +104,8 @@ def tracking_setup(
 
 def _skin(settings: TrackingSettings) -> HandSkin:
     if settings.shape is None:
-        return hand_skin(hand_skeleton(HandDimensions.from_measured(settings.sizes_mm), settings.hand))
+        sizes = HandDimensions.from_measured(settings.sizes_mm)
+        return hand_skin(hand_skeleton(sizes, "left" if settings.hand == "left" else "right"))
     shape = read_shape(settings.shape)
     if shape.hand != settings.hand:
         raise BadInput(f"{settings.shape} is of a {shape.hand} hand; the {settings.hand} one wears the glove")

@@ -26,7 +26,7 @@ from glovecal_models.hand.dimensions import DIMENSIONS, HandDimensions
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.progress import Cancel, Report, stop_if
 
-FEWEST, MOST = 20, 50
+FEWEST_PICTURES, MOST_PICTURES = 20, 50
 """Pictures that are used."""
 ROUNDS = 4
 SIZE_SD, MEASURED_SIZE_SD = 0.05, 0.02
@@ -92,11 +92,13 @@ def fitted_hand_shape(
     cancelled: Cancel | None = None,
 ) -> HandShape:
     """``tracker``: of the starting hand and the pictures' cameras. ``pictures``: label images (H, W) uint8,
-    one of each camera, of different poses; of more than ``MOST`` every so manieth is used.
+    one of each camera, of different poses; of more than ``MOST_PICTURES`` every so manieth is used.
 
-    Raises BadInput where fewer than ``FEWEST`` pictures show a hand that is understood; Cancelled.
+    Raises BadInput where fewer than ``FEWEST_PICTURES`` pictures show a hand that is understood; Cancelled.
     """
-    chosen = np.unique(np.linspace(0, len(pictures) - 1, min(MOST, len(pictures))).astype(int)).tolist()
+    chosen = np.unique(
+        np.linspace(0, len(pictures) - 1, min(MOST_PICTURES, len(pictures))).astype(int)
+    ).tolist()
     alone = HandTracker(
         tracker.hand, tracker.lookup, tracker.cameras, tracker.errors, stage="dense", follows=False
     )
@@ -116,10 +118,10 @@ def fitted_hand_shape(
             before.append(answer.disagreeing)
         if report:
             report("tracking", 0.3 * (done + 1) / len(chosen))
-    if len(frames) < FEWEST:
+    if len(frames) < FEWEST_PICTURES:
         raise BadInput(
             f"{len(frames)} of {len(chosen)} pictures show a hand whose pose is understood; the shape needs "
-            f"at least {FEWEST}, of different poses, the whole glove in view"
+            f"at least {FEWEST_PICTURES}, of different poses, the whole glove in view"
         )
     prior = np.array([size_sd] + [BONES] * len(_BONES) + [RADII] * len(RADII_MM)) ** -2.0
     values, hand = np.zeros(len(PARAMETERS)), alone.hand

@@ -29,7 +29,7 @@ LINE_BINS = 2
 NARROW_BINS = (4, 8)
 NARROW_SHARE = 0.125
 """Of the line, which half a hertz to a hertz beside it may be left: a tremor is wider."""
-LEAST_DEG = 0.25
+LEAST_HUM_DEG = 0.25
 IN_READINGS = 0.5
 """Of the line's power in the errors: the readings must have it."""
 IN_ANGLE = 0.25
@@ -94,7 +94,7 @@ def _tone(sensor: ReadingErrors) -> Hum | None:
     beside = np.concatenate([padded[at : at + far - near + 1], padded[at + far + near : at + 2 * far + 1]])
     is_tone = (
         over[at] >= OVER_AROUND
-        and mean_square >= LEAST_DEG**2
+        and mean_square >= LEAST_HUM_DEG**2
         and beside.mean() <= NARROW_SHARE * power[at]
         and in_readings[line].sum() >= IN_READINGS * power[line].sum()
         and (in_angle - _around(in_angle))[line].sum() <= IN_ANGLE * power[line].sum()

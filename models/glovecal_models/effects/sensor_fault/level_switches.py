@@ -25,9 +25,9 @@ SIDE_S, SIDE_FRAMES = 0.12, 4
 """Each mean is over so long, and at least so many frames."""
 SPREADS = 4.0
 """Times the robust spread of the differences of means."""
-LEAST_DEG = 1.0
-FEWEST = 12
-STEP_SHARE = 0.75
+LEAST_SWITCH_DEG = 1.0
+FEWEST_SWITCHES = 12
+SWITCH_SHARE = 0.75
 """Of the difference of means, which the step beside a slope must be."""
 READING_SHARE = 0.65
 """Of the difference of means, which the readings' own step beside a slope must be. On 414 simulated gloves
@@ -87,9 +87,9 @@ class _Candidates:
     @property
     def are_switches(self) -> bool:
         return (
-            self.count >= FEWEST
-            and self.size_deg >= LEAST_DEG
-            and self.step_share >= STEP_SHARE
+            self.count >= FEWEST_SWITCHES
+            and self.size_deg >= LEAST_SWITCH_DEG
+            and self.step_share >= SWITCH_SHARE
             and self.reading_share >= READING_SHARE
             and self.turns >= TURNS
             and self.apart_se <= APART_SE

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 PIECES = 30
-FEWEST_FRAMES = 300
+FEWEST_READINGS = 300
 LEAST_ANGLES_DEG = 3.0
 
 
@@ -34,7 +34,7 @@ def reading_errors(
     """
     x, y = np.concatenate(readings), np.concatenate(angles)
     known = np.isfinite(x) & np.isfinite(y)
-    if known.sum() < FEWEST_FRAMES or np.ptp(y[known]) < LEAST_ANGLES_DEG:
+    if known.sum() < FEWEST_READINGS or np.ptp(y[known]) < LEAST_ANGLES_DEG:
         return None
     intervals = np.concatenate([np.diff(time) for time in times])
     gain, _ = np.polyfit(y[known], x[known], 1)

@@ -87,7 +87,9 @@ def shape(
                 )  # fmt: skip
         except Cancelled as cancelled:
             raise Refusal(f"stopped; nothing was written to {file}") from cancelled
-    kept = ShapeOnFile(worn_on, found.sizes_mm, found.radii_mm, found.size_sd, found.bones_sd)
+    kept = ShapeOnFile(
+        setup.hand.skin.skeleton.hand, found.sizes_mm, found.radii_mm, found.size_sd, found.bones_sd
+    )
     write_shape(file, kept)
     if as_json:
         print_json(
