@@ -13,7 +13,8 @@
     python3 do.py study     the blind study of the diagnosis: figures, confusion matrix, a page (hours;
                             --quick, --minutes N; --page docs/study.md writes what was found);
                             study active: active sampling against the fixed protocol (half an hour);
-                            study camera: a camera as the reference against true angles (half an hour)
+                            study camera: a camera as the reference against true angles (half an hour);
+                            study camera-errors: what the colour glove's tracker errs by (quarter of an hour)
     python3 do.py picture   README's picture of the studio, from the running page (needs Chromium)
 
 uv is installed into .tools and the locked packages into .venv; nothing outside this folder is touched.
@@ -113,6 +114,8 @@ def paper(arguments: list[str]) -> int:
 def study(arguments: list[str]) -> int:
     if arguments[:1] == ["active"]:
         return run("python", "tests/study/active_sampling.py", *arguments[1:], beside=SIMULATED)
+    if arguments[:1] == ["camera-errors"]:
+        return run("python", "tests/study/tracked_errors.py", *arguments[1:])
     if arguments[:1] == ["camera"]:
         return run("python", "tests/study/camera_study.py", *arguments[1:], beside=SIMULATED)
     return run("python", "tests/study/study.py", *arguments)

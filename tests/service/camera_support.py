@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import atexit
+import os
+import shutil
 import subprocess
 import sys
+import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from glovecal_client.errors import DeviceFinished
 from glovecal_client.pictures.source import Picture
@@ -21,35 +26,87 @@ from glovecal_models.colour_glove.database import DatabaseSettings, pose_databas
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM
 from glovecal_models.colour_glove.lookup import PoseLookup
 from glovecal_models.colour_glove.pattern import printed_pattern
+from glovecal_models.colour_glove.pictures.picture_check import PictureCheck
 from glovecal_models.colour_glove.pose.error_learning import errors_file
+from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
 from glovecal_models.colour_glove.pose.learned_errors import LearnedErrors
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.pose_set import generated_poses
 from glovecal_models.colour_glove.skin import hand_skin
+from glovecal_service.camera import tracking_setup as setup_module
 from glovecal_service.camera.camera_settings import CameraSettings, TrackingSettings
 from glovecal_service.camera.camera_tracking import CameraSummary, CameraTracking
 from glovecal_service.camera.rendered_glove import RATE_HZ, RenderedGlove
-from glovecal_service.camera.tracking_setup import ASSUMED
+from glovecal_service.camera.tracking_setup import ASSUMED, glove_colours
 
 SMALL: dict[str, Any] = {"entries": 300, "clips": 3}
 
 
-def ready_folder(data: Path, *others: tuple[Camera, ...]) -> RenderedGlove:
-    """Put a small database and plain errors where a camera keeps them; the glove that ``rendered`` draws.
+BESIDE = Camera(translation_mm=(-60.0, 0.0, 0.0))
+"""A second camera, which the small folder is ready for too, beside the assumed one."""
 
-    Learning errors takes half a minute; here the posterior deviations stand as they are. ``others``: cameras
-    beside the assumed one that the hand is to be tracked by.
+
+def ready_folder(data: Path) -> RenderedGlove:
+    """Put a small database, plain errors and learned colours where a camera keeps them; the glove that
+    ``rendered`` draws.
+
+    Learning errors takes half a minute; here the posterior deviations stand as they are. All is made once in
+    a run of tests, and copied.
     """
+    folder = TrackingSettings(data=data).folder
+    try:
+        shutil.copytree(_made_once(), folder, dirs_exist_ok=True)
+    except (OSError, shutil.Error):  # the process that made it has just ended
+        _make(folder)
+    return RenderedGlove(PrintedHand(hand_skin(), printed_pattern()), ASSUMED)
+
+
+def _made_once() -> Path:
+    """The folder that is copied; whichever process of this run comes first makes it."""
+    run = os.environ.get("PYTEST_XDIST_TESTRUNUID", f"process-{os.getpid()}")
+    place = Path(tempfile.gettempdir(), f"glovecal-cameras-{run}")
+    if not place.is_dir():
+        made = Path(tempfile.mkdtemp(prefix="glovecal-cameras-"))
+        _make(made)
+        try:
+            made.rename(place)
+            atexit.register(shutil.rmtree, place, ignore_errors=True)
+        except OSError:  # another process was quicker
+            shutil.rmtree(made)
+    return place
+
+
+def _make(folder: Path) -> None:
     skin = hand_skin()
     hand, settings = PrintedHand(skin, printed_pattern()), DatabaseSettings(entries=SMALL["entries"])
-    folder = TrackingSettings(data=data).folder
     database = pose_database(skin, hand.pattern, generated_poses(), folder, settings, workers=1)
     lookup = PoseLookup(database, pca_code(database.transforms))
     deviation = np.array([15.0] * 20 + [15.0] * 3 + [20.0, 20.0, 60.0])
     errors = LearnedErrors.as_posterior(np.diag(deviation**2), np.full(DEGREES_OF_FREEDOM, 60.0))
-    for cameras in ((ASSUMED,), *others):
+    for cameras in ((ASSUMED,), (ASSUMED, BESIDE)):
         errors.save(errors_file(hand, lookup, cameras, SMALL["clips"]))
-    return RenderedGlove(hand, ASSUMED)
+    glove_colours(folder, hand)
+
+
+@contextmanager
+def prepared_once() -> Iterator[None]:
+    """Within it this process reads a data folder's database for the same cameras once, not for each camera
+    that a test starts: that takes a second each time."""
+    really, check, known = setup_module.prepared_tracker, setup_module.PictureCheck, dict[Any, Any]()
+
+    def prepared(folder: Path, cameras: Sequence[Camera], **options: Any) -> HandTracker:
+        key = (folder, tuple(cameras), options["entries"], options["clips"])
+        if key not in known:
+            known[key] = really(folder, cameras, **options)
+        return known[key]
+
+    def checked(lookup: PoseLookup) -> PictureCheck:
+        return known.setdefault(id(lookup), check(lookup))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(setup_module, "prepared_tracker", prepared)
+        patch.setattr(setup_module, "PictureCheck", checked)
+        yield
 
 
 class ScriptedCamera:

@@ -19,7 +19,15 @@ from realtime_support import eventually, free_endpoint
 pytest.importorskip("cv2")
 pytest.importorskip("numba")
 
-from camera_support import SMALL, ScriptedCamera, camera_process, ran_to_the_end, ready_folder, running
+from camera_support import (
+    SMALL,
+    ScriptedCamera,
+    camera_process,
+    prepared_once,
+    ran_to_the_end,
+    ready_folder,
+    running,
+)
 
 from glovecal_client.errors import DeviceLost, QueryRefused
 from glovecal_client.pictures.label_file import LabelFilePictures
@@ -40,6 +48,12 @@ from glovecal_service.camera.rendered_glove import RATE_HZ, RenderedGlove
 PICTURE = np.full((480, 640, 3), 180, np.uint8)
 """Of a wall."""
 PERIOD_NS = round(1e9 / RATE_HZ)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def quickly() -> Iterator[None]:
+    with prepared_once():
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,6 +14,7 @@ from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import Method, TrainingSettings
 from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.errors import BadInput, NotTrainable
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.protocol import evaluation_segment, sampling_protocol
@@ -27,10 +29,12 @@ from glovecal_models.takes.camera_reference.covered_range import covered_ranges
 from glovecal_models.takes.camera_reference.estimates import CameraEstimates
 from glovecal_models.takes.take import Take
 
-CALIBRATED = SimulatedCamera()
+MEASURED = SimulatedCamera()
 TRUE_SIZE, CAMERA_SIZE = 1.3, 2.6
 """Strength of the hidden effect in noise floors: of the glove's usual reference, and twice that."""
 NUISANCES: tuple[Nuisance, ...] = ("drift", "white", "posture")
+FEWEST_SAMPLES = 15
+"""Effective ones of a rotation that is trained by the camera."""
 FIRST_SEED = 5000
 """Gloves of smaller seeds were looked at while the limits were chosen."""
 
@@ -41,7 +45,7 @@ class CameraGlove:
 
     effect: str
     number: int
-    camera: SimulatedCamera = CALIBRATED
+    camera: SimulatedCamera = MEASURED
 
     def glove(self, size: float) -> BlindGlove:
         clean = BlindGlove(
@@ -70,18 +74,23 @@ class CameraGlove:
 
 
 def seen_takes(glove: BlindGlove, camera: SimulatedCamera) -> list[Take]:
-    """The glove's takes with the camera as their reference, clocks found anew in each."""
-    return [
-        with_camera(take, truth, glove.plan.rotations, camera, 100 * glove.seed + number)
-        for number, (take, truth) in enumerate(zip(glove.session.takes, glove.session.truth, strict=True))
-    ]
+    """The glove's takes with the camera as their reference, clocks found anew in each; one whose clock is not
+    found is refused, and left out."""
+    found = []
+    for number, (take, truth) in enumerate(zip(glove.session.takes, glove.session.truth, strict=True)):
+        seed = 100 * glove.seed + number
+        with suppress(BadInput):
+            found.append(with_camera(take, truth, glove.plan.rotations, camera, glove.seed, seed))
+    return found
 
 
 def with_camera(
-    take: Take, truth: np.ndarray, rotations: Sequence[str], camera: SimulatedCamera, seed: int
+    take: Take, truth: np.ndarray, rotations: Sequence[str], camera: SimulatedCamera, hand: int, seed: int
 ) -> Take:
+    """``hand``: whose it is; the part of the camera's errors that stays is the same in all its takes."""
     columns = [rotations.index(name) for name in take.rotations]
-    return reference_from_camera(take, camera.see(take.time_s, truth[:, columns], take.rotations, seed)).take
+    seen = replace(camera, hand=hand).see(take.time_s, truth[:, columns], take.rotations, seed)
+    return reference_from_camera(take, seen).take
 
 
 @dataclass(frozen=True)
@@ -89,7 +98,7 @@ class CalibratedGlove:
     """Trained on the first wearing, by true angles and by the camera; judged on the second."""
 
     number: int
-    camera: SimulatedCamera = CALIBRATED
+    camera: SimulatedCamera = MEASURED
 
     def of_cyberglove(self, method: Method) -> dict[str, Any]:
         """18 sensors, cloth that couples them, another fit in the second wearing; 40 s of the protocol."""
@@ -107,8 +116,10 @@ class CalibratedGlove:
         ).take
         fingers = [name for name in first.rotations if not name.startswith("WRIST")]
         kept = [first.rotations.index(name) for name in fingers]
-        estimates = self.camera.see(first.time_s, first.reference[:, kept], tuple(fingers), seed)
-        seen = reference_from_camera(first, estimates).take
+        estimates = replace(self.camera, hand=seed).see(
+            first.time_s, first.reference[:, kept], tuple(fingers), seed
+        )
+        seen = _teachable(reference_from_camera(first, estimates).take)
         layout = Layout.built_in("cyberglove18")
         return {"glove": "cyberglove", **self._errors([first], [seen], [test], layout, method)}
 
@@ -123,7 +134,9 @@ class CalibratedGlove:
         ]
         first = [take for take in true if take.wearing == "wearing-1"]
         seen = [
-            with_camera(take, take.reference, plan.rotations, self.camera, 1000 * plan.seed + number)
+            with_camera(
+                take, take.reference, plan.rotations, self.camera, plan.seed, 1000 * plan.seed + number
+            )
             for number, take in enumerate(first)
         ]
         layout = Layout.from_columns("five", plan.sensors, plan.rotations)
@@ -137,7 +150,11 @@ class CalibratedGlove:
         settings = TrainingSettings(method=method, folds=0, samples=1000)
         rmse = {}
         for kind, takes in (("true", true), ("camera", seen)):
-            predictor, squares = GlovePredictor(train(takes, layout, "anna", settings)), []
+            try:
+                model = train(takes, layout, "anna", settings)
+            except NotTrainable:
+                return {"number": self.number, "method": method, "true": None, "camera": None, "ratio": None}
+            predictor, squares = GlovePredictor(model), []
             for take in test:
                 mean = predictor.predict_take(take.time_s, take.readings, take.context, take.wearing).mean
                 for name in set(ranges) & set(predictor.rotations):
@@ -146,6 +163,19 @@ class CalibratedGlove:
                     squares.append((mean[inside, predictor.rotations.index(name)] - angle[inside]) ** 2)
             rmse[kind] = float(np.sqrt(np.concatenate(squares).mean()))
         return {"number": self.number, "method": method, **rmse, "ratio": rmse["camera"] / rmse["true"]}
+
+
+def _teachable(take: Take) -> Take:
+    """Without rotations of which the camera accepted too little to train on: some DIP joints."""
+    found = {item.rotation: item.effective_samples for item in covered_ranges([take], take.rotations)}
+    kept = [number for number, name in enumerate(take.rotations) if found.get(name, 0) >= FEWEST_SAMPLES]
+    assert take.reference_sd is not None
+    return replace(
+        take,
+        rotations=tuple(take.rotations[number] for number in kept),
+        reference=take.reference[:, kept],
+        reference_sd=take.reference_sd[:, kept],
+    )
 
 
 def clock_error(number: int, motion: str) -> dict[str, Any]:

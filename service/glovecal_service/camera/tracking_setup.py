@@ -6,6 +6,7 @@ import hashlib
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -99,7 +100,9 @@ def tracking_setup(
     check = PictureCheck(first.lookup)
     _ = check.distance_limit_px2  # takes a moment: not while pictures wait
     is_known = settings.calibration is not None or built[0].name == RENDERED
-    return TrackingSetup(built, hand, cameras, is_known, _colours(settings, hand), check, first, made_from)
+    colours = settings.colours
+    table = glove_colours(settings.folder, hand) if colours is None else ColourTable.load(colours)
+    return TrackingSetup(built, hand, cameras, is_known, table, check, first, made_from)
 
 
 def _skin(settings: TrackingSettings) -> HandSkin:
@@ -149,12 +152,10 @@ def _cameras(settings: TrackingSettings, sources: Sequence[PictureSource]) -> tu
     return cameras[: len(sources)]
 
 
-def _colours(settings: TrackingSettings, hand: PrintedHand) -> ColourTable:
-    """The table named, else one that was learned from rendered photographs of the printed colours."""
-    if settings.colours is not None:
-        return ColourTable.load(settings.colours)
+def glove_colours(folder: Path, hand: PrintedHand) -> ColourTable:
+    """Learned from rendered photographs of the printed colours; kept in ``folder``."""
     told = repr((LEARNED, hand.pattern.colour_of_patch.tolist()))
-    file = settings.folder / f"colours-{hashlib.sha256(told.encode()).hexdigest()[:20]}.npz"
+    file = folder / f"colours-{hashlib.sha256(told.encode()).hexdigest()[:20]}.npz"
     if file.exists():
         try:
             return ColourTable.load(file)

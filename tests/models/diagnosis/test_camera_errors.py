@@ -17,7 +17,7 @@ from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import RecordedSession, record_session
 from glovecal_models.simulation.session_plan import SessionPlan
-from glovecal_models.simulation.simulated_camera import SimulatedCamera
+from glovecal_models.simulation.simulated_camera import CALIBRATED
 from glovecal_models.takes.camera_reference.camera_reference import CAMERA_PATCHES, reference_from_camera
 from glovecal_models.takes.take import Take
 
@@ -37,7 +37,7 @@ def seen(effect: str = "", lean: float = 0.5, *, visibility_deg: float = 0.0) ->
     so."""
     found = []
     for number, (take, truth) in enumerate(zip(session(effect).takes, session(effect).truth, strict=True)):
-        estimates = SimulatedCamera(lean=lean).see(take.time_s, truth, take.sensors, seed=number)
+        estimates = replace(CALIBRATED, lean=lean).see(take.time_s, truth, take.sensors, seed=number)
         few = np.clip((14.5 - estimates.patches) / 3.0, 0.0, 1.0)[:, None]
         estimates = replace(estimates, angles_deg=estimates.angles_deg + visibility_deg * few)
         found.append(reference_from_camera(take, estimates).take)

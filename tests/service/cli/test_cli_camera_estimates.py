@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 pytest.importorskip("cv2")
 pytest.importorskip("numba")
 
-from camera_support import SMALL, ready_folder
+from camera_support import BESIDE, SMALL, prepared_once, ready_folder
 from cli_running import Run, glovecal
 
 from glovecal_client.pictures.label_file import LabelWriter
@@ -37,8 +37,13 @@ from glovecal_service.camera.recorded_estimates import Recordings, matched
 from glovecal_service.camera.rendered_glove import RATE_HZ, RenderedGlove
 from glovecal_service.camera.tracking_setup import ASSUMED, tracking_setup
 
-BESIDE = Camera(translation_mm=(-60.0, 0.0, 0.0))
 PERIOD_NS = round(1e9 / RATE_HZ)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def quickly() -> Iterator[None]:
+    with prepared_once():
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +53,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def glove(data: Path) -> RenderedGlove:
-    return ready_folder(data, (ASSUMED, BESIDE))
+    return ready_folder(data)
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ import pytest
 from glovecal_client.rest import Refused, RestClient
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
-from glovecal_models.simulation.simulated_camera import SimulatedCamera
+from glovecal_models.simulation.simulated_camera import CALIBRATED
 from glovecal_models.takes.camera_reference.estimates import write_estimates
 from glovecal_models.takes.table import read_takes
 from glovecal_models.takes.write_table import write_takes
@@ -38,7 +38,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[RestCli
     ]
     write_takes(bare, folder / "takes.csv")
     for number, (take, truth) in enumerate(zip(session.takes, session.truth, strict=True)):
-        seen = SimulatedCamera(offset_s=0.25).see(take.time_s, truth, take.sensors, number)
+        seen = replace(CALIBRATED, offset_s=0.25).see(take.time_s, truth, take.sensors, number)
         write_estimates(seen, folder / f"{number}.npz")
     with in_process_client(Settings(data=folder / "data")) as client:
         client.post("/subjects", {"name": "anna"})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,7 +21,6 @@ from glovecal_client.keys import GloveKeys
 from glovecal_client.rest import Refused, RestClient
 from glovecal_client.session import open_router
 from glovecal_models.colour_glove.camera_file import write_cameras
-from glovecal_service.camera.learned_colours import drawn_table
 from glovecal_service.camera.tracking_setup import ASSUMED
 from glovecal_service.rest.in_process import in_process_client
 from glovecal_service.settings import Settings
@@ -38,10 +38,10 @@ def client(settings: Settings) -> Iterator[RestClient]:
         yield client
 
 
-def keep_camera_files(client: RestClient, folder: Path) -> None:
+def keep_camera_files(client: RestClient, folder: Path, learned: Path) -> None:
     """A table ``lamp`` and a calibration ``desk``; what is neither is refused and changes nothing."""
     table, calibration = folder / "table.npz", folder / "camera.json"
-    drawn_table().save(table)
+    shutil.copy(next(learned.glob("colours-*.npz")), table)
     write_cameras(calibration, [ASSUMED])
     known = client.put("/camera-files/colours/lamp", {"upload": client.upload(table)})
     assert known == {"colours": ["lamp"], "calibrations": []}
@@ -67,7 +67,7 @@ def test_a_camera_from_its_start_to_its_end(client: RestClient, settings: Settin
         body |= {"colours": "lamp", "calibration": "desk"}
         with pytest.raises(Refused, match="no colours 'lamp'; there are: none yet"):
             client.post("/cameras", body)
-        keep_camera_files(client, tmp_path)
+        keep_camera_files(client, tmp_path, settings.data / "cameras")
         begun = client.post("/cameras", body | SMALL)
         assert (begun["state"], begun["is_simulated"], begun["started_here"]) == ("opening", True, True)
         with pytest.raises(Refused, match="publishes glove right already"):

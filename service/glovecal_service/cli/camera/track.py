@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import threading
 from enum import Enum
@@ -25,7 +26,8 @@ from glovecal_service.cli.camera.tracking_options import (
 )
 from glovecal_service.cli.glove.capture import GloveOption
 from glovecal_service.cli.terminal.options import DEFAULT_ZENOH, Site, Zenoh
-from glovecal_service.cli.terminal.printing import out
+from glovecal_service.cli.terminal.printing import err, out
+from glovecal_service.cli.terminal.refusal import EXPECTED, exit_code_of, sentence_of
 
 
 class Kept(Enum):
@@ -77,7 +79,13 @@ def track(
         calibration=calibration, shape=shape, entries=entries, clips=clips, sizes_mm=sizes_mm,
     )  # fmt: skip
     stop = threading.Event()
-    with stopped_by_signals(stop):
-        summary = run_camera(settings, stop)
+    try:
+        with stopped_by_signals(stop):
+            out.print(str(run_camera(settings, stop)))
+        code = 0
+    except EXPECTED as error:
+        err.print(sentence_of(error), style="red")
+        code = exit_code_of(error)
+    sys.stdout.flush()
     sys.stderr.flush()
-    out.print(str(summary))
+    os._exit(code)  # all is closed; a driver's thread that hangs must not turn this into a crash

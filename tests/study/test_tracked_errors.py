@@ -1,0 +1,45 @@
+"""What is told of the tracker's errors, from errors that are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tracked_errors import TrackedHand, cameras, correlations, table
+
+from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS
+from glovecal_models.simulation.simulated_camera import lasting_noise
+
+
+def known(number: int, *, stays: float, lasts_s: float, times: float) -> TrackedHand:
+    rng, frames = np.random.default_rng([number, 3]), np.arange(600)
+    columns = len(FINGER_ROTATIONS)
+    truth = 30.0 + 15.0 * lasting_noise(frames / 30.0, columns, 0.5, rng)
+    error = np.sqrt(1 - stays**2) * lasting_noise(frames / 30.0, columns, lasts_s / 2, rng)
+    error += stays * rng.standard_normal(columns)
+    return TrackedHand(
+        frames, truth, 4.0 * times * error, np.full_like(truth, 4.0), np.ones(truth.shape, bool)
+    )
+
+
+def test_how_large_and_how_lasting_errors_are_is_told():
+    hands = [known(number, stays=0.5, lasts_s=0.8, times=1.3) for number in range(20)]
+    at, correlation = correlations(hands)
+    assert correlation[0] == pytest.approx(1.0)
+    assert correlation[at >= 2.0].mean() == pytest.approx(0.25, abs=0.06)
+    text = table(hands)
+    assert float(text.partition("RMS ")[2].partition(" degrees")[0]) == pytest.approx(5.2, abs=0.2)
+    lasting = float(text.partition("Errors last ")[2].partition(" s")[0])
+    assert lasting == pytest.approx(0.8, abs=0.12)
+    assert "lean to the prior 0.0" in text.replace("-0.0", "0.0")
+    kinds = [line.split("|")[1].strip() for line in text.splitlines() if line.startswith("| ")][1:]
+    assert kinds == ["MCP", "PIP", "DIP", "IP", "TMC", "ABD", "VIR"]
+
+
+def test_the_second_camera_looks_at_the_same_place_from_the_side():
+    first, second = cameras(2)
+    middle = np.array([0.0, 0.0, 470.0])
+    seen = np.array(second.rotation) @ middle + np.array(second.translation_mm)
+    assert seen == pytest.approx(middle)
+    turn = np.arccos((np.trace(np.array(second.rotation)) - 1) / 2)
+    assert np.degrees(turn) == pytest.approx(60.0)
+    assert first.translation_mm == (0.0, 0.0, 0.0)
