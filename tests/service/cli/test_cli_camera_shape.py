@@ -31,7 +31,7 @@ KNOWN = ShapeOnFile(
 
 
 def test_a_shape_is_found_and_told_with_what_one_camera_leaves_open(tmp_path: Path) -> None:
-    ready_folder(tmp_path, (ASSUMED,))
+    ready_folder(tmp_path)
     hand, film, shape = other_hand(hand_skin(), 5), tmp_path / "hand.labels", tmp_path / "shape.json"
     writer = LabelWriter(film, (480, 640), {"simulated": True})
     for at, state in enumerate(hand_motion(hand, 44.0, 0.5, seed=5)[:22]):

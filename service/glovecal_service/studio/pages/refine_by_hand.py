@@ -33,6 +33,9 @@ class RefineByHand:
         self._model: dict[str, Any] = {}
         self._served: list[tuple[float, float]] = [NEUTRAL]
         """Where the sliders stood at each version made here, the one that is served last."""
+        self._replaced: set[str | None] = set()
+        """Models that were served before a change made here."""
+        self._doubted: str | None = None
         self._busy = False
         with ui.expansion("Refine by hand").classes("refine") as self._part:
             ui.label(WHAT)
@@ -48,8 +51,15 @@ class RefineByHand:
         self._part.set_visibility(False)
 
     async def follow(self, model: str | None) -> None:
-        """The model that is served now."""
+        """The model that is served now, or was when it was asked for."""
+        if self._busy:
+            return
         if model == self._model.get("id"):
+            self._doubted = None
+            return
+        if model in self._replaced and model != self._doubted:
+            # The question may be older than the change; told a second time, it was taken back elsewhere.
+            self._doubted = model
             return
         self._model = {}
         self._begin()
@@ -98,6 +108,7 @@ class RefineByHand:
             self._stand(now)
         else:
             self._served.append(wanted)
+            self._replaced.add(before)
             version = version_name(self._model)
             self._said.set_text(
                 f"{rotation} times {wanted[0]:g}, {wanted[1]:+g} degrees: {version} is served."
@@ -117,6 +128,15 @@ class RefineByHand:
         self._offset.set_value(at[1])
 
     async def _undo(self) -> None:
+        if self._busy:
+            return
+        self._busy = True
+        try:
+            await self._take_back()
+        finally:
+            self._busy = False
+
+    async def _take_back(self) -> None:
         which = {key: self._model.get(key) for key in ("subject", "layout")}
         try:
             back = await self._studio.service.post("/models/rollback", which)
@@ -125,6 +145,7 @@ class RefineByHand:
             return
         self._served = self._served[:-1] or [NEUTRAL]
         self._stand(self._served[-1])
+        self._replaced.add(self._model.get("id"))
         self._model = {**self._model, "id": back["model"]}
         self._said.set_text(f"Taken back: {back['model'][:12]} is served again.")
         await self._video.follow(self._model)
