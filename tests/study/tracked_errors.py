@@ -18,10 +18,12 @@ import numpy as np
 
 from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.drawn.hand_motion import hand_motion
-from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS
+from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS, HandState
 from glovecal_models.colour_glove.pose.error_learning import other_hand, spoilt
+from glovecal_models.colour_glove.pose.hand_shape_fit import fitted_hand_shape
 from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
 from glovecal_models.colour_glove.pose.prepared import prepared_tracker
+from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import posed
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
@@ -34,6 +36,7 @@ FIRST_SEED = 7000
 ASIDE_DEG, AROUND_MM = 60.0, 470.0
 """The second camera looks at the same place from the side."""
 ENTRIES, CLIPS = 20_000, 36
+SHAPE_PICTURES = 30
 PLATEAU_S = (1.5, 3.0)
 """Lags at which what is left of the correlation stays as long as the hand does."""
 
@@ -61,21 +64,32 @@ def cameras(count: int) -> tuple[Camera, ...]:
     return (Camera(), aside)[:count]
 
 
-def tracked(first: HandTracker, number: int, seconds: float = SECONDS) -> TrackedHand:
-    """A hand of its own, followed from frame to frame at stage dense."""
+def tracked(
+    first: HandTracker, number: int, seconds: float = SECONDS, *, fits_shape: bool = False
+) -> TrackedHand:
+    """A hand of its own, followed from frame to frame at stage dense; with the hand assumed, or with the
+    shape that 30 other pictures of it give."""
     hand, rng = (
         other_hand(first.hand.skin, FIRST_SEED + number),
         np.random.default_rng([FIRST_SEED + number, 4]),
     )
-    tracker = HandTracker(first.hand, first.lookup, first.cameras, first.errors, stage="dense")
-    rows = []
-    for frame, state in enumerate(hand_motion(hand, seconds, RATE_HZ, seed=FIRST_SEED + number)):
+
+    def seen(state: HandState) -> list[np.ndarray]:
         placed = posed(hand, state)
-        labels = [
+        return [
             spoilt(rasterise(placed, hand.triangles, camera).painted(first.hand.pattern.colour), rng)
             for camera in first.cameras
         ]
-        pose = tracker.track(labels, frame / RATE_HZ)
+
+    model = first.hand
+    if fits_shape:
+        others = hand_motion(hand, 2.0 * SHAPE_PICTURES, 0.5, seed=FIRST_SEED + 500 + number)
+        shape = fitted_hand_shape(first, [seen(state) for state in others[:SHAPE_PICTURES]])
+        model = PrintedHand(shape.skin, first.hand.pattern)
+    tracker = HandTracker(model, first.lookup, first.cameras, first.errors, stage="dense")
+    rows = []
+    for frame, state in enumerate(hand_motion(hand, seconds, RATE_HZ, seed=FIRST_SEED + number)):
+        pose = tracker.track(seen(state), frame / RATE_HZ)
         if pose is not None:
             error = pose.state.angles_deg - state.angles_deg
             rows.append((frame, state.angles_deg, error, pose.standard_deviation[:20], pose.accepted))
@@ -157,6 +171,9 @@ def main(arguments: Sequence[str]) -> int:
     )
     parser.add_argument("--hands", type=int, default=16, help="each for 10 s (default 16)")
     parser.add_argument("--folder", type=Path, default=Path(".study"), help="for database and table")
+    parser.add_argument(
+        "--shapes", action="store_true", help="each hand's shape is fitted to 30 other pictures of it first"
+    )
     parser.add_argument("--smoke", action="store_true", help="two hands for 2 s, a small database")
     options = parser.parse_args(arguments)
     pin_blas_to_one_thread()
@@ -166,17 +183,21 @@ def main(arguments: Sequence[str]) -> int:
         return 0
     database = options.folder / "colour-glove"
     database.mkdir(parents=True, exist_ok=True)
-    text = report(database, options.hands, SECONDS, entries=ENTRIES, clips=CLIPS)
+    text = report(database, options.hands, SECONDS, entries=ENTRIES, clips=CLIPS, fits_shape=options.shapes)
     print(text)
-    (options.folder / "camera-errors.md").write_text(text, encoding="utf-8")
+    name = "camera-errors-shapes.md" if options.shapes else "camera-errors.md"
+    (options.folder / name).write_text(text, encoding="utf-8")
     return 0
 
 
-def report(database: Path, hands: int, seconds: float, *, entries: int, clips: int) -> str:
+def report(
+    database: Path, hands: int, seconds: float, *, entries: int, clips: int, fits_shape: bool = False
+) -> str:
     text = "# The tracker's errors: rendered label images, hands that are not the model's\n"
     for count, name in ((1, "One camera"), (2, "Two cameras")):
         first = prepared_tracker(database, cameras(count), entries=entries, clips=clips)
-        text += f"\n## {name}\n\n{table([tracked(first, number, seconds) for number in range(hands)])}\n"
+        found = [tracked(first, number, seconds, fits_shape=fits_shape) for number in range(hands)]
+        text += f"\n## {name}\n\n{table(found)}\n"
     return text
 
 
