@@ -33,7 +33,7 @@ class ForwardDesign:
     signals: tuple[Signals, ...]
     """One for each take, own (N, R)."""
     known: tuple[frozenset[str], ...]
-    """Names among ``others`` that the base of each joint reads already."""
+    """Names among ``others`` that the base of each joint reads already, and joints that bend as it does."""
     unit_take: tuple[int, ...]
     """The take of each unit that is left out: a whole take, or a quarter of a short one."""
     used: tuple[tuple[np.ndarray, ...], ...]
@@ -146,7 +146,8 @@ def forward(
         units = with_precision(
             units, [_variance(takes[take], rows, column) for take, rows in zip(unit_take, index, strict=True)]
         )
-        read.append(frozenset({rotation, *neighbours, *item.sensors}))
+        alike = _bending_alike(everything, column, limits.same_angle_share)
+        read.append(frozenset({rotation, *neighbours, *item.sensors, *(names[other] for other in alike)}))
         used.append(tuple(index))
         of_known = [found.prior_sd for found in extra]
         free = np.full(units[0].base.shape[1] - sum(map(len, of_known)), np.inf)
@@ -163,6 +164,15 @@ def _variance(take: ResampledTake, rows: np.ndarray, column: int) -> np.ndarray 
     stated = take.reference_sd[rows, column]
     # Smoothing reaches past the last accepted sample by less than half its width.
     return np.where(np.isfinite(stated), stated, np.nanmax(take.reference_sd[:, column])) ** 2
+
+
+def _bending_alike(angles: np.ndarray, column: int, share: float) -> list[int]:
+    """Other columns of ``angles`` (N, R) that are a cubic of one, but for ``share`` of their deviation."""
+    scale = max(float(angles[:, column].std()), 1e-9)
+    own = np.vander((angles[:, column] - angles[:, column].mean()) / scale, 4)
+    rest = angles - own @ np.linalg.lstsq(own, angles, rcond=None)[0]
+    alike = rest.std(axis=0) < share * angles.std(axis=0)
+    return [int(other) for other in np.flatnonzero(alike) if other != column]
 
 
 def _read_beside(item: Correspondence, names: Sequence[str], layout: Layout) -> list[str]:

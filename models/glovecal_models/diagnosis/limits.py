@@ -36,6 +36,15 @@ class DiagnosisLimits(SignificanceLimits):
         "Belsley, Kuh & Welsch 1980: 30 and more is a strong dependence.",
     )
 
+    same_angle_share: float = limit(
+        0.1,
+        "share of the angle's standard deviation",
+        "A neighbouring joint whose angle is a smooth function of the joint's own to within so much is no"
+        " candidate for its cross-coupling: two noisy measurements of one angle help each other.",
+        "4 of 100 simulated clean gloves, all with PIP and DIP joints that bend together (0.05), were called"
+        " cross-coupled without it (2026-11-23).",
+    )
+
     camera_lean_share: float = limit(
         0.3,
         "stated standard deviations",

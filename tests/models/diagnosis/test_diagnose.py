@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS
 from glovecal_models.diagnosis.text import diagnosis_sentences
 from glovecal_models.effects.base.assessment import block_starts
 from glovecal_models.errors import BadInput, Cancelled
@@ -38,6 +39,18 @@ def test_a_clean_glove_is_left_alone(clean):
     again = diagnose(clean, LAYOUT)
     assert diagnosis_sentences(found) == diagnosis_sentences(again), "the same takes, the same answer"
     assert [item.rmse_deg for item in found.assessments] == [item.rmse_deg for item in again.assessments]
+
+
+@pytest.mark.parametrize("seed", [11, 12])
+def test_two_measurements_of_one_angle_are_no_cross_coupling(seed):
+    """PIP and DIP joints bend together: of two noisy angles each says something of the other's sensor."""
+    sensors = ("I_MCP", "M_PIP", "M_DIP")
+    layout = Layout.from_columns("three", sensors, sensors)
+    takes = record_session(SessionPlan(seed=seed, sensors=sensors, takes_per_wearing=3, take_s=20.0)).takes
+    assert diagnose(takes, layout).named is None
+    named = diagnose(takes, layout, limits=replace(DIAGNOSIS_LIMITS, same_angle_share=0.0)).named
+    assert named is not None
+    assert named.effect == "cross_coupling"
 
 
 @pytest.mark.parametrize(
