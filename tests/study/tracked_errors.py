@@ -19,15 +19,15 @@ import numpy as np
 from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.drawn.hand_motion import hand_motion
 from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS, HandState
-from glovecal_models.colour_glove.pose.error_learning import other_hand, spoilt
-from glovecal_models.colour_glove.pose.hand_shape_fit import fitted_hand_shape
+from glovecal_models.colour_glove.pose.error_learning import ShapeSpread, other_hand, spoilt
+from glovecal_models.colour_glove.pose.hand_shape_fit import HandShape, fitted_hand_shape
 from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
 from glovecal_models.colour_glove.pose.prepared import prepared_tracker
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.rasterise import rasterise
-from glovecal_models.colour_glove.skin import posed
+from glovecal_models.colour_glove.skin import HandSkin, posed
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
-from glovecal_models.simulation.simulated_camera import STATED_SD_DEG, towards_prior
+from glovecal_models.simulation.simulated_camera import ERRORS, towards_prior
 from glovecal_models.threads import pin_blas_to_one_thread
 
 RATE_HZ, SECONDS = 30.0, 10.0
@@ -64,36 +64,37 @@ def cameras(count: int) -> tuple[Camera, ...]:
     return (Camera(), aside)[:count]
 
 
+def fitted(first: HandTracker, number: int) -> HandShape:
+    """From 30 pictures that show it in other poses than those it is judged by."""
+    hand, rng = other_hand(first.hand.skin, FIRST_SEED + number), np.random.default_rng([number, 5])
+    states = hand_motion(hand, 2.0 * SHAPE_PICTURES, 0.5, seed=FIRST_SEED + 500 + number)
+    return fitted_hand_shape(first, [_seen(first, hand, state, rng) for state in states[:SHAPE_PICTURES]])
+
+
 def tracked(
-    first: HandTracker, number: int, seconds: float = SECONDS, *, fits_shape: bool = False
+    first: HandTracker, number: int, seconds: float = SECONDS, *, model: HandSkin | None = None
 ) -> TrackedHand:
-    """A hand of its own, followed from frame to frame at stage dense; with the hand assumed, or with the
-    shape that 30 other pictures of it give."""
-    hand, rng = (
-        other_hand(first.hand.skin, FIRST_SEED + number),
-        np.random.default_rng([FIRST_SEED + number, 4]),
-    )
-
-    def seen(state: HandState) -> list[np.ndarray]:
-        placed = posed(hand, state)
-        return [
-            spoilt(rasterise(placed, hand.triangles, camera).painted(first.hand.pattern.colour), rng)
-            for camera in first.cameras
-        ]
-
-    model = first.hand
-    if fits_shape:
-        others = hand_motion(hand, 2.0 * SHAPE_PICTURES, 0.5, seed=FIRST_SEED + 500 + number)
-        shape = fitted_hand_shape(first, [seen(state) for state in others[:SHAPE_PICTURES]])
-        model = PrintedHand(shape.skin, first.hand.pattern)
-    tracker = HandTracker(model, first.lookup, first.cameras, first.errors, stage="dense")
+    """A hand of its own, followed from frame to frame at stage dense; ``model``: taken for it, without one
+    the hand assumed."""
+    hand = other_hand(first.hand.skin, FIRST_SEED + number)
+    rng = np.random.default_rng([FIRST_SEED + number, 4])
+    taken = first.hand if model is None else PrintedHand(model, first.hand.pattern)
+    tracker = HandTracker(taken, first.lookup, first.cameras, first.errors, stage="dense")
     rows = []
     for frame, state in enumerate(hand_motion(hand, seconds, RATE_HZ, seed=FIRST_SEED + number)):
-        pose = tracker.track(seen(state), frame / RATE_HZ)
+        pose = tracker.track(_seen(first, hand, state, rng), frame / RATE_HZ)
         if pose is not None:
             error = pose.state.angles_deg - state.angles_deg
             rows.append((frame, state.angles_deg, error, pose.standard_deviation[:20], pose.accepted))
     return TrackedHand(*(np.array(column) for column in zip(*rows, strict=True)))
+
+
+def _seen(first: HandTracker, hand: HandSkin, state: HandState, rng: np.random.Generator) -> list[np.ndarray]:
+    placed = posed(hand, state)
+    return [
+        spoilt(rasterise(placed, hand.triangles, camera).painted(first.hand.pattern.colour), rng)
+        for camera in first.cameras
+    ]
 
 
 def table(hands: Sequence[TrackedHand]) -> str:
@@ -119,7 +120,7 @@ def table(hands: Sequence[TrackedHand]) -> str:
         "mean error at little, middle, deep flexion, degrees |",
         "|---|---|---|---|---|---|---|",
     ]
-    for kind in STATED_SD_DEG:
+    for kind in ERRORS:
         columns = [number for number, name in enumerate(FINGER_ROTATIONS) if name.rpartition("_")[2] == kind]
         e, s, a = error[:, columns], sd[:, columns], accepted[:, columns]
         bent = np.column_stack([_bent(FINGER_ROTATIONS[number], truth[:, number]) for number in columns])
@@ -145,6 +146,10 @@ def correlations(hands: Sequence[TrackedHand]) -> tuple[np.ndarray, np.ndarray]:
             products[lag] += np.nansum(both)
             counts[lag] += np.isfinite(both).sum()
     return lags / RATE_HZ, products / np.maximum(counts, 1) / (products[0] / max(counts[0], 1))
+
+
+def _percent(spread: ShapeSpread) -> str:
+    return f"{100 * spread.bones:.1f} % of bones and {100 * spread.overall:.1f} % of the size"
 
 
 def _lean(score: np.ndarray, lean: np.ndarray) -> float:
@@ -196,7 +201,16 @@ def report(
     text = "# The tracker's errors: rendered label images, hands that are not the model's\n"
     for count, name in ((1, "One camera"), (2, "Two cameras")):
         first = prepared_tracker(database, cameras(count), entries=entries, clips=clips)
-        found = [tracked(first, number, seconds, fits_shape=fits_shape) for number in range(hands)]
+        models: list[HandSkin | None] = [None] * hands
+        if fits_shape:
+            shapes = [fitted(first, number) for number in range(hands)]
+            models = [shape.skin for shape in shapes]
+            left = [sd**2 for shape in shapes for sd in shape.bones_sd.values()]
+            size = np.sqrt(np.mean([shape.size_sd**2 for shape in shapes]))
+            spread = ShapeSpread.after_fit(float(size), [float(np.sqrt(np.mean(left)))])
+            first = prepared_tracker(database, cameras(count), spread=spread, entries=entries, clips=clips)
+            text += f"\n{name}: the fit leaves {_percent(spread)} open.\n"
+        found = [tracked(first, number, seconds, model=model) for number, model in enumerate(models)]
         text += f"\n## {name}\n\n{table(found)}\n"
     return text
 

@@ -17,6 +17,7 @@ from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.pattern import printed_pattern
 from glovecal_models.colour_glove.pictures.classify import ColourTable
 from glovecal_models.colour_glove.pictures.picture_check import PictureCheck
+from glovecal_models.colour_glove.pose.error_learning import PEOPLE, ShapeSpread
 from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
 from glovecal_models.colour_glove.pose.prepared import prepared_tracker
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
@@ -85,7 +86,7 @@ def tracking_setup(
 
     Raises DeviceLost where no picture comes, BadInput for files that cannot be used, Cancelled.
     """
-    skin = _skin(settings)
+    skin, spread = _skin(settings)
     hand = PrintedHand(skin, printed_pattern())
     built = tuple(
         camera_source(source, lambda: RenderedGlove(hand, ASSUMED)) if isinstance(source, str) else source
@@ -93,10 +94,10 @@ def tracking_setup(
     )
     cameras = _cameras(settings, built)
     first = prepared_tracker(
-        settings.folder, cameras, skin=skin, pattern=hand.pattern, entries=settings.entries,
-        clips=settings.clips, report=report, cancelled=cancelled,
+        settings.folder, cameras, skin=skin, pattern=hand.pattern, spread=spread,
+        entries=settings.entries, clips=settings.clips, report=report, cancelled=cancelled,
     )  # fmt: skip
-    made_from = repr((first.lookup.database.folder.name, cameras, settings.clips))
+    made_from = repr((first.lookup.database.folder.name, cameras, spread, settings.clips))
     check = PictureCheck(first.lookup)
     _ = check.distance_limit_px2  # takes a moment: not while pictures wait
     is_known = settings.calibration is not None or built[0].name == RENDERED
@@ -105,14 +106,15 @@ def tracking_setup(
     return TrackingSetup(built, hand, cameras, is_known, table, check, first, made_from)
 
 
-def _skin(settings: TrackingSettings) -> HandSkin:
+def _skin(settings: TrackingSettings) -> tuple[HandSkin, ShapeSpread]:
+    """The hand to be tracked, and how far the one that is seen may be from it."""
     if settings.shape is None:
         sizes = HandDimensions.from_measured(settings.sizes_mm)
-        return hand_skin(hand_skeleton(sizes, "left" if settings.hand == "left" else "right"))
+        return hand_skin(hand_skeleton(sizes, "left" if settings.hand == "left" else "right")), PEOPLE
     shape = read_shape(settings.shape)
     if shape.hand != settings.hand:
         raise BadInput(f"{settings.shape} is of a {shape.hand} hand; the {settings.hand} one wears the glove")
-    return shape.skin()
+    return shape.skin(), ShapeSpread.after_fit(shape.size_sd, shape.bones_sd.values())
 
 
 def _size(source: PictureSource) -> tuple[int, int]:

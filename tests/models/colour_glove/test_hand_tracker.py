@@ -11,7 +11,14 @@ from glovecal_models.colour_glove.database import PoseDatabase
 from glovecal_models.colour_glove.drawn.hand_motion import hand_motion
 from glovecal_models.colour_glove.lookup import PoseLookup
 from glovecal_models.colour_glove.pattern import glove_pattern
-from glovecal_models.colour_glove.pose.error_learning import learned_errors, other_hand, spoilt
+from glovecal_models.colour_glove.pose.error_learning import (
+    PEOPLE,
+    ShapeSpread,
+    errors_file,
+    learned_errors,
+    other_hand,
+    spoilt,
+)
 from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
 from glovecal_models.colour_glove.pose.learned_errors import LearnedErrors, fitted_scale
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
@@ -149,6 +156,19 @@ def test_learned_errors_are_kept_and_wrong_files_refused(errors: LearnedErrors, 
         LearnedErrors(errors.blend_covariance, errors.speed, {}).deviation("ik", False, np.ones(26), 0.1)
     with pytest.raises(Cancelled):
         learned_errors(HAND, lookup, CAMERAS, clips=5, workers=1, cancelled=lambda: True)
+
+
+def test_a_fitted_shape_has_errors_of_its_own(lookup):
+    """Its bones are better known than people's; radii gain as much, the size counts apart."""
+    left = ShapeSpread.after_fit(0.004, [0.011, 0.016])
+    assert left.bones == pytest.approx(np.sqrt(np.mean([0.011**2, 0.016**2]) - 0.004**2))
+    assert left.radii / left.bones == pytest.approx(PEOPLE.radii / PEOPLE.bones)
+    assert left.overall == 0.004
+    assert ShapeSpread.after_fit(0.05, [0.049]).bones == 0.0
+    usual = errors_file(HAND, lookup, CAMERAS, 3)
+    assert (
+        errors_file(HAND, lookup, CAMERAS, 3, left) != usual == errors_file(HAND, lookup, CAMERAS, 3, PEOPLE)
+    )
 
 
 def test_a_scale_is_found_again():

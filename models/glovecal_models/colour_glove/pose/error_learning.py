@@ -10,9 +10,10 @@ are learned once.
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from functools import partial
@@ -44,8 +45,6 @@ from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.progress import Cancel, Report, part, stop_if
 from glovecal_models.threads import begin_worker
 
-BONES, RADII, OVERALL = 0.045, 0.05, 0.02
-"""Relative standard deviations of another hand's bones, radii and size about the measured ones."""
 CLIPS = 24
 """Each with a hand of its own."""
 _APART, _CLOSE = (20, 1.5), (24, 30.0)
@@ -57,20 +56,37 @@ _FORMAT = 2
 _LEAST_PIXELS = 400
 
 
-def other_hand(
-    skin: HandSkin, seed: int, bones: float = BONES, radii: float = RADII, overall: float = OVERALL
-) -> HandSkin:
+@dataclass(frozen=True)
+class ShapeSpread:
+    """Relative standard deviations of hands about their model; by default those between people."""
+
+    bones: float = 0.045
+    radii: float = 0.05
+    overall: float = 0.02
+
+    @classmethod
+    def after_fit(cls, size_sd: float, bones_sd: Collection[float]) -> ShapeSpread:
+        """What a fitted shape leaves open; ``bones_sd`` hold the size's share, radii gain as bones do."""
+        bones = math.sqrt(max(0.0, sum(sd**2 for sd in bones_sd) / len(bones_sd) - size_sd**2))
+        return cls(bones, bones * cls.radii / cls.bones, size_sd)
+
+
+PEOPLE = ShapeSpread()
+"""Of hands whose shape was not fitted."""
+
+
+def other_hand(skin: HandSkin, seed: int, spread: ShapeSpread = PEOPLE) -> HandSkin:
     """A hand like ``skin``'s but for its bones, radii and size: what a model of this hand may be wrong by."""
     rng = np.random.default_rng([seed, 3])
-    sizes, grown = skin.skeleton.dimensions.sizes_mm, 1.0 + overall * rng.standard_normal()
+    sizes, grown = skin.skeleton.dimensions.sizes_mm, 1.0 + spread.overall * rng.standard_normal()
     whole = ("hand_length", "hand_breadth")
     changed = {
-        name: float(size * grown * (1.0 if name in whole else 1.0 + bones * rng.standard_normal()))
+        name: float(size * grown * (1.0 if name in whole else 1.0 + spread.bones * rng.standard_normal()))
         for name, size in sizes.items()
     }
     skeleton = hand_skeleton(HandDimensions.from_measured(changed), skin.skeleton.hand)
     share = skeleton.dimensions.hand_length_mm / hand_skin().skeleton.dimensions.hand_length_mm
-    thicker = {name: 1.0 + radii * rng.standard_normal() for name in RADII_MM}
+    thicker = {name: 1.0 + spread.radii * rng.standard_normal() for name in RADII_MM}
     return hand_skin(
         skeleton,
         {
@@ -104,30 +120,34 @@ def learned_errors(
     lookup: PoseLookup,
     cameras: Sequence[Camera],
     *,
+    spread: ShapeSpread = PEOPLE,
     clips: int = CLIPS,
     workers: int | None = None,
     report: Report | None = None,
     cancelled: Cancel | None = None,
 ) -> LearnedErrors:
     """Those of this hand, database and cameras: loaded from beside the database, or learned and kept there.
+    ``spread``: how far the hand that is seen may be from the model.
 
     Raises BadInput, Cancelled.
     """
-    file = errors_file(hand, lookup, cameras, clips)
+    file = errors_file(hand, lookup, cameras, clips, spread)
     if file.exists():
         try:
             return LearnedErrors.load(file)
         except BadInput:
             file.unlink()
     said = part(report, 0.0, 0.25)
-    steps = _over_clips(partial(_blend_errors, hand, lookup, cameras), clips, workers, said, cancelled)
+    steps = _over_clips(
+        partial(_blend_errors, hand, lookup, cameras, spread), clips, workers, said, cancelled
+    )
     blends = np.concatenate(steps)
     covariance = blends.T @ blends / len(blends) + np.eye(DEGREES_OF_FREEDOM)
     speed = _speed(hand.skin, clips)
     first = LearnedErrors.as_posterior(covariance, speed)
     said = part(report, 0.25, 0.6)
     colours = drawn_colours(hand)
-    job = partial(_errors_alone, hand, lookup, cameras, colours, first)
+    job = partial(_errors_alone, hand, lookup, cameras, spread, colours, first)
     alone = _over_clips(job, clips, workers, said, cancelled)
     scales = {}
     for stage in STAGES:
@@ -140,7 +160,7 @@ def learned_errors(
     )
     said = part(report, 0.6, 1.0)
     # A followed answer differs from one alone only while a hand is followed: half the clips tell enough.
-    job = partial(_errors_followed, hand, lookup, cameras, colours, first)
+    job = partial(_errors_followed, hand, lookup, cameras, spread, colours, first)
     followed = _over_clips(job, -(-clips // 2), workers, said, cancelled)
     for stage in ("ik", "dense"):
         scales[scale_name(stage, True)] = fitted_scale(*_joined(followed, stage))
@@ -151,9 +171,16 @@ def learned_errors(
     return found
 
 
-def errors_file(hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], clips: int) -> Path:
+def errors_file(
+    hand: PrintedHand,
+    lookup: PoseLookup,
+    cameras: Sequence[Camera],
+    clips: int,
+    spread: ShapeSpread = PEOPLE,
+) -> Path:
     """Where they are kept: beside the database, named after what they were learned with."""
-    found = hashlib.sha256(repr((_FORMAT, clips, lookup.database.folder.name, tuple(cameras))).encode())
+    name = (_FORMAT, clips, lookup.database.folder.name, tuple(cameras), spread)
+    found = hashlib.sha256(repr(name).encode())
     for array in (hand.skin.vertices_mm, hand.pattern.colour_of_patch):
         found.update(np.ascontiguousarray(array).tobytes())
     return lookup.database.folder / f"errors-{found.hexdigest()[:20]}.npz"
@@ -193,11 +220,11 @@ class _Clip:
 
 
 def _clip(
-    hand: PrintedHand, cameras: Sequence[Camera], colours: ColourTable | None, seed: int,
+    hand: PrintedHand, cameras: Sequence[Camera], spread: ShapeSpread, colours: ColourTable | None, seed: int,
     frames: int, rate_hz: float,
 ) -> _Clip:  # fmt: skip
     """``colours`` None: labels are rendered and spoilt; else they are classified on photographs."""
-    other, rng = other_hand(hand.skin, seed), np.random.default_rng([seed, 4])
+    other, rng = other_hand(hand.skin, seed, spread), np.random.default_rng([seed, 4])
     seconds = np.arange(frames) / rate_hz
     states = hand_motion(other, frames / rate_hz, rate_hz, seed=seed)[:frames]
     look = Photography(exposure=float(rng.uniform(0.8, 1.1)), arm=("skin", "sleeve")[seed % 2])
@@ -230,10 +257,12 @@ def _at_the_end_of_exposure(states: Sequence[HandState], index: int, rate_hz: fl
     return states[index].moved(_EXPOSURE_S * rate_hz * states[index + 1].step_from(states[index]))
 
 
-def _blend_errors(hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], clip: int) -> np.ndarray:
+def _blend_errors(
+    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], spread: ShapeSpread, clip: int
+) -> np.ndarray:
     plain = LearnedErrors.as_posterior(np.eye(DEGREES_OF_FREEDOM), np.ones(DEGREES_OF_FREEDOM))
     tracker = HandTracker(hand, lookup, cameras[:1], plain, stage="blend")
-    made = _clip(hand, cameras[:1], None, 1000 + clip, 2 * _APART[0], _APART[1])
+    made = _clip(hand, cameras[:1], spread, None, 1000 + clip, 2 * _APART[0], _APART[1])
     steps = []
     for state, views in zip(made.states, made.pictures, strict=True):
         glimpse = tracker.glimpse(views[0], cameras[0])
@@ -246,25 +275,26 @@ _Errors = dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]
 
 
 def _errors_alone(
-    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], colours: ColourTable,
-    errors: LearnedErrors, clip: int,
+    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], spread: ShapeSpread,
+    colours: ColourTable, errors: LearnedErrors, clip: int,
 ) -> _Errors:  # fmt: skip
-    return _errors(hand, lookup, cameras, colours, errors, clip, STAGES, False, _APART)
+    return _errors(hand, lookup, cameras, spread, colours, errors, clip, STAGES, False, _APART)
 
 
 def _errors_followed(
-    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], colours: ColourTable,
-    errors: LearnedErrors, clip: int,
+    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], spread: ShapeSpread,
+    colours: ColourTable, errors: LearnedErrors, clip: int,
 ) -> _Errors:  # fmt: skip
-    return _errors(hand, lookup, cameras, colours, errors, clip, ("ik", "dense"), True, _CLOSE)
+    return _errors(hand, lookup, cameras, spread, colours, errors, clip, ("ik", "dense"), True, _CLOSE)
 
 
 def _errors(
-    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], colours: ColourTable,
-    errors: LearnedErrors, clip: int, stages: Sequence[str], follows: bool, frames: tuple[int, float],
+    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], spread: ShapeSpread,
+    colours: ColourTable, errors: LearnedErrors, clip: int, stages: Sequence[str], follows: bool,
+    frames: tuple[int, float],
 ) -> _Errors:  # fmt: skip
     """Per stage: errors (N, 26), posterior deviations (N, 26), disagreeing shares (N,)."""
-    made, found = _clip(hand, cameras, colours, 2000 + clip, *frames), {}
+    made, found = _clip(hand, cameras, spread, colours, 2000 + clip, *frames), {}
     for stage in stages:
         tracker = HandTracker(hand, lookup, cameras, errors, stage=stage, follows=follows)
         rows = defaultdict(list)

@@ -16,7 +16,7 @@ import numpy as np
 
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, FINGER_ROTATIONS, HandState
 from glovecal_models.colour_glove.pose.dense import joint_equations, refine_by_labels
-from glovecal_models.colour_glove.pose.error_learning import BONES, RADII
+from glovecal_models.colour_glove.pose.error_learning import PEOPLE
 from glovecal_models.colour_glove.pose.gaussian_step import Belief
 from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
 from glovecal_models.colour_glove.pose.window_view import PrintedHand, WindowView
@@ -123,7 +123,7 @@ def fitted_hand_shape(
             f"{len(frames)} of {len(chosen)} pictures show a hand whose pose is understood; the shape needs "
             f"at least {FEWEST_PICTURES}, of different poses, the whole glove in view"
         )
-    prior = np.array([size_sd] + [BONES] * len(_BONES) + [RADII] * len(RADII_MM)) ** -2.0
+    prior = np.array([size_sd] + [PEOPLE.bones] * len(_BONES) + [PEOPLE.radii] * len(RADII_MM)) ** -2.0
     values, hand = np.zeros(len(PARAMETERS)), alone.hand
     covariance = np.diag(1.0 / prior)
     for done in range(rounds):

@@ -10,7 +10,7 @@ from glovecal_models.colour_glove.codes.pca import pca_code
 from glovecal_models.colour_glove.database import ENTRIES, DatabaseSettings, pose_database
 from glovecal_models.colour_glove.lookup import PoseLookup
 from glovecal_models.colour_glove.pattern import Pattern, printed_pattern
-from glovecal_models.colour_glove.pose.error_learning import CLIPS, learned_errors
+from glovecal_models.colour_glove.pose.error_learning import CLIPS, PEOPLE, ShapeSpread, learned_errors
 from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.pose_set import PAPER_COUNT, generated_poses
@@ -24,6 +24,7 @@ def prepared_tracker(
     *,
     skin: HandSkin | None = None,
     pattern: Pattern | None = None,
+    spread: ShapeSpread = PEOPLE,
     entries: int = ENTRIES,
     clips: int = CLIPS,
     stage: str = "dense",
@@ -33,7 +34,7 @@ def prepared_tracker(
     cancelled: Cancel | None = None,
 ) -> HandTracker:
     """``skin``: the hand to be seen; without one the assumed right hand. ``pattern``: what its glove shows;
-    without one what ``glovecal camera sheets`` prints.
+    without one what ``glovecal camera sheets`` prints. ``spread``: how far the hand may be from ``skin``.
 
     The database takes about half a minute on two cores, what is learned of its errors a minute; afterwards
     both are read. Raises BadInput, Cancelled.
@@ -49,6 +50,7 @@ def prepared_tracker(
         hand,
         lookup,
         cameras,
+        spread=spread,
         clips=clips,
         workers=workers,
         report=part(report, 0.3, 1.0),
