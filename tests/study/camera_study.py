@@ -1,8 +1,8 @@
 """``python3 do.py study camera``: is a camera as good a reference as true angles?
 
 Gloves and camera are simulated; no picture is made. What the camera's errors are like was measured on
-rendered pictures (``simulation/simulated_camera.py``); a few gloves are seen by a better camera too. Clock
-offsets, the error of a calibration in a second wearing, hidden effects judged by the camera, clean gloves.
+rendered pictures (``simulation/simulated_camera.py``). Clock offsets, the error of a calibration in a second
+wearing, hidden effects judged by the camera, clean gloves.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from camera_gloves import CAMERA_SIZE, TRUE_SIZE, CalibratedGlove, CameraGlove, 
 from intervals import wilson
 
 from glovecal_models.calibration.training_settings import Method
-from glovecal_models.simulation.simulated_camera import CALIBRATED
 from glovecal_models.threads import pin_blas_to_one_thread
 
 GLOVES = {
@@ -76,10 +75,6 @@ def tasks(gloves: int, clean: int, clocks: int) -> Iterator[Callable[[], dict[st
                     "part": "calibration",
                     **CalibratedGlove(n).of_cyberglove(m),
                 }
-        if number < 10:
-            yield lambda n=number: {"part": "calibrated", **CameraGlove("none", n, CALIBRATED).named()}
-        for effect in EFFECTS if number < min(gloves, 5) else ():
-            yield lambda n=number, e=effect: {"part": "seen", **CameraGlove(e, n, CALIBRATED).named()}
 
 
 def table(answers: Sequence[Answer]) -> str:
@@ -128,32 +123,28 @@ def _hidden_rows(answers: Sequence[Answer]) -> Iterator[str]:
     for effects in ((effect,) for effect in EFFECTS):
         yield from _hidden_row(answers, effects)
     yield from _hidden_row(answers, EFFECTS)
-    yield from _hidden_row(answers, EFFECTS, "seen", " (a better camera)")
 
 
-def _hidden_row(
-    answers: Sequence[Answer], effects: Sequence[str], part: str = "hidden", camera: str = ""
-) -> Iterator[str]:
-    found = [item for item in _of(answers, part) if item["effect"] in effects]
+def _hidden_row(answers: Sequence[Answer], effects: Sequence[str]) -> Iterator[str]:
+    found = [item for item in _of(answers, "hidden") if item["effect"] in effects]
     if found:
         true, seen = (sum(item[kind] == item["effect"] for item in found) for kind in ("true", "camera"))
         yield (
-            f"| {' or '.join(effects)} named{camera} | by the camera at {CAMERA_SIZE} floors "
+            f"| {' or '.join(effects)} named | by the camera at {CAMERA_SIZE} floors "
             f"{_share(seen, len(found))}; by a true reference at {TRUE_SIZE} {_share(true, len(found))} "
             "| within 10 points |"
         )
 
 
 def _clean_rows(answers: Sequence[Answer]) -> Iterator[str]:
-    for part, what in (("clean", "clean gloves"), ("calibrated", "clean gloves, a better camera")):
-        found = _of(answers, part)
-        if found:
-            true, seen = (sum(item[kind] is not None for item in found) for kind in ("true", "camera"))
-            alarms = sum(item["alarm_camera"] for item in found)
-            yield (
-                f"| {what}: an effect is named | by the camera {seen} of {len(found)} (and {alarms} "
-                f"unexplained residuals); by a true reference {true} | 1 of 60 |"
-            )
+    found = _of(answers, "clean")
+    if found:
+        true, seen = (sum(item[kind] is not None for item in found) for kind in ("true", "camera"))
+        alarms = sum(item["alarm_camera"] for item in found)
+        yield (
+            f"| clean gloves: an effect is named | by the camera {seen} of {len(found)} (and {alarms} "
+            f"unexplained residuals); by a true reference {true} | 1 of 60 |"
+        )
 
 
 def _share(count: int, total: int) -> str:

@@ -138,7 +138,7 @@ CALIBRATED = SimulatedCamera(
     stated_times=0.7, spread=0.0, flexion_times=4.0, away_times=2.0, lasting_s=0.3, lean=0.5, stays=0.0,
     accepted_below_deg=2.5, over_stated=1.0,
 )  # fmt: skip
-"""A better camera than was measured: errors as large as stated, which grow with flexion."""
+"""Not the one that was measured: errors as large as stated, which grow with flexion."""
 
 
 def _of_kind(name: str) -> JointErrors:
