@@ -21,6 +21,7 @@ OF_DO_PY |= {"--set-aside": "tests/study/study.py", "--gloves": "tests/bench/str
 OF_DO_PY |= dict.fromkeys(("--limits", "--minutes", "--page"), "tests/study/study.py")
 OF_DO_PY["--simulated"] = "client/examples/stream/hand_stream.py"
 OF_DO_PY["--confusion"] = "client/examples/spell.py"
+OF_DO_PY["--shapes"] = "tests/study/tracked_errors.py"
 COMMAND = typer.main.get_command(app)
 
 

@@ -21,7 +21,7 @@ def test_limits_are_read_by_name(tmp_path):
     limits = read_limits(file)
     assert (limits.diagnosis.clear_share, limits.comparison.at_floor_times) == (0.3, 1.1)
     assert other_limits(limits) == {"diagnosis.clear_share": 0.3, "comparison.at_floor_times": 1.1}
-    assert other_limits(limits_from({"improvement": {"least_gain": 0.05}})) == {}
+    assert other_limits(limits_from({"improvement": {"least_gain": 0.08}})) == {}
 
 
 @pytest.mark.parametrize(

@@ -15,9 +15,6 @@ from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.catalogue import effect
 from glovecal_models.errors import BadInput
-from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES, forms
-from glovecal_models.simulation.causes.form import Cause
-from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 
 RATE_HZ = 50
@@ -61,7 +58,7 @@ def _of_name(name: str) -> Schematic | None:
 
 def _made(known: Effect) -> Schematic | None:
     shown = _by_columns(known) if known.has_columns else None
-    return _by_simulation(known) if shown is None and known.name in KNOWN_CAUSES else shown
+    return _by_simulation(known) if shown is None else shown
 
 
 def _time_label(known: Effect) -> str:
@@ -113,7 +110,14 @@ def _ramp_and_hold(known: Effect, number: int) -> Signals:
 
 
 def _by_simulation(known: Effect) -> Schematic | None:
-    """A simulated glove with and without the cause, where it does most."""
+    """A simulated glove with and without the cause, where it does most; None where nobody simulates it."""
+    # Slow to load, with scipy.signal, and every command and service loads this file.
+    from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES, forms
+    from glovecal_models.simulation.causes.form import Cause
+    from glovecal_models.simulation.session import record_session
+
+    if known.name not in KNOWN_CAUSES:
+        return None
     session = record_session(SIMULATED, [Cause(known.name, forms(known.name)[0].name, strength_deg=6.0)])
     take, clean = session.takes[0], session.clean[0]
     label, pair = "reading", (clean.readings, take.readings)
