@@ -2,7 +2,8 @@
 
 Several plays (Prandtl-Ishlinskii): the play of half-width r follows the joint only after it has moved 2 r
 back. The inverse of such a sum is again one (Kuhnen 2003), so the same columns undo it. The columns are play
-minus joint, which are bounded by r and zero for a width of zero.
+minus joint, which are bounded by r and zero for a width of zero. To be named it has their products with the
+joint too: loops may be wider at one end, or cross in mid-range (butterfly).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from glovecal_models.effects.base.facts import Parameter, Rival, Settings
 from glovecal_models.effects.base.history_effect import ArrayStateEffect
+from glovecal_models.effects.base.joint_units import fit_joint_units, in_joint_units
 from glovecal_models.effects.base.motions import RAMPS
 from glovecal_models.effects.base.signals import Signals
 
@@ -47,7 +49,11 @@ class Hysteresis(ArrayStateEffect):
         spread = np.sqrt(np.mean([take.own.var(axis=0) for take in takes], axis=0))
         return np.array(WIDEST_SHARES)[:, None, None] * spread[None, :, None]
 
+    def fit_constants(self, takes: Sequence[Signals]) -> Settings:
+        return fit_joint_units(takes)
+
     def fit_repair_constants(self, takes: Sequence[Signals]) -> Settings:
+        """A learned form brings the products with the joint."""
         return {"widths": list(REPAIR_WIDTHS)}
 
     def start(self, own: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
@@ -65,7 +71,7 @@ class Hysteresis(ArrayStateEffect):
         joint = own[..., None]
         np.minimum(joint + width, state, out=state)
         np.maximum(joint - width, state, out=state)
-        return state - joint
+        return _beside_products(state - joint, own, settings)
 
     def run_takes(
         self, state: np.ndarray, elapsed_s: np.ndarray, own: np.ndarray, settings: Settings, shape: np.ndarray
@@ -82,7 +88,8 @@ class Hysteresis(ArrayStateEffect):
             np.maximum(low, play, out=play)
             before = play
         state[...] = before.reshape(state.shape)
-        return np.subtract(plays, joint, out=plays).reshape(len(own), *state.shape)
+        loops = np.subtract(plays, joint, out=plays).reshape(len(own), *state.shape)
+        return _beside_products(loops, own, settings)
 
     def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
         widths = list(enumerate(_widths(settings)))
@@ -90,11 +97,23 @@ class Hysteresis(ArrayStateEffect):
         return {f"play {width:g}": columns[:, :, at] for at, width in widths[every - 1 :: every]}
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
-        return tuple(f"play_{width:g}_of_widest_deg_per_deg" for width in _widths(settings))
+        names = tuple(f"play_{width:g}_of_widest_deg_per_deg" for width in _widths(settings))
+        return (*names, *(f"{name}_per_sd" for name in names)) if _has_products(settings) else names
 
 
 def _widths(settings: Settings) -> Sequence[float]:
     return settings.get("widths", WIDTHS)
+
+
+def _has_products(settings: Settings) -> bool:
+    return "own_scale_deg" in settings
+
+
+def _beside_products(loops: np.ndarray, own: np.ndarray, settings: Settings) -> np.ndarray:
+    """``loops`` (..., L, C) and, where the settings have the joint's units, their products with it."""
+    if not _has_products(settings):
+        return loops
+    return np.concatenate([loops, loops * in_joint_units(own, settings)[..., None]], axis=-1)
 
 
 def _turns(take: Signals) -> int:

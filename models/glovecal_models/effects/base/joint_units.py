@@ -24,8 +24,8 @@ def fit_joint_units(takes: Sequence[Signals]) -> Settings:
 
 
 def in_joint_units(own: np.ndarray, settings: Settings) -> np.ndarray:
-    """(N, L) standard deviations from the centre; lanes may be the settled ones several times over."""
-    lanes = own.shape[1]
+    """(..., L) standard deviations from the centre; lanes may be the settled ones several times over."""
+    lanes = own.shape[-1]
     scale = on_lanes(settings["own_scale_deg"], lanes)
     return (own - on_lanes(settings["own_centre_deg"], lanes)) / np.maximum(scale, 1e-6)
 

@@ -1,4 +1,4 @@
-"""The end of a sensor's range in which it no longer says where the joint is, and how unsure that leaves it.
+"""The part of a sensor's range in which it no longer says where the joint is, and how unsure that leaves it.
 
 Before anything is learned the whole band counts as unsure as the reference spreads in it. From errors on
 held-out takes the band and its neighbours get a standard deviation for each narrow step of readings: a sensor
@@ -32,9 +32,9 @@ class SaturatedBand:
     low: float
     high: float
     """Raw readings; the open end is the sensor's own."""
-    end: Literal["low", "high"]
+    end: Literal["low", "high", "middle"]
     towards: int
-    """+1 when the true angle may be larger than predicted, -1 when smaller."""
+    """+1 when the true angle may be larger than predicted, -1 when smaller, 0 in a dead band in mid-range."""
     extra_sd_deg: float
     """What the reference spreads in the band beyond what it does in the next one."""
     piled_up: float
@@ -56,7 +56,9 @@ class SaturatedBand:
         return steps[np.minimum(self._step(readings), len(steps) - 1)]
 
     def depth(self, readings: np.ndarray) -> np.ndarray:
-        """(N,) how far from the open end, counts; not negative."""
+        """(N,) how far from the open end, counts; not negative. Of a dead band twice that from its middle."""
+        if self.end == "middle":
+            return np.abs(2.0 * readings - self.low - self.high)
         return np.maximum(self.high - readings if self.end == "high" else readings - self.low, 0.0)
 
     def is_near(self, readings: np.ndarray) -> np.ndarray:

@@ -1,9 +1,10 @@
-"""Saturation: near one end of its range the sensor stops responding.
+"""Saturation: near one end of its range, or in a dead band within it, the sensor stops responding.
 
 Found by bands of 4 % of a sensor's range. In the end band readings pile up, and the reference there spreads
 more than one band's worth of angles. Where the reference rests too, it is a posture. A curve that becomes
 flat looks the same as a clipped one, and what was lost is the same: inside the band the angle is known on one
-side only. The interval there has to cover what the reference was seen to do.
+side only. The interval there has to cover what the reference was seen to do. A dead band is told from a hand
+that rests, or a sensor that drops out to one value, by angles that differ on its two sides.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ PILED_UP = 3.0
 SPREAD = 2.0
 LEAST_FRAMES = 30
 LEAST_VISITS = 4
+MIDDLE_BAND, CROSSED = 0.02, 2.0
+"""Of a dead band: its share of the range, and how far apart the angles beside it are, in its own spread."""
 MOVES_SHARE = 0.25
 """Of the reference's spread in the band, to be seen within visits to it: else the hand only rested there."""
 LEAST_EXTRA_DEG = 2.0
@@ -34,7 +37,9 @@ LEAST_NOISE_SHARE, MOST_NOISE_SHARE = 0.05, 2.0
 
 class Saturation(IntervalEffect):
     name = "saturation"
-    explanation = "The sensor stops responding near the end of its range: further bending is not seen."
+    explanation = (
+        "The sensor stops responding near the end of its range, or in a part of it: bending is not seen."
+    )
     source = "clipped converter or fully stretched sensor; bands: study of missing effects"
     rivals: ClassVar = (Rival("nonlinearity", RAMPS),)
 
@@ -106,7 +111,7 @@ def _noise_share(bands: Sequence[SaturatedBand], held_out: Sequence[ClaimedError
 
 
 def saturated_bands(takes: Sequence[Take], sensor_of: Mapping[str, str]) -> tuple[SaturatedBand, ...]:
-    """The bands in which sensors stop responding, at most two for each rotation."""
+    """The bands in which sensors stop responding, at most three for each rotation."""
     found = []
     for rotation, sensor in sensor_of.items():
         pairs = [
@@ -122,6 +127,9 @@ def saturated_bands(takes: Sequence[Take], sensor_of: Mapping[str, str]) -> tupl
             band = _end_band(sensor, rotation, readings[known], angles[known], sign)
             if band is not None:
                 found.append(band)
+        band = _middle_band(sensor, rotation, readings[known], angles[known])
+        if band is not None:
+            found.append(band)
     return tuple(found)
 
 
@@ -159,6 +167,44 @@ def _end_band(
     )  # fmt: skip
 
 
+def _middle_band(
+    sensor: str, rotation: str, readings: np.ndarray, angles: np.ndarray
+) -> SaturatedBand | None:
+    """The narrow band away from the ends in which most readings pile up, if it is dead."""
+    if len(readings) < LEAST_FRAMES:
+        return None
+    bottom, top = np.percentile(readings, [0.1, 99.9])
+    width = MIDDLE_BAND * (top - bottom)
+    if width <= 0:
+        return None
+    steps = np.histogram(readings, np.arange(bottom, top + width, width / 2))[0]
+    pairs, margin = steps[:-1] + steps[1:], round(2 * 2 * BAND / MIDDLE_BAND)
+    if len(pairs) <= 2 * margin:
+        return None
+    beside = sum(np.roll(pairs, shift) for shift in (-6, -4, 4, 6)) / 4
+    ratio = pairs / np.maximum(beside, 1.0)
+    at = margin + int(np.argmax(ratio[margin:-margin]))
+    low, high = bottom + at * width / 2, bottom + at * width / 2 + width
+    inside = (readings >= low) & (readings < high)
+    below = (readings < low - 0.5 * width) & (readings >= low - 2.5 * width)
+    above = (readings >= high + 0.5 * width) & (readings < high + 2.5 * width)
+    if min(inside.sum(), below.sum(), above.sum()) < LEAST_FRAMES:
+        return None
+    piled_up = 4.0 * inside.sum() / (below.sum() + above.sum())
+    spread, usual = float(angles[inside].std()), float(max(angles[below].std(), angles[above].std()))
+    crossed = abs(float(np.median(angles[above]) - np.median(angles[below])))
+    if piled_up <= PILED_UP or spread <= SPREAD * usual or crossed < CROSSED * spread:
+        return None
+    extra = float(np.sqrt(spread**2 - usual**2))
+    visits = np.cumsum(np.diff(inside, prepend=False) != 0)[inside]
+    if extra < LEAST_EXTRA_DEG or _moves_within(visits, angles[inside]) < MOVES_SHARE * spread:
+        return None
+    return SaturatedBand(
+        sensor, rotation, float(low), float(high), "middle", 0, extra, float(piled_up),
+        spread / max(usual, 1e-9), int(inside.sum()),
+    )  # fmt: skip
+
+
 def _moves_within(visits: np.ndarray, angles: np.ndarray) -> float:
     """Spread of angles (M,) about the mean of each of the numbered visits (M,); 0 for too few visits."""
     _, number = np.unique(visits, return_inverse=True)
@@ -170,7 +216,11 @@ def _moves_within(visits: np.ndarray, angles: np.ndarray) -> float:
 
 
 def _finding(band: SaturatedBand) -> Finding:
-    side = f"from {band.low:.4g} upwards" if band.end == "high" else f"from {band.high:.4g} downwards"
+    side = {
+        "high": f"from {band.low:.4g} upwards",
+        "low": f"from {band.high:.4g} downwards",
+        "middle": f"between {band.low:.4g} and {band.high:.4g}",
+    }[band.end]
     sentence = (
         f"{band.sensor}: the sensor stops responding here, {side}; {band.rotation} spreads by "
         f"{band.extra_sd_deg:.1f} deg there unseen. Nothing brings it back; the interval becomes wider."
