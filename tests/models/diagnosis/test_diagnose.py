@@ -65,6 +65,23 @@ def test_a_strong_cause_is_named_with_its_evidence(cause, form):
     assert named.saved_deg > 2 * max(named.control_saved_deg, 0.0)
 
 
+def test_loops_that_cross_in_mid_range_are_hysteresis():
+    """A butterfly: the play times the distance from a crossing point. No simulated cause has it."""
+    changed = []
+    for take in session(14):
+        readings = take.readings.copy()
+        for column in range(readings.shape[1]):
+            own, play, behind = readings[:, column], readings[0, column], np.empty(len(readings))
+            for frame, now in enumerate(own):
+                play = min(max(play, now - 12.0), now + 12.0)
+                behind[frame] = (now - play) / 12.0
+            readings[:, column] = own + 12.0 * behind * (own - np.median(own)) / np.ptp(own)
+        changed.append(replace(take, readings=readings))
+    named = diagnose(changed, LAYOUT).named
+    assert named is not None
+    assert named.effect == "hysteresis"
+
+
 def test_a_reference_ahead_of_its_sensor_is_no_lag(clean):
     late = [replace(take, reference_time_s=take.reference_time_s + 0.06) for take in clean]
     found = diagnose(late, LAYOUT)

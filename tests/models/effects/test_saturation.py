@@ -114,3 +114,19 @@ def test_what_cannot_be_used_is_named(glove):
         SATURATION.find(takes, glove.sensor_of, [np.zeros(3), np.zeros(3)])
     with pytest.raises(BadInput, match=r"errors have shape \(3,\), expected \(1800, 3\)"):
         SATURATION.find(takes, glove.sensor_of, [np.zeros(3)])
+
+
+def test_a_dead_band_in_mid_range_is_found(glove):
+    """As of a push-pull stage: nothing changes about the middle, and its width is missing outside."""
+    takes = []
+    middle = np.median(np.concatenate([take.readings[:, 1] for take in glove.takes()]))
+    for take in glove.takes():
+        readings = take.readings.copy()
+        readings[:, 1] -= np.clip(readings[:, 1] - middle, -12.0, 12.0)
+        takes.append(replace(take, readings=readings))
+    [band] = saturated_bands(takes, glove.sensor_of)
+    assert (band.sensor, band.end, band.towards) == ("M_PIP", "middle", 0)
+    width = band.high - band.low
+    depths = band.depth(np.array([(band.low + band.high) / 2, band.high, band.low, band.high + width]))
+    np.testing.assert_allclose(depths, [0.0, width, width, 3 * width], atol=1e-9)
+    assert "between" in SATURATION.find(takes, glove.sensor_of)[0].sentence
