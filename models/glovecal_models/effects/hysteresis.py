@@ -29,6 +29,11 @@ WIDEST_SHARES = (0.12, 0.25, 0.5)
 """Half-width of the widest play, in standard deviations of the motion. Wider ones imitate creep."""
 
 
+FEWEST_TURNS, FEWEST_TURNS_FOR_PRODUCTS = 4, 12
+"""In one take. A few strides are one cycle over and over: there a product with the joint is a function of the
+cycle's phase, and anything that goes with the phase would bear the name."""
+
+
 class Hysteresis(ArrayStateEffect):
     name = "hysteresis"
     explanation = (
@@ -43,14 +48,17 @@ class Hysteresis(ArrayStateEffect):
     parameters: ClassVar = (Parameter("widest_play", "deg", 0.2, 30.0, "1 to 7 deg in bend sensors"),)
 
     def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
-        return None if any(_turns(take) >= 4 for take in takes) else "no joint goes to and fro in these takes"
+        if any(_turns(take) >= FEWEST_TURNS for take in takes):
+            return None
+        return "no joint goes to and fro in these takes"
 
     def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
         spread = np.sqrt(np.mean([take.own.var(axis=0) for take in takes], axis=0))
         return np.array(WIDEST_SHARES)[:, None, None] * spread[None, :, None]
 
     def fit_constants(self, takes: Sequence[Signals]) -> Settings:
-        return fit_joint_units(takes)
+        enough = any(_turns(take) >= FEWEST_TURNS_FOR_PRODUCTS for take in takes)
+        return fit_joint_units(takes) if enough else {}
 
     def fit_repair_constants(self, takes: Sequence[Signals]) -> Settings:
         """A learned form brings the products with the joint."""
