@@ -152,14 +152,15 @@ UNKNOWN_CAUSES = tuple(f"unknown:{name}" for name in FORMS_BY_NAME)
 def forms(name: str) -> tuple[Form, ...]:
     """The forms of one cause, those set aside last. Raises BadInput for another name."""
     if name in UNKNOWN_CAUSES:
-        return (*FORMS_BY_NAME[name.removeprefix("unknown:")], *_set_aside(name.replace(":", "_")))
-    if name not in KNOWN_CAUSES:
+        own = FORMS_BY_NAME[name.removeprefix("unknown:")]
+    elif name in KNOWN_CAUSES:
+        own = import_module(f"{PACKAGE}.{name}").FORMS
+    else:
         raise BadInput(f"no cause {name!r}; there are {', '.join(KNOWN_CAUSES + UNKNOWN_CAUSES)}")
-    return (*import_module(f"{PACKAGE}.{name}").FORMS, *_set_aside(name))
+    return (*own, *_further("retired", name), *_further("set_aside", name))
 
 
-def _set_aside(name: str) -> tuple[Form, ...]:
-    """Those kept for a final test; none for a cause that has no such file."""
-    if find_spec(f"{PACKAGE}.set_aside.{name}") is None:
-        return ()
-    return import_module(f"{PACKAGE}.set_aside.{name}").FORMS
+def _further(folder: str, name: str) -> tuple[Form, ...]:
+    """Those of one folder beside this file; none for a cause that has no file there."""
+    module = f"{PACKAGE}.{folder}.{name.replace(':', '_')}"
+    return import_module(module).FORMS if find_spec(module) is not None else ()

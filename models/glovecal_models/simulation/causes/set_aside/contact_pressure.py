@@ -1,7 +1,6 @@
-"""Contact pressure: what the hand presses against changes the reading, as the recorded force tells.
+"""Contact pressure: what the hand holds presses on the sensors, in proportion to nothing but the force.
 
-A dome of cloth snaps in under some newtons, a strip that spans a gap between two bones is pressed into it
-in mid-bend only, and a soft layer is squeezed aside the faster the harder it is pressed.
+Padding first bulges and then goes flat, glue yields above a force, and a strip bends between two supports.
 """
 
 from __future__ import annotations
@@ -15,48 +14,46 @@ from glovecal_models.simulation.scene import Scene
 
 @form(
     Stage.MECHANICAL,
-    "A dome resists a light touch and gives way under a firm one: a rise, then a fall (snap dome;"
-    " shape ours).",
+    "Light pressure makes the padding bulge under the sensor, stronger pressure flattens it again (ours).",
     set_aside=True,
     column=contact_column,
 )
-def dome_gives_way(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Most at a few newtons, ever less beyond."""
-    share = _newtons(scene, draws) / draws.each("peak_n", 2.5, 5.0)
-    return signal + size * draws.signs() * 8.0 * share * np.exp(1 - share)
+def bulges_then_flattens(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A rise and fall over the force that ends below where it began."""
+    ratio = _force(scene, draws) / draws.each("peak_n", 3.0, 6.0)
+    return signal + size * draws.signs() * 3 * (1 - draws.each("flat", 0.3, 0.6) * ratio) * ratio * np.exp(
+        1 - ratio
+    )
 
 
 @form(
     Stage.MECHANICAL,
-    "The strip spans a gap between two bones in mid-bend and is pressed into it, not where it lies"
-    " on bone (ours).",
+    "Stitching holds the strip until a force is exceeded, and gives way in proportion above it (ours).",
     set_aside=True,
     column=contact_column,
 )
-def pressed_into_gap(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Newtons times a bell over the own bend, next to nothing at both ends of the range."""
-    middle = draws.each("middle", 0.4, 0.6)
-    share = (scene.own - scene.low) / scene.span
-    spans = np.exp(-0.5 * np.square((share - middle) / draws.each("width", 0.15, 0.22)))
-    return signal + size * draws.signs() * _newtons(scene, draws) * spans
+def gives_way_above(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """In proportion to the force above a threshold, nothing below."""
+    over = np.maximum(_force(scene, draws) - draws.each("holds_n", 3.0, 7.0), 0)
+    return signal + size * draws.sign() * 0.5 * over
 
 
 @form(
     Stage.MECHANICAL,
-    "A soft layer is squeezed aside and leaves the strip to bear the rest: square of the force"
-    " (thin pad; ours).",
+    "A half-bent strip spans a gap and is pressed through, others lie on (three-point bending).",
     set_aside=True,
     column=contact_column,
 )
-def squeezed_aside(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Hardly anything at a light touch, four times as much at twice the force."""
-    stiff = draws.each("stiff_n", 7.0, 11.0)
-    return signal + size * draws.signs() * 5.0 * np.square(_newtons(scene, draws) / stiff)
+def pressed_through(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The force times a bow over the bend: nothing at both ends of the range."""
+    bend = np.clip((signal - scene.low) / scene.span, 0, 1)
+    gap = np.sin(np.pi * bend ** draws.each("power", 0.7, 1.4))
+    return signal + size * draws.sign() * 0.4 * _force(scene, draws) * gap**2
 
 
-def _newtons(scene: Scene, draws: Draws) -> np.ndarray:
-    """The contact force, shape (T, N, 1)."""
+def _force(scene: Scene, draws: Draws) -> np.ndarray:
+    """The recorded force in newtons, shape (T, N, 1)."""
     return contact_column(scene, draws)[1][:, :, None]
 
 
-FORMS = (dome_gives_way, pressed_into_gap, squeezed_aside)
+FORMS = (bulges_then_flattens, gives_way_above, pressed_through)

@@ -1,7 +1,6 @@
-"""Humidity: readings move with the humidity that the hygrometer shows.
+"""Humidity: the sensor's answer moves with the water in the air of the glove.
 
-Cloth wets faster than it dries, dry air lets charge stay on the cloth, and two layers that swell unequally
-balance at one humidity only.
+Cloth wets faster than it dries, water changes what a capacitor holds, and hygroscopic layers curl.
 """
 
 from __future__ import annotations
@@ -14,48 +13,46 @@ from glovecal_models.simulation.scene import Scene
 
 @form(
     Stage.ELECTRICAL,
-    "Fibres take up water quicker than they give it off, and zero points follow the water (sorption"
-    " kinetics).",
+    "Zero points follow the humidity: soon while it rises, late while it falls (drying is the slower way).",
     set_aside=True,
 )
-def wets_quicker_than_dries(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """The water runs after the humidity within seconds upwards and within a minute or two downwards."""
-    wets = -np.expm1(-1 / (draws.one("wets_s", 4.0, 12.0) * scene.rate_hz))
-    dries = -np.expm1(-1 / (draws.one("dries_s", 60.0, 150.0) * scene.rate_hz))
-    air = scene.humidity_pct - scene.usual_air[1]
-    water = np.empty_like(air)
-    state = air[:, 0]
-    for frame in range(air.shape[1]):
-        missing = air[:, frame] - state
-        state = state + np.where(missing > 0, wets, dries) * missing
+def dries_slowly(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Water taken up within seconds and given off within minutes."""
+    wets_s, dries_s = draws.one("wets_s", 4.0, 15.0), draws.one("dries_s", 60.0, 180.0)
+    water = np.empty_like(scene.humidity_pct)
+    state = scene.humidity_pct[:, 0]
+    for frame in range(water.shape[1]):
+        away = scene.humidity_pct[:, frame] - state
+        state = state + away * np.where(away > 0, 1 / wets_s, 1 / dries_s) / scene.rate_hz
         water[:, frame] = state
-    return signal + size * draws.signs() * draws.each("share", 0.6, 1.4) * water[:, :, None]
+    return signal + size * draws.signs() * 0.5 * (water - scene.usual_air[1])[:, :, None]
 
 
 @form(
     Stage.ELECTRICAL,
-    "Dry air lets charge stay on the cloth, damp air leads it away: exponential in dryness"
-    " (triboelectricity).",
+    "A capacitor's filling of fibre, air and water: gains by the cube of mixed cube roots (Looyenga 1965).",
     set_aside=True,
 )
-def dry_cloth_charges(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Zero points move the more steeply the drier the air, and near the bent end half as far again."""
-    e_fold = draws.one("e_fold_pct", 2.5, 6.0)
-    charge = np.exp(np.clip((scene.usual_air[1] - scene.humidity_pct) / e_fold, -8.0, 4.0))[:, :, None]
-    nearer = 1 + 0.5 * np.clip((signal - scene.low) / scene.span, 0.0, 1.0)
-    return signal + size * draws.signs() * 3.0 * (charge - 1.0) * nearer
+def wet_dielectric(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The permittivity of damp cloth sets how much a degree counts."""
+    holds = draws.each("holds", 0.1, 0.3)
+    damp, usual = scene.humidity_pct[:, :, None] / 100, scene.usual_air[1] / 100
+    mixed = (1 + holds * (80 ** (1 / 3) - 1) * damp**2) ** 3
+    rest = (1 + holds * (80 ** (1 / 3) - 1) * usual**2) ** 3
+    bend = (signal - scene.low) / scene.span
+    return signal + size * draws.sign() * 10 * bend * (mixed / rest - 1)
 
 
 @form(
     Stage.ELECTRICAL,
-    "Two layers that swell unequally balance at one humidity and curl the strip on both sides of it (ours).",
+    "A layer that swells curls the straight strip; a bent strip is held flat against the finger (ours).",
     set_aside=True,
 )
-def layers_balance_once(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Nothing at one humidity, and with the square of the difference above and below."""
-    balance = scene.usual_air[1] + draws.one("balance_pct", -1.5, 1.5)
-    off = np.square((scene.humidity_pct - balance) / 4.0)[:, :, None]
-    return signal + size * draws.signs() * draws.each("share", 0.6, 1.4) * 3.0 * (off - 0.7)
+def curling_strip(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """In proportion to the humidity times the square of what is left to bend."""
+    left = np.clip((scene.high - signal) / scene.span, 0, 1) ** draws.each("power", 1.5, 3.0)
+    damp = (scene.humidity_pct - scene.usual_air[1])[:, :, None]
+    return signal + size * draws.signs() * damp * left
 
 
-FORMS = (wets_quicker_than_dries, dry_cloth_charges, layers_balance_once)
+FORMS = (dries_slowly, wet_dielectric, curling_strip)

@@ -1,7 +1,6 @@
-"""Nonlinearity: a curve over the own bend that is the same at every moment, and not straight.
+"""Nonlinearity: the reading does not go in a straight line with the joint, whatever the time and history.
 
-Beyond one bow or one corner, real sensors show the steep law of a magnet that moves away, the waves of an
-angle computed from two unequal channels, and the scallops of a strip made of several printed sections.
+Potentiometers, optical gratings and strips with two patches each leave a curve of their own.
 """
 
 from __future__ import annotations
@@ -14,54 +13,49 @@ from glovecal_models.simulation.scene import Scene
 
 @form(
     Stage.ELECTRICAL,
-    "A magnet leaves its Hall sensor as the finger bends: inverse cube of the distance (dipole field).",
+    "A potentiometer whose wiper is loaded: low by the turn squared times what is left (circuit theory).",
     set_aside=True,
     judged_by="straight_line",
 )
-def magnet_leaves(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """The field of a dipole over the bend, scaled to be right at both ends of the range."""
-    travel = draws.each("travel_per_gap", 0.5, 1.3)
-    share = np.clip(_share(signal, scene), -0.2, 1.2)
-    field = (1 + travel * share) ** -3.0
-    far = (1 + travel) ** -3.0
-    answer = (1 - field) / (1 - far)
-    return signal + size * draws.signs() * 10.0 * (answer - share)
+def loaded_potentiometer(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The wiper of a potentiometer feeds too small a resistance, worst at two thirds of the turn."""
+    load = draws.each("load", 0.6, 2.5)
+    turn = np.clip(_share(signal, scene), 0, 1)
+    loss = turn**2 * (1 - turn) * (1 + load) / (1 + load * turn * (1 - turn))
+    return signal - size * draws.sign() * 6.75 * loss
 
 
 @form(
     Stage.ELECTRICAL,
-    "Sine and cosine channels of a magnetic encoder of unequal offset and height (first and second"
-    " harmonic).",
+    "A ripple of a few periods over the range (interpolation error of gratings; Heydemann 1981).",
     set_aside=True,
     judged_by="straight_line",
 )
-def encoder_harmonics(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """A wave over the electrical angle and one of half its length, as of an encoder with several poles."""
-    turns = np.deg2rad(draws.each("pole_pairs", 4.0, 7.0) * signal)
-    first = draws.each("first_phase", 0.0, 2 * np.pi)
-    second = draws.each("second_phase", 0.0, 2 * np.pi)
-    share = draws.each("second_share", 0.2, 0.5)
-    return signal + size * (np.sin(turns + first) + share * np.sin(2 * turns + second))
+def grating_ripple(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Unequal sine and cosine of a grating leave a ripple with a weaker second harmonic."""
+    periods = draws.each("periods", 1.8, 3.4)
+    phase = 2 * np.pi * (periods * _share(signal, scene) + draws.each("phase", 0, 1))
+    return signal + size * (np.sin(phase) + draws.each("second", 0.2, 0.5) * np.sin(2 * phase))
 
 
 @form(
     Stage.ELECTRICAL,
-    "A strip of three or four printed sections, each of which bows on its own (segmented flex sensor; ours).",
+    "Two patches on one strip that answer one after the other, with a flatter stretch between them (ours).",
     set_aside=True,
     judged_by="straight_line",
 )
-def printed_sections(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Scallops over the bend: one arch for every section, with corners between them."""
-    sections = draws.each("sections", 2.6, 4.2)
-    place = draws.each("first_corner", 0.0, 1.0)
-    within = np.mod(_share(signal, scene) * sections + place, 1.0)
-    # A section is stiffest at its ends, where the conducting pads sit.
-    return signal + size * draws.signs() * 5.0 * (4 * within * (1 - within) - 2 / 3)
+def two_patches(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Each patch answers while the fold passes it; between them the strip hardly answers."""
+    share = _share(signal, scene)
+    width = draws.each("width", 0.06, 0.11)
+    first = np.tanh((share - draws.each("first", 0.22, 0.34)) / width)
+    second = np.tanh((share - draws.each("second", 0.62, 0.78)) / width)
+    weight = draws.each("weight", 0.35, 0.65)
+    return signal + size * (weight * first + (1 - weight) * second + 1 - 2 * share)
 
 
 def _share(signal: np.ndarray, scene: Scene) -> np.ndarray:
-    """The signal as a share of the sensor's range, a little below 0 and above 1 at the ends."""
     return (signal - scene.low) / scene.span
 
 
-FORMS = (magnet_leaves, encoder_harmonics, printed_sections)
+FORMS = (loaded_potentiometer, grating_ripple, two_patches)

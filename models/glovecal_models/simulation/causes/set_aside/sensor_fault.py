@@ -1,7 +1,6 @@
-"""Sensor fault: one sensor or its wiring is broken and reads wrongly at times or all the time.
+"""Sensor fault: one sensor's reading fails at times of its own, while the others are right.
 
-A cold solder joint sits in one of two states, a broken shield lets the mains in, and a cracked track parts
-in some of the deep bends and not in others.
+A defect in a contact switches to and fro, an amplifier begins to oscillate, a capacitor loses its charge.
 """
 
 from __future__ import annotations
@@ -10,63 +9,64 @@ import numpy as np
 
 from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
+from glovecal_models.simulation.signals import lasting_noise
 
 
 @form(
     Stage.CONVERTER,
-    "A cold solder joint sits in one of two states and changes between them by itself (random"
-    " telegraph signal).",
+    "A defect switches the reading to and fro between two levels at random (random telegraph noise).",
     set_aside=True,
     touches="one",
 )
-def two_state_joint(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """A fixed number of degrees is added for stretches that begin and end at random moments."""
-    stays = draws.one("stays_s", 0.4, 2.5), draws.one("shifted_s", 0.4, 2.5)
-    shifted = np.empty((*signal.shape[:2], 1))
-    for take, start in enumerate(scene.starts):
-        random = draws.stream("states", start.key)
-        pairs = round(4 * (scene.time_s[-1] - scene.time_s[0]) / sum(stays))
-        lengths = random.exponential(np.tile(stays, (pairs, 1)))
-        changes = scene.time_s[0] + np.cumsum(lengths.ravel())
-        shifted[take, :, 0] = np.searchsorted(changes, scene.time_s) % 2
-    return signal + size * draws.sign() * 2.0 * shifted
+def telegraph(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Two levels, each left again after a random time with a mean of its own."""
+    high_s, low_s = draws.one("high_s", 0.4, 2.0), draws.one("low_s", 0.8, 4.0)
+    raised = np.empty(signal.shape[:2])
+    for row, start in enumerate(scene.starts):
+        random = draws.stream("switches", start.key)
+        stays = random.exponential(1.0, 2000) * np.tile([high_s, low_s], 1000)
+        turn = np.searchsorted(np.cumsum(stays), scene.time_s - scene.time_s[0])
+        raised[row] = turn % 2 == 0
+    return signal + size * draws.sign() * 2 * raised[:, :, None]
 
 
 @form(
     Stage.CONVERTER,
-    "A broken shield lets the mains in, which the frame rate folds down to some hertz (aliased hum).",
+    "A loose capacitor lets the sensor's amplifier oscillate for stretches; sampled as a slow beat.",
     set_aside=True,
     touches="one",
 )
-def hum_from_mains(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """A sine of the mains' frequency with a weaker third harmonic, as frames happen to meet it."""
-    mains = 2 * np.pi * draws.one("mains_hz", 49.93, 50.07)
-    phase = draws.one("phase", 0.0, 2 * np.pi)
-    third = draws.one("third", 0.1, 0.35)
-    turned = mains * scene.session_s + phase
-    hum = np.sin(turned) + third * np.sin(3 * turned)
-    return signal + size * 1.4 * hum[:, :, None]
+def oscillates(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A sine that grows, holds and dies away again, at a frequency of its own that shifts with the level."""
+    beat_hz = draws.one("beat_hz", 1.5, 9.0)
+    lasts_s, level = draws.one("lasts_s", 1.0, 3.0), draws.one("level", 0.2, 0.8)
+    swing = np.empty(signal.shape[:2])
+    for row, start in enumerate(scene.starts):
+        random = draws.stream("bursts", start.key)
+        loose = lasting_noise(random, len(scene.time_s), 1, lasts_s, scene.rate_hz)[:, 0]
+        alive = np.clip((loose - level) / 0.2, 0, 1)
+        swing[row] = alive * np.sin(2 * np.pi * beat_hz * scene.session_s[row] + 0.5 * loose)
+    return signal + size * 3 * swing[:, :, None]
 
 
 @form(
     Stage.CONVERTER,
-    "A cracked track parts in some of the deep bends, by another resistance each time (crack in a"
-    " bent conductor).",
+    "A cracked capacitor loses its charge and is charged anew at random moments: uneven saw teeth (ours).",
     set_aside=True,
     touches="one",
 )
-def crack_parts_in_bends(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """The reading leaps while the joint is bent past the crack, in about half of the bends."""
-    parts_at = draws.each("parts_at", 0.4, 0.55)
-    apart = (scene.own - scene.low) / scene.span > parts_at
-    bends = np.cumsum(np.diff(apart, axis=1, prepend=False) & apart, axis=1)
-    leaps = np.zeros_like(signal)
-    for take, start in enumerate(scene.starts):
-        random = draws.stream("bends", start.key)
-        heights = random.uniform(0.4, 1.6, (bends[take].max() + 1, signal.shape[2]))
-        heights *= random.random(heights.shape) < 0.5
-        leaps[take] = np.take_along_axis(heights, bends[take], axis=0)
-    return signal + size * draws.sign() * 3.0 * np.where(apart, leaps, 0.0)
+def loses_charge(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """After every charging the reading sinks away with one time until it is charged again."""
+    every_s, sinks_s = draws.one("every_s", 2.0, 7.0), draws.one("sinks_s", 1.0, 6.0)
+    sunk = np.empty(signal.shape[:2])
+    for row, start in enumerate(scene.starts):
+        random = draws.stream("charges", start.key)
+        moments = np.cumsum(random.exponential(every_s, 400)) - every_s
+        times = scene.time_s - scene.time_s[0]
+        last = np.searchsorted(moments, times) - 1
+        since = times - np.where(last < 0, 0.0, moments[np.maximum(last, 0)])
+        sunk[row] = -np.expm1(-since / sinks_s)
+    return signal + size * draws.sign() * 3 * sunk[:, :, None]
 
 
-FORMS = (two_state_joint, hum_from_mains, crack_parts_in_bends)
+FORMS = (telegraph, oscillates, loses_charge)

@@ -1,7 +1,6 @@
-"""Temperature: readings move with the temperature that the thermometer shows.
+"""Temperature: the sensor's answer moves with the temperature of the air in the glove.
 
-Firmware corrects by a table of whole steps, a piezoelectric film answers to warming rather than to warmth,
-and a strip of two layers curls where the finger does not hold it.
+Crystals have cubic curves, gaps close as parts expand, and bonded layers warp as a bimetal does.
 """
 
 from __future__ import annotations
@@ -14,48 +13,40 @@ from glovecal_models.simulation.scene import Scene
 
 @form(
     Stage.ELECTRICAL,
-    "Firmware corrects the zero points by a table of whole steps; what lies between is left over"
-    " (sawtooth; ours).",
+    "Zero points follow a cubic with two turning points (frequency of AT-cut quartz over temperature).",
     set_aside=True,
 )
-def corrected_in_steps(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """The error rises with the temperature and falls back at each entry of the table."""
-    step = draws.one("step_c", 0.8, 1.6)
-    left = np.mod(scene.temperature_c / step + draws.one("first_entry", 0.0, 1.0), 1.0) - 0.5
-    return signal + size * draws.signs() * draws.each("share", 0.6, 1.4) * 5.0 * left[:, :, None]
+def quartz_cubic(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A count made against a quartz: down, up and down again over the temperature."""
+    scaled = _from_usual(scene) / draws.each("scale_c", 0.7, 1.1) - draws.each("turn", -0.3, 0.3)
+    return signal + size * draws.signs() * (scaled**3 / 3 - scaled)
 
 
 @form(
     Stage.ELECTRICAL,
-    "A polar film gives charge while it warms or cools, which leaks away (pyroelectricity of PVDF).",
+    "Nothing moves until a gap has closed; from there parts press on each other as they expand (ours).",
     set_aside=True,
 )
-def film_gives_charge(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Zero points follow how fast the temperature changed within the last half minute."""
-    leaks_s = draws.one("leaks_s", 8.0, 25.0)
-    warming = np.gradient(scene.temperature_c, 1 / scene.rate_hz, axis=1)
-    keep = np.exp(-1 / (leaks_s * scene.rate_hz))
-    charge = np.empty_like(warming)
-    state = warming[:, 0]
-    for frame in range(warming.shape[1]):  # pyright: ignore
-        state = keep * state + (1 - keep) * warming[:, frame]
-        charge[:, frame] = state
-    # Some hundredths of a degree a second are usual.
-    return signal + size * draws.signs() * draws.each("share", 0.6, 1.4) * 500.0 * charge[:, :, None]
+def gap_closes(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """In proportion to the temperature above where the gap closes, nothing below."""
+    closes_c = draws.one("closes_c", -0.7, 0.4)
+    return signal + size * draws.signs() * 2 * np.maximum(_from_usual(scene) - closes_c, 0)
 
 
 @form(
     Stage.ELECTRICAL,
-    "Two layers that expand unequally curl the strip where the finger leaves it free (Timoshenko's"
-    " bimetal; ours).",
+    "Two bonded layers warp while the strip is straight; a bend holds them flat (bimetal; Timoshenko 1925).",
     set_aside=True,
 )
-def curls_when_free(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """In proportion to the temperature, most while straight and nothing once the bend holds the strip."""
-    held = draws.each("held_from", 0.5, 0.9)
-    free = np.square(np.clip(1 - (signal - scene.low) / scene.span / held, 0.0, 1.2))
-    warmer = (scene.temperature_c - scene.usual_air[0])[:, :, None]
-    return signal + size * draws.signs() * 5.0 * warmer * free
+def bimetal_strip(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """In proportion to the temperature, less and less with the square of the bend."""
+    bend = np.clip((signal - scene.low) / scene.span, 0, 1)
+    held = 1 / (1 + (bend / draws.each("half_bend", 0.25, 0.5)) ** 2)
+    return signal + size * draws.signs() * 3 * _from_usual(scene) * held
 
 
-FORMS = (corrected_in_steps, film_gives_charge, curls_when_free)
+def _from_usual(scene: Scene) -> np.ndarray:
+    return (scene.temperature_c - scene.usual_air[0])[:, :, None]
+
+
+FORMS = (quartz_cubic, gap_closes, bimetal_strip)

@@ -1,0 +1,72 @@
+"""Clock offset: the reference's times are wrong, so that its angles belong to other moments than stamped.
+
+The glove is right in all of these: only the reference is read at other times, all its rotations alike.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glovecal_models.simulation.causes.form import Draws, Stage, form
+from glovecal_models.simulation.scene import Scene
+from glovecal_models.simulation.signals import at_times
+
+SIZES = (0.002, 1.2)
+LONGEST_S = 20000.0
+
+
+@form(
+    Stage.CLOCK,
+    "Times counted in frames at the nominal rate while the true one differs, from nought in every take"
+    " (drop-frame timecode).",
+    only_by_name=True,
+    sizes=SIZES,
+    shared=True,
+)
+def counted_at_nominal_rate(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The difference is nought at the start signal and grows evenly until the take ends, every time anew."""
+    take_s = (scene.recorded.stop - scene.recorded.start) / scene.rate_hz
+    off = draws.sign() * 1.6 * np.clip(scene.time_s / take_s, 0.0, 1.1)
+    return _read_late(signal, scene, float(size.max()) * np.tile(off, (len(scene.starts), 1)))
+
+
+@form(
+    Stage.CLOCK,
+    "Cameras lose frames now and then and number the rest on: the time difference grows in steps (ours).",
+    only_by_name=True,
+    sizes=SIZES,
+    shared=True,
+)
+def lost_frames_not_counted(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A staircase over the session: a step wherever frames were lost, and none is ever made good."""
+    every = draws.one("every_s", 40.0, 110.0)
+    gaps = draws.stream("gaps").exponential(every, round(LONGEST_S / every))
+    steps = np.searchsorted(np.cumsum(gaps), scene.session_s)
+    # What matters is the difference since the clocks were set, some steps before the first take.
+    off = draws.sign() * (1.0 + steps) / 6.0
+    return _read_late(signal, scene, float(size.max()) * np.minimum(off, 2.0))
+
+
+@form(
+    Stage.CLOCK,
+    "The reference's computer changes to and fro between two time servers that disagree (network time).",
+    only_by_name=True,
+    sizes=SIZES,
+    shared=True,
+)
+def two_time_servers(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """One of two time differences at any moment, each for a while; neither of the servers is right."""
+    stay = draws.one("stay_s", 8.0, 40.0)
+    changes = np.cumsum(draws.stream("stays").exponential(stay, round(LONGEST_S / stay)))
+    second = np.searchsorted(changes, scene.session_s) % 2
+    other = draws.one("other", -0.6, 0.4)
+    return _read_late(signal, scene, float(size.max()) * draws.sign() * np.where(second, other, 1.0))
+
+
+def _read_late(signal: np.ndarray, scene: Scene, off_s: np.ndarray) -> np.ndarray:
+    """The reference read at times moved by ``off_s`` (T, N) seconds."""
+    moved = [at_times(scene.time_s, one, scene.time_s - off) for one, off in zip(signal, off_s, strict=True)]
+    return np.stack(moved)
+
+
+FORMS = (counted_at_nominal_rate, lost_frames_not_counted, two_time_servers)

@@ -1,0 +1,62 @@
+"""Contact pressure: what the hand presses against changes the reading, as the recorded force tells.
+
+A dome of cloth snaps in under some newtons, a strip that spans a gap between two bones is pressed into it
+in mid-bend only, and a soft layer is squeezed aside the faster the harder it is pressed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glovecal_models.simulation.causes.contact_pressure import contact_column
+from glovecal_models.simulation.causes.form import Draws, Stage, form
+from glovecal_models.simulation.scene import Scene
+
+
+@form(
+    Stage.MECHANICAL,
+    "A dome resists a light touch and gives way under a firm one: a rise, then a fall (snap dome;"
+    " shape ours).",
+    only_by_name=True,
+    column=contact_column,
+)
+def dome_gives_way(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Most at a few newtons, ever less beyond."""
+    share = _newtons(scene, draws) / draws.each("peak_n", 2.5, 5.0)
+    return signal + size * draws.signs() * 8.0 * share * np.exp(1 - share)
+
+
+@form(
+    Stage.MECHANICAL,
+    "The strip spans a gap between two bones in mid-bend and is pressed into it, not where it lies"
+    " on bone (ours).",
+    only_by_name=True,
+    column=contact_column,
+)
+def pressed_into_gap(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Newtons times a bell over the own bend, next to nothing at both ends of the range."""
+    middle = draws.each("middle", 0.4, 0.6)
+    share = (scene.own - scene.low) / scene.span
+    spans = np.exp(-0.5 * np.square((share - middle) / draws.each("width", 0.15, 0.22)))
+    return signal + size * draws.signs() * _newtons(scene, draws) * spans
+
+
+@form(
+    Stage.MECHANICAL,
+    "A soft layer is squeezed aside and leaves the strip to bear the rest: square of the force"
+    " (thin pad; ours).",
+    only_by_name=True,
+    column=contact_column,
+)
+def squeezed_aside(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Hardly anything at a light touch, four times as much at twice the force."""
+    stiff = draws.each("stiff_n", 7.0, 11.0)
+    return signal + size * draws.signs() * 5.0 * np.square(_newtons(scene, draws) / stiff)
+
+
+def _newtons(scene: Scene, draws: Draws) -> np.ndarray:
+    """The contact force, shape (T, N, 1)."""
+    return contact_column(scene, draws)[1][:, :, None]
+
+
+FORMS = (dome_gives_way, pressed_into_gap, squeezed_aside)

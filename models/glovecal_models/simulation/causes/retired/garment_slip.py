@@ -1,0 +1,81 @@
+"""Garment slip: the glove moves on the hand while it is worn, and nothing brings it back before it is off.
+
+A strap gives way once, a seam wanders over its knuckle, and every opening of a closed hand works the cloth
+on by a notch. Each begins anew when the glove is put on again.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glovecal_models.simulation.causes.form import Draws, Stage, form
+from glovecal_models.simulation.scene import Scene
+
+SHUT, OPEN = 0.55, 0.4
+"""How far the hand closes and opens again to count as opened once."""
+
+
+@form(
+    Stage.WEARING,
+    "A strap gives way once in every wearing, within seconds, and all sensors sit otherwise from"
+    " then on (ours).",
+    only_by_name=True,
+)
+def strap_gives_way(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A smooth step at one moment of each wearing, of another height for each sensor and wearing."""
+    over_s = draws.one("over_s", 1.0, 5.0)
+    given = np.empty_like(signal)
+    for take, start in enumerate(scene.starts):
+        random = draws.stream("strap", start.wearing)
+        moment = random.uniform(45.0, 130.0)
+        heights = random.uniform(0.5, 1.5, len(scene.sensors))
+        step = 0.5 + 0.5 * np.tanh((scene.since_donned_s[take] - moment) / over_s)
+        given[take] = step[:, None] * heights
+    return signal + size * draws.signs() * 4.0 * given
+
+
+@form(
+    Stage.WEARING,
+    "A seam that lifts the strip wanders along the finger: a hump whose place moves since donning (ours).",
+    only_by_name=True,
+)
+def seam_wanders(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The bend at which the seam lies on the knuckle rises ever slower from where it lay at donning."""
+    first, way = draws.each("first_place", 0.1, 0.3), draws.each("way", 0.5, 0.7)
+    slows_s = draws.one("slows_s", 90.0, 200.0)
+    worn = np.maximum(scene.since_donned_s, 0.0)[:, :, None]
+    place = first + way * worn / (worn + slows_s)
+    share = (signal - scene.low) / scene.span
+    lifted = np.exp(-0.5 * np.square((share - place) / draws.each("width", 0.12, 0.22)))
+    return signal + size * draws.signs() * 6.0 * lifted
+
+
+@form(
+    Stage.WEARING,
+    "Each opening of a closed hand works the cloth on by a notch that closing does not take back"
+    " (ratchet; ours).",
+    only_by_name=True,
+)
+def notch_at_each_opening(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """One way only, by steps of unequal height, and as often while nobody records."""
+    notches_per_s = draws.one("unrecorded_per_s", 0.05, 0.15)
+    worked = np.empty_like(signal)
+    for take, start in enumerate(scene.starts):
+        # Nobody looked before the first frame; as many openings as are usual have gone by then.
+        before = int(notches_per_s * max(start.since_donned_s, 0.0))
+        count = before + _openings(scene.closing[take] * (scene.time_s >= 0))
+        random = draws.stream("notches", start.wearing)
+        heights = np.cumsum(random.exponential(1.0, (count[-1] + 1, len(scene.sensors))), axis=0)
+        worked[take] = heights[count]
+    return signal + size * draws.signs() * worked
+
+
+def _openings(closing: np.ndarray) -> np.ndarray:
+    """How often the hand has opened so far after it was closed, shape (N,)."""
+    told = np.where(closing > SHUT, 1, np.where(closing < OPEN, 0, -1))
+    last = np.maximum.accumulate(np.where(told >= 0, np.arange(len(told)), 0))
+    shut = told[last] == 1
+    return np.cumsum(np.diff(shut.astype(int), prepend=0) < 0)
+
+
+FORMS = (strap_gives_way, seam_wanders, notch_at_each_opening)

@@ -1,0 +1,78 @@
+"""Glove latency: all channels of the glove come late by the same constant time.
+
+A filter of flat group delay on the whole board, a link whose packets differ a little in their time of
+travel, and a display that draws between two snapshots it already has: all of them delay, and delay alike.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.signal import bessel, freqs
+
+from glovecal_models.simulation.causes.form import Draws, Stage, form
+from glovecal_models.simulation.scene import Scene
+from glovecal_models.simulation.signals import at_times
+
+SIZES = (0.002, 0.4)
+ORDER = 6
+
+
+@form(
+    Stage.COUNTS,
+    "One analogue filter for the multiplexed signals, of the flattest group delay (Thomson 1949, Bessel).",
+    only_by_name=True,
+    sizes=SIZES,
+    shared=True,
+)
+def flat_group_delay(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A Bessel low-pass of order six, whose delay at low frequencies is ``size`` seconds."""
+    frames = signal.shape[1]
+    numerator, denominator = bessel(ORDER, 1.0, analog=True, norm="delay")  # pyright: ignore
+    # Mirrored at its end, the signal has no jump where the transform closes it to a ring.
+    ring = np.concatenate([signal, signal[:, ::-1]], axis=1)
+    rates = 2 * np.pi * np.fft.rfftfreq(2 * frames, 1 / scene.rate_hz)
+    passed = freqs(numerator, denominator, rates * float(size.max()))[1]  # pyright: ignore
+    return np.fft.irfft(np.fft.rfft(ring, axis=1) * passed[None, :, None], 2 * frames, axis=1)[:, :frames]
+
+
+@form(
+    Stage.TRANSPORT,
+    "A radio link with a fixed time of travel and a little waiting that differs from frame to frame"
+    " (CSMA; ours).",
+    only_by_name=True,
+    sizes=SIZES,
+    shared=True,
+)
+def waits_for_the_channel(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Every frame comes late by a constant time, up to a tenth of it of waiting without memory."""
+    late = np.empty(signal.shape)
+    waiting = draws.one("waiting_share", 0.03, 0.12)
+    for take, start in enumerate(scene.starts):
+        waits = draws.stream("waits", start.key).beta(1.2, 3.0, len(scene.time_s))
+        times = scene.time_s - float(size.max()) * (1.0 - waiting / 3 + waiting * waits)
+        # Frames keep their order on the way.
+        late[take] = at_times(scene.time_s, signal[take], np.maximum.accumulate(times))
+    return late
+
+
+@form(
+    Stage.TRANSPORT,
+    "Poses are drawn between the last two snapshots, always the same time ago (interpolation delay"
+    " of engines).",
+    only_by_name=True,
+    sizes=SIZES,
+    shared=True,
+)
+def between_snapshots(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Straight lines between snapshots a third to half a delay apart, shown one delay late."""
+    delay = float(size.max())
+    apart = max(delay * draws.one("apart_share", 0.3, 0.5), 1 / scene.rate_hz)
+    shots = np.arange(scene.time_s[0], scene.time_s[-1], apart)
+    then = np.clip(scene.time_s - delay, shots[0], shots[-1])
+    place = np.clip(np.searchsorted(shots, then, side="right") - 1, 0, len(shots) - 2)
+    share = ((then - shots[place]) / apart)[:, None]
+    shown = [at_times(scene.time_s, one, shots) for one in signal]
+    return np.stack([(1 - share) * shot[place] + share * shot[place + 1] for shot in shown])
+
+
+FORMS = (flat_group_delay, waits_for_the_channel, between_snapshots)

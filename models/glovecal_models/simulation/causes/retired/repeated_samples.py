@@ -1,0 +1,74 @@
+"""Repeated samples: frames that bring nothing new, because the newest reading is shown again.
+
+Frames are lost by the packet, fingers are read in turn so that each is old for a while, or the receiver
+pauses at even intervals to tidy up.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glovecal_models.simulation.causes.form import Draws, Stage, form
+from glovecal_models.simulation.scene import Scene
+
+
+@form(
+    Stage.TRANSPORT,
+    "Several frames travel in one packet; a packet that is lost leaves the last frame shown all its"
+    " time (ours).",
+    only_by_name=True,
+    sizes=(0.005, 0.97),
+    shared=True,
+)
+def whole_packets_lost(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Repeats come in runs of whole packets, each of which is lost with the same chance."""
+    frames = signal.shape[1]
+    per_packet = round(draws.one("frames_per_packet", 4.0, 12.0))
+    packet = np.arange(frames) // per_packet
+    new = np.empty(signal.shape[:2], dtype=bool)
+    for take, start in enumerate(scene.starts):
+        chance = draws.stream("packets", start.key).random(packet[-1] + 1)
+        new[take] = chance[packet] >= float(size.max())
+    return _hold(signal, np.repeat(new[:, :, None], signal.shape[2], axis=2))
+
+
+@form(
+    Stage.TRANSPORT,
+    "Sensors are read in turn and the others sent again as they were (round-robin scan of a slow converter).",
+    only_by_name=True,
+    sizes=(1.02, 40.0),
+    shared=True,
+)
+def sensors_take_turns(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Each sensor is new once in ``size`` frames, each at another moment of the round."""
+    frames, channels = signal.shape[1:]
+    turn = np.arange(channels) / channels + draws.one("first_turn", 0.0, 1.0)
+    rounds = np.floor(np.arange(frames)[:, None] / float(size.max()) + turn)
+    new = np.diff(rounds, axis=0, prepend=rounds[:1] - 1) > 0
+    return _hold(signal, np.broadcast_to(new, signal.shape))
+
+
+@form(
+    Stage.TRANSPORT,
+    "The receiver stands still at even intervals, as long each time (garbage collection of a"
+    " managed runtime).",
+    only_by_name=True,
+    sizes=(0.02, 3.0),
+    shared=True,
+)
+def regular_pauses(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Pauses of ``size`` seconds begin every few seconds by the session's clock."""
+    every = draws.one("every_s", 3.2, 6.0)
+    since = np.mod(scene.session_s + draws.one("first_s", 0.0, 6.0), every)
+    new = since >= float(size.max())
+    return _hold(signal, np.repeat(new[:, :, None], signal.shape[2], axis=2))
+
+
+def _hold(signal: np.ndarray, new: np.ndarray) -> np.ndarray:
+    """The signal where ``new``, elsewhere the newest value before, for each sensor on its own."""
+    frames = np.arange(signal.shape[1])[None, :, None]
+    newest = np.maximum.accumulate(np.where(new, frames, 0), axis=1)
+    return np.take_along_axis(signal, newest, axis=1)
+
+
+FORMS = (whole_packets_lost, sensors_take_turns, regular_pauses)

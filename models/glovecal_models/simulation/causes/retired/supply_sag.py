@@ -1,0 +1,63 @@
+"""Supply sag: readings follow the voltage that feeds the glove, as its battery empties.
+
+An amplifier loses headroom at its upper end first, firmware corrects by a gauge that knows a few levels
+only, and the input current that loads a wiper changes with the supply.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glovecal_models.simulation.causes.form import Draws, Stage, form
+from glovecal_models.simulation.scene import Scene
+
+USUAL_V = 4.04
+
+
+@form(
+    Stage.ELECTRICAL,
+    "An amplifier's upper end is pressed together as the supply takes its headroom (output swing;"
+    " shape ours).",
+    only_by_name=True,
+)
+def top_loses_headroom(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """High readings come out too low in proportion to the missing voltage, low ones stay right."""
+    power = draws.one("power", 2.5, 4.5)
+    share = np.clip((signal - scene.low) / scene.span, 0.0, 1.15)
+    return signal + size * 100.0 * _above_usual(scene) * share**power
+
+
+@form(
+    Stage.ELECTRICAL,
+    "Firmware corrects for the supply by a battery gauge of few levels; the rest within a level is"
+    " left (ours).",
+    only_by_name=True,
+)
+def gauge_of_few_levels(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The error falls with the voltage and leaps back where the gauge falls by a level."""
+    level_v = draws.one("level_v", 0.05, 0.09)
+    left = np.mod(scene.supply_v / level_v + draws.one("first_level", 0.0, 1.0), 1.0) - 0.5
+    loses = draws.each("gain_share", 0.2, 0.6)
+    share = (signal - scene.low) / scene.span
+    return signal + size * 6.0 * left[:, :, None] * (1 - loses + 2 * loses * share)
+
+
+@form(
+    Stage.ELECTRICAL,
+    "An input current that changes with the supply loads a sensor wired as a wiper (loading error"
+    " of dividers).",
+    only_by_name=True,
+)
+def loaded_wiper(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The source resistance is highest past mid-range, and there the error bows; it is small at both ends."""
+    share = np.clip((signal - scene.low) / scene.span, -0.1, 1.1)
+    way = draws.each("wiper_from", 0.0, 0.15) + draws.each("wiper_way", 0.8, 0.85) * share
+    return signal + size * draws.sign() * 400.0 * _above_usual(scene) * way**2 * (1 - way)
+
+
+def _above_usual(scene: Scene) -> np.ndarray:
+    """Volts above what is usual in mid-session, shape (T, N, 1)."""
+    return scene.supply_v[:, :, None] - USUAL_V
+
+
+FORMS = (top_loses_headroom, gauge_of_few_levels, loaded_wiper)

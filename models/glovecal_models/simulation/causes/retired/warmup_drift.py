@@ -1,0 +1,63 @@
+"""Warm-up drift: readings move with the time since power-on, and begin anew after the glove was off.
+
+The electronics warm by themselves: an oven that overshoots before it settles, a light source that dims, and
+a thermistor that switches once it is warm.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glovecal_models.simulation.causes.form import Draws, Stage, form
+from glovecal_models.simulation.scene import Scene
+
+
+@form(
+    Stage.ELECTRICAL,
+    "Zero points follow the heater of a voltage reference that overshoots and rings"
+    " (oven-controlled reference).",
+    only_by_name=True,
+)
+def oven_rings(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A swing about the final zero point that dies away since power-on."""
+    on = _since_on(scene)
+    ring_s = draws.one("ring_s", 90.0, 260.0)
+    dies_s = draws.one("dies_s", 120.0, 260.0)
+    swing = np.exp(-on / dies_s) * np.cos(2 * np.pi * on / ring_s)
+    return signal + size * draws.signs() * draws.each("share", 0.6, 1.4) * 5.0 * swing
+
+
+@form(
+    Stage.ELECTRICAL,
+    "A light-emitting diode dims as its junction warms: gains fall by a slow power of the time"
+    " since power-on.",
+    only_by_name=True,
+)
+def light_dims(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """All of the light behind a reading fades, so that high readings lose most."""
+    power = draws.one("power", 0.2, 0.6)
+    bright = (1 + _since_on(scene) / draws.one("first_s", 10.0, 40.0)) ** -power
+    usual = (1 + 200.0 / 25.0) ** -power
+    light = (scene.counts_zero_deg + signal) / (scene.counts_zero_deg + scene.high)
+    return signal + size * 10.0 * (bright - usual) * light
+
+
+@form(
+    Stage.ELECTRICAL,
+    "A protecting thermistor heats itself past its switching point within the first minutes (PTC; ours).",
+    only_by_name=True,
+)
+def thermistor_switches(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Zero points stay, move within half a minute or so, and stay again."""
+    moment = draws.one("moment_s", 60.0, 130.0) + draws.each("later_s", -15.0, 15.0)
+    width = draws.each("width_s", 8.0, 25.0)
+    switched = 0.5 + 0.5 * np.tanh((_since_on(scene) - moment) / width)
+    return signal + size * draws.signs() * 5.0 * (switched - 0.5)
+
+
+def _since_on(scene: Scene) -> np.ndarray:
+    """Seconds since power-on, shape (T, N, 1), 0 before."""
+    return np.maximum(scene.power_on_s, 0.0)[:, :, None]
+
+
+FORMS = (oven_rings, light_dims, thermistor_switches)
