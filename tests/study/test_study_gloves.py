@@ -14,7 +14,7 @@ from wandering_reference import WANDER_DEG
 
 from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES, forms
 
-FEW = StudyChoices(gloves=3, clean=6, repairs=2, pairs=6, second_names=36, ceilings=48, recorded=16)
+FEW = StudyChoices(gloves=3, clean=6, repairs=2, pairs=6, second_names=36, ceilings=48, recorded=28)
 
 
 def open_forms(name: str) -> set[str]:

@@ -29,9 +29,10 @@ WIDEST_SHARES = (0.12, 0.25, 0.5)
 """Half-width of the widest play, in standard deviations of the motion. Wider ones imitate creep."""
 
 
-FEWEST_TURNS, FEWEST_TURNS_FOR_PRODUCTS = 4, 12
-"""In one take. A few strides are one cycle over and over: there a product with the joint is a function of the
-cycle's phase, and anything that goes with the phase would bear the name."""
+FEWEST_TURNS = 4
+SHORTEST_FOR_PRODUCTS_S = 5.0
+"""Of the longest take. Strides are one cycle over and over: there a product with the joint is a function of
+the cycle's phase, and anything that goes with the phase would bear the name."""
 
 
 class Hysteresis(ArrayStateEffect):
@@ -57,8 +58,8 @@ class Hysteresis(ArrayStateEffect):
         return np.array(WIDEST_SHARES)[:, None, None] * spread[None, :, None]
 
     def fit_constants(self, takes: Sequence[Signals]) -> Settings:
-        enough = any(_turns(take) >= FEWEST_TURNS_FOR_PRODUCTS for take in takes)
-        return fit_joint_units(takes) if enough else {}
+        longest_s = max(float(np.ptp(take.time_s)) for take in takes)
+        return fit_joint_units(takes) if longest_s >= SHORTEST_FOR_PRODUCTS_S else {}
 
     def fit_repair_constants(self, takes: Sequence[Signals]) -> Settings:
         """A learned form brings the products with the joint."""
