@@ -83,11 +83,11 @@ def glovecal(arguments: list[str]) -> int:
 
 
 def test(arguments: list[str]) -> int:
-    """Three files at a time: many tests wait for a glove, a cable or a process. Slow ones: -m slow."""
+    """Four files at a time: many tests wait for a glove, a cable or a process. Slow ones: -m slow."""
     if SMOKE in arguments:
         return run("pytest", "-q", *SMOKE_TESTS, dev=True)
-    three = ("-n", "3", "--dist", "loadfile", "--no-loadscope-reorder")
-    return run("pytest", *three, *arguments, dev=True)
+    four = ("-n", "4", "--dist", "loadfile", "--no-loadscope-reorder")
+    return run("pytest", *four, *arguments, dev=True)
 
 
 def check(arguments: list[str]) -> int:
