@@ -83,11 +83,11 @@ def glovecal(arguments: list[str]) -> int:
 
 
 def test(arguments: list[str]) -> int:
-    """Four files at a time: many tests wait for a glove, a cable or a process. Slow ones: -m slow."""
+    """Three files at a time: many tests wait for a glove, a cable or a process. Slow ones: -m slow."""
     if SMOKE in arguments:
         return run("pytest", "-q", *SMOKE_TESTS, dev=True)
-    four = ("-n", "4", "--dist", "loadfile", "--no-loadscope-reorder")
-    return run("pytest", *four, *arguments, dev=True)
+    three = ("-n", "3", "--dist", "loadfile", "--no-loadscope-reorder")
+    return run("pytest", *three, *arguments, dev=True)
 
 
 def check(arguments: list[str]) -> int:

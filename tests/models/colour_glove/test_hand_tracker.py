@@ -56,8 +56,8 @@ def pictures(skin: HandSkin, state, rng: np.random.Generator) -> list[np.ndarray
 
 @pytest.fixture(scope="module")
 def moment():
-    """Twelve hands that are not the model's, half a second and more apart."""
-    states = hand_motion(other_hand(SKIN, 70), 12.0, 1.0, seed=71)[:12]
+    """Eight hands that are not the model's, half a second and more apart."""
+    states = hand_motion(other_hand(SKIN, 70), 8.0, 1.0, seed=71)[:8]
     rng = np.random.default_rng(72)
     return [(state, pictures(other_hand(SKIN, 70), state, rng)) for state in states]
 

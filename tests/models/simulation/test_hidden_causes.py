@@ -24,7 +24,17 @@ STRENGTH_DEG = 1.5
 ROUGHLY = ("changes_mode", "narrow_window", "wrong_channel")
 """Set-aside forms whose strength does not follow their size on this short motion; within a factor of two."""
 HASHES = Path(__file__).parents[2] / "study" / "set_aside_forms.sha256"
-ALL_FORMS = [(name, form) for name in KNOWN_CAUSES + UNKNOWN_CAUSES for form in forms(name)]
+ALL_FORMS = [
+    # The retired ones were tried while they were set aside, and are not changed.
+    pytest.param(
+        name,
+        form,
+        id=f"{name}-{form.name}",
+        marks=[pytest.mark.slow] if form.only_by_name and not form.set_aside else [],
+    )
+    for name in KNOWN_CAUSES + UNKNOWN_CAUSES
+    for form in forms(name)
+]
 
 
 def disturbance(session: RecordedSession, form: Form) -> np.ndarray:
@@ -70,7 +80,7 @@ def measured_strength(session: RecordedSession, form: Form) -> float:
     return float(np.sqrt(np.mean([left_by_own_map(changed[:, c], own[:, c], degree) for c in columns])))
 
 
-@pytest.mark.parametrize(("name", "form"), ALL_FORMS, ids=[f"{name}-{form.name}" for name, form in ALL_FORMS])
+@pytest.mark.parametrize(("name", "form"), ALL_FORMS)
 def test_a_hidden_cause_is_as_strong_as_asked_and_changes_nothing_else(name, form):
     session = record_session(PLAN, [Cause(name, form.name, STRENGTH_DEG)])
     hidden = session.causes[0]

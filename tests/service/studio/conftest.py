@@ -81,7 +81,10 @@ def opened(browser: Browser, address: str) -> Iterator[Open]:
     contexts = []
 
     def open_page(name: str, at: str = address) -> Opened:
-        context = browser.new_context(viewport={"width": 1280, "height": 800}, color_scheme="light")
+        # Half as many pixels each way: the processor draws them all.
+        context = browser.new_context(
+            viewport={"width": 1280, "height": 800}, device_scale_factor=0.5, color_scheme="light"
+        )
         contexts.append(context)
         seen = Opened(context.new_page())
 

@@ -29,6 +29,7 @@ FLAGS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
     "--enable-unsafe-swiftshader",
+    "--webgl-antialiasing-mode=none",
 )  # fmt: skip
 
 STREAMING = {"state": "streaming", "sentence": "", "rate_hz": 60.0}
