@@ -40,9 +40,9 @@ def posture() -> None:
 def an_hour(
     drift: float, offset_s: float, seed: int, multiplier: int, part: float = 1.0
 ) -> tuple[np.ndarray, OwnClock, np.ndarray]:
-    """True times of an hour's records (or those of a part of it), the clock measured from them, and the stamps: an accelerated clock.
+    """True times of the records of an hour or a part of it, the clock measured from them, and the stamps.
 
-    Records travel 1 to 17 ms, as over a USB serial adapter with its timer of 16 ms.
+    The clock is accelerated. Records travel 1 to 17 ms, as over a USB serial adapter with its timer of 16 ms.
     """
     faults = Faults()
     faults.drift, faults.offset_s = drift, offset_s

@@ -62,7 +62,7 @@ def address(settings: Settings, model: str) -> Iterator[str]:
 def browser(not_here: Callable[[str], NoReturn]) -> Iterator[Browser]:
     if shutil.which("chromium") is None:
         not_here("Chromium is not installed (Debian: apt-get install chromium)")
-    with running_browser() as browser:
+    with running_browser("--webgl-antialiasing-mode=none") as browser:
         yield browser
 
 

@@ -29,20 +29,19 @@ FLAGS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
     "--enable-unsafe-swiftshader",
-    "--webgl-antialiasing-mode=none",
 )  # fmt: skip
 
 STREAMING = {"state": "streaming", "sentence": "", "rate_hz": 60.0}
 
 
 @contextmanager
-def running_browser() -> Iterator[Browser]:
+def running_browser(*flags: str) -> Iterator[Browser]:
     """The Chromium of this computer, headless; WebGL is drawn by the processor."""
     chromium = shutil.which("chromium")
     if chromium is None:
         raise FileNotFoundError("Chromium is not installed (Debian: apt-get install chromium)")
     with sync_playwright() as running:
-        browser = running.chromium.launch(executable_path=chromium, args=list(FLAGS))
+        browser = running.chromium.launch(executable_path=chromium, args=[*FLAGS, *flags])
         yield browser
         browser.close()
 
