@@ -21,6 +21,24 @@ os.umask(MASK)
 SAFE_PATH = "PYTHONSAFEPATH"
 
 
+COMPUTING = ("models", "paper", "study", "architecture")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files that compute come between files that wait for gloves, cables and pages: both at once."""
+    files: dict[Path, list[pytest.Item]] = {}
+    for item in items:
+        files.setdefault(item.path, []).append(item)
+    here = Path(__file__).parent
+    kinds: dict[bool, list[Path]] = {True: [], False: []}
+    for path in files:
+        kinds[path.relative_to(here).parts[0] in COMPUTING].append(path)
+    place = {
+        path: (number + 0.5) / len(paths) for paths in kinds.values() for number, path in enumerate(paths)
+    }
+    items[:] = [item for path in sorted(files, key=place.__getitem__) for item in files[path]]
+
+
 @pytest.fixture(autouse=True)
 def process_as_it_was() -> Iterator[None]:
     """A command sets its process's umask and import path; here many commands and tests share one process."""
