@@ -104,7 +104,7 @@ def diagnose(
     impossible += [NotIdentifiable(item.name, SINGLE_POSES) for item in waiting]
     naming = _with_alikes_ordered(naming, beside, screened, by_name)
     lacking = [item for item in every if item.name not in has]
-    asked = signature_findings(takes, layout, problem.joints, naming, found, lacking, known)
+    asked = signature_findings(takes, layout, problem.joints, naming, lacking, known)
     findings = tuple(asked) if signatures else ()
     findings = tuple(
         item

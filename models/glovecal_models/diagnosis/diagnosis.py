@@ -91,7 +91,13 @@ class Diagnosis:
                 return tuple(item for item in self.findings if item.effect == name)
         if self.naming.ranked:
             last = [item for item in self.findings if self.effects[item.effect].stage == "last"]
-            return tuple(item for item in last if may_explain(self.effects[item.effect], self.naming))
+            by_effect = {item.effect: [each for each in last if each.effect == item.effect] for item in last}
+            return tuple(
+                finding
+                for name, found in by_effect.items()
+                if may_explain(self.effects[name], self.naming, found)
+                for finding in found
+            )
         return tuple(item for item in self.findings if item.effect == self.findings[0].effect)
 
     @property

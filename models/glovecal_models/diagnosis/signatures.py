@@ -12,7 +12,6 @@ from glovecal_models.calibration.folds import held_levels
 from glovecal_models.calibration.held_out import BaseProducts, Rows
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.naming import Naming
-from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Stage
 from glovecal_models.effects.base.signals import Signals
@@ -24,15 +23,21 @@ FEWEST_MEASURED = 50
 """Measured frames of a joint; fewer tell no curve."""
 
 
-def may_explain(effect: Effect, naming: Naming) -> bool:
-    """Whether an effect that is asked for last may be behind a ranking: nothing is ranked, or only effects
-    that seem to explain a part of it, and explain no more than that."""
-    if not naming.ranked:
+def may_explain(effect: Effect, naming: Naming, found: Sequence[Finding]) -> bool:
+    """Whether what an effect that is asked for last found is behind a ranking: nothing is ranked, or only
+    effects that seem to explain a part of it, and explain no more than that or are not needed beside it."""
+    if not _is_asked(effect, naming):
+        return False
+    if all(item.effect in set.intersection(*(set(f.accounts_for) for f in found)) for item in naming.ranked):
         return True
     first = naming.ranked[0]
-    share = np.mean([first.errors[joint].contrast for joint in first.significant_joints])
-    only = all(item.effect in effect.also_explained_by for item in naming.ranked)
-    return only and bool(share < effect.also_explained_share)
+    errors = [first.errors[joint] for joint in first.significant_joints]
+    before, after = (sum(float(getattr(item, part).sum()) for item in errors) for part in ("base", "added"))
+    return after > (1.0 - effect.also_explained_share) * before
+
+
+def _is_asked(effect: Effect, naming: Naming) -> bool:
+    return all(item.effect in effect.also_explained_by for item in naming.ranked)
 
 
 def by_signature(effects: Sequence[Effect], stage: Stage) -> list[SignatureEffect]:
@@ -52,7 +57,6 @@ def signature_findings(
     layout: Layout,
     joints: Sequence[str],
     naming: Naming,
-    assessments: Sequence[Assessment],
     effects: Sequence[Effect],
     known: Sequence[KnownEffect] = (),
 ) -> Iterator[Finding]:
@@ -69,9 +73,10 @@ def signature_findings(
     for item in first:
         yield from item.find(takes, sensor_of)
     for item in by_signature(effects, "last"):
-        if may_explain(item, naming):
-            plausible = _with_plausible_context(takes, assessments, effects)
-            yield from item.find(plausible, sensor_of, static_errors(takes, sensor_of, known))
+        if _is_asked(item, naming):
+            found = item.find(takes, sensor_of, static_errors(takes, sensor_of, known))
+            if found and may_explain(item, naming, found):
+                yield from found
 
 
 def are_held_levels(takes: Sequence[Take]) -> bool:
@@ -91,23 +96,6 @@ def beside_levels(
     if naming.ranked[0].effect not in found.alike_between_levels:
         return naming
     return replace(naming, confidence_set=(*naming.confidence_set, found.name))
-
-
-def _with_plausible_context(
-    takes: Sequence[Take], assessments: Sequence[Assessment], effects: Sequence[Effect]
-) -> list[Take]:
-    """Without the context columns that save too little: takes are few, and each column uses one up."""
-    context = {item.name: item.context for item in effects}
-    saving = [
-        item
-        for item in assessments
-        if max(e.contrast for e in item.errors) >= item.limits.least_session_share
-    ]
-    kept = {name for item in saving for name in context.get(item.effect, ())}
-    return [
-        replace(take, context={name: values for name, values in take.context.items() if name in kept})
-        for take in takes
-    ]
 
 
 def static_errors(

@@ -1,8 +1,8 @@
-"""How the error of one rotation wanders inside takes: a random walk, its rate, and if it is beyond chance.
+"""How the error of one rotation wanders inside takes: the rate of a random walk.
 
 The error is averaged over 10 s. Frame noise and everything that is stationary within 10 s (misfit that comes
-and goes with the posture) give such means a variance that can be worked out from the 10 s themselves; a slip
-gives far more, and its means follow one another.
+and goes with the posture) give such means a variance that can be worked out from the 10 s themselves; what
+they vary by beyond it is the walk's.
 """
 
 from __future__ import annotations
@@ -11,21 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtri
 
 MEAN_S = 10.0
 SHORT_S = 1.0
 LEAST_MEANS = 3
 """Of a take, for it to count; over all takes twice as many."""
-EVERY_GLOVE_DEG = 0.6
-"""Slow wandering of a healthy glove stays below this."""
-OVER_NOISE = 1.0
-"""The slip must exceed the frame noise so many times."""
-OVER_STATIONARY = 3.0
-"""Variance of the 10 s means over what stationary errors would give."""
-FOLLOWS = 1.5
-"""Von Neumann's ratio: 2 for means in no order, below 1 for a random walk."""
-WALK_P_VALUE = 0.01
 POSTURE_DEGREE = 3
 
 
@@ -35,21 +25,8 @@ class SlipWalk:
 
     size_deg: float
     """Standard deviation of the wandering inside a take."""
-    least_deg: float
-    """Its lower bound, one-sided 99 %."""
     rate_deg_per_sqrt_min: float
-    frame_noise_deg: float
-    over_stationary: float
-    follows: float
     means: int
-
-    @property
-    def is_slip(self) -> bool:
-        return (
-            self.least_deg > max(EVERY_GLOVE_DEG, OVER_NOISE * self.frame_noise_deg)
-            and self.over_stationary > OVER_STATIONARY
-            and self.follows < FOLLOWS
-        )
 
 
 def slip_walk(
@@ -67,20 +44,10 @@ def slip_walk(
     long = [group.mean(axis=1) for group in groups]
     free = sum(len(means) - 1 for means in long)
     squares = sum(float(np.sum((means - means.mean()) ** 2)) for means in long)
-    successive = sum(float(np.sum(np.diff(means) ** 2)) for means in long)
-    expected = _stationary_variance(np.concatenate(groups))
-    variance = squares / free
-    excess = max(variance - expected, 0.0)
-    # The means of a walk hold one another: about half of them count as independent.
-    independent = max(free / 2.0, 1.0)
-    least = max(variance * independent / float(chdtri(independent, WALK_P_VALUE)) - expected, 0.0)
+    excess = max(squares / free - _stationary_variance(np.concatenate(groups)), 0.0)
     # A walk of rate q gives J means of length T a variance of q² T (J + 1) / 6.
     walked = sum(MEAN_S * (len(means) + 1) / 6.0 * (len(means) - 1) for means in long) / free
-    return SlipWalk(
-        float(np.sqrt(excess)), float(np.sqrt(least)), float(np.sqrt(60.0 * excess / walked)),
-        frame_noise(errors, times), variance / max(expected, 1e-12), successive / max(squares, 1e-12),
-        sum(map(len, long)),
-    )  # fmt: skip
+    return SlipWalk(float(np.sqrt(excess)), float(np.sqrt(60.0 * excess / walked)), sum(map(len, long)))
 
 
 def without_posture(errors: Sequence[np.ndarray], angles: Sequence[np.ndarray]) -> list[np.ndarray]:

@@ -1,0 +1,242 @@
+"""Is it the glove that slips? The slow error of a rotation as a sum of variance components, by likelihood.
+
+The error's means over about 10 s are taken for a Gaussian process whose covariance is a sum: noise, the
+wandering of a healthy glove that comes back, posture, one offset and gain of each wearing, a line and a smooth
+curve over each recorded context column; and beside them what a slip does: a walk since donning, the same way
+in every wearing or in each its own, a walk inside takes, an offset of each take, all of them also in
+proportion to the bend. Variances are the likeliest ones (restricted maximum likelihood: Patterson & Thompson
+1971). Every glove slips a little: held against the likeliest slip is one of ``EVERY_GLOVE_DEG`` at most in
+each component, all else being free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg.lapack import dpotrf, dpotri
+from scipy.optimize import minimize
+
+from glovecal_models.effects.garment_slip.slip_walk import MEAN_S
+from glovecal_models.takes.take import Take
+
+EVERY_GLOVE_DEG = 0.25
+"""Of each component; a healthy glove's own wandering comes back, and is a component of its own."""
+LIKELIER, FEW_JOINTS = 4.0, 5
+"""Twice the log likelihood ratio from which on it is a slip; more with more joints, each a chance to err. Of 80
+simulated clean gloves of five and six joints none reaches 3, of 36 that slip by 1.3 noise floors 32 reach 4; a
+clean session of six minutes reached 3.5."""
+LEAST_SPREAD_DEG = 0.35
+"""Means that scatter by less hold no slip that is worth a name."""
+FEWEST_PIECES, MOST_PIECES = 12, 160
+HEALTHY_LASTS_S = 25.0
+ALIKE_SD = 0.5
+"""Bends within so many standard deviations have about one error of posture."""
+CURVE_SD = 0.7
+"""The same of a context column's curve."""
+FIRST_WORN_S = 30.0
+"""A glove is recorded about so long after it was put on."""
+PAUSE_S = 20.0
+"""Between takes, where nothing tells the time."""
+MEASURED_SHARE, COMPLETE_SHARE = 0.5, 0.9
+"""A piece counts where so much of it was measured, and it has about as many frames as the longest."""
+NUGGET = 1e-2
+"""Of the variance: keeps the covariance positive."""
+LEAST_LOG, START_LOG, MOST_LOG = -7.0, -1.6, 3.0
+ROUNDS = 60
+SINCE_DONNING, SAME_WAY, INSIDE, BETWEEN = "since donning", "same way", "inside takes", "between takes"
+SLIPS = (SINCE_DONNING, SAME_WAY, INSIDE, BETWEEN)
+WORN = "wearing"
+POWER_ON = "power_on_s"
+
+
+@dataclass(frozen=True)
+class SlipComponents:
+    """Of one rotation."""
+
+    size_deg: float
+    """Standard deviation over the session of all that is slip."""
+    likelier: float
+    """Twice the log of the likelihood ratio, against a slip as of every glove."""
+    kind: str
+    """The largest component, one of ``SLIPS``."""
+    wearings_likelier: float
+    """The same ratio for offsets and gains of the wearings beside the slip."""
+    pieces: int
+
+    def is_slip(self, joints: int) -> bool:
+        """One of so many joints that were looked at."""
+        return self.likelier > LIKELIER + 2 * np.log(max(joints / FEW_JOINTS, 1.0))
+
+
+@dataclass(frozen=True)
+class _Pieces:
+    """Means over pieces of takes; each array (P,)."""
+
+    error: np.ndarray
+    bend: np.ndarray
+    worn_s: np.ndarray
+    """Since donning."""
+    inside_s: np.ndarray
+    """Since the take's first frame."""
+    take: np.ndarray
+    wearing: np.ndarray
+    context: tuple[np.ndarray, ...]
+
+
+def slip_components(
+    takes: Sequence[Take], errors: Sequence[np.ndarray], angles: Sequence[np.ndarray]
+) -> SlipComponents | None:
+    """``errors`` (N,) of each take less what goes with posture, ``angles`` (N,) measured, degrees; NaN where
+    there is no reference. None where there is too little to say, or no slow error worth a name."""
+    pieces = _pieces(takes, errors, angles)
+    if len(pieces.error) < FEWEST_PIECES or pieces.error.std() < LEAST_SPREAD_DEG:
+        return None
+    spread = float(pieces.error.std())
+    parts = _covariances(pieces)
+    likelihood = _Likelihood(parts, pieces.error / spread)
+    most = 2 * np.log(EVERY_GLOVE_DEG / spread)
+    held, start = likelihood.highest(dict.fromkeys(parts, MOST_LOG) | dict.fromkeys(_slip_names(parts), most))
+    free, logs = likelihood.highest(dict.fromkeys(parts, MOST_LOG), start)
+    if 2 * (free - held) <= LIKELIER:
+        return None
+    variance = {name: spread**2 * float(np.exp(log)) for name, log in logs.items()}
+    sizes = {kind: sum(variance[name] for name in _slip_names(parts) if name[0] == kind) for kind in SLIPS}
+    without_wearings = {name: MOST_LOG if name[0] != WORN else LEAST_LOG for name in parts}
+    worn_alike, _ = likelihood.highest(without_wearings, logs)
+    return SlipComponents(
+        float(np.sqrt(sum(sizes.values()))), 2 * (free - held), max(sizes, key=lambda kind: sizes[kind]),
+        2 * (free - worn_alike), len(pieces.error),
+    )  # fmt: skip
+
+
+Name = tuple[str, str]
+"""What a component follows, and how."""
+
+
+def _slip_names(parts: Mapping[Name, np.ndarray]) -> list[Name]:
+    return [name for name in parts if name[0] in SLIPS]
+
+
+class _Likelihood:
+    """Of errors (P,) under a sum of covariances (P, P) with free variances and an unknown mean."""
+
+    def __init__(self, parts: Mapping[Name, np.ndarray], error: np.ndarray) -> None:
+        count = len(error)
+        contrasts = np.linalg.qr(np.column_stack([np.ones(count), np.eye(count)[:, 1:]]))[0][:, 1:]
+        self._names = list(parts)
+        self._error = contrasts.T @ error
+        projected = [contrasts.T @ part @ contrasts * (count / np.trace(part)) for part in parts.values()]
+        self._parts = np.array([part.ravel() for part in projected])
+        self._nugget = NUGGET * np.eye(count - 1)
+
+    def highest(
+        self, most: Mapping[Name, float], start: Mapping[Name, float] | None = None
+    ) -> tuple[float, dict[Name, float]]:
+        """The log likelihood and the logs of the variances, each at most ``most``."""
+        bounds = [(LEAST_LOG, max(most[name], LEAST_LOG)) for name in self._names]
+        begin = [START_LOG if start is None else start[name] for name in self._names]
+        found = minimize(
+            self._negative, np.clip(begin, *np.transpose(bounds)), jac=True, method="L-BFGS-B", bounds=bounds,
+            options={"maxiter": ROUNDS},
+        )  # fmt: skip
+        return -float(found.fun), dict(zip(self._names, map(float, found.x), strict=True))
+
+    def _negative(self, logs: np.ndarray) -> tuple[float, np.ndarray]:
+        variances = np.exp(logs)
+        covariance = (variances @ self._parts).reshape(self._nugget.shape) + self._nugget
+        factor, failed = dpotrf(covariance, lower=1)
+        if failed:
+            return 1e9, np.zeros(len(logs))
+        inverse = dpotri(factor, lower=1)[0]
+        inverse = np.tril(inverse) + np.tril(inverse, -1).T
+        solved = inverse @ self._error
+        value = 0.5 * self._error @ solved + np.log(np.diag(factor)).sum()
+        return float(value), -0.5 * variances * (self._parts @ (np.outer(solved, solved) - inverse).ravel())
+
+
+def _covariances(pieces: _Pieces) -> dict[Name, np.ndarray]:
+    """(P, P) of every component; the scale of each is free."""
+    count = len(pieces.error)
+    worn = (pieces.wearing[:, None] == pieces.wearing[None, :]).astype(float)
+    take = (pieces.take[:, None] == pieces.take[None, :]).astype(float)
+    bend = _standard(pieces.bend)
+    bent = np.outer(bend, bend)
+    apart_s = np.abs(pieces.worn_s[:, None] - pieces.worn_s[None, :])
+    since_donned = np.minimum(pieces.worn_s[:, None], pieces.worn_s[None, :])
+    since_begun = np.minimum(pieces.inside_s[:, None], pieces.inside_s[None, :])
+    found = {
+        ("noise", ""): np.eye(count),
+        ("healthy", ""): np.exp(-apart_s / HEALTHY_LASTS_S) * worn,
+        ("posture", ""): _alike(bend, ALIKE_SD),
+        (WORN, ""): worn,
+        (WORN, "bend"): worn * bent,
+    }
+    for number, column in enumerate(pieces.context):
+        value = _standard(column)
+        found[f"context {number}", "line"] = np.outer(value, value) * (1 + bent)
+        found[f"context {number}", "curve"] = _alike(value, CURVE_SD) * (1 + bent)
+    found |= {
+        (SINCE_DONNING, ""): since_donned * worn,
+        (SINCE_DONNING, "bend"): since_donned * worn * bent,
+        (SAME_WAY, ""): since_donned,
+        (SAME_WAY, "bend"): since_donned * bent,
+        (INSIDE, ""): since_begun * take,
+        (BETWEEN, ""): take,
+        (BETWEEN, "bend"): take * bent,
+    }
+    return found
+
+
+def _alike(values: np.ndarray, within: float) -> np.ndarray:
+    return np.exp(-0.5 * np.square((values[:, None] - values[None, :]) / within))
+
+
+def _standard(values: np.ndarray) -> np.ndarray:
+    return (values - values.mean()) / max(float(values.std()), 1e-9)
+
+
+def _pieces(takes: Sequence[Take], errors: Sequence[np.ndarray], angles: Sequence[np.ndarray]) -> _Pieces:
+    """Of about ``MEAN_S``, longer in long sessions."""
+    lasts_s = MEAN_S * max(1.0, sum(take.duration_s for take in takes) / (MEAN_S * MOST_PIECES))
+    names = _context_names(takes)
+    rows: list[np.ndarray] = []
+    for number, (take, begins_s) in enumerate(zip(takes, _worn_s(takes), strict=True)):
+        piece = np.floor((take.time_s - take.time_s[0]) / lasts_s).astype(int)
+        known = np.isfinite(errors[number]) & np.isfinite(angles[number])
+        every, count = np.bincount(piece), np.bincount(piece, known)
+        good = (count >= MEASURED_SHARE * every) & (every >= COMPLETE_SHARE * every.max()) & (count > 0)
+        columns = (errors[number], angles[number], *(take.context[name] for name in names))
+        total = [np.bincount(piece, np.where(known, column, 0.0))[good] / count[good] for column in columns]
+        middle = lasts_s * (np.flatnonzero(good) + 0.5)
+        rows.append(np.column_stack([np.full(len(middle), number), begins_s + middle, middle, *total]))
+    take_of, worn_s, inside_s, error, bend, *context = np.concatenate(rows).T
+    wearings = list(dict.fromkeys(take.wearing for take in takes))
+    wearing = np.array([wearings.index(takes[int(number)].wearing) for number in take_of])
+    varied = tuple(column for column in context if np.ptp(column) > 1e-9)
+    return _Pieces(error, bend, worn_s, inside_s, take_of, wearing, varied)
+
+
+def _context_names(takes: Sequence[Take]) -> list[str]:
+    """Columns that every take knows throughout."""
+    names = takes[0].context if takes else {}
+    return [n for n in names if all(n in t.context and np.isfinite(t.context[n]).all() for t in takes)]
+
+
+def _worn_s(takes: Sequence[Take]) -> list[float]:
+    """How long the glove was worn when each take began, by the time since power-on where it was recorded."""
+    found, last = [], {}
+    for take in takes:
+        on = take.context.get(POWER_ON)
+        now = float(on[0]) if on is not None and np.isfinite(on[0]) else None
+        begins_s = FIRST_WORN_S
+        if take.wearing in last:
+            began_s, power_s, lasted_s = last[take.wearing]
+            begins_s = began_s + lasted_s + PAUSE_S
+            if now is not None and power_s is not None:
+                went_on = now - power_s >= lasted_s
+                begins_s = began_s + now - power_s if went_on else began_s + lasted_s + now
+        found.append(begins_s)
+        last[take.wearing] = (begins_s, now, take.duration_s)
+    return found
