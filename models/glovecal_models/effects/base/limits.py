@@ -75,6 +75,12 @@ class SignificanceLimits:
         "Offsets of each take must save so much of the error without any offset beyond a common one.",
         CHOSEN,
     )
+    within_take_offset_share: float = limit(
+        0.05,
+        "share of the squared error",
+        "Offsets that change within takes must save so much of it beyond those of each take.",
+        CHOSEN,
+    )
 
 
 SIGNIFICANCE_LIMITS = SignificanceLimits()

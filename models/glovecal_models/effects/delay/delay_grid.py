@@ -70,6 +70,8 @@ class DelayErrors:
     """(B,), the take each block lies in."""
     fast: np.ndarray
     """(B,), degrees squared: how much the angle bends within ``BEND_S``, where filters show."""
+    rows: int
+    """Of all blocks."""
 
     @property
     def whole(self) -> float:
@@ -176,6 +178,7 @@ def _joint(problem: Problem, joint: int, form: np.ndarray, delay: np.ndarray) ->
         np.add.reduceat(left * left, starts),
         np.array(problem.unit_take)[np.searchsorted(ends, starts, side="right")],
         np.add.reduceat(bend * bend, starts),
+        len(target),
     )
 
 

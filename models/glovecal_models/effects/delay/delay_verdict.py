@@ -17,6 +17,7 @@ import numpy as np
 from glovecal_models.effects.base.assessment import over_joints
 from glovecal_models.effects.base.limits import SIGNIFICANCE_LIMITS, SignificanceLimits
 from glovecal_models.effects.base.problem import Problem
+from glovecal_models.effects.delay.clock_path import cells_of_others
 from glovecal_models.effects.delay.delay_grid import DelayErrors, DelayForm, delay_errors
 from glovecal_models.takes.known_latency import KnownLatency
 from glovecal_models.takes.tap_latency import usual_key
@@ -57,6 +58,8 @@ class ClockChoice:
     """(1,) for all takes, or (takes,)."""
     cell: np.ndarray
     """(takes,) index among the cells of a mere delay, of each take."""
+    within: Sequence[np.ndarray] | None = None
+    """For each joint (B,) the cell in each block, where the offset changes within takes."""
 
     @property
     def is_per_take(self) -> bool:
@@ -66,8 +69,9 @@ class ClockChoice:
         """For each joint (B,): squared errors with the offset, and with the mirrored one."""
         size = len(grids[0].clock)
         true, mirrored = [], []
-        for grid in grids:
-            rows, cell = np.arange(len(grid.take)), self.cell[grid.take]
+        for joint, grid in enumerate(grids):
+            rows = np.arange(len(grid.take))
+            cell = self.cell[grid.take] if self.within is None else self.within[joint]
             true.append(grid.blocks[rows, grid.clock[cell]])
             mirrored.append(grid.blocks[rows, grid.clock[size - 1 - cell]])
         return true, mirrored
@@ -76,7 +80,8 @@ class ClockChoice:
 def clock_choice(
     grids: Sequence[DelayErrors], limits: SignificanceLimits = SIGNIFICANCE_LIMITS
 ) -> ClockChoice:
-    """One offset for all takes, unless their own save clearly more (each judged on other blocks)."""
+    """One offset for all takes, unless their own save clearly more (each judged on other blocks), or one that
+    changes within takes does (judged on the joints that it was not found by)."""
     clock, takes = grids[0].clock, int(max(grid.take.max() for grid in grids)) + 1
     share = [grid.blocks[:, clock] / grid.whole for grid in grids]
     each = np.array(
@@ -89,9 +94,17 @@ def clock_choice(
     own = np.array([int(np.argmin(row)) if row.any() else common for row in each])
     gain = each.sum(axis=0)[common] - _judged_on_other_blocks(share, grids, takes, common)
     delays = grids[0].delay_s[clock]
-    if takes > 1 and gain > limits.per_take_offset_share * len(grids):
-        return ClockChoice(delays[own], own)
-    return ClockChoice(delays[[common]], np.full(takes, common))
+    is_per_take = takes > 1 and gain > limits.per_take_offset_share * len(grids)
+    cells = own if is_per_take else np.full(takes, common)
+    within = cells_of_others(grids)
+    if within is not None:
+        shares = [part[np.arange(len(part)), cell] for part, cell in zip(share, within, strict=True)]
+        left = sum(float(part.sum()) for part in shares)
+        saved = sum(float(part[np.arange(len(part)), cells[grid.take]].sum())
+                    for part, grid in zip(share, grids, strict=True)) - left  # fmt: skip
+        if saved > limits.within_take_offset_share * len(grids):
+            return ClockChoice(delays[own], own, within)
+    return ClockChoice(delays[own] if is_per_take else delays[[common]], cells)
 
 
 def common_choice(grids: Sequence[DelayErrors]) -> ClockChoice:
@@ -136,7 +149,7 @@ def possible_delays(
     """The effects that these delays may come from, the likeliest first."""
     clear = limits.delay_clear_se
     clock = clock_choice(grids, limits)
-    if np.median(clock.offset_s) < 0:
+    if np.median(clock.offset_s) < 0 or clock.within is not None:
         return (CLOCK,)
     together = {form: _together(grids, form) for form in DelayForm}
     if clock.is_per_take:
