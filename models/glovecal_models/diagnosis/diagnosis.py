@@ -14,7 +14,7 @@ from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.naming import Naming
 from glovecal_models.diagnosis.next_take import NextTake
 from glovecal_models.diagnosis.not_identifiable import NotIdentifiable
-from glovecal_models.diagnosis.signatures import may_explain
+from glovecal_models.diagnosis.signatures import is_outweighed, may_explain
 from glovecal_models.diagnosis.unexplained_residual import UnexplainedResidual
 from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.effect import Effect
@@ -87,8 +87,9 @@ class Diagnosis:
         """Findings of the effect that is to be named by its signature, before any ranking; mostly none."""
         repairs = {item.effect for item in self.findings if self.effects[item.effect].kind == "repair"}
         for name in dict.fromkeys(item.effect for item in self.findings if item.effect in repairs):
-            if name not in self.naming.confidence_set:
-                return tuple(item for item in self.findings if item.effect == name)
+            found = tuple(item for item in self.findings if item.effect == name)
+            if name not in self.naming.confidence_set and not is_outweighed(found, self.naming):
+                return found
         if self.naming.ranked:
             last = [item for item in self.findings if self.effects[item.effect].stage == "last"]
             by_effect = {item.effect: [each for each in last if each.effect == item.effect] for item in last}

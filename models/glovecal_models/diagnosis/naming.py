@@ -9,6 +9,7 @@ import numpy as np
 
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.effects.base.assessment import Assessment, over_joints
+from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.signature_effect import Finding
 
 
@@ -48,6 +49,25 @@ def beside_known(found: Sequence[Assessment], saved: Mapping[str, float]) -> lis
     if not saved:
         return list(found)
     return [replace(item, known_saved_square=tuple(saved[name] for name in item.joints)) for item in found]
+
+
+def beside_last(found: Sequence[Assessment], known: Sequence[Effect]) -> list[Assessment]:
+    """The same, where the model has an effect that is asked for last, such as a slip: what seems to explain a
+    part of it has to explain more than that."""
+    shares = {name: item.also_explained_share for item in known for name in item.also_explained_by}
+    return [
+        replace(item, known_saved_square=(np.inf,) * len(item.joints))
+        if saved_share_of(item) < shares.get(item.effect, 0.0)
+        else item
+        for item in found
+    ]
+
+
+def saved_share_of(found: Assessment) -> float:
+    """Share of the squared error that an effect saves on its significant joints, all together."""
+    errors = [found.errors[joint] for joint in found.significant_joints]
+    before, after = (sum(float(getattr(item, part).sum()) for item in errors) for part in ("base", "added"))
+    return 1.0 - after / before if before > 0 else 0.0
 
 
 def is_beside_known(finding: Finding, saved: Mapping[str, float], share: float) -> bool:

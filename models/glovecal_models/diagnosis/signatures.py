@@ -11,11 +11,11 @@ from glovecal_models.calibration.effect_correction import SignalScale
 from glovecal_models.calibration.folds import held_levels
 from glovecal_models.calibration.held_out import BaseProducts, Rows
 from glovecal_models.diagnosis.known_effect import KnownEffect
-from glovecal_models.diagnosis.naming import Naming
+from glovecal_models.diagnosis.naming import Naming, saved_share_of
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Stage
 from glovecal_models.effects.base.signals import Signals
-from glovecal_models.effects.base.signature_effect import Finding, SignatureEffect
+from glovecal_models.effects.base.signature_effect import Finding, SignatureEffect, frames_inside
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
@@ -30,14 +30,24 @@ def may_explain(effect: Effect, naming: Naming, found: Sequence[Finding]) -> boo
         return False
     if all(item.effect in set.intersection(*(set(f.accounts_for) for f in found)) for item in naming.ranked):
         return True
-    first = naming.ranked[0]
-    errors = [first.errors[joint] for joint in first.significant_joints]
-    before, after = (sum(float(getattr(item, part).sum()) for item in errors) for part in ("base", "added"))
-    return after > (1.0 - effect.also_explained_share) * before
+    return saved_share_of(naming.ranked[0]) < effect.also_explained_share
 
 
 def _is_asked(effect: Effect, naming: Naming) -> bool:
     return all(item.effect in effect.also_explained_by for item in naming.ranked)
+
+
+OUTWEIGHED = 3.0
+"""Times the squared error where findings are: what saves so much more is named before them."""
+
+
+def is_outweighed(found: Sequence[Finding], naming: Naming) -> bool:
+    """Whether the first of a ranking explains far more error than there is where something was found."""
+    squares = [item.error_square for item in found]
+    if not naming.ranked or any(square is None for square in squares):
+        return False
+    there = sum(square for square in squares if square is not None)
+    return naming.ranked[0].saved_square > OUTWEIGHED * there
 
 
 def by_signature(effects: Sequence[Effect], stage: Stage) -> list[SignatureEffect]:
@@ -71,7 +81,10 @@ def signature_findings(
             yield from item.find_between_levels(takes, sensor_of)
         return
     for item in first:
-        yield from item.find(takes, sensor_of)
+        found = item.find(takes, sensor_of)
+        if naming.ranked and any(each.stretches for each in found):
+            found = _with_error_squares(found, takes, sensor_of, static_errors(takes, sensor_of, known))
+        yield from found
     for item in by_signature(effects, "last"):
         if _is_asked(item, naming):
             found = item.find(takes, sensor_of, static_errors(takes, sensor_of, known))
@@ -96,6 +109,27 @@ def beside_levels(
     if naming.ranked[0].effect not in found.alike_between_levels:
         return naming
     return replace(naming, confidence_set=(*naming.confidence_set, found.name))
+
+
+def _with_error_squares(
+    found: Sequence[Finding],
+    takes: Sequence[Take],
+    sensor_of: Mapping[str, str],
+    errors: Sequence[np.ndarray],
+) -> list[Finding]:
+    """Each finding with the squared error of its sensors' rotations in its stretches."""
+    result = []
+    for item in found:
+        columns = [place for place, sensor in enumerate(sensor_of.values()) if sensor in item.where]
+        inside = [frames_inside(take, item.stretches)[:, None] for take in takes]
+        squares = [
+            np.where(mask, part[:, columns] ** 2, 0.0) for mask, part in zip(inside, errors, strict=True)
+        ]
+        count = sum(int(np.isfinite(part[:, columns]).any(axis=1).sum()) for part in errors)
+        known = item.stretches and columns and count
+        total = sum(float(np.nansum(part)) for part in squares)
+        result.append(replace(item, error_square=total / count) if known else item)
+    return result
 
 
 def static_errors(

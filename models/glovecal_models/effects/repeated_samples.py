@@ -7,11 +7,13 @@ same is looked for in the rows of the reference, whose padding is usual when it 
 A stream that halts now and then repeats too few frames for that. But when it goes on it leaps over what
 it missed, and then moves more slowly; a hand that rested starts slowly. How often movements leap by chance is
 told by the frames that follow one another without a repeat.
+
+Sensors that are read in turn repeat each by itself: most frames in a movement of theirs hold an old reading.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -46,6 +48,9 @@ LEAP_STEP = 4.0
 LONGEST_HALT = 60
 """Frames; a hand may rest for longer."""
 LEAST_LEAPS = 8
+OLD_SHARE, FEWEST_MOMENTS = 0.6, 100
+"""A sensor that is read in turn repeats at so many of the moments inside its movements; of sound sensors of 8
+to 12 bits, simulated at 30 to 100 Hz, at a quarter at most."""
 LEAPS_P_VALUE = 1e-4
 """That so many repeats end in a leap by chance (binomial)."""
 
@@ -95,14 +100,19 @@ class RepeatedSamples(SignatureEffect):
         check_signature_input(takes, sensor_of, errors)
         frames = [repeats(take.readings) for take in takes]
         rows = [repeats(take.reference) for take in takes]
-        found = [_finding("frames", takes, frames), _finding("reference rows", takes, rows)]
+        by_frames = _finding("frames", takes, frames)
+        found = [by_frames, _finding("reference rows", takes, rows)]
+        if by_frames is None:
+            found.append(_finding_in_turn(takes, list(dict.fromkeys(sensor_of.values()))))
         return tuple(item for item in found if item is not None)
 
     def repaired(self, takes: Sequence[Take], settings: Settings | None = None) -> tuple[Take, ...]:
-        """Without the repeated frames; repeated reference rows become unknown (NaN)."""
+        """Without the repeated frames; repeated reference rows become unknown (NaN). Between the frames in
+        which a sensor that is read in turn is new, its readings follow straight lines."""
         drop_frames = _is_found([repeats(take.readings) for take in takes])
         drop_rows = _is_found([repeats(take.reference) for take in takes])
-        return tuple(_without(take, drop_frames, drop_rows) for take in takes)
+        old = {} if drop_frames or not takes else _read_in_turn(takes, takes[0].sensors)
+        return tuple(_renewed(_without(take, drop_frames, drop_rows), old) for take in takes)
 
 
 def repeats(values: np.ndarray) -> Repeats:
@@ -203,6 +213,56 @@ def _finding(kind: str, takes: Sequence[Take], found: Sequence[Repeats]) -> Find
         "leaps_after_halts_count": sum(item.leaps for item in found),
     }
     return Finding(RepeatedSamples.name, names, sentence, kind=kind, count=count, evidence=evidence)
+
+
+def _read_in_turn(takes: Sequence[Take], sensors: Sequence[str]) -> dict[str, float]:
+    """Sensors that are new in few frames, with the share of moments at which each repeats; none where it is
+    less than half of those that move."""
+    shares = {}
+    for sensor in sensors:
+        if not all(sensor in take.sensors for take in takes):
+            continue
+        found = [repeats(take.readings[:, [take.sensors.index(sensor)]]) for take in takes]
+        interrupted, moving = (
+            sum(getattr(item, name) for item in found) for name in ("interrupted", "moving")
+        )
+        if interrupted + moving >= FEWEST_MOMENTS:
+            shares[sensor] = interrupted / (interrupted + moving)
+    old = {sensor: share for sensor, share in shares.items() if share >= OLD_SHARE}
+    return old if 2 * len(old) > len(shares) else {}
+
+
+def _finding_in_turn(takes: Sequence[Take], sensors: Sequence[str]) -> Finding | None:
+    old = _read_in_turn(takes, sensors)
+    if not old:
+        return None
+    share = float(np.mean(list(old.values())))
+    sentence = (
+        f"{named(list(old))} hold an old reading at {share:.0%} of the moments inside their movements, each at"
+        " moments of its own: they are read in turn. Between new readings straight lines are drawn; live poses"
+        " stay as late as the glove's round of sensors."
+    )
+    names = tuple(take.name for take in takes)
+    evidence = {"repeated_share_of_moving_pct": 100.0 * share, "sensors_count": float(len(old))}
+    return Finding(RepeatedSamples.name, names, sentence, kind="sensors", evidence=evidence)
+
+
+def _renewed(take: Take, sensors: Collection[str]) -> Take:
+    """With straight lines between the new readings of ``sensors``."""
+    if not sensors or len(take.readings) < 2:
+        return take
+    readings, time = take.readings.astype(float), take.time_s
+    for sensor in sensors:
+        column = take.sensors.index(sensor)
+        new = np.flatnonzero(np.diff(readings[:, column], prepend=np.nan) != 0)
+        lasts = np.diff(new)
+        if not len(lasts):
+            continue
+        # A joint at rest holds its reading for longer than a round of the sensors: it moves in the last one.
+        rested = new[1:] - round(float(np.median(lasts)))
+        known = np.union1d(new, rested[rested > new[:-1]])
+        readings[:, column] = np.interp(time, time[known], readings[known, column])
+    return replace(take, readings=readings)
 
 
 def _without(take: Take, drop_frames: bool, drop_rows: bool) -> Take:

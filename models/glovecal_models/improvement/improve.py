@@ -149,6 +149,8 @@ class _Loop:
         )  # fmt: skip
         self.diagnosed = takes
         tried = self._tried
+        if self._is_named_last(self.diagnosis):
+            return self._add_widenings()
         for item in self.diagnosis.naming.ranked:
             if item.effect in tried:
                 continue
@@ -260,6 +262,13 @@ class _Loop:
             ):
                 return True
         return False
+
+    def _is_named_last(self, diagnosis: Diagnosis) -> bool:
+        """Whether it names an effect that seems to be explained by those which it ranks, and is not."""
+        names = {
+            item.effect for item in diagnosis.signature if diagnosis.effects[item.effect].stage == "last"
+        }
+        return bool(names - self._tried)
 
     def _add_widenings(self) -> bool:
         steps = widenings(self.steps[-1].model, self._repaired(), self.diagnosis, self._tried | self._has)

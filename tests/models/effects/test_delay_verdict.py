@@ -31,7 +31,7 @@ def errors(lowpass_gain: float) -> DelayErrors:
             forms.append(form)
     return DelayErrors(
         np.array(forms), np.tile(DELAYS_S, len(DelayForm)), np.stack(blocks, axis=1),
-        5.0 + 4.0 * fast, np.repeat(np.arange(4), 12), fast,
+        5.0 + 4.0 * fast, np.repeat(np.arange(4), 12), fast, 6000,
     )  # fmt: skip
 
 

@@ -86,3 +86,24 @@ def test_nothing_to_look_at():
     assert not repeats(np.empty((0, 0))).rows.any()
     assert repeats(np.full((50, 2), np.nan)).share == 0.0
     assert repeats(np.ones((50, 2))).share == 0.0
+
+
+def in_turn(readings: np.ndarray, every: int) -> np.ndarray:
+    """Each column new in one of ``every`` frames, each at another one."""
+    rows = np.arange(len(readings))
+    newest = [np.maximum((rows - first) // every * every + first, 0) for first in range(readings.shape[1])]
+    return np.column_stack([column[at] for column, at in zip(readings.T, newest, strict=True)])
+
+
+def test_sensors_that_are_read_in_turn_are_found_and_follow_straight_lines(glove):
+    plain = glove.takes()
+    takes = [replace(take, readings=in_turn(take.readings, 6)) for take in plain]
+    [finding] = REPEATED.find(takes, glove.sensor_of)
+    assert finding.kind == "sensors"
+    mended = REPEATED.repaired(takes)
+    errors = [
+        np.sqrt(np.mean((np.stack([t.readings for t in some]) - np.stack([t.readings for t in plain])) ** 2))
+        for some in (takes, mended)
+    ]
+    assert errors[1] < 0.4 * errors[0]
+    assert REPEATED.find(mended, glove.sensor_of) == ()

@@ -51,6 +51,8 @@ class Finding:
     stretches: tuple[Stretch, ...] = ()
     is_only_told: bool = False
     """Whether no model is better for it: it is to be put right at the glove."""
+    error_square: float | None = None
+    """How much of the squared error is where it was found, degrees squared per frame; None: not known."""
     accounts_for: tuple[str, ...] = ()
     """Effects that would seem to explain it, and are not needed beside it."""
 

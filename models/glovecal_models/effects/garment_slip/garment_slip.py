@@ -170,7 +170,9 @@ HOW = {
 
 def _finding(rotation: str, slip: SlipComponents, walk: SlipWalk | None) -> Finding:
     rate = "" if walk is None else f", {walk.rate_deg_per_sqrt_min:.1f} deg in a minute"
-    advice = "start every take with a known pose" if slip.kind == BETWEEN else "hold a known pose now and then"
+    advice = (
+        "start every take with a known pose" if slip.kind == BETWEEN else "hold a known pose now and then"
+    )
     sentence = (
         f"{rotation}: the error {HOW[slip.kind]}, by {slip.size_deg:.1f} deg in all{rate}; {advice}. "
         f"No recorded column goes along with it."
