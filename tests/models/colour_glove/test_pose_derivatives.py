@@ -12,10 +12,17 @@ from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.crop import Window
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, RANGE_DEG, HandState
 from glovecal_models.colour_glove.pattern import glove_pattern
+from glovecal_models.colour_glove.pose.centroid_ik import correspondences, drawn_patches
 from glovecal_models.colour_glove.pose.dense import label_equations, refine_by_labels
 from glovecal_models.colour_glove.pose.gaussian_step import Belief, damped_step
 from glovecal_models.colour_glove.pose.vertex_motion import pixel_motion
-from glovecal_models.colour_glove.pose.window_view import SEEN_POINTS, PrintedHand, WindowView, colour_shares
+from glovecal_models.colour_glove.pose.window_view import (
+    DRAWN_POINTS,
+    SEEN_POINTS,
+    PrintedHand,
+    WindowView,
+    colour_shares,
+)
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import hand_skin, posed
 from glovecal_models.hand.skeleton import hand_skeleton
@@ -107,6 +114,36 @@ def test_boundaries_move_as_drawings_do():
             assert alike > 0.85, f"degree {degree}"
             assert 0.7 < expected @ found / (expected @ expected) < 1.3, f"degree {degree}"
         assert compared > 10
+
+
+def test_centroids_and_areas_move_as_drawings_do():
+    """Their analytic derivatives against drawings a visible step apart: partly hidden patches too."""
+    for seed in (4, 5):
+        here = state(seed)
+        seen = view(here)
+
+        def patches(moved: HandState, seen: WindowView = seen) -> np.ndarray:
+            return drawn_patches(seen.drawn(HAND, moved), 20)
+
+        found = correspondences(HAND, seen, here, 0.15)
+        assert len(found.patches) > 10
+        assert np.abs(found.log_area).max() < 0.5  # one hand, once by pixels, once by points
+        expected, told = [], []
+        for degree in range(DEGREES_OF_FREEDOM):
+            size = 12.0 if degree == 25 else 4.0
+            step = size * np.eye(DEGREES_OF_FREEDOM)[degree]
+            ahead, behind = (patches(here.moved(sign * step))[found.patches] for sign in (1, -1))
+            apart = ahead[:, 1:] / ahead[:, :1] - behind[:, 1:] / behind[:, :1]
+            pixels = apart * seen.cell_px / DRAWN_POINTS / (2 * size)
+            growth = np.log(ahead[:, 0] / behind[:, 0]) / (2 * size)
+            # In radii of a patch, so that both count alike.
+            radius = np.sqrt(patches(here)[found.patches, 0] / np.pi) * seen.cell_px / DRAWN_POINTS
+            expected.append(np.append(pixels / radius[:, None], growth))
+            told.append(np.append(found.motion_px[:, :, degree] / radius[:, None], found.growth[:, degree]))
+        alike = [np.corrcoef(one, other)[0, 1] for one, other in zip(expected, told, strict=True)]
+        assert np.median(alike) > 0.9  # where a patch is nearly hidden, single points come and go
+        slope = np.sum(np.multiply(expected, told)) / np.sum(np.square(expected))
+        assert 0.8 < slope < 1.2
 
 
 def test_a_step_stays_within_a_hands_range_and_follows_the_tighter_belief():
