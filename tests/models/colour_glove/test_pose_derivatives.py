@@ -23,7 +23,7 @@ from glovecal_models.colour_glove.pose.window_view import (
     WindowView,
     colour_shares,
 )
-from glovecal_models.colour_glove.rasterise import rasterise
+from glovecal_models.colour_glove.rasterise import rasterise, z_buffer
 from glovecal_models.colour_glove.skin import hand_skin, posed
 from glovecal_models.hand.skeleton import hand_skeleton
 
@@ -61,6 +61,30 @@ def test_points_move_as_finite_differences_say(side):
         step = 1e-4 * np.eye(DEGREES_OF_FREEDOM)[degree]
         ahead, behind = (BESIDE.project(posed(skin, here.moved(sign * step))[vertices]) for sign in (1, -1))
         assert np.allclose(found[:, :, degree], (ahead - behind) / 2e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_what_faces_away_from_the_camera_is_hidden_anyway(side):
+    skin = hand_skin(hand_skeleton(hand=side))
+    placed = posed(skin, state(2))
+    pixels = PLAIN.project(placed)
+    all_of_them, _ = z_buffer(pixels, placed[:, 2], skin.triangles, 480, 640)
+    fronts, _ = z_buffer(pixels, placed[:, 2], skin.triangles, 480, 640, True)
+    assert np.count_nonzero(all_of_them >= 0) > 15_000
+    assert np.count_nonzero(fronts != all_of_them) < 10
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10_000))
+def test_a_turn_and_its_vector_are_scipys(seed):
+    rng = np.random.default_rng(seed)
+    vector = rng.normal(size=3) * 10.0 ** rng.uniform(-9.0, 0.4)
+    step = np.concatenate([np.zeros(20), np.degrees(vector), np.zeros(3)])
+    here = state(seed)
+    expected = Rotation.from_rotvec(vector).as_matrix() @ here.rotation
+    assert np.allclose(here.moved(step).rotation, expected, atol=1e-12)
+    back = Rotation.from_matrix(expected @ here.rotation.T).as_rotvec(degrees=True)
+    assert np.allclose(here.moved(step).step_from(here)[20:23], back, atol=1e-6)
 
 
 @settings(max_examples=20, deadline=None)
@@ -123,7 +147,7 @@ def test_centroids_and_areas_move_as_drawings_do():
         seen = view(here)
 
         def patches(moved: HandState, seen: WindowView = seen) -> np.ndarray:
-            return drawn_patches(seen.drawn(HAND, moved), 20)
+            return drawn_patches(seen.shown(HAND, posed(SKIN, moved)), HAND.patch_of, 20)[0]
 
         found = correspondences(HAND, seen, here, 0.15)
         assert len(found.patches) > 10

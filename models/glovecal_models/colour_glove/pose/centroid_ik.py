@@ -99,16 +99,16 @@ def correspondences(
 ) -> Correspondences:
     """The patches both seen and drawn; R grows the less alike their areas are."""
     placed = posed(hand.skin, state)
-    shown = view.shown(hand, placed)
-    patch = hand.patch_of[shown]
-    drawn = drawn_patches(patch, len(hand.colour_of) - 1)
+    pixels, depth = view.projected(placed)
+    shown = view.shown_at(hand, pixels, depth)
+    drawn, patch = drawn_patches(shown, hand.patch_of, len(hand.colour_of) - 1)
     visible = drawn[:, 0] >= _LEAST_POINTS
     places = drawn[:, 1:] / np.maximum(drawn[:, :1], 1.0)
     finer = SEEN_POINTS / DRAWN_POINTS
-    labels = view.seen_beside(hand, shown)
     seen = seen_patches(
-        labels, (places + 0.5) * finer - 0.5, visible, hand.colour_of, _GATE * CELLS * SEEN_POINTS
-    )
+        view.labels, (places + 0.5) * finer - 0.5, visible, hand.colour_of, _GATE * CELLS * SEEN_POINTS,
+        shown, patch, hand.is_cuff,
+    )  # fmt: skip
     seen[:, 0] /= finer**2
     both = visible & (seen[:, 0] >= _LEAST_POINTS)
     patches, areas = np.flatnonzero(both), drawn[both, 0]
@@ -118,7 +118,8 @@ def correspondences(
     sd_cells = np.hypot(noise_cells, BY_AREA * np.abs(log_area) * radius / DRAWN_POINTS)
     sd_area = np.hypot(AREA_SD, AREA_EDGE_POINTS / radius) * (noise_cells / FULL_NOISE_CELLS[-1])
     sd_area = np.hypot(sd_area, log_area / _AREA_BELIEVED)
-    moved = _moved_patches(hand, view, state, placed, shown, patch, places)[both] / areas[:, None, None]
+    moved = _moved_patches(hand, view, state, (placed, depth), shown, patch, places)[both]
+    moved /= areas[:, None, None]
     px = view.cell_px / DRAWN_POINTS
     return Correspondences(
         patches, (seen_places - places[both]) * px, sd_cells * view.cell_px, moved[:, 1:] * px,
@@ -127,28 +128,31 @@ def correspondences(
 
 
 def _moved_patches(
-    hand: PrintedHand, view: WindowView, state: HandState, placed_mm: np.ndarray, shown: np.ndarray,
-    patch: np.ndarray, centroids: np.ndarray,
+    hand: PrintedHand, view: WindowView, state: HandState, body: tuple[np.ndarray, np.ndarray],
+    shown: np.ndarray, patch: np.ndarray, centroids: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
-    """(P, 3, 26): derivatives of each patch's points, and of the sums of u and v about its centroid."""
-    depth = view.projected(placed_mm)[1]
-    vertices, which, places, before, after, across = boundaries(shown, patch, hand.skin.triangles, depth, 1)
+    """(P, 3, 26): derivatives of each patch's points, and of the sums of u and v about its centroid.
+    ``body``: places (V, 3) and depths (V,) of the vertices."""
+    placed_mm, depth = body
+    vertices, *edges = boundaries(shown, patch, hand.skin.triangles, depth, 1)
     moving = pixel_motion(hand.skin, state, vertices, placed_mm[vertices], view.camera)
     moving *= DRAWN_POINTS / view.cell_px
-    return moved_sums(moving, which, places, before, after, across, centroids, shown.shape[0])
+    return moved_sums(moving, *edges, centroids, shown.shape[0])
 
 
 @numba.njit(cache=True)
-def drawn_patches(patch, count):  # type: ignore[no-untyped-def]
-    """Kernel: points, sum of u, sum of v of each patch (P, 3)."""
-    sums = np.zeros((count, 3))
-    for v in range(patch.shape[0]):
-        for u in range(patch.shape[1]):
-            if patch[v, u]:
-                sums[patch[v, u] - 1, 0] += 1.0
-                sums[patch[v, u] - 1, 1] += u
-                sums[patch[v, u] - 1, 2] += v
-    return sums
+def drawn_patches(shown, patch_of, count):  # type: ignore[no-untyped-def]
+    """Kernel: points, sum of u, sum of v of each patch (P, 3), and the patch at each point."""
+    sums, patch = np.zeros((count, 3)), np.empty(shown.shape, dtype=np.uint8)
+    for v in range(shown.shape[0]):
+        for u in range(shown.shape[1]):
+            here = patch_of[shown[v, u]]
+            patch[v, u] = here
+            if here:
+                sums[here - 1, 0] += 1.0
+                sums[here - 1, 1] += u
+                sums[here - 1, 2] += v
+    return sums, patch
 
 
 @numba.njit(cache=True)
@@ -172,23 +176,36 @@ def moved_sums(moving, which, places, before, after, across, centroids, side):  
 
 
 @numba.njit(cache=True)
-def seen_patches(labels, centroids, visible, colour_of, gate):  # type: ignore[no-untyped-def]
-    """Kernel: points, sum of u, sum of v (P, 3) of the seen points nearest to each visible patch."""
-    count = len(centroids)
+def seen_patches(labels, centroids, visible, colour_of, gate, shown, patch, is_cuff):  # type: ignore[no-untyped-def]
+    """Kernel: points, sum of u, sum of v (P, 3) of the seen points nearest to each visible patch. Where no
+    glove is seen on the cuff, what is drawn there is taken for seen."""
+    count, finer = len(centroids), labels.shape[0] // shown.shape[0]
+    # Per colour: how many visible patches have it, and which.
+    having, which = np.zeros(256, dtype=np.int64), np.empty((256, count), dtype=np.int64)
+    for index in range(count):
+        if visible[index]:
+            colour = colour_of[index + 1]
+            which[colour, having[colour]] = index
+            having[colour] += 1
     sums = np.zeros((count, 3))
+    nearest = gate * gate
     for v in range(labels.shape[0]):
-        for u in range(labels.shape[1]):
-            colour = labels[v, u]
-            if colour == 0:
-                continue
-            best, least = -1, gate * gate
-            for index in range(count):
-                if visible[index] and colour_of[index + 1] == colour:
+        row = v // finer
+        for column in range(shown.shape[1]):
+            there = shown[row, column]
+            unseen = colour_of[patch[row, column]] if there >= 0 and is_cuff[there] else 0
+            for u in range(column * finer, (column + 1) * finer):
+                colour = labels[v, u] if labels[v, u] else unseen
+                if colour == 0:
+                    continue
+                best, least = -1, nearest
+                for place in range(having[colour]):
+                    index = which[colour, place]
                     du, dv = u - centroids[index, 0], v - centroids[index, 1]
                     if du * du + dv * dv < least:
                         least, best = du * du + dv * dv, index
-            if best >= 0:
-                sums[best, 0] += 1.0
-                sums[best, 1] += u
-                sums[best, 2] += v
+                if best >= 0:
+                    sums[best, 0] += 1.0
+                    sums[best, 1] += u
+                    sums[best, 2] += v
     return sums
