@@ -33,6 +33,7 @@ from glovecal_models.colour_glove.drawn.photograph import (
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, HandState
 from glovecal_models.colour_glove.lookup import PoseLookup
 from glovecal_models.colour_glove.pictures.classify import ColourTable
+from glovecal_models.colour_glove.pictures.white_balance import Gains
 from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
 from glovecal_models.colour_glove.pose.learned_errors import LearnedErrors, fitted_scale, scale_name
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
@@ -109,9 +110,14 @@ def spoilt(labels: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return found
 
 
-def drawn_colours(hand: PrintedHand) -> ColourTable:
-    """The table of colours learned from drawn photographs of this hand before the camera assumed."""
-    examples = labelled_photographs(hand.skin, hand.pattern, Camera())
+def drawn_colours(hand: PrintedHand, light: Gains | None = None) -> ColourTable:
+    """The table of colours learned from drawn photographs of this hand before the camera assumed.
+
+    ``light``: gains that correct it; the photographs are taken in it, uncorrected. What a strong light cuts
+    off at the end of a channel no gain brings back, but the table learns how the colours look so.
+    """
+    cast = (1.0, 1.0, 1.0) if light is None else (1 / light.red, 1 / light.green, 1 / light.blue)
+    examples = labelled_photographs(hand.skin, hand.pattern, Camera(), gains=cast)
     return ColourTable.trained([each.picture for each in examples], [each.labels for each in examples])
 
 
