@@ -134,10 +134,10 @@ def _moved_patches(
     """(P, 3, 26): derivatives of each patch's points, and of the sums of u and v about its centroid.
     ``body``: places (V, 3) and depths (V,) of the vertices."""
     placed_mm, depth = body
-    vertices, *edges = boundaries(shown, patch, hand.skin.triangles, depth, 1)
+    vertices, which, places, before, after, across = boundaries(shown, patch, hand.skin.triangles, depth, 1)
     moving = pixel_motion(hand.skin, state, vertices, placed_mm[vertices], view.camera)
     moving *= DRAWN_POINTS / view.cell_px
-    return moved_sums(moving, *edges, centroids, shown.shape[0])
+    return moved_sums(moving, which, places, before, after, across, centroids, shown.shape[0])
 
 
 @numba.njit(cache=True)
