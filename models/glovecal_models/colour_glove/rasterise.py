@@ -51,10 +51,12 @@ def rasterise(vertices_mm: np.ndarray, triangles: np.ndarray, camera: Camera) ->
 
 
 @numba.njit(cache=True)
-def z_buffer(pixels, depth, triangles, height, width):  # type: ignore[no-untyped-def]
+def z_buffer(pixels, depth, triangles, height, width, fronts_only=False):  # type: ignore[no-untyped-def]
     """Kernel: triangle (H, W) int32 and depth (H, W) float32 of corners ``pixels`` (V, 2), ``depth`` (V,).
 
-    1 / depth is linear over the picture of a plane, so it is what the buffer holds.
+    1 / depth is linear over the picture of a plane, so it is what the buffer holds. ``fronts_only`` leaves
+    out triangles whose corners run clockwise in the picture: of the closed skin those that face away, half of
+    them, in almost half the time.
     """
     shown = np.full((height, width), -1, dtype=np.int32)
     inverse = np.zeros((height, width))
@@ -65,7 +67,7 @@ def z_buffer(pixels, depth, triangles, height, width):  # type: ignore[no-untype
         ax, ay, bx, by = pixels[a, 0], pixels[a, 1], pixels[b, 0], pixels[b, 1]
         cx, cy = pixels[c, 0], pixels[c, 1]
         area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        if not np.abs(area) > 1e-12:
+        if not np.abs(area) > 1e-12 or (fronts_only and area > 0.0):
             continue
         left = np.ceil(max(min(ax, bx, cx), 0.0))
         right = np.floor(min(max(ax, bx, cx), width - 1.0))

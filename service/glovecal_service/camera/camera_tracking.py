@@ -24,7 +24,9 @@ from glovecal_client.errors import CaptureRefused
 from glovecal_client.pictures.source import PictureSource
 from glovecal_client.wire.pose import Pose, PoseFlag, RotationFlag, encode_pose
 from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS
+from glovecal_models.colour_glove.pictures.classify import ColourTable
 from glovecal_models.colour_glove.pictures.white_balance import Gains, blind_gains
+from glovecal_models.colour_glove.pose.error_learning import drawn_colours
 from glovecal_models.colour_glove.pose_estimate import STAGES, PoseEstimate
 from glovecal_models.errors import BadInput, Cancelled
 from glovecal_service.camera.camera_health import HAND, NO_HAND, CameraHealth
@@ -93,6 +95,7 @@ class CameraTracking:
         self._reader: PictureReader | None = None
         self._seen: SeenPicture | None = None
         self._gains = Gains()
+        self._in_this_light: ColourTable | None = None
         self._of_glove: deque[np.ndarray] = deque(maxlen=BALANCED_ON)
         self._of_glove_s = 0.0
         self._last: Pose | None = None
@@ -192,6 +195,8 @@ class CameraTracking:
         if now - self._of_glove_s >= APART_S:
             self._of_glove_s = now
             self._of_glove.append(pixels)
+        if self._in_this_light is not None:
+            return self._in_this_light.labels(pixels)
         return self._setup.colours.labels(self._gains.corrected(pixels))
 
     def _check(self, pixels: np.ndarray, labels: np.ndarray) -> None:
@@ -263,7 +268,9 @@ class CameraTracking:
 
     def _balance(self, setup: TrackingSetup) -> dict[str, Any]:
         pictures = list(self._of_glove)
-        self._gains, distance, before = blind_gains(pictures, setup.colours, setup.first.lookup)
+        gains, distance, before = blind_gains(pictures, setup.colours, setup.first.lookup)
+        own = self._settings.colours is not None  # a table from pictures cannot be drawn in another light
+        self._gains, self._in_this_light = gains, None if own else drawn_colours(setup.hand, gains)
         self.health.forget_poses()
         self._link.publish_status()
         return {**asdict(self._gains), "distance_px2": distance, "distance_before_px2": before}

@@ -22,7 +22,8 @@ from glovecal_models.colour_glove.palette import encoded_light, linear_light
 from glovecal_models.colour_glove.pattern import glove_pattern
 from glovecal_models.colour_glove.pictures.classify import ColourTable, _Mixture, many_coloured
 from glovecal_models.colour_glove.pictures.white_balance import Gains, blind_gains, white_gains
-from glovecal_models.colour_glove.pose.error_learning import other_hand
+from glovecal_models.colour_glove.pose.error_learning import drawn_colours, other_hand
+from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.skin import hand_skin
 from glovecal_models.errors import BadInput
 
@@ -75,6 +76,14 @@ def test_a_cast_is_corrected_by_white_and_blindly(table, database: PoseDatabase)
     blind, left, before = blind_gains([f.picture for f in found], table, lookup)
     assert left < before
     assert right(table, found, blind) > 0.9
+
+
+def test_a_table_learned_in_the_light_knows_what_is_cut_off(table):
+    """Red that is over-exposed: no gain brings yellow and violet back."""
+    found = photographs(4, gains=(1.55, 1.0, 0.8))
+    white = Gains(1 / 1.55, 1.0, 1 / 0.8)
+    own = drawn_colours(PrintedHand(SKIN, PATTERN), white)
+    assert right(own, found) > right(table, found, white) + 0.01
 
 
 def test_mixtures_are_scikit_learns():

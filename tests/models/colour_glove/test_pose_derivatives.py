@@ -12,11 +12,18 @@ from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.crop import Window
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, RANGE_DEG, HandState
 from glovecal_models.colour_glove.pattern import glove_pattern
+from glovecal_models.colour_glove.pose.centroid_ik import correspondences, drawn_patches
 from glovecal_models.colour_glove.pose.dense import label_equations, refine_by_labels
 from glovecal_models.colour_glove.pose.gaussian_step import Belief, damped_step
 from glovecal_models.colour_glove.pose.vertex_motion import pixel_motion
-from glovecal_models.colour_glove.pose.window_view import SEEN_POINTS, PrintedHand, WindowView, colour_shares
-from glovecal_models.colour_glove.rasterise import rasterise
+from glovecal_models.colour_glove.pose.window_view import (
+    DRAWN_POINTS,
+    SEEN_POINTS,
+    PrintedHand,
+    WindowView,
+    colour_shares,
+)
+from glovecal_models.colour_glove.rasterise import rasterise, z_buffer
 from glovecal_models.colour_glove.skin import hand_skin, posed
 from glovecal_models.hand.skeleton import hand_skeleton
 
@@ -54,6 +61,30 @@ def test_points_move_as_finite_differences_say(side):
         step = 1e-4 * np.eye(DEGREES_OF_FREEDOM)[degree]
         ahead, behind = (BESIDE.project(posed(skin, here.moved(sign * step))[vertices]) for sign in (1, -1))
         assert np.allclose(found[:, :, degree], (ahead - behind) / 2e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_what_faces_away_from_the_camera_is_hidden_anyway(side):
+    skin = hand_skin(hand_skeleton(hand=side))
+    placed = posed(skin, state(2))
+    pixels = PLAIN.project(placed)
+    all_of_them, _ = z_buffer(pixels, placed[:, 2], skin.triangles, 480, 640)
+    fronts, _ = z_buffer(pixels, placed[:, 2], skin.triangles, 480, 640, True)
+    assert np.count_nonzero(all_of_them >= 0) > 15_000
+    assert np.count_nonzero(fronts != all_of_them) < 10
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10_000))
+def test_a_turn_and_its_vector_are_scipys(seed):
+    rng = np.random.default_rng(seed)
+    vector = rng.normal(size=3) * 10.0 ** rng.uniform(-9.0, 0.4)
+    step = np.concatenate([np.zeros(20), np.degrees(vector), np.zeros(3)])
+    here = state(seed)
+    expected = Rotation.from_rotvec(vector).as_matrix() @ here.rotation
+    assert np.allclose(here.moved(step).rotation, expected, atol=1e-12)
+    back = Rotation.from_matrix(expected @ here.rotation.T).as_rotvec(degrees=True)
+    assert np.allclose(here.moved(step).step_from(here)[20:23], back, atol=1e-6)
 
 
 @settings(max_examples=20, deadline=None)
@@ -107,6 +138,36 @@ def test_boundaries_move_as_drawings_do():
             assert alike > 0.85, f"degree {degree}"
             assert 0.7 < expected @ found / (expected @ expected) < 1.3, f"degree {degree}"
         assert compared > 10
+
+
+def test_centroids_and_areas_move_as_drawings_do():
+    """Their analytic derivatives against drawings a visible step apart: partly hidden patches too."""
+    for seed in (4, 5):
+        here = state(seed)
+        seen = view(here)
+
+        def patches(moved: HandState, seen: WindowView = seen) -> np.ndarray:
+            return drawn_patches(seen.shown(HAND, posed(SKIN, moved)), HAND.patch_of, 20)[0]
+
+        found = correspondences(HAND, seen, here, 0.15)
+        assert len(found.patches) > 10
+        assert np.abs(found.log_area).max() < 0.5  # one hand, once by pixels, once by points
+        expected, told = [], []
+        for degree in range(DEGREES_OF_FREEDOM):
+            size = 12.0 if degree == 25 else 4.0
+            step = size * np.eye(DEGREES_OF_FREEDOM)[degree]
+            ahead, behind = (patches(here.moved(sign * step))[found.patches] for sign in (1, -1))
+            apart = ahead[:, 1:] / ahead[:, :1] - behind[:, 1:] / behind[:, :1]
+            pixels = apart * seen.cell_px / DRAWN_POINTS / (2 * size)
+            growth = np.log(ahead[:, 0] / behind[:, 0]) / (2 * size)
+            # In radii of a patch, so that both count alike.
+            radius = np.sqrt(patches(here)[found.patches, 0] / np.pi) * seen.cell_px / DRAWN_POINTS
+            expected.append(np.append(pixels / radius[:, None], growth))
+            told.append(np.append(found.motion_px[:, :, degree] / radius[:, None], found.growth[:, degree]))
+        alike = [np.corrcoef(one, other)[0, 1] for one, other in zip(expected, told, strict=True)]
+        assert np.median(alike) > 0.9  # where a patch is nearly hidden, single points come and go
+        slope = np.sum(np.multiply(expected, told)) / np.sum(np.square(expected))
+        assert 0.8 < slope < 1.2
 
 
 def test_a_step_stays_within_a_hands_range_and_follows_the_tighter_belief():

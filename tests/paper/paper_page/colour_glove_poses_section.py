@@ -41,7 +41,7 @@ NOTE = (
     "Reprojection is the root mean square distance of the skin's vertices in the picture. The paper "
     f"tells no error of joints; its depth errors are {PAPER_DEPTH_MM[0]} to {PAPER_DEPTH_MM[1]} mm. "
     f"Its times: {PAPER_MS} ms a frame (image, "
-    "look-up, inverse kinematics). Times are of one processor, beside whatever else the computer did."
+    "look-up, inverse kinematics). Ours are processor times of one thread."
 )
 
 

@@ -40,7 +40,7 @@ NOTE = (
     "root mean squares over the skin's vertices, turned palm included. The paper prints Figures 8 and 9 "
     "without numbers, but for its 192 bits. Greedy low-dispersion sampling makes the largest gap small, not "
     "the mean distance: rare hand shapes count as much as frequent ones. Times "
-    "of brute force and look-up are taken one after the other, beside whatever else the computer does then."
+    "are processor times of one thread."
 )
 
 

@@ -1,10 +1,9 @@
 """Learn the tracker's errors on rendered hands that are not the model's: other bones, radii and sizes.
 
 The paper learns R, Q and P on a recorded sequence about local averages of its own answers (section 5.3);
-rendered hands have a truth, and errors that last are errors too. Q is learned on rendered labels, spoilt as a
-classifier spoils them; how large errors are for what the tracker says on drawn photographs, with an arm, a
-face and a room, whose colours are classified. Kept beside the database: the same hand, database and cameras
-are learned once.
+rendered hands have a truth, and errors that last are errors too. All is learned on drawn photographs, with an
+arm, a face and a room, whose colours are classified. Kept beside the database: the same hand, database and
+cameras are learned once.
 """
 
 from __future__ import annotations
@@ -24,7 +23,8 @@ from pathlib import Path
 import numpy as np
 
 from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.drawn.hand_motion import hand_motion
+from glovecal_models.colour_glove.database import DatabaseSettings
+from glovecal_models.colour_glove.drawn.hand_motion import CONE_DEG, hand_motion
 from glovecal_models.colour_glove.drawn.photograph import (
     Photographer,
     Photography,
@@ -33,6 +33,7 @@ from glovecal_models.colour_glove.drawn.photograph import (
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, HandState
 from glovecal_models.colour_glove.lookup import PoseLookup
 from glovecal_models.colour_glove.pictures.classify import ColourTable
+from glovecal_models.colour_glove.pictures.white_balance import Gains
 from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
 from glovecal_models.colour_glove.pose.learned_errors import LearnedErrors, fitted_scale, scale_name
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
@@ -52,7 +53,7 @@ _APART, _CLOSE = (20, 1.5), (24, 30.0)
 _WRONG, _CLUTTER = 0.04, 3
 """Share of wrong glove pixels, and little blobs of glove colour beside the hand."""
 _EXPOSURE_S = 0.01
-_FORMAT = 2
+_FORMAT = 3
 _LEAST_PIXELS = 400
 
 
@@ -109,9 +110,14 @@ def spoilt(labels: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return found
 
 
-def drawn_colours(hand: PrintedHand) -> ColourTable:
-    """The table of colours learned from drawn photographs of this hand before the camera assumed."""
-    examples = labelled_photographs(hand.skin, hand.pattern, Camera())
+def drawn_colours(hand: PrintedHand, light: Gains | None = None) -> ColourTable:
+    """The table of colours learned from drawn photographs of this hand before the camera assumed.
+
+    ``light``: gains that correct it; the photographs are taken in it, uncorrected. What a strong light cuts
+    off at the end of a channel no gain brings back, but the table learns how the colours look so.
+    """
+    cast = (1.0, 1.0, 1.0) if light is None else (1 / light.red, 1 / light.green, 1 / light.blue)
+    examples = labelled_photographs(hand.skin, hand.pattern, Camera(), gains=cast)
     return ColourTable.trained([each.picture for each in examples], [each.labels for each in examples])
 
 
@@ -138,15 +144,14 @@ def learned_errors(
         except BadInput:
             file.unlink()
     said = part(report, 0.0, 0.25)
-    steps = _over_clips(
-        partial(_blend_errors, hand, lookup, cameras, spread), clips, workers, said, cancelled
-    )
+    colours = drawn_colours(hand)
+    job = partial(_blend_errors, hand, lookup, cameras, spread, colours)
+    steps = _over_clips(job, clips, workers, said, cancelled)
     blends = np.concatenate(steps)
     covariance = blends.T @ blends / len(blends) + np.eye(DEGREES_OF_FREEDOM)
     speed = _speed(hand.skin, clips)
     first = LearnedErrors.as_posterior(covariance, speed)
     said = part(report, 0.25, 0.6)
-    colours = drawn_colours(hand)
     job = partial(_errors_alone, hand, lookup, cameras, spread, colours, first)
     alone = _over_clips(job, clips, workers, said, cancelled)
     scales = {}
@@ -220,13 +225,13 @@ class _Clip:
 
 
 def _clip(
-    hand: PrintedHand, cameras: Sequence[Camera], spread: ShapeSpread, colours: ColourTable | None, seed: int,
-    frames: int, rate_hz: float,
+    hand: PrintedHand, cameras: Sequence[Camera], spread: ShapeSpread, colours: ColourTable, seed: int,
+    frames: int, rate_hz: float, cone_deg: float = CONE_DEG,
 ) -> _Clip:  # fmt: skip
-    """``colours`` None: labels are rendered and spoilt; else they are classified on photographs."""
+    """Photographs of a hand of its own, their colours classified."""
     other, rng = other_hand(hand.skin, seed, spread), np.random.default_rng([seed, 4])
     seconds = np.arange(frames) / rate_hz
-    states = hand_motion(other, frames / rate_hz, rate_hz, seed=seed)[:frames]
+    states = hand_motion(other, frames / rate_hz, rate_hz, seed=seed, cone_deg=cone_deg)[:frames]
     look = Photography(exposure=float(rng.uniform(0.8, 1.1)), arm=("skin", "sleeve")[seed % 2])
     rooms = [
         Photographer(other, hand.pattern, camera, look, seed + number * 1_000_000)
@@ -240,12 +245,10 @@ def _clip(
         ]
         if sum(np.count_nonzero(labels) for labels in drawn) < _LEAST_PIXELS:
             pictures.append(None)
-        elif colours is None:
-            pictures.append([spoilt(labels, rng) for labels in drawn])
-        else:
-            until = _at_the_end_of_exposure(states, index, rate_hz)
-            taken = [room.photograph(state, until, number=index).picture for room in rooms]
-            pictures.append([colours.labels(picture) for picture in taken])
+            continue
+        until = _at_the_end_of_exposure(states, index, rate_hz)
+        taken = [room.photograph(state, until, number=index).picture for room in rooms]
+        pictures.append([colours.labels(picture) for picture in taken])
     kept = [index for index, views in enumerate(pictures) if views is not None]
     return _Clip([states[i] for i in kept], [pictures[i] for i in kept], seconds[kept])
 
@@ -258,11 +261,14 @@ def _at_the_end_of_exposure(states: Sequence[HandState], index: int, rate_hz: fl
 
 
 def _blend_errors(
-    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], spread: ShapeSpread, clip: int
-) -> np.ndarray:
+    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], spread: ShapeSpread,
+    colours: ColourTable, clip: int,
+) -> np.ndarray:  # fmt: skip
+    """(N, 26), of hands turned as far as the database's are."""
     plain = LearnedErrors.as_posterior(np.eye(DEGREES_OF_FREEDOM), np.ones(DEGREES_OF_FREEDOM))
     tracker = HandTracker(hand, lookup, cameras[:1], plain, stage="blend")
-    made = _clip(hand, cameras[:1], spread, None, 1000 + clip, 2 * _APART[0], _APART[1])
+    frames, cone_deg = (2 * _APART[0], _APART[1]), DatabaseSettings().cone_deg
+    made = _clip(hand, cameras[:1], spread, colours, 1000 + clip, *frames, cone_deg)
     steps = []
     for state, views in zip(made.states, made.pictures, strict=True):
         glimpse = tracker.glimpse(views[0], cameras[0])

@@ -15,7 +15,7 @@ import numpy as np
 
 from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, HandState
-from glovecal_models.colour_glove.lookup import PoseLookup
+from glovecal_models.colour_glove.lookup import Neighbours, PoseLookup
 from glovecal_models.colour_glove.pictures.sighting import Sighting
 from glovecal_models.colour_glove.pose.centroid_ik import (
     FULL_NOISE_CELLS,
@@ -26,8 +26,6 @@ from glovecal_models.colour_glove.pose.dense import ITERATIONS, label_equations,
 from glovecal_models.colour_glove.pose.gaussian_step import Belief, damped_step
 from glovecal_models.colour_glove.pose.learned_errors import LearnedErrors
 from glovecal_models.colour_glove.pose.window_view import (
-    DRAWN_POINTS,
-    SEEN_POINTS,
     PrintedHand,
     WindowView,
 )
@@ -39,6 +37,8 @@ LONGEST_UNSEEN_S = 0.5
 """Without a picture of the glove: after more, nothing is expected of the next."""
 _CLEARLY_FEWER = 0.9
 """Of the followed answer's disagreeing points: then the picture alone knows better."""
+_UNCLEAR, _OTHER_STARTS = 0.25, 3
+"""Of disagreeing points: above, inverse kinematics also starts from single neighbours, this many at most."""
 ACCEPTED_SD_DEG = 5.0
 """A joint that is known as well as this may serve as a reference."""
 
@@ -51,6 +51,7 @@ class Glimpse:
     nearest: HandState
     blend: Belief
     """In the frame of the first camera."""
+    sighting: Sighting
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +95,7 @@ class HandTracker:
         self.hand, self.lookup, self.cameras, self.errors = hand, lookup, tuple(cameras), errors
         self.stage, self.follows, self.iterations = stage, follows, iterations
         self._before: _Before | None = None
+        self._last_drawn: tuple[WindowView, HandState, PrintedHand, np.ndarray] | None = None
 
     def forget(self) -> None:
         """The next picture stands alone."""
@@ -129,8 +131,8 @@ class HandTracker:
             return None
         views = [glimpse.view for glimpse in glimpses]
         if self.stage in ("nearest", "blend") or before is None or not self.follows:
-            state = self._alone(glimpses, self.stage)
-            disagreeing, followed = self.disagreeing(views, state), False
+            state, disagreeing = self._alone(glimpses, self.stage)
+            followed = False
         else:
             state, disagreeing, followed = self._followed(glimpses, before, seconds)
         beliefs = tuple(glimpse.blend for glimpse in glimpses)
@@ -157,23 +159,42 @@ class HandTracker:
             carried[20:23, 20:23] = carried[23:, 23:] = turn.T
             covariance = carried @ covariance @ carried.T
         belief = Belief(_in_first(blend, camera), covariance)
-        return Glimpse(WindowView.of(seen.labels, seen.window, camera), _in_first(nearest, camera), belief)
+        return Glimpse(
+            WindowView.of(seen.labels, seen.window, camera), _in_first(nearest, camera), belief, seen
+        )
 
-    def _alone(self, glimpses: Sequence[Glimpse], stage: str) -> HandState:
-        if stage == "nearest":
-            return glimpses[0].nearest
-        beliefs = tuple(glimpse.blend for glimpse in glimpses)
+    def _alone(
+        self, glimpses: Sequence[Glimpse], stage: str, others: int = _OTHER_STARTS
+    ) -> tuple[HandState, float]:
+        """State and disagreeing share; ``others``: neighbours that may be started from beside the blend."""
+        views, beliefs = [glimpse.view for glimpse in glimpses], tuple(glimpse.blend for glimpse in glimpses)
         start = beliefs[0].state
         if len(beliefs) > 1:
             nothing = np.zeros((DEGREES_OF_FREEDOM,) * 2)
             start = damped_step(start, beliefs, nothing, nothing[0], 0.0)
-        if stage == "blend":
-            return start
-        views = [glimpse.view for glimpse in glimpses]
+        if stage in ("nearest", "blend"):
+            state = start if stage == "blend" else glimpses[0].nearest
+            return state, self.disagreeing(views, state)
         state = refine_by_centroids(self.hand, views, start, beliefs)
-        if stage == "ik":
-            return state
-        return refine_by_labels(self.hand, views, state, beliefs, self.iterations).state
+        disagreeing = self.disagreeing(views, state)
+        for number in range(others):
+            if disagreeing <= _UNCLEAR:
+                break
+            start = self._neighbour(glimpses[0], views[0].camera, number)
+            other = refine_by_centroids(self.hand, views, start, beliefs)
+            left = self.disagreeing(views, other)
+            if left < disagreeing:
+                state, disagreeing = other, left
+        if stage == "dense":
+            state = refine_by_labels(self.hand, views, state, beliefs, self.iterations).state
+            disagreeing = self.disagreeing(views, state)
+        return state, disagreeing
+
+    def _neighbour(self, glimpse: Glimpse, camera: Camera, number: int) -> HandState:
+        """One of the database's entries that look like the picture, where the hand is seen."""
+        found, one = glimpse.sighting, slice(number, number + 1)
+        entry = Neighbours(found.neighbours.entries[one], found.neighbours.distances[one])
+        return _in_first(self.lookup.placed(entry, found.window, camera), camera)
 
     def _followed(
         self, glimpses: Sequence[Glimpse], before: _Before, seconds: float
@@ -185,8 +206,8 @@ class HandTracker:
         followed = refine_by_centroids(self.hand, views, before.state, beliefs, FULL_NOISE_CELLS[2:])
         if self.stage == "dense":
             followed = refine_by_labels(self.hand, views, followed, beliefs, self.iterations).state
-        alone = self._alone(glimpses, "ik")
-        left, left_alone = self.disagreeing(views, followed), self.disagreeing(views, alone)
+        left = self.disagreeing(views, followed)
+        alone, left_alone = self._alone(glimpses, "ik", _OTHER_STARTS if left > _UNCLEAR else 0)
         if self.stage == "dense" and left_alone < 1.5 * left:
             alone = refine_by_labels(self.hand, views, alone, beliefs[:-1], self.iterations).state
             left_alone = self.disagreeing(views, alone)
@@ -210,20 +231,21 @@ class HandTracker:
     ) -> float:
         """Share of the points, seen or drawn, whose colours differ, 0 to 1; ``hand``: in place of the own."""
         hand = self.hand if hand is None else hand
-        different = either = 0
-        finer = SEEN_POINTS // DRAWN_POINTS
-        for view in views:
-            shown = view.shown(hand, posed(hand.skin, state))
-            drawn = hand.colour_of[hand.patch_of[shown]]
-            seen = view.seen_beside(hand, shown)[finer // 2 :: finer, finer // 2 :: finer]
-            either += int(np.count_nonzero(drawn | seen))
-            different += int(np.count_nonzero(drawn != seen))
-        return different / max(either, 1)
+        counts = [view.disagreeing(hand, self._shown(view, state, hand)) for view in views]
+        different, either = np.sum(counts, axis=0)
+        return float(different / max(either, 1))
+
+    def _shown(self, view: WindowView, state: HandState, hand: PrintedHand) -> np.ndarray:
+        """As ``WindowView.shown``; what was drawn last is not drawn again."""
+        last = self._last_drawn
+        if last is None or last[0] is not view or last[1] is not state or last[2] is not hand:
+            self._last_drawn = last = view, state, hand, view.shown(hand, posed(hand.skin, state))
+        return last[3]
 
     def _patches(self, views: Sequence[WindowView], state: HandState) -> tuple[int, ...]:
         found: set[int] = set()
         for view in views:
-            found |= set(np.unique(view.drawn(self.hand, state)).tolist())
+            found |= set(np.unique(self.hand.patch_of[self._shown(view, state, self.hand)]).tolist())
         return tuple(sorted(found - {0}))
 
 

@@ -86,10 +86,17 @@ class WindowView:
 
     def shown(self, hand: PrintedHand, vertices_mm: np.ndarray) -> np.ndarray:
         """(96, 96) int32: the triangle at each point, -1 beside the hand."""
-        pixels, depth = self.projected(vertices_mm)
+        return self.shown_at(hand, *self.projected(vertices_mm))
+
+    def shown_at(self, hand: PrintedHand, pixels: np.ndarray, depth: np.ndarray) -> np.ndarray:
+        """As ``shown``, of vertices that are projected already."""
         points = (pixels - self.low_px) * (DRAWN_POINTS / self.cell_px) - 0.5
         side = CELLS * DRAWN_POINTS
-        return z_buffer(points, depth, hand.skin.triangles, side, side)[0]
+        return z_buffer(points, depth, hand.skin.triangles, side, side, True)[0]
+
+    def disagreeing(self, hand: PrintedHand, shown: np.ndarray) -> tuple[int, int]:
+        """Points whose colours seen and drawn (``shown``) differ, and points of glove in either."""
+        return differing(self.labels, shown, hand.patch_of, hand.colour_of, hand.is_cuff)
 
     def to_px(self, points: np.ndarray, points_a_cell: int) -> np.ndarray:
         """Places among a window's points (..., 2) as pixels of the picture."""
@@ -109,6 +116,25 @@ def sampled(labels, low_u, low_v, step, count):  # type: ignore[no-untyped-def]
                 if 0 <= u < width:
                     found[row, column] = labels[v, u]
     return found
+
+
+@numba.njit(cache=True)
+def differing(labels, shown, patch_of, colour_of, is_cuff):  # type: ignore[no-untyped-def]
+    """Kernel: at the points of the coarser grid; a cuff that is not seen is taken for seen."""
+    finer = labels.shape[0] // shown.shape[0]
+    different = either = 0
+    for v in range(shown.shape[0]):
+        for u in range(shown.shape[1]):
+            here = shown[v, u]
+            drawn = colour_of[patch_of[here]]
+            seen = labels[v * finer + finer // 2, u * finer + finer // 2]
+            if seen == 0 and is_cuff[here]:
+                seen = drawn
+            if drawn or seen:
+                either += 1
+                if drawn != seen:
+                    different += 1
+    return different, either
 
 
 @numba.njit(cache=True)
