@@ -238,9 +238,9 @@ def _finding_in_turn(takes: Sequence[Take], sensors: Sequence[str]) -> Finding |
         return None
     share = float(np.mean(list(old.values())))
     sentence = (
-        f"{named(list(old))} hold an old reading at {share:.0%} of the moments inside their movements, each at"
-        " moments of its own: they are read in turn. Between new readings straight lines are drawn; live poses"
-        " stay as late as the glove's round of sensors."
+        f"{named(list(old))} hold an old reading at {share:.0%} of the moments inside their movements, each"
+        " at moments of its own: they are read in turn. Between new readings straight lines are drawn; live"
+        " poses stay as late as the glove's round of sensors."
     )
     names = tuple(take.name for take in takes)
     evidence = {"repeated_share_of_moving_pct": 100.0 * share, "sensors_count": float(len(old))}

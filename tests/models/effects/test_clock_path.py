@@ -1,4 +1,4 @@
-"""A clock that changes within takes: each joint's offset is that of the others, and sound clocks have none."""
+"""A clock that changes within takes: a joint's offset is that of the others; sound clocks have none."""
 
 from __future__ import annotations
 

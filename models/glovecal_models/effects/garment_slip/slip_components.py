@@ -1,9 +1,9 @@
 """Is it the glove that slips? The slow error of a rotation as a sum of variance components, by likelihood.
 
 The error's means over about 10 s are taken for a Gaussian process whose covariance is a sum: noise, the
-wandering of a healthy glove that comes back, posture, one offset and gain of each wearing, a line and a smooth
-curve over each recorded context column; and beside them what a slip does: a walk since donning, the same way
-in every wearing or in each its own, a walk inside takes, an offset of each take, all of them also in
+wandering of a healthy glove that comes back, posture, one offset and gain of each wearing, a line and a
+smooth curve over each recorded context column; and beside them what a slip does: a walk since donning, the
+same way in every wearing or in each its own, a walk inside takes, an offset of each take, all of them also in
 proportion to the bend. Variances are the likeliest ones (restricted maximum likelihood: Patterson & Thompson
 1971). Every glove slips a little: held against the likeliest slip is one of ``EVERY_GLOVE_DEG`` at most in
 each component, all else being free.
@@ -24,9 +24,9 @@ from glovecal_models.takes.take import Take
 EVERY_GLOVE_DEG = 0.25
 """Of each component; a healthy glove's own wandering comes back, and is a component of its own."""
 LIKELIER, FEW_JOINTS = 4.0, 5
-"""Twice the log likelihood ratio from which on it is a slip; more with more joints, each a chance to err. Of 80
-simulated clean gloves of five and six joints none reaches 3, of 36 that slip by 1.3 noise floors 32 reach 4; a
-clean session of six minutes reached 3.5."""
+"""Twice the log likelihood ratio from which on it is a slip; more with more joints, each a chance to err. Of
+80 simulated clean gloves of five and six joints none reaches 3, of 36 that slip by 1.3 noise floors 32 reach
+4; a clean session of six minutes reached 3.5."""
 LEAST_SPREAD_DEG = 0.35
 """Means that scatter by less hold no slip that is worth a name."""
 FEWEST_PIECES, MOST_PIECES = 12, 160
