@@ -212,7 +212,11 @@ class _Lane:
         """Gram matrix and right side of own columns and ``terms``, for weights expected of size 1."""
         keys: list[Key] = [None, *((term.inputs, term.lengthscale) for term in terms)]
         scale = np.concatenate([np.ones(len(self._plain)), *(np.full(t.count, t.sd_deg) for t in terms)])
-        gram = np.block([[self._product(one, other) for other in keys] for one in keys])
+        gram, ends = np.empty((len(scale), len(scale))), np.cumsum([len(self._of(key)) for key in keys])
+        places = [slice(end - len(self._of(key)), end) for key, end in zip(keys, ends.tolist(), strict=True)]
+        for one, rows in zip(keys, places, strict=True):
+            for other, columns in zip(keys, places, strict=True):
+                gram[rows, columns] = self._product(one, other)
         right = np.concatenate([self._with_target(key) for key in keys])
         return gram * scale[:, None] * scale[None, :], right * scale
 

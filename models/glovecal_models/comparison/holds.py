@@ -58,9 +58,9 @@ def holds(item: TakeResiduals, column: int, limits: ComparisonLimits = COMPARISO
     """Where the joint of ``column`` is still, in the order of time."""
     frames = np.flatnonzero(np.isfinite(item.measured[:, column]) & np.isfinite(item.error[:, column]))
     time, angle, error = item.take.time_s[frames], item.measured[frames, column], item.error[frames, column]
-    predicted, readings = item.predicted[frames, column], item.take.readings[frames]
-    spread = readings.std(axis=0) if len(readings) else np.zeros(0)
-    found = []
+    predicted, is_whole = item.predicted[frames, column], len(frames) == len(item.take.time_s)
+    readings = item.take.readings if is_whole else item.take.readings[frames]
+    held: list[slice] = []
     start, track = 0, _Track.of(time, angle, limits)
     while start < len(time):
         if track.moves_at_once[start]:
@@ -70,20 +70,32 @@ def holds(item: TakeResiduals, column: int, limits: ComparisonLimits = COMPARISO
         if time[end - 1] - time[start] >= limits.shortest_hold_s:
             settled = int(np.searchsorted(time, time[start] + limits.settled_s))
             if end - settled >= limits.fewest_hold_frames:
-                rows = slice(settled, end)
-                still = _is_still(readings[rows], limits.still_share * spread)
-                found.append(Hold(frames[rows], time[rows], error[rows], predicted[rows], angle[rows], still))
+                held.append(slice(settled, end))
             start = end
         else:
             start += max(1, (end - start) // 2)
-    return found
+    if not held:
+        return []
+    spread = item.reading_spread if is_whole else readings.std(axis=0)
+    still = _are_still(readings, held, limits.still_share * spread)
+    return [
+        Hold(frames[rows], time[rows], error[rows], predicted[rows], angle[rows], is_still)
+        for rows, is_still in zip(held, still, strict=True)
+    ]
 
 
-def _is_still(readings: np.ndarray, allowed: np.ndarray) -> bool:
-    """Whether no sensor changes over a hold by more than is ``allowed`` (S,)."""
-    thirds = np.array_split(readings, 3)
-    moved = np.ptp([part.mean(axis=0) for part in thirds], axis=0)
-    return bool((moved <= allowed).all())
+def _are_still(readings: np.ndarray, held: Sequence[slice], allowed: np.ndarray) -> list[bool]:
+    """For each hold whether no sensor changes over its rows of ``readings`` (N, S) by more than is
+    ``allowed`` (S,): between the means of its thirds, of which the first have the rows that are left over."""
+    size = np.array([rows.stop - rows.start for rows in held])
+    counts = (size[:, None] + [2, 1, 0]) // 3
+    ends = np.array([rows.start for rows in held])[:, None] + np.cumsum(counts, axis=1)
+    # A last row of zeros: a hold may end with the take. The fourth sum of each is of what lies between holds.
+    padded = np.concatenate([readings, np.zeros((1, readings.shape[1]))])
+    edges = np.column_stack([ends - counts, ends[:, 2]]).ravel().astype(np.intp)
+    sums = np.add.reduceat(padded, edges, axis=0).reshape(len(held), 4, -1)[:, :3]
+    moved = np.ptp(sums / counts[:, :, None], axis=1)
+    return (moved <= allowed).all(axis=1).tolist()
 
 
 class _Track(NamedTuple):
