@@ -16,7 +16,7 @@ from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Stage
 from glovecal_models.effects.base.signals import Signals
-from glovecal_models.effects.base.signature_effect import Finding, SignatureEffect
+from glovecal_models.effects.base.signature_effect import Finding, FoundBefore, SignatureEffect
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
@@ -55,9 +55,11 @@ def signature_findings(
     assessments: Sequence[Assessment],
     effects: Sequence[Effect],
     known: Sequence[KnownEffect] = (),
+    found_before: FoundBefore | None = None,
 ) -> Iterator[Finding]:
     """Largest first within each effect of ``effects``, those that the model does not have; ``known`` are
     those that it has."""
+    found_before = found_before or FoundBefore()
     sensor_of = own_sensors(layout, joints)
     if not sensor_of:
         return
@@ -67,7 +69,7 @@ def signature_findings(
             yield from item.find_between_levels(takes, sensor_of)
         return
     for item in first:
-        yield from item.find(takes, sensor_of)
+        yield from found_before.find(item, takes, sensor_of)
     for item in by_signature(effects, "last"):
         if may_explain(item, naming):
             plausible = _with_plausible_context(takes, assessments, effects)
