@@ -24,6 +24,7 @@ from glovecal_models.comparison.residuals import TakeResiduals
 
 HELD_STEP_S = 0.1
 """Neighbouring frames whose mean angles are compared."""
+LONGEST_HELD_GAP_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -63,8 +64,9 @@ def holds(item: TakeResiduals, column: int, limits: ComparisonLimits = COMPARISO
     held: list[slice] = []
     start, track = 0, _Track.of(time, angle, limits)
     while start < len(time):
-        if track.moves_at_once[start]:
-            start += max(1, track.step[start] // 2)
+        early = track.early_end[start]
+        if early:
+            start += max(1, (early - start) // 2)
             continue
         end = track.end_of_hold(start, limits.still_deg_per_s)
         if time[end - 1] - time[start] >= limits.shortest_hold_s:
@@ -107,20 +109,28 @@ class _Track(NamedTuple):
     """Of the angles of the first 0 to N frames, degrees."""
     step: list[int]
     """Of N frames: how many lie within the next ``HELD_STEP_S``."""
-    moves_at_once: list[bool]
-    """Whether the angle moves within the first two steps from a frame, too early for a hold."""
+    early_end: list[int]
+    """Of N frames: ``end_of_hold`` where that is too early for a hold, else 0."""
 
     @classmethod
     def of(cls, time_s: np.ndarray, angle: np.ndarray, limits: ComparisonLimits) -> _Track:
         start, sums = np.arange(len(time_s)), np.concatenate([[0.0], np.cumsum(angle)])
         step = np.maximum(1, np.searchsorted(time_s, time_s + HELD_STEP_S) - start)
-        end = np.minimum(start + step, len(time_s))
-        following = np.minimum(end + step, len(time_s))
+        early = np.zeros(len(time_s), dtype=int)
+        going, end = start, np.minimum(start + step, len(time_s))
         before = (sums[end] - sums[start]) / (end - start)
-        after = (sums[following] - sums[end]) / np.maximum(following - end, 1)
-        moves = (following > end) & (np.abs(after - before) > limits.still_deg_per_s * HELD_STEP_S)
-        moves &= time_s[end - 1] - time_s < limits.shortest_hold_s
-        return cls(time_s.tolist(), sums.tolist(), step.tolist(), moves.tolist())
+        while len(going):
+            # As ``end_of_hold``, for all frames whose holds are not over yet and still too short.
+            is_short = time_s[end - 1] - time_s[going] < limits.shortest_hold_s
+            going, end, before = going[is_short], end[is_short], before[is_short]
+            following = np.minimum(end + step[going], len(time_s))
+            after = (sums[following] - sums[end]) / np.maximum(following - end, 1)
+            is_over = np.abs(after - before) > limits.still_deg_per_s * HELD_STEP_S
+            is_over |= time_s[following - 1] - time_s[end - 1] > LONGEST_HELD_GAP_S
+            is_over |= end == len(time_s)
+            early[going[is_over]] = end[is_over]
+            going, end, before = going[~is_over], following[~is_over], after[~is_over]
+        return cls(time_s.tolist(), sums.tolist(), step.tolist(), early.tolist())
 
     def end_of_hold(self, start: int, still_deg_per_s: float) -> int:
         """One past the last frame up to which the angle stays on a slope too small for motion.
@@ -135,7 +145,7 @@ class _Track(NamedTuple):
             after = (sums[following] - sums[end]) / (following - end)
             if (
                 abs(after - before) > still_deg_per_s * HELD_STEP_S
-                or time[following - 1] - time[end - 1] > 0.5
+                or time[following - 1] - time[end - 1] > LONGEST_HELD_GAP_S
             ):
                 break
             end, before = following, after
