@@ -37,6 +37,21 @@ def test_a_job_runs_in_polite_worker_processes(dispatched, ledger):
         assert facts["pid"] != os.getpid()
 
 
+def test_one_command_runs_a_single_task_itself(sqlite_store, sqlite_settings, ledger):
+    with Dispatcher(
+        sqlite_store, sqlite_settings, {"count": CountingJob()}, of_one_command=True
+    ) as dispatcher:
+        (facts,) = result_of(sqlite_store, create(sqlite_store, ledger, [4]).id)["facts"]
+        assert facts["pid"] == os.getpid()
+        assert facts["niceness"] == 10
+        assert not dispatcher.workers.started
+        job = create(sqlite_store, ledger, [5], seconds=60)
+        wait_for(lambda: 5 in noted(ledger, "begin"))
+        sqlite_store.jobs.request_cancel(job.id)
+        assert wait_for_job(sqlite_store, job.id).state == "cancelled"
+    assert os.nice(0) == 0, "the thread alone steps back"
+
+
 def test_progress_is_told_task_by_task_and_kept(dispatched, ledger):
     store, _ = dispatched
     job = wait_for_job(store, create(store, ledger, [3, 4, 5]).id)

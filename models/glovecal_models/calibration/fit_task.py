@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import asdict, dataclass, field, replace
+from functools import cache
 from importlib.metadata import version
 from typing import Any
 
@@ -128,6 +129,12 @@ def _fit(task: FitTask, cancelled: Cancel | None, report: Report | None) -> Regr
     return replace(sparse, evidence=sparse.evidence | start.evidence)
 
 
+@cache
+def _software() -> str:
+    """The installed version: finding it reads the package's description on disk."""
+    return version("glovecal-models")
+
+
 def _key(task: FitTask) -> str:
     digest = hashlib.sha256()
     facts = {
@@ -135,7 +142,7 @@ def _key(task: FitTask) -> str:
         "fold": task.fold,
         "sensors": task.sensors,
         "settings": asdict(task.settings),
-        "software": version("glovecal-models"),
+        "software": _software(),
     }
     if task.without:
         facts["without"] = task.without

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -212,7 +212,12 @@ class _Lane:
         """Gram matrix and right side of own columns and ``terms``, for weights expected of size 1."""
         keys: list[Key] = [None, *((term.inputs, term.lengthscale) for term in terms)]
         scale = np.concatenate([np.ones(len(self._plain)), *(np.full(t.count, t.sd_deg) for t in terms)])
-        gram = np.block([[self._product(one, other) for other in keys] for one in keys])
+        ends = np.cumsum([len(self._plain), *(term.count for term in terms)]).tolist()
+        places = [slice(start, end) for start, end in pairwise([0, *ends])]
+        gram = np.empty((len(scale), len(scale)))
+        for one, rows in zip(keys, places, strict=True):
+            for other, columns in zip(keys, places, strict=True):
+                gram[rows, columns] = self._product(one, other)
         right = np.concatenate([self._with_target(key) for key in keys])
         return gram * scale[:, None] * scale[None, :], right * scale
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -214,8 +214,7 @@ def _without_wearings(
             continue  # what is left cannot carry a model: it says nothing about the error
         if is_left_out.any():
             fold, chosen = settings.folds + number, left_out_settings(settings)
-            task = task_for(correspondence, kept, fold, chosen, palm=palm)
-            tasks.append(replace(task, without=group, key=""))
+            tasks.append(task_for(correspondence, kept, fold, chosen, palm=palm, without=group))
     return tasks
 
 
@@ -226,8 +225,10 @@ def task_for(
     settings: TrainingSettings,
     held_out: Samples | None = None,
     palm: Samples | None = None,
+    without: tuple[str, ...] = (),
 ) -> FitTask:
-    """``palm``: samples of the palm; those of takes that ``samples`` has are used."""
+    """``palm``: samples of the palm; those of takes that ``samples`` has are used. ``without``: wearings that
+    ``samples`` does not have."""
     known_gain = None
     if palm is not None:
         known_gain = palm_gain(palm.select(np.isin(palm.take, samples.take)))
@@ -244,6 +245,7 @@ def task_for(
         held_out_target=held_out.target if held_out else np.empty(0),
         sensors=correspondence.inputs,
         settings=settings,
+        without=without,
         known_gain=known_gain,
         variance=None if samples.variance is None else samples.variance[index],
     )

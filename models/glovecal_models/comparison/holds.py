@@ -24,6 +24,7 @@ from glovecal_models.comparison.residuals import TakeResiduals
 
 HELD_STEP_S = 0.1
 """Neighbouring frames whose mean angles are compared."""
+LONGEST_HELD_GAP_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -58,32 +59,45 @@ def holds(item: TakeResiduals, column: int, limits: ComparisonLimits = COMPARISO
     """Where the joint of ``column`` is still, in the order of time."""
     frames = np.flatnonzero(np.isfinite(item.measured[:, column]) & np.isfinite(item.error[:, column]))
     time, angle, error = item.take.time_s[frames], item.measured[frames, column], item.error[frames, column]
-    predicted, readings = item.predicted[frames, column], item.take.readings[frames]
-    spread = readings.std(axis=0) if len(readings) else np.zeros(0)
-    found = []
+    predicted, is_whole = item.predicted[frames, column], len(frames) == len(item.take.time_s)
+    readings = item.take.readings if is_whole else item.take.readings[frames]
+    held: list[slice] = []
     start, track = 0, _Track.of(time, angle, limits)
     while start < len(time):
-        if track.moves_at_once[start]:
-            start += max(1, track.step[start] // 2)
+        early = track.early_end[start]
+        if early:
+            start += max(1, (early - start) // 2)
             continue
         end = track.end_of_hold(start, limits.still_deg_per_s)
         if time[end - 1] - time[start] >= limits.shortest_hold_s:
             settled = int(np.searchsorted(time, time[start] + limits.settled_s))
             if end - settled >= limits.fewest_hold_frames:
-                rows = slice(settled, end)
-                still = _is_still(readings[rows], limits.still_share * spread)
-                found.append(Hold(frames[rows], time[rows], error[rows], predicted[rows], angle[rows], still))
+                held.append(slice(settled, end))
             start = end
         else:
             start += max(1, (end - start) // 2)
-    return found
+    if not held:
+        return []
+    spread = item.reading_spread if is_whole else readings.std(axis=0)
+    still = _are_still(readings, held, limits.still_share * spread)
+    return [
+        Hold(frames[rows], time[rows], error[rows], predicted[rows], angle[rows], is_still)
+        for rows, is_still in zip(held, still, strict=True)
+    ]
 
 
-def _is_still(readings: np.ndarray, allowed: np.ndarray) -> bool:
-    """Whether no sensor changes over a hold by more than is ``allowed`` (S,)."""
-    thirds = np.array_split(readings, 3)
-    moved = np.ptp([part.mean(axis=0) for part in thirds], axis=0)
-    return bool((moved <= allowed).all())
+def _are_still(readings: np.ndarray, held: Sequence[slice], allowed: np.ndarray) -> list[bool]:
+    """For each hold whether no sensor changes over its rows of ``readings`` (N, S) by more than is
+    ``allowed`` (S,): between the means of its thirds, of which the first have the rows that are left over."""
+    size = np.array([rows.stop - rows.start for rows in held])
+    counts = (size[:, None] + [2, 1, 0]) // 3
+    ends = np.array([rows.start for rows in held])[:, None] + np.cumsum(counts, axis=1)
+    # A last row of zeros: a hold may end with the take. The fourth sum of each is of what lies between holds.
+    padded = np.concatenate([readings, np.zeros((1, readings.shape[1]))])
+    edges = np.column_stack([ends - counts, ends[:, 2]]).ravel().astype(np.intp)
+    sums = np.add.reduceat(padded, edges, axis=0).reshape(len(held), 4, -1)[:, :3]
+    moved = np.ptp(sums / counts[:, :, None], axis=1)
+    return (moved <= allowed).all(axis=1).tolist()
 
 
 class _Track(NamedTuple):
@@ -95,20 +109,28 @@ class _Track(NamedTuple):
     """Of the angles of the first 0 to N frames, degrees."""
     step: list[int]
     """Of N frames: how many lie within the next ``HELD_STEP_S``."""
-    moves_at_once: list[bool]
-    """Whether the angle moves within the first two steps from a frame, too early for a hold."""
+    early_end: list[int]
+    """Of N frames: ``end_of_hold`` where that is too early for a hold, else 0."""
 
     @classmethod
     def of(cls, time_s: np.ndarray, angle: np.ndarray, limits: ComparisonLimits) -> _Track:
         start, sums = np.arange(len(time_s)), np.concatenate([[0.0], np.cumsum(angle)])
         step = np.maximum(1, np.searchsorted(time_s, time_s + HELD_STEP_S) - start)
-        end = np.minimum(start + step, len(time_s))
-        following = np.minimum(end + step, len(time_s))
+        early = np.zeros(len(time_s), dtype=int)
+        going, end = start, np.minimum(start + step, len(time_s))
         before = (sums[end] - sums[start]) / (end - start)
-        after = (sums[following] - sums[end]) / np.maximum(following - end, 1)
-        moves = (following > end) & (np.abs(after - before) > limits.still_deg_per_s * HELD_STEP_S)
-        moves &= time_s[end - 1] - time_s < limits.shortest_hold_s
-        return cls(time_s.tolist(), sums.tolist(), step.tolist(), moves.tolist())
+        while len(going):
+            # As ``end_of_hold``, for all frames whose holds are not over yet and still too short.
+            is_short = time_s[end - 1] - time_s[going] < limits.shortest_hold_s
+            going, end, before = going[is_short], end[is_short], before[is_short]
+            following = np.minimum(end + step[going], len(time_s))
+            after = (sums[following] - sums[end]) / np.maximum(following - end, 1)
+            is_over = np.abs(after - before) > limits.still_deg_per_s * HELD_STEP_S
+            is_over |= time_s[following - 1] - time_s[end - 1] > LONGEST_HELD_GAP_S
+            is_over |= end == len(time_s)
+            early[going[is_over]] = end[is_over]
+            going, end, before = going[~is_over], following[~is_over], after[~is_over]
+        return cls(time_s.tolist(), sums.tolist(), step.tolist(), early.tolist())
 
     def end_of_hold(self, start: int, still_deg_per_s: float) -> int:
         """One past the last frame up to which the angle stays on a slope too small for motion.
@@ -123,7 +145,7 @@ class _Track(NamedTuple):
             after = (sums[following] - sums[end]) / (following - end)
             if (
                 abs(after - before) > still_deg_per_s * HELD_STEP_S
-                or time[following - 1] - time[end - 1] > 0.5
+                or time[following - 1] - time[end - 1] > LONGEST_HELD_GAP_S
             ):
                 break
             end, before = following, after

@@ -26,6 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -49,7 +50,7 @@ class _PlainResiduals(TakeResiduals):
 
     left: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
 
-    @property
+    @cached_property
     def error(self) -> np.ndarray:
         return self.left
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -31,10 +32,15 @@ class TakeResiduals:
     excluded: tuple[int, ...] = ()
     """For each rotation the measured frames that are not compared: its sensor failed. Empty: none."""
 
-    @property
+    @cached_property
     def error(self) -> np.ndarray:
         """Predicted minus measured, (N, R), degrees."""
         return self.predicted - self.measured
+
+    @cached_property
+    def reading_spread(self) -> np.ndarray:
+        """Standard deviation of each sensor over the take, (S,), counts."""
+        return self.take.readings.std(axis=0)
 
 
 @dataclass(frozen=True)

@@ -97,18 +97,16 @@ def _permutations(
     owners: np.ndarray, counts: tuple[int, ...], generator: np.random.Generator
 ) -> list[np.ndarray]:
     """All other partitions when they are few, else many random ones, each at most once."""
-    true = partition_of(owners)
-    found: dict[tuple[int, ...], np.ndarray] = {}
+    found: dict[bytes, np.ndarray] = {}
     if len(counts) == 2 and _partitions(counts) <= MOST_PARTITIONS:
-        for chosen in combinations(range(len(owners)), counts[0]):
-            permuted = np.ones(len(owners), dtype=int)
-            permuted[list(chosen)] = 0
-            found[partition_of(permuted)] = permuted
+        first = np.array(list(combinations(range(len(owners)), counts[0])))
+        drawn = np.ones((len(first), len(owners)), dtype=int)
+        np.put_along_axis(drawn, first, 0, axis=1)
     else:
-        for _ in range(2 * MOST_PARTITIONS):
-            permuted = generator.permutation(owners)
-            found[partition_of(permuted)] = permuted
-    found.pop(true, None)
+        drawn = np.array([generator.permutation(owners) for _ in range(2 * MOST_PARTITIONS)])
+    for permuted, partition in zip(drawn, _partitions_of(drawn), strict=True):
+        found[partition.tobytes()] = permuted
+    found.pop(_partitions_of(owners[None])[0].tobytes(), None)
     return list(found.values())[:MOST_PARTITIONS]
 
 
@@ -117,6 +115,15 @@ def permuted_sessions(owners: np.ndarray, most: int, generator: np.random.Genera
     counts = tuple(np.bincount(owners).tolist())
     permutations = _permutations(owners, counts, generator)
     return [permutations[i] for i in generator.permutation(len(permutations))[:most]]
+
+
+def _partitions_of(owners: np.ndarray) -> np.ndarray:
+    """``partition_of`` each row of (D, T), whose numbers are below T."""
+    numbers = np.arange(owners.shape[1])
+    is_owner = owners[:, None, :] == numbers[None, :, None]
+    first = np.where(is_owner.any(axis=2), is_owner.argmax(axis=2), owners.shape[1])
+    rank = np.argsort(np.argsort(first, axis=1, kind="stable"), axis=1)
+    return np.take_along_axis(rank, owners, axis=1)
 
 
 def partition_of(owners: np.ndarray) -> tuple[int, ...]:

@@ -35,6 +35,7 @@ from glovecal_models.diagnosis.signatures import are_held_levels, beside_levels,
 from glovecal_models.diagnosis.unexplained_residual import UnexplainedResidual, unexplained_residual
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Motion
+from glovecal_models.effects.base.signature_effect import FoundBefore
 from glovecal_models.effects.catalogue import candidates
 from glovecal_models.layout import Layout
 from glovecal_models.progress import Cancel, Report, stop_if
@@ -51,6 +52,7 @@ def diagnose(
     signatures: bool = True,
     judge_residual: bool = True,
     noise_floors: Mapping[str, NoiseFloor] | None = None,
+    found_before: FoundBefore | None = None,
     seed: int = 0,
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
     cancelled: Cancel | None = None,
@@ -60,6 +62,7 @@ def diagnose(
 
     Without ``signatures`` and ``judge_residual`` only the naming is worked out, in less time.
     ``noise_floors``: of these takes, where they were measured before; None: they are measured.
+    ``found_before``: signatures that were looked for before.
 
     Raises BadInput, Cancelled.
     """
@@ -105,7 +108,7 @@ def diagnose(
     impossible += [NotIdentifiable(item.name, SINGLE_POSES) for item in waiting]
     naming = _with_alikes_ordered(naming, beside, screened, by_name)
     lacking = [item for item in every if item.name not in has]
-    asked = signature_findings(takes, layout, problem.joints, naming, lacking, known)
+    asked = signature_findings(takes, layout, problem.joints, naming, lacking, known, found_before)
     findings = tuple(asked) if signatures else ()
     findings = tuple(
         item

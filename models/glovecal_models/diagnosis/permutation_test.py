@@ -82,9 +82,9 @@ class _Given:
         """(J,) share of the target's square that columns explain beside the base, weights shrunk by their
         prior; ``givers``: for each take a number as ``_permutations`` has them."""
         parts = [self._of(take, int(giver)) for take, giver in enumerate(givers)]
-        base = np.sum([part.base for part in parts], axis=0)
-        gram = np.sum([part.columns for part in parts], axis=0) - base.swapaxes(-1, -2) @ base
-        right = np.sum([part.target for part in parts], axis=0)
+        base = _sum([part.base for part in parts])
+        gram = _sum([part.columns for part in parts]) - base.swapaxes(-1, -2) @ base
+        right = _sum([part.target for part in parts])
         gram = gram + self._held[:, None, :, None] * np.eye(gram.shape[-1])
         moves = self._square > 0
         found = np.zeros(len(self._square))
@@ -112,6 +112,14 @@ class _Given:
             base[lane, :, : joint.base.shape[1]] = joint.base[part].T @ mine
             target[lane] = joint.target[part] @ mine
         return _Products(columns, base, target)
+
+
+def _sum(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """Of arrays of one shape, which are not copied side by side first."""
+    total = parts[0].copy()
+    for part in parts[1:]:
+        total += part
+    return total
 
 
 def _shares_as_large(values: np.ndarray) -> np.ndarray:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from glovecal_models.diagnosis.camera_columns import CameraPart
 from glovecal_models.diagnosis.form_inputs import FormInputs
-from glovecal_models.diagnosis.forward_design import EVERY, ForwardDesign, forward
+from glovecal_models.diagnosis.forward_basis import EVERY, ForwardBasis
+from glovecal_models.diagnosis.forward_design import ForwardDesign, forward
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.naming import Naming
@@ -38,6 +39,8 @@ class DiagnosisProblem:
     linear: bool
     known: tuple[KnownEffect, ...]
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS
+    bases: dict[tuple[int, int, CameraPart], ForwardBasis] = field(default_factory=dict, compare=False)
+    """What the designs of the same takes share, by smoothing, rows that are fitted, and camera."""
 
     @classmethod
     def of(
@@ -78,15 +81,16 @@ class DiagnosisProblem:
         self, smoothing: int = SMOOTHING, every: int = EVERY, camera: CameraPart = "varying"
     ) -> ForwardDesign:
         """Readings from angles, on signals smoothed over so many rows; one row in ``every`` is fitted."""
-        even = [smoothed(take, smoothing) for take in self.even]
-        return forward(
-            *(even, self.layout, self.joints),
-            linear=self.linear,
-            known=self.known,
-            limits=self.limits,
-            every=every,
-            camera=camera,
-        )
+        chosen = smoothing, every, camera
+        if chosen not in self.bases:
+            self.bases[chosen] = ForwardBasis.of(
+                *([smoothed(take, smoothing) for take in self.even], self.layout, self.joints),
+                linear=self.linear,
+                same_angle_share=self.limits.same_angle_share,
+                every=every,
+                camera=camera,
+            )
+        return forward(self.bases[chosen], self.joints, known=self.known, limits=self.limits)
 
     def saved_by_known(self, design: ForwardDesign) -> dict[str, float]:
         """Squared degrees per row that the known effects save on each joint, held out; empty without any.
@@ -116,7 +120,7 @@ class DiagnosisProblem:
         if delay is not None:
             delay = np.broadcast_to(delay, (len(self.even),))
             moved = [shifted(take, float(by)) for take, by in zip(self.even, delay, strict=True)]
-            return replace(self, even=tuple(moved))
+            return replace(self, even=tuple(moved), bases={})
         where = tuple(first.joints[i] for i in first.significant_joints)
         shapes = tuple(first.shapes[i] for i in first.significant_joints)
         return self.beside(_with_learned_terms(KnownEffect(effects[first.effect], where, shapes), design))

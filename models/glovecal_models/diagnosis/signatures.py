@@ -15,7 +15,12 @@ from glovecal_models.diagnosis.naming import Naming, saved_share_of
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Stage
 from glovecal_models.effects.base.signals import Signals
-from glovecal_models.effects.base.signature_effect import Finding, SignatureEffect, frames_inside
+from glovecal_models.effects.base.signature_effect import (
+    Finding,
+    FoundBefore,
+    SignatureEffect,
+    frames_inside,
+)
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
@@ -69,9 +74,11 @@ def signature_findings(
     naming: Naming,
     effects: Sequence[Effect],
     known: Sequence[KnownEffect] = (),
+    found_before: FoundBefore | None = None,
 ) -> Iterator[Finding]:
     """Largest first within each effect of ``effects``, those that the model does not have; ``known`` are
     those that it has."""
+    found_before = found_before or FoundBefore()
     sensor_of = own_sensors(layout, joints)
     if not sensor_of:
         return
@@ -81,7 +88,7 @@ def signature_findings(
             yield from item.find_between_levels(takes, sensor_of)
         return
     for item in first:
-        found = item.find(takes, sensor_of)
+        found = found_before.find(item, takes, sensor_of)
         if naming.ranked and any(each.stretches for each in found):
             found = _with_error_squares(found, takes, sensor_of, static_errors(takes, sensor_of, known))
         yield from found

@@ -11,6 +11,7 @@ from glovecal_models.calibration.training_settings import LINEAR_METHODS
 from glovecal_models.diagnosis.candidates import assessed
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.formed_error import formed_control_share
+from glovecal_models.diagnosis.forward_basis import ForwardBasis
 from glovecal_models.diagnosis.forward_design import forward
 from glovecal_models.diagnosis.known_effect import known_effects
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
@@ -50,7 +51,10 @@ def share_left_by_control(
     even = [smoothed(resampled(take, model.layout.sensors, joints, bridge), SMOOTHING) for take in takes]
     known = [item for item in known_effects(model) if item.effect.name != effect.name]
     linear = model.method in LINEAR_METHODS
-    direction = forward(even, model.layout, joints, linear=linear, known=known, limits=limits)
+    basis = ForwardBasis.of(
+        even, model.layout, joints, linear=linear, same_angle_share=limits.same_angle_share
+    )
+    direction = forward(basis, joints, known=known, limits=limits)
     if known_share is None:
         found, _ = assessed(direction, [effect], np.random.default_rng(0), set(), progress)
         judged = next((item for item in found if item.effect == effect.name), None)

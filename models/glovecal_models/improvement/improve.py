@@ -33,7 +33,7 @@ from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.known_effect import known_effects
 from glovecal_models.diagnosis.text import action_sentence
-from glovecal_models.effects.base.signature_effect import SignatureEffect
+from glovecal_models.effects.base.signature_effect import FoundBefore, SignatureEffect
 from glovecal_models.effects.catalogue import catalogue, effect
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.improvement.control_share import share_in
@@ -118,6 +118,7 @@ class _Loop:
         """The takes of the diagnosis."""
         self.errors = HeldOutErrors({}, {})
         self.has_looked = False
+        self.found_before = FoundBefore()
 
     def start(self) -> None:
         """The base model and its error."""
@@ -136,7 +137,7 @@ class _Loop:
         """One round; False when the loop is over."""
         model = self.steps[-1].model
         share = 0.15 + 0.12 * len(self.steps)
-        found = repairs(model, self._repaired(), self._not_repaired)
+        found = repairs(model, self._repaired(), self._not_repaired, self.found_before)
         self.has_looked = True
         if self._add_first(found):
             return True
@@ -144,8 +145,8 @@ class _Loop:
         takes = self._repaired()
         self.diagnosis = diagnose(
             takes, self.layout, linear=self.settings.method in LINEAR_METHODS, known=known_effects(model),
-            noise_floors=self._known_floors(takes), seed=self.seed, limits=self.limits.diagnosis,
-            cancelled=self.cancelled,
+            noise_floors=self._known_floors(takes), found_before=self.found_before, seed=self.seed,
+            limits=self.limits.diagnosis, cancelled=self.cancelled,
         )  # fmt: skip
         self.diagnosed = takes
         tried = self._tried
@@ -271,7 +272,8 @@ class _Loop:
         return bool(names - self._tried)
 
     def _add_widenings(self) -> bool:
-        steps = widenings(self.steps[-1].model, self._repaired(), self.diagnosis, self._tried | self._has)
+        without = self._tried | self._has
+        steps = widenings(self.steps[-1].model, self._repaired(), self.diagnosis, without, self.found_before)
         return self._add_first(steps)
 
     def _add_first(self, steps: Sequence[Proposed]) -> bool:

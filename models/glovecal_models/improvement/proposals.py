@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence, Set
 from typing import NamedTuple
 
+import numpy as np
+
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.model_recipe import repaired_takes, requested_effects, trained_rotations
 from glovecal_models.calibration.training_settings import LINEAR_METHODS
@@ -14,7 +16,7 @@ from glovecal_models.diagnosis.known_effect import known_effects
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.posed_holds import are_pose_labels
 from glovecal_models.diagnosis.signatures import are_held_levels, own_sensors, static_errors
-from glovecal_models.effects.base.signature_effect import Proposal, Recorded, SignatureEffect
+from glovecal_models.effects.base.signature_effect import FoundBefore, Proposal, Recorded, SignatureEffect
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.errors import BadInput
 from glovecal_models.progress import Cancel
@@ -28,13 +30,19 @@ class Proposed(NamedTuple):
     proposal: Proposal
 
 
-def repairs(model: CalibrationModel, takes: Sequence[Take], without: Set[str]) -> list[Proposed]:
+def repairs(
+    model: CalibrationModel, takes: Sequence[Take], without: Set[str], found_before: FoundBefore | None = None
+) -> list[Proposed]:
     """What the measurement needs; ``without`` is not looked for."""
-    return _looked_for(model, takes, "repair", without)
+    return _looked_for(model, takes, "repair", without, found_before)
 
 
 def widenings(
-    model: CalibrationModel, takes: Sequence[Take], diagnosis: Diagnosis | None, without: Set[str]
+    model: CalibrationModel,
+    takes: Sequence[Take],
+    diagnosis: Diagnosis | None,
+    without: Set[str],
+    found_before: FoundBefore | None = None,
 ) -> list[Proposed]:
     """What is left when nothing more is to be corrected: where and how much the interval has to be wider.
 
@@ -49,7 +57,7 @@ def widenings(
         if effect.kind == "interval" and effect.stage == "last" and where and name not in without:
             last.append(Proposed(name, Proposal({}, where, tuple(item.sentence for item in found))))
     late = {name for name, item in catalogue().items() if item.stage == "last"}
-    return [*last, *_looked_for(model, takes, "interval", without | late)]
+    return [*last, *_looked_for(model, takes, "interval", without | late, found_before)]
 
 
 def proposed(
@@ -76,21 +84,29 @@ def proposed(
     return found
 
 
-def recorded(model: CalibrationModel, takes: Sequence[Take]) -> Recorded:
+def recorded(
+    model: CalibrationModel, takes: Sequence[Take], found_before: FoundBefore | None = None
+) -> Recorded:
     """Takes as effects look at them by their signature."""
     sensor_of = own_sensors(model.layout, trained_rotations(model))
     known = known_effects(model)
-    return Recorded(
-        tuple(takes), sensor_of, lambda: static_errors(takes, sensor_of, known), are_held_levels(takes)
-    )
+
+    def static() -> list[np.ndarray]:
+        return static_errors(takes, sensor_of, known)
+
+    return Recorded(tuple(takes), sensor_of, static, are_held_levels(takes), found_before or FoundBefore())
 
 
 def _looked_for(
-    model: CalibrationModel, takes: Sequence[Take], kind: str, without: Set[str]
+    model: CalibrationModel,
+    takes: Sequence[Take],
+    kind: str,
+    without: Set[str],
+    found_before: FoundBefore | None,
 ) -> list[Proposed]:
     if are_pose_labels(takes):
         return []
-    found, looked_at = [], recorded(model, takes)
+    found, looked_at = [], recorded(model, takes, found_before)
     for name, effect in catalogue().items():
         if isinstance(effect, SignatureEffect) and effect.kind == kind and name not in without:
             proposal = effect.proposed(looked_at)

@@ -29,8 +29,18 @@ JOBS_AT_ONCE = 2
 class Dispatcher:
     """``start()`` once, ``stop()`` once; both return soon. Also a context manager."""
 
-    def __init__(self, store: Store, settings: Settings, kinds: Mapping[str, JobKind] = KINDS) -> None:
+    def __init__(
+        self,
+        store: Store,
+        settings: Settings,
+        kinds: Mapping[str, JobKind] = KINDS,
+        *,
+        of_one_command: bool = False,
+    ) -> None:
+        """``of_one_command``: this process has nothing to do but wait for a job, so that it runs a job's only
+        task itself and starts no workers for it."""
         self.workers = Workers(settings)
+        self._runs_single_tasks = of_one_command and settings.scheduler is None
         self._store = store
         self._folder = settings.fits_folder
         self._owners = settings.data / "owners"
@@ -106,7 +116,9 @@ class Dispatcher:
             known = ", ".join(sorted(self._kinds))
             self._store.jobs.fail(job.id, job.attempt, f"no job of kind {job.kind!r}; there are {known}")
             return
-        run = JobRun(self._store, job, kind, self.workers, self._folder)
+        run = JobRun(
+            self._store, job, kind, self.workers, self._folder, runs_single_tasks=self._runs_single_tasks
+        )
         thread = threading.Thread(target=run.run, name=f"job-{job.id}", daemon=True)
         self._runs[thread] = run
         thread.start()

@@ -14,6 +14,7 @@ import structlog
 from glovecal_models.errors import Cancelled, GlovecalError
 from glovecal_service.jobs.finished_tasks import FinishedTasks
 from glovecal_service.jobs.job_kind import JobKind, JobPlan, Task, TaskResult
+from glovecal_service.jobs.niceness import step_back
 from glovecal_service.jobs.progress_file import ProgressFile, TaskProgress
 from glovecal_service.jobs.task_run import TaskOutcome, run_task
 from glovecal_service.jobs.time_left import TimeLeft
@@ -38,7 +39,18 @@ RETRY_WRITES_FOR_S = 60.0
 class JobRun:
     """Runs in a thread of its own; a second thread keeps the lease and watches for the cancel request."""
 
-    def __init__(self, store: Store, job: JobRecord, kind: JobKind, workers: Workers, folder: Path) -> None:
+    def __init__(
+        self,
+        store: Store,
+        job: JobRecord,
+        kind: JobKind,
+        workers: Workers,
+        folder: Path,
+        *,
+        runs_single_tasks: bool = False,
+    ) -> None:
+        """``runs_single_tasks``: a single task that is left to do runs in this process."""
+        self._runs_single_tasks = runs_single_tasks
         self._store = store
         self._job = job
         self._kind = kind
@@ -103,7 +115,10 @@ class JobRun:
     def _result(self) -> dict:
         plan = self._kind.plan(self._store, self._job)
         results = self._known(plan)
-        if plan.in_this_process:
+        is_single = self._runs_single_tasks and len(plan.tasks) - len(results) <= 1
+        if is_single and not plan.in_this_process:
+            step_back()  # this thread ends with the job
+        if plan.in_this_process or is_single:
             self._fit_here(plan, results)
         else:
             self._fit_in_workers(plan, results)

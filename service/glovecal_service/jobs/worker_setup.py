@@ -9,8 +9,7 @@ from distributed import Worker
 
 from glovecal_client.private_files import keep_private
 from glovecal_models.threads import pin_blas_to_one_thread
-
-NICENESS = 10
+from glovecal_service.jobs.niceness import NICENESS
 
 
 def dask_setup(worker: Worker) -> None:

@@ -11,10 +11,12 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
 from importlib.resources import files
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 STYLE = (files("glovecal_service.report") / "templates" / "style.css").read_text(encoding="utf-8")
 WIDE_PT = 430
@@ -125,6 +127,12 @@ def _part(macro: str, *values: Any) -> Markup:
 
 @cache
 def _environment() -> Environment:
+    from jinja2 import (
+        Environment,
+        PackageLoader,
+        StrictUndefined,
+    )  # slow to load, and few commands make a page
+
     environment = Environment(
         loader=PackageLoader("glovecal_service.report"),
         autoescape=True,

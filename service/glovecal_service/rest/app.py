@@ -116,9 +116,15 @@ ROUTERS = (
 
 
 def create_app(
-    settings: Settings, store: Store | None = None, *, body_patience_s: float = BODY_PATIENCE_S
+    settings: Settings,
+    store: Store | None = None,
+    *,
+    body_patience_s: float = BODY_PATIENCE_S,
+    of_one_command: bool = False,
 ) -> FastAPI:
     """The application; its lifespan opens the store (unless given) and runs the job dispatcher.
+
+    ``of_one_command``: it lives in the process of a single command, as ``Dispatcher`` is told.
 
     No logins: whoever reaches the port may do everything, so it is bound to loopback by default, and
     ``RequestGuard`` keeps pages of other sites out.
@@ -132,7 +138,7 @@ def create_app(
         uploads_folder = UploadFolder(settings.uploads_folder)
         await run_in_threadpool(uploads_folder.sweep)
         app.state.parts = Parts(settings, opened, uploads_folder, metrics, Predictors(opened))
-        dispatcher = Dispatcher(opened, settings)
+        dispatcher = Dispatcher(opened, settings, of_one_command=of_one_command)
         dispatcher.start()
         try:
             yield

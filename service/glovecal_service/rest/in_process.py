@@ -23,7 +23,7 @@ def in_process_client(settings: Settings) -> Iterator[RestClient]:
     The application lives on an event loop in a thread of its own, until the block ends. Raises what
     opening the store raises.
     """
-    app = create_app(settings)
+    app = create_app(settings, of_one_command=True)
     with (
         start_blocking_portal() as portal,
         portal.wrap_async_context_manager(app.router.lifespan_context(app)),

@@ -110,6 +110,8 @@ class Assessment:
         if not self.known_saved_square:
             return False
         item = self.errors[joint]
+        if item.contrast >= self.limits.beside_known_rest_share:
+            return bool(np.isinf(self.known_saved_square[joint]))
         saved = float(item.base.sum() - item.added.sum()) / max(item.rows, 1)
         return saved < self.limits.beside_known_share * self.known_saved_square[joint]
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -45,6 +45,26 @@ def sines(place: np.ndarray, count: int) -> np.ndarray:
     return np.imag(powers) / np.sqrt(BOX)
 
 
+@lru_cache(maxsize=64)
+def _needed_sines(dimensions: int, lengthscale: float, sd_deg: float) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of half waves (K, D) that a term needs, and the standard deviations (K,) of their weights: from
+    the spectral density at each frequency. Kept, since a choice of forms makes the same terms many times."""
+    numbers = np.arange(1, MOST_SINES + 1)
+    if dimensions == 1:
+        every = numbers[:, None]
+    else:
+        every = np.stack(np.meshgrid(numbers, numbers, indexing="ij"), axis=-1).reshape(-1, 2)
+    frequency = np.pi * every / (2 * BOX)
+    density = (np.sqrt(2 * np.pi) * lengthscale) ** dimensions
+    square = density * np.exp(-0.5 * lengthscale**2 * np.sum(frequency**2, axis=1))
+    sd = sd_deg * np.sqrt(square)
+    is_needed = sd >= LEAST_SD_SHARE * sd.max()
+    found = every[is_needed], sd[is_needed]
+    for array in found:
+        array.setflags(write=False)
+    return found
+
+
 @dataclass(frozen=True)
 class FormTerm:
     """One Gaussian process of one or two inputs."""
@@ -58,21 +78,7 @@ class FormTerm:
     @cached_property
     def _sines(self) -> np.ndarray:
         """(K, D) numbers of half waves in the box, of each input."""
-        numbers = np.arange(1, MOST_SINES + 1)
-        if len(self.inputs) == 1:
-            every = numbers[:, None]
-        else:
-            every = np.stack(np.meshgrid(numbers, numbers, indexing="ij"), axis=-1).reshape(-1, 2)
-        sd = self._sd(every)
-        return every[sd >= LEAST_SD_SHARE * sd.max()]
-
-    def _sd(self, numbers: np.ndarray) -> np.ndarray:
-        """(K,) from the spectral density at each frequency."""
-        frequency = np.pi * numbers / (2 * BOX)
-        dimensions = numbers.shape[1]
-        density = (np.sqrt(2 * np.pi) * self.lengthscale) ** dimensions
-        square = density * np.exp(-0.5 * self.lengthscale**2 * np.sum(frequency**2, axis=1))
-        return self.sd_deg * np.sqrt(square)
+        return _needed_sines(len(self.inputs), self.lengthscale, self.sd_deg)[0]
 
     @property
     def count(self) -> int:
@@ -82,7 +88,7 @@ class FormTerm:
     @cached_property
     def weight_sd(self) -> np.ndarray:
         """(K,) by which columns are multiplied, so that every weight is expected to be of size one."""
-        return self._sd(self._sines)
+        return _needed_sines(len(self.inputs), self.lengthscale, self.sd_deg)[1]
 
     @cached_property
     def most_sines(self) -> int:

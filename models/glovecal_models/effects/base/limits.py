@@ -47,6 +47,12 @@ class SignificanceLimits:
         "24 simulated gloves of six joints drawn from the whole hand, one cause each (2026-11-23): the second"
         " names that were not there saved 1 to 22 %.",
     )
+    beside_known_rest_share: float = limit(
+        0.5,
+        "share of the squared error",
+        "Or so much of what is left there, beyond its control: that is more than a form misses.",
+        "Chosen on one simulated glove with donning shift and a supply's knee (0.8, 2026-11-24).",
+    )
     fewest_blocks: int = limit(
         9,
         "blocks of 5 s",

@@ -57,6 +57,23 @@ class Finding:
     """Effects that would seem to explain it, and are not needed beside it."""
 
 
+class FoundBefore:
+    """What signatures were found in some takes, for whoever looks at the same takes again."""
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[object, ...], tuple[tuple[Take, ...], tuple[Finding, ...]]] = {}
+
+    def find(
+        self, effect: SignatureEffect, takes: Sequence[Take], sensor_of: Mapping[str, str]
+    ) -> tuple[Finding, ...]:
+        """As ``effect.find``, without errors of a model; the same takes are the same objects."""
+        key = (effect.name, *sensor_of.items(), *map(id, takes))
+        if key not in self._found:
+            # The takes are kept: another one could get the number of one that is gone.
+            self._found[key] = tuple(takes), effect.find(takes, sensor_of)
+        return self._found[key][1]
+
+
 @dataclass(frozen=True)
 class Recorded:
     """Takes in which an effect is looked for by its signature."""
@@ -68,6 +85,7 @@ class Recorded:
     """For each take (N, len(sensor_of)), degrees: what a smooth curve of the own sensors leaves."""
     only_held_levels: bool = False
     """Whether the takes only hold one angle after another: nothing moves, and repeats mean nothing."""
+    found_before: FoundBefore = field(default_factory=FoundBefore, compare=False)
 
 
 @dataclass(frozen=True)
@@ -157,7 +175,8 @@ class SignatureEffect(ColumnlessEffect):
         """What would be added for what is found in takes; None when nothing is, or it is only told."""
         if recorded.only_held_levels or not recorded.sensor_of:
             return None
-        found = [item for item in self.find(recorded.takes, recorded.sensor_of) if not item.is_only_told]
+        every = recorded.found_before.find(self, recorded.takes, recorded.sensor_of)
+        found = [item for item in every if not item.is_only_told]
         where = sorted({place for item in found for place in item.where})
         return Proposal({"where": where}, None, tuple(item.sentence for item in found)) if found else None
 

@@ -117,7 +117,8 @@ def delay_errors(problem: Problem) -> tuple[DelayErrors, ...]:
 
 def _delay_errors(problem: Problem) -> tuple[DelayErrors, ...]:
     form, delay = _cells()
-    return tuple(_joint(problem, joint, form, delay) for joint in range(len(problem.rotations)))
+    fine = [_Fine.of(take.time_s, take.own) for take in problem.signals]
+    return tuple(_joint(problem, fine, joint, form, delay) for joint in range(len(problem.rotations)))
 
 
 def held_out_beside(
@@ -150,16 +151,18 @@ def _cells() -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(form), np.concatenate(delay)
 
 
-def _joint(problem: Problem, joint: int, form: np.ndarray, delay: np.ndarray) -> DelayErrors:
+def _joint(
+    problem: Problem, fine: Sequence[_Fine], joint: int, form: np.ndarray, delay: np.ndarray
+) -> DelayErrors:
     products = problem.products[joint]
     base = np.concatenate([unit.base for unit in products.units])
     orthogonal, _ = np.linalg.qr(base)
     target = np.concatenate([unit.target for unit in products.units])
-    used = [(problem.signals[take], rows) for take, rows in problem.units(joint)]
-    moved = _moved([_Track.of(take.time_s, take.own[:, joint], rows) for take, rows in used], form, delay)
-    own = np.concatenate([take.own[rows, joint] for take, rows in used])
-    moved *= _slope(base, products.whole, own)
-    bend = _bend(moved, form, delay)
+    used = list(problem.units(joint))
+    moved = _moved([fine[take].track(joint, rows) for take, rows in used], form, delay)
+    own = np.concatenate([problem.signals[take].own[rows, joint] for take, rows in used])
+    slope = _slope(base, products.whole, own)
+    bend = _bend(moved, form, delay, slope)
     left = target - orthogonal @ (orthogonal.T @ target)
     lengths = [len(rows) for _, rows in used]
     starts = block_starts(lengths)
@@ -167,6 +170,7 @@ def _joint(problem: Problem, joint: int, form: np.ndarray, delay: np.ndarray) ->
     blocks = np.empty((len(starts), len(moved)))
     for first in range(0, len(moved), CELLS_AT_ONCE):
         some = moved[first : first + CELLS_AT_ONCE]
+        some *= slope
         some -= (some @ orthogonal) @ orthogonal.T
         np.subtract(left, some, out=some)
         np.square(some, out=some)
@@ -182,10 +186,10 @@ def _joint(problem: Problem, joint: int, form: np.ndarray, delay: np.ndarray) ->
     )
 
 
-def _bend(moved: np.ndarray, form: np.ndarray, delay: np.ndarray) -> np.ndarray:
+def _bend(moved: np.ndarray, form: np.ndarray, delay: np.ndarray, slope: np.ndarray) -> np.ndarray:
     """(rows,): the angle ``BEND_S`` before and after, less twice itself."""
     either = (form == DelayForm.PURE) & (np.abs(np.abs(delay) - BEND_S) < 0.5 * STEP_S)
-    return moved[either].sum(axis=0)
+    return (moved[either] * slope).sum(axis=0)
 
 
 def _slope(base: np.ndarray, coefficients: np.ndarray, own: np.ndarray) -> np.ndarray:
@@ -198,26 +202,40 @@ def _slope(base: np.ndarray, coefficients: np.ndarray, own: np.ndarray) -> np.nd
 
 
 @dataclass(frozen=True)
-class _Track:
-    """The angle of one take on times ``STEP_S`` apart, cubic between its rows: straight lines would flatten
+class _Fine:
+    """The angles of one take on times ``STEP_S`` apart, cubic between its rows: straight lines would flatten
     fast motion as a filter does."""
+
+    angles: np.ndarray
+    """(R, F), degrees."""
+    at: np.ndarray
+    """(N,) places of the take's rows among the fine times."""
+
+    @classmethod
+    def of(cls, time: np.ndarray, own: np.ndarray) -> _Fine:
+        """``own``: (N, R)."""
+        if len(time) < 2:
+            return cls(own.T.astype(float), np.arange(len(time)))
+        from scipy.interpolate import CubicSpline  # slow to load, too
+
+        factor = max(1, round(float(np.median(np.diff(time))) / STEP_S))
+        fine_time = time[0] + STEP_S * np.arange((len(time) - 1) * factor + 1)
+        fine = CubicSpline(time, own)(np.clip(fine_time, time[0], time[-1]))
+        at = np.clip(np.searchsorted(fine_time, time - EVEN_S), 0, len(fine) - 1)
+        return cls(np.ascontiguousarray(fine.T), at)
+
+    def track(self, joint: int, rows: np.ndarray) -> _Track:
+        return _Track(self.angles[joint], self.at[rows])
+
+
+@dataclass(frozen=True)
+class _Track:
+    """The angle of one joint in one take."""
 
     fine: np.ndarray
     """(F,), degrees."""
     at: np.ndarray
     """(N,) places of the fitted rows among the fine times."""
-
-    @classmethod
-    def of(cls, time: np.ndarray, own: np.ndarray, rows: np.ndarray) -> _Track:
-        if len(time) < 2:
-            return cls(own.astype(float), rows)
-        from scipy.interpolate import CubicSpline  # slow to load, too
-
-        factor = max(1, round(float(np.median(np.diff(time))) / STEP_S))
-        fine_time = time[0] + STEP_S * np.arange((len(time) - 1) * factor + 1)
-        fine = np.asarray(CubicSpline(time, own)(np.clip(fine_time, time[0], time[-1])))
-        at = np.clip(np.searchsorted(fine_time, time[rows] - EVEN_S), 0, len(fine) - 1)
-        return cls(fine, at)
 
     @property
     def backwards(self) -> _Track:

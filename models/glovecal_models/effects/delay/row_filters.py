@@ -70,20 +70,30 @@ def window_means(signal: np.ndarray, rows: np.ndarray, newest: np.ndarray, oldes
     rest = int(np.ceil(oldest.max(initial=0.0))) + 1
     sums = np.concatenate([[0.0], np.cumsum(0.5 * (signal[1:] + signal[:-1]))])
     sums = np.concatenate([signal[0] * np.arange(-rest, 0), sums, sums[-1:]])
-
-    def sum_until(ago: float) -> np.ndarray:
-        whole = int(np.ceil(ago))
-        below = rows + (rest - whole)
-        if len(rows) > 1 and is_even:
-            some = slice(below[0], below[-1] + 1, between)
-            first, following = sums[some], sums[some.start + 1 : some.stop + 1 : between]
-        else:
-            first, following = sums[below], sums[below + 1]
-        return first + (whole - ago) * (following - first)
-
-    between = int(rows[1] - rows[0]) if len(rows) > 1 else 0
-    is_even = between > 0 and bool((np.diff(rows) == between).all())
-    result = np.empty((len(newest), len(rows)))
-    for each, new, old in zip(result, newest, oldest, strict=True):
-        each[:] = (sum_until(new) - sum_until(old)) / (old - new)
+    ago, place = np.unique(np.concatenate([newest, oldest]), return_inverse=True)
+    until = _sums_until(sums, rows + rest, ago)
+    new, old = place[: len(newest)], place[len(newest) :]
+    result = until[new]
+    result -= until[old]
+    result /= (oldest - newest)[:, None]
     return result
+
+
+def _sums_until(sums: np.ndarray, rows: np.ndarray, ago: np.ndarray) -> np.ndarray:
+    """(K, N): running ``sums`` (F,) at times ``ago`` (K,), in samples, before each of ``rows`` (N,)."""
+    whole = np.ceil(ago).astype(int)
+    between = int(rows[1] - rows[0]) if len(rows) > 1 else 0
+    if between > 0 and (np.diff(rows) == between).all():
+        # Every ``between``-th sum side by side: what rows read is then one piece of it.
+        beside = np.pad(sums, (0, -len(sums) % between)).reshape(-1, between).T.copy()
+        view = np.lib.stride_tricks.sliding_window_view(beside, len(rows), axis=1)
+        below = rows[0] - whole
+        first = view[below % between, below // between]
+        following = view[(below + 1) % between, (below + 1) // between]
+    else:
+        below = rows - whole[:, None]
+        first, following = sums[below], sums[below + 1]
+    following -= first
+    following *= (whole - ago)[:, None]
+    following += first
+    return following
