@@ -108,7 +108,7 @@ def diagnose(
     impossible += [NotIdentifiable(item.name, SINGLE_POSES) for item in waiting]
     naming = _with_alikes_ordered(naming, beside, screened, by_name)
     lacking = [item for item in every if item.name not in has]
-    asked = signature_findings(takes, layout, problem.joints, naming, lacking, known, found_before)
+    asked = signature_findings(takes, layout, problem.joints, naming, lacking, by_name, known, found_before)
     findings = tuple(asked) if signatures else ()
     findings = tuple(
         item

@@ -96,7 +96,7 @@ class Diagnosis:
             return tuple(
                 finding
                 for name, found in by_effect.items()
-                if may_explain(self.effects[name], self.naming, found)
+                if may_explain(self.effects[name], self.naming, found, self.effects)
                 for finding in found
             )
         return tuple(item for item in self.findings if item.effect == self.findings[0].effect)

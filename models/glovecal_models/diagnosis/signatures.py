@@ -28,18 +28,32 @@ FEWEST_MEASURED = 50
 """Measured frames of a joint; fewer tell no curve."""
 
 
-def may_explain(effect: Effect, naming: Naming, found: Sequence[Finding]) -> bool:
+def may_explain(
+    effect: Effect, naming: Naming, found: Sequence[Finding], effects: Mapping[str, Effect]
+) -> bool:
     """Whether what an effect that is asked for last found is behind a ranking: nothing is ranked, or only
-    effects that seem to explain a part of it, and explain no more than that or are not needed beside it."""
-    if not _is_asked(effect, naming):
+    effects that seem to explain a part of it. These explain no more than that, or they are not needed beside
+    what was found where that is larger. ``effects``: those that were ranked, by name."""
+    if not _is_asked(effect, naming, effects):
         return False
-    if all(item.effect in set.intersection(*(set(f.accounts_for) for f in found)) for item in naming.ranked):
+    if not naming.ranked:
         return True
-    return saved_share_of(naming.ranked[0]) < effect.also_explained_share
+    first = naming.ranked[0]
+    if saved_share_of(first) < effect.also_explained_share:
+        return True
+    needless = [set(item.accounts_for) for item in found]
+    if all(item.effect in set.intersection(*needless) for item in naming.ranked):
+        return True
+    size = sum(item.size_deg**2 for item in found if item.size_deg is not None)
+    return all(item.effect in set.union(*needless) for item in naming.ranked) and size > first.saved_square
 
 
-def _is_asked(effect: Effect, naming: Naming) -> bool:
-    return all(item.effect in effect.also_explained_by for item in naming.ranked)
+def _is_asked(effect: Effect, naming: Naming, effects: Mapping[str, Effect]) -> bool:
+    """A column that goes along is no cause by itself, whatever its name."""
+    return all(
+        item.effect in effect.also_explained_by or not effects[item.effect].is_physical
+        for item in naming.ranked
+    )
 
 
 OUTWEIGHED = 3.0
@@ -73,11 +87,12 @@ def signature_findings(
     joints: Sequence[str],
     naming: Naming,
     effects: Sequence[Effect],
+    by_name: Mapping[str, Effect],
     known: Sequence[KnownEffect] = (),
     found_before: FoundBefore | None = None,
 ) -> Iterator[Finding]:
     """Largest first within each effect of ``effects``, those that the model does not have; ``known`` are
-    those that it has."""
+    those that it has, ``by_name`` all that were ranked."""
     found_before = found_before or FoundBefore()
     sensor_of = own_sensors(layout, joints)
     if not sensor_of:
@@ -93,9 +108,9 @@ def signature_findings(
             found = _with_error_squares(found, takes, sensor_of, static_errors(takes, sensor_of, known))
         yield from found
     for item in by_signature(effects, "last"):
-        if _is_asked(item, naming):
+        if _is_asked(item, naming, by_name):
             found = item.find(takes, sensor_of, static_errors(takes, sensor_of, known))
-            if found and may_explain(item, naming, found):
+            if found and may_explain(item, naming, found, by_name):
                 yield from found
 
 

@@ -71,6 +71,13 @@ def test_a_lucky_control_does_not_undo_an_effect():
     assert added(found) == ["supply_sag"]
 
 
+def test_what_seems_to_explain_a_part_of_a_slip_is_not_added():
+    found = improved(
+        7, ("I_MCP", "I_PIP", "M_MCP", "M_PIP", "R_MCP"), Cause("garment_slip", "slides_along_finger", 2.0)
+    )
+    assert added(found) == ["garment_slip"]
+
+
 @pytest.mark.parametrize(("size_deg", "kept"), [(0.9, False), (1.1, True), (None, True)])
 def test_a_finding_is_held_against_what_is_saved_on_its_rotations(size_deg, kept):
     finding = Finding("garment_slip", ("I_PIP",), "it slips", size_deg=size_deg)

@@ -1,0 +1,77 @@
+"""What is found by its signature, and what is ranked by the error it saves: which of them is named first."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from glovecal_models.diagnosis.naming import Naming, beside_last, saved_share_of
+from glovecal_models.diagnosis.signatures import is_outweighed, may_explain
+from glovecal_models.effects.base.assessment import Assessment, JointErrors
+from glovecal_models.effects.base.signature_effect import Finding
+from glovecal_models.effects.catalogue import catalogue, effect
+
+BLOCKS = 12
+
+
+def ranked(name: str, saved: float, joints: int = 2, square: float = 4.0) -> Assessment:
+    """An effect that saves this share of a squared error of ``square`` per row on every joint."""
+    take = np.repeat(np.arange(4), BLOCKS // 4)
+    base = np.full(BLOCKS, 100 * square)
+    errors = tuple(JointErrors(base, (1 - saved) * base, base, 100 * BLOCKS, take) for _ in range(joints))
+    nothing = tuple(np.empty(0) for _ in range(joints))
+    names = tuple(f"J{number}" for number in range(joints))
+    return Assessment(name, names, errors, nothing, nothing, p_value=0.004)
+
+
+def naming(*items: Assessment) -> Naming:
+    return Naming(items, (items[0].effect,) if items else ())
+
+
+def slip(*accounts_for: str) -> Finding:
+    return Finding("garment_slip", ("J0",), "it slips", size_deg=1.0, accounts_for=accounts_for)
+
+
+def test_a_slip_is_behind_what_explains_a_part_of_it_only():
+    garment_slip = effect("garment_slip")
+    assert may_explain(garment_slip, naming(), [slip()], catalogue())
+    assert may_explain(garment_slip, naming(ranked("temperature", 0.4)), [slip()], catalogue())
+    assert not may_explain(garment_slip, naming(ranked("temperature", 0.7)), [slip()], catalogue())
+    assert not may_explain(garment_slip, naming(ranked("hysteresis", 0.2)), [slip()], catalogue())
+
+
+def test_offsets_of_wearings_that_are_not_needed_beside_a_slip_do_not_hide_it():
+    wearings = naming(ranked("donning_shift", 0.7))
+    assert may_explain(effect("garment_slip"), wearings, [slip("donning_shift")], catalogue())
+    assert not may_explain(effect("garment_slip"), wearings, [slip("donning_shift"), slip()], catalogue())
+
+
+def test_slips_that_are_larger_than_the_wearings_come_first():
+    wearings = naming(ranked("donning_shift", 0.7, square=0.5))
+    assert may_explain(effect("garment_slip"), wearings, [slip("donning_shift"), slip()], catalogue())
+
+
+def test_beside_a_known_slip_a_column_has_to_explain_more_than_a_part():
+    found = [ranked("temperature", 0.4), ranked("temperature", 0.7), ranked("hysteresis", 0.4)]
+    kept = [bool(item.significant_joints) for item in beside_last(found, [effect("garment_slip")])]
+    assert kept == [False, True, True]
+    assert all(item.significant_joints for item in beside_last(found, []))
+
+
+def test_the_share_is_that_of_all_significant_joints_together():
+    assert saved_share_of(ranked("temperature", 0.4)) == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize(("error_square", "outweighed"), [(0.1, True), (2.0, False), (None, False)])
+def test_a_small_fault_comes_after_what_explains_far_more(error_square, outweighed):
+    fault = Finding("sensor_fault", ("J0",), "it drops out once", error_square=error_square)
+    assert is_outweighed([fault], naming(ranked("lag", 0.6))) is outweighed
+    assert not is_outweighed([fault], naming())
+
+
+def test_what_saves_half_of_what_is_left_is_no_rest_of_a_form():
+    items = [ranked("supply_sag", share) for share in (0.3, 0.8)]
+    known = [replace(item, known_saved_square=(50.0, 50.0)) for item in items]
+    assert [bool(item.significant_joints) for item in known] == [False, True]
