@@ -15,10 +15,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.optimize import minimize
 
 from glovecal_models.effects.garment_slip.slip_walk import MEAN_S
+from glovecal_models.regression.lapack_routines import potrf, potri
 from glovecal_models.takes.take import Take
 
 EVERY_GLOVE_DEG = 0.25
@@ -97,7 +97,8 @@ def slip_components(
     parts = _covariances(pieces)
     likelihood = _Likelihood(parts, pieces.error / spread)
     most = 2 * np.log(EVERY_GLOVE_DEG / spread)
-    held, start = likelihood.highest(dict.fromkeys(parts, MOST_LOG) | dict.fromkeys(_slip_names(parts), most))
+    slips = _slip_names(parts)
+    held, start = likelihood.highest({name: most if name in slips else MOST_LOG for name in parts})
     free, logs = likelihood.highest(dict.fromkeys(parts, MOST_LOG), start)
     if 2 * (free - held) <= LIKELIER:
         return None
@@ -146,10 +147,10 @@ class _Likelihood:
     def _negative(self, logs: np.ndarray) -> tuple[float, np.ndarray]:
         variances = np.exp(logs)
         covariance = (variances @ self._parts).reshape(self._nugget.shape) + self._nugget
-        factor, failed = dpotrf(covariance, lower=1)
+        factor, failed = potrf(covariance, lower=1)
         if failed:
             return 1e9, np.zeros(len(logs))
-        inverse = dpotri(factor, lower=1)[0]
+        inverse = potri(factor, lower=1)[0]
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
         solved = inverse @ self._error
         value = 0.5 * self._error @ solved + np.log(np.diag(factor)).sum()
