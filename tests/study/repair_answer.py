@@ -58,11 +58,15 @@ def repair_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_LIM
         before = held_out_errors(PreparedTakes.of(takes, glove.layout), rotations, (), settings)
         told |= {"added": False, "before_deg": _rmse(before, rotations)}
     else:
-        model = addition.model
+        model, before, after = addition.model, addition.before, addition.after
+        left_out = [name for name in rotations if name not in before.square]
+        if left_out:  # where the effect raised the error: there it stays as it was
+            same = held_out_errors(PreparedTakes.of(takes, glove.layout), left_out, (), settings)
+            before, after = before.with_those_of(same), after.with_those_of(same)
         told |= {
             "added": addition.added,
-            "before_deg": _rmse(addition.before, rotations),
-            "after_deg": _rmse(addition.after, rotations),
+            "before_deg": _rmse(before, rotations),
+            "after_deg": _rmse(after, rotations),
         }
     if glove.truth in COVERAGE:
         told["covered"] = _covered(glove, model, rotations)
