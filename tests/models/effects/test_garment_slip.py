@@ -72,6 +72,15 @@ def test_without_errors_or_with_short_takes_nothing_is_said(glove):
     assert slip_walk(times, errors, [take.reference[:, 1] for take in takes]) is None
 
 
+def test_references_that_are_measured_here_and_there_tell_no_slip(glove):
+    takes = glove.takes(count=4, seconds=30, shape_counts=slipping(4.0))
+    errors = glove.errors(takes)
+    for error in errors:
+        error[np.arange(len(error)) % 10 > 1] = np.nan
+    takes = [replace(take, context={"temperature_c": np.full(len(take.time_s), 20.0)}) for take in takes]
+    assert SLIP.find(takes, glove.sensor_of, errors) == ()
+
+
 def between_takes(size_deg):
     """Each take starts elsewhere and stays there."""
 

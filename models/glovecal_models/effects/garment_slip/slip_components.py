@@ -27,9 +27,9 @@ LIKELIER, FEW_JOINTS = 4.0, 5
 """Twice the log likelihood ratio from which on it is a slip; more with more joints, each a chance to err. Of
 80 simulated clean gloves of five and six joints none reaches 3, of 36 that slip by 1.3 noise floors 32 reach
 4; a clean session of six minutes reached 3.5."""
-LEAST_SPREAD_DEG = 0.35
+LEAST_SLOW_DEG = 0.35
 """Means that scatter by less hold no slip that is worth a name."""
-FEWEST_PIECES, MOST_PIECES = 12, 160
+FEWEST_SLOW_PIECES, MOST_PIECES = 12, 160
 HEALTHY_LASTS_S = 25.0
 ALIKE_SD = 0.5
 """Bends within so many standard deviations have about one error of posture."""
@@ -44,7 +44,7 @@ MEASURED_SHARE, COMPLETE_SHARE = 0.5, 0.9
 NUGGET = 1e-2
 """Of the variance: keeps the covariance positive."""
 LEAST_LOG, START_LOG, MOST_LOG = -7.0, -1.6, 3.0
-ROUNDS = 60
+LIKELIHOOD_ROUNDS = 60
 SINCE_DONNING, SAME_WAY, INSIDE, BETWEEN = "since donning", "same way", "inside takes", "between takes"
 SLIPS = (SINCE_DONNING, SAME_WAY, INSIDE, BETWEEN)
 WORN = "wearing"
@@ -91,7 +91,7 @@ def slip_components(
     """``errors`` (N,) of each take less what goes with posture, ``angles`` (N,) measured, degrees; NaN where
     there is no reference. None where there is too little to say, or no slow error worth a name."""
     pieces = _pieces(takes, errors, angles)
-    if len(pieces.error) < FEWEST_PIECES or pieces.error.std() < LEAST_SPREAD_DEG:
+    if len(pieces.error) < FEWEST_SLOW_PIECES or pieces.error.std() < LEAST_SLOW_DEG:
         return None
     spread = float(pieces.error.std())
     parts = _covariances(pieces)
@@ -140,7 +140,7 @@ class _Likelihood:
         begin = [START_LOG if start is None else start[name] for name in self._names]
         found = minimize(
             self._negative, np.clip(begin, *np.transpose(bounds)), jac=True, method="L-BFGS-B", bounds=bounds,
-            options={"maxiter": ROUNDS},
+            options={"maxiter": LIKELIHOOD_ROUNDS},
         )  # fmt: skip
         return -float(found.fun), dict(zip(self._names, map(float, found.x), strict=True))
 
@@ -215,7 +215,7 @@ def _pieces(takes: Sequence[Take], errors: Sequence[np.ndarray], angles: Sequenc
     take_of, worn_s, inside_s, error, bend, *context = np.concatenate(rows).T
     wearings = list(dict.fromkeys(take.wearing for take in takes))
     wearing = np.array([wearings.index(takes[int(number)].wearing) for number in take_of])
-    varied = tuple(column for column in context if np.ptp(column) > 1e-9)
+    varied = tuple(column for column in context if column.size and np.ptp(column) > 1e-9)
     return _Pieces(error, bend, worn_s, inside_s, take_of, wearing, varied)
 
 

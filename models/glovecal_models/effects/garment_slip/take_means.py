@@ -10,7 +10,7 @@ from glovecal_models.takes.take import Take
 
 COMMON_JOINTS, COMMON_SHARE = 3, 0.8
 """What moves so many together to this share has a cause outside them."""
-FEWEST_TAKES = 4
+FEWEST_COMMON_TAKES = 4
 
 
 def is_common(takes: Sequence[Take], errors: Sequence[Sequence[np.ndarray]]) -> bool:
@@ -18,7 +18,7 @@ def is_common(takes: Sequence[Take], errors: Sequence[Sequence[np.ndarray]]) -> 
     if len(errors) < COMMON_JOINTS:
         return False
     known = [number for number in range(len(takes)) if all(np.isfinite(e[number]).any() for e in errors)]
-    if len(known) < FEWEST_TAKES:
+    if len(known) < FEWEST_COMMON_TAKES:
         return False
     means = np.array([[np.nanmean(joint[number]) for joint in errors] for number in known])
     wearings = np.array([takes[number].wearing for number in known])
