@@ -54,13 +54,18 @@ def beside_known(found: Sequence[Assessment], saved: Mapping[str, float]) -> lis
 def beside_last(found: Sequence[Assessment], known: Sequence[Effect]) -> list[Assessment]:
     """The same, where the model has an effect that is asked for last, such as a slip: what seems to explain a
     part of it has to explain more than that."""
-    shares = {name: item.also_explained_share for item in known for name in item.also_explained_by}
-    return [
-        replace(item, known_saved_square=(np.inf,) * len(item.joints))
-        if saved_share_of(item) < shares.get(item.effect, 0.0)
-        else item
-        for item in found
-    ]
+    wholes = {name: item for item in known for name in item.also_explained_by}
+    result = []
+    for item in found:
+        whole = wholes.get(item.effect)
+        if (
+            whole is not None
+            and item.significant_joints
+            and saved_share_of(item) < whole.also_explained_share
+        ):
+            item = replace(item, part_of=whole.name)
+        result.append(item)
+    return result
 
 
 def saved_share_of(found: Assessment) -> float:

@@ -31,6 +31,7 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
     elif not diagnosis.findings:
         sentences.append(nothing_named_sentence(diagnosis))
     sentences += [within_known_sentence(item) for item in diagnosis.assessments if item.within_known]
+    sentences += [part_sentence(item) for item in diagnosis.assessments if item.part_of]
     if diagnosis.next_take is not None:
         sentences.append(next_take_sentence(diagnosis.next_take))
     sentences.append(residual_sentence(diagnosis.residual))
@@ -98,6 +99,14 @@ def within_known_sentence(item: Assessment) -> str:
         f"{item.effect} on {where} is not named: it would save less than"
         f" {100 * item.limits.beside_known_share:.0f} % of the squared error that the model's effects save"
         " there, and the form of those may leave as much."
+    )
+
+
+def part_sentence(item: Assessment) -> str:
+    """Of an effect that seems to explain a part of what the model has a wider interval for."""
+    return (
+        f"{item.effect} is not named: it would save too little of the error to be more than a part of"
+        f" {item.part_of}, which the model has."
     )
 
 

@@ -89,6 +89,8 @@ class Assessment:
     """Squared degrees per row that the effects of the model save on each joint; empty where it has none."""
     within_camera: tuple[int, ...] = ()
     """Joints on which what it saves may as well be an error of the camera that measured the angles."""
+    part_of: str = ""
+    """An effect of the model that it seems to explain a part of; empty: none."""
 
     def shape_described(self, joint: int) -> dict[str, float]:
         """The shape of one joint by its numbers' names."""
@@ -97,21 +99,23 @@ class Assessment:
     @cached_property
     def significant_joints(self) -> tuple[int, ...]:
         """Joints on which the effect beats its control significantly, saves more than the effects of the
-        model may have left there, and is not the camera's."""
+        model may have left there, and is not the camera's; none where it seems to explain a part of one."""
+        if self.part_of:
+            return ()
         mine = (i for i in self._beyond_control if i not in self.within_camera)
         return tuple(i for i in mine if not self._is_within_known(i))
 
     @cached_property
     def within_known(self) -> tuple[int, ...]:
         """Joints on which it beats its control, but saves no more than the model's effects may have left."""
-        return tuple(i for i in self._beyond_control if self._is_within_known(i))
+        return () if self.part_of else tuple(i for i in self._beyond_control if self._is_within_known(i))
 
     def _is_within_known(self, joint: int) -> bool:
         if not self.known_saved_square:
             return False
         item = self.errors[joint]
         if item.contrast >= self.limits.beside_known_rest_share:
-            return bool(np.isinf(self.known_saved_square[joint]))
+            return False
         saved = float(item.base.sum() - item.added.sum()) / max(item.rows, 1)
         return saved < self.limits.beside_known_share * self.known_saved_square[joint]
 
