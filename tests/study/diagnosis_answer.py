@@ -20,6 +20,9 @@ def diagnosis_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_
     found = diagnose(glove.takes, glove.layout, linear=glove.linear, limits=limits.diagnosis)
     signatures = list(dict.fromkeys(item.effect for item in found.signature))
     ranked = [*signatures, *(item.effect for item in found.naming.ranked)]
+    if not ranked and found.by_column:
+        ranked = [item.effect for item in found.by_column[:1]]
+        signatures = ranked
     return {
         "first": ranked[0] if ranked else NOTHING,
         "confidence_set": signatures[:1] or list(found.naming.confidence_set),

@@ -14,12 +14,14 @@ from glovecal_models.diagnosis.next_take import NextTake
 from glovecal_models.effects.base.motions import TAPS
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 from glovecal_models.simulation.session_plan import TakeMotion
+from glovecal_models.simulation.signals import at_times
 from glovecal_models.takes.known_latency import KnownLatency
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.tap_latency import USUAL_KEY_S, usual_key
 
 MOST_TAKES = 2
 NEW_WEARING_S = 40.0
+DELAYS_S = np.arange(0.0, 0.1, 0.001)
 TAPS_SD_S = 0.003
 """What taps scatter and the finger's stop is misjudged by."""
 
@@ -49,16 +51,33 @@ def _decides(found: Diagnosis) -> bool:
 
 
 def _tapped(glove: BlindGlove, random: np.random.Generator) -> KnownLatency:
-    """What taps on some key measure: how late the whole glove is, its sensors' lag included."""
+    """What taps on some key measure: how late the whole glove is, its sensors' lag and the age of frames that
+    come again included."""
     hidden = zip(glove.causes, glove.session.causes, strict=False)
     late = [(mine, item) for mine, item in hidden if item.name in ("glove_latency", "lag")]
     true_s = sum(
         float(np.mean(list(item.sizes.values()))) * (0.5 if mine.form == "moving_average" else 1.0)
         for mine, item in late
     )
+    if any(item.name == "repeated_samples" for item in glove.causes):
+        true_s += _late_s(glove)
     usual_s, key_sd_s = usual_key()
     wrong_s = usual_s - random.uniform(*USUAL_KEY_S) + random.normal(0.0, TAPS_SD_S)
     return KnownLatency(true_s + wrong_s, float(np.hypot(TAPS_SD_S, key_sd_s)))
+
+
+def _late_s(glove: BlindGlove) -> float:
+    """By which delay the clean twin's readings come nearest to those of a glove that sends old ones again:
+    they are the same readings, noise included."""
+    pairs = list(zip(glove.takes, glove.clean_takes, strict=True))
+    left = [
+        sum(
+            float(np.mean((take.readings - at_times(take.time_s, clean.readings, take.time_s - delay)) ** 2))
+            for take, clean in pairs
+        )
+        for delay in DELAYS_S
+    ]
+    return float(DELAYS_S[int(np.argmin(left))])
 
 
 def _recorded(glove: BlindGlove, asked: NextTake, repeat: int) -> Take:

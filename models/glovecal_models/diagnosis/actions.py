@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence, Set
 from dataclasses import dataclass
 
+import numpy as np
+
 from glovecal_models.diagnosis.formed_error import formed_rmse
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.residual_association import ResidualAssociation
@@ -49,6 +51,24 @@ class Action:
         """Whether the effect beats nothing and its control on held-out takes."""
         found = self.rmse_deg
         return found is not None and found.after < min(found.before, found.control)
+
+    @property
+    def saved_share(self) -> float | None:
+        """Of the squared error, beyond what the control saves."""
+        found = self.rmse_deg
+        if found is None or found.before <= 0:
+            return None
+        return (min(found.before, found.control) ** 2 - found.after**2) / found.before**2
+
+
+def together(actions: Sequence[Action]) -> HeldOutRmse:
+    """Errors of several actions, each on its rotation, as one root mean square."""
+    found = [item.rmse_deg for item in actions if item.rmse_deg is not None]
+    before, after, control = (
+        float(np.sqrt(np.mean([getattr(item, part) ** 2 for item in found]))) if found else 0.0
+        for part in ("before", "after", "control")
+    )
+    return HeldOutRmse(before, after, control)
 
 
 def actions_for(

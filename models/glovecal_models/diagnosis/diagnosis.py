@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from glovecal_models.comparison.floor_estimate import NoiseFloor
-from glovecal_models.diagnosis.actions import Action
+from glovecal_models.diagnosis.actions import Action, together
 from glovecal_models.diagnosis.camera_errors import CameraErrors
 from glovecal_models.diagnosis.hold_drift import HoldDrift
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
@@ -120,8 +120,30 @@ class Diagnosis:
             return self._named_by_signature()
         if self.naming.ranked:
             return self._named_by_comparison()
+        if self.by_column:
+            return self._named_by_column()
         held = self.hold_drift
         return None if held is None or not held.confidence_set else _named_by_drift(held)
+
+    @property
+    def by_column(self) -> tuple[Action, ...]:
+        """One for each rotation, where an effect is named because the residual goes along with the very
+        column that measures its cause: where nothing else is named, and beside no other effect, whose form
+        may have left as much. Empty otherwise."""
+        if self.naming.ranked or self.findings or any(item.known_saved_square for item in self.assessments):
+            return ()
+        found = [item for item in self.actions if item.saves and self._is_own_column(item)]
+        return tuple(item for item in found if item.effect == found[0].effect)
+
+    def _is_own_column(self, action: Action) -> bool:
+        effect = self.effects.get(action.effect or "")
+        share = action.saved_share
+        if effect is None or not action.is_physical or share is None:
+            return False
+        return (
+            action.association.column in [f"context {name}" for name in effect.context]
+            and share >= self.limits.own_column_share
+        )
 
     def _named_by_signature(self) -> NamedEffect:
         first, rivals = self.signature[0], self.naming.confidence_set
@@ -146,6 +168,20 @@ class Diagnosis:
             rmse.before - rmse.after,
             rmse.before - rmse.control,
             self.effects[item.effect].learned_by if self.linear else None,
+        )
+
+    def _named_by_column(self) -> NamedEffect:
+        asked = self.by_column
+        name, rmse = asked[0].effect or "", together(asked)
+        return NamedEffect(
+            name,
+            tuple(item.rotation for item in asked),
+            self.effects[name].kind,
+            (name,),
+            {},
+            rmse.before - rmse.after,
+            rmse.before - rmse.control,
+            self.effects[name].learned_by if self.linear else None,
         )
 
 

@@ -40,12 +40,17 @@ def may_explain(
         return True
     first = naming.ranked[0]
     if saved_share_of(first) < effect.also_explained_share:
-        return True
+        return _size_square(found) >= LEAST_SIZE * first.saved_square
     needless = [set(item.accounts_for) for item in found]
     if all(item.effect in set.intersection(*needless) for item in naming.ranked):
         return True
-    size = sum(item.size_deg**2 for item in found if item.size_deg is not None)
-    return all(item.effect in set.union(*needless) for item in naming.ranked) and size > first.saved_square
+    is_larger = _size_square(found) > first.saved_square
+    return all(item.effect in set.union(*needless) for item in naming.ranked) and is_larger
+
+
+def _size_square(found: Sequence[Finding]) -> float:
+    """Degrees squared, summed over where something was found; nothing for what has no size."""
+    return sum(item.size_deg**2 for item in found if item.size_deg is not None)
 
 
 def _is_asked(effect: Effect, naming: Naming, effects: Mapping[str, Effect]) -> bool:
@@ -56,6 +61,7 @@ def _is_asked(effect: Effect, naming: Naming, effects: Mapping[str, Effect]) -> 
     )
 
 
+LEAST_SIZE = 0.35
 OUTWEIGHED = 3.0
 """Times the squared error where findings are: what saves so much more is named before them."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from glovecal_models.diagnosis.actions import Action
+from glovecal_models.diagnosis.actions import Action, together
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.floor_ratio import FloorRatio
 from glovecal_models.diagnosis.hold_drift import HAND, HoldDrift, PoseDrift, drifting
@@ -26,6 +26,8 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
     sentences += [item.sentence for item in diagnosis.findings]
     if diagnosis.naming.ranked:
         sentences.append(ranked_sentence(diagnosis))
+    elif diagnosis.by_column:
+        sentences.append(by_column_sentence(diagnosis.by_column))
     elif diagnosis.hold_drift is not None:
         sentences += [hold_sentence(diagnosis.hold_drift), UNITS]
     elif not diagnosis.findings:
@@ -60,6 +62,8 @@ def named_sentence(diagnosis: Diagnosis) -> str | None:
         return diagnosis.signature[0].sentence
     if diagnosis.naming.ranked:
         return ranked_sentence(diagnosis)
+    if diagnosis.by_column:
+        return by_column_sentence(diagnosis.by_column)
     held = diagnosis.hold_drift
     return None if held is None or not held.confidence_set else hold_sentence(held)
 
@@ -81,6 +85,16 @@ def ranked_sentence(diagnosis: Diagnosis) -> str:
     if rivals:
         return f"{start}; ambiguous with {', '.join(rivals)}. {more}".rstrip()
     return f"{start}; {named.caveat}. {more}".rstrip() if named.caveat else f"{start}. {more}".rstrip()
+
+
+def by_column_sentence(actions: Sequence[Action]) -> str:
+    """Of an effect that is named because the residual goes along with the column that measures its cause."""
+    rmse, where = together(actions), ", ".join(item.rotation for item in actions)
+    return (
+        f"{actions[0].effect} on {where} reduces the held-out error from {rmse.before:.2f} to"
+        f" {rmse.after:.2f} degrees (control: {rmse.control:.2f}) in a form that these takes tell; no usual"
+        f" form of it does. The error goes along with {actions[0].association.phrase}, which measures it."
+    )
 
 
 def nothing_named_sentence(diagnosis: Diagnosis) -> str:

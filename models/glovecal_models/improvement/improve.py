@@ -166,7 +166,7 @@ class _Loop:
             tried.add(item.effect)
             if len(tried) > self.limits.most_undone:
                 return False
-        if self._add_associated(self.diagnosis):
+        if self._add_by_column(self.diagnosis) or self._add_associated(self.diagnosis):
             return True
         if not tried:
             self.stopped = "nothing_named"
@@ -250,6 +250,14 @@ class _Loop:
         added = AddedInStep.of(addition, constants, diagnosis, confidence_set, action)
         self._step(model, added)
         return True
+
+    def _add_by_column(self, diagnosis: Diagnosis) -> bool:
+        """The effect that is named by the column that measures its cause, if it stays."""
+        asked = diagnosis.by_column
+        if not asked or asked[0].effect is None or asked[0].effect in self._tried:
+            return False
+        where = [item.rotation for item in asked]
+        return self._add(asked[0].effect, where, None, diagnosis, tuple(map(action_sentence, asked)))
 
     def _add_associated(self, diagnosis: Diagnosis) -> bool:
         """The first effect of a column that the residual goes along with, if it stays."""

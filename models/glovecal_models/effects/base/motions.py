@@ -8,7 +8,7 @@ FAST = Motion(
     "fast",
     "Swing several fingers to and fro as fast as you comfortably can, 2 to 3.5 times a second, about 25"
     " degrees wide.",
-    25,
+    45,
 )
 RAMPS = Motion(
     "ramps",

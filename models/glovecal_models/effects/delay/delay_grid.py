@@ -10,7 +10,7 @@ slope. All cells are compared at once by projecting them off the base.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -33,6 +33,7 @@ FIRST_POLE_SHARE = 0.65
 WINDOW_SHARE = 0.6
 """Length of a delayed window, of that of a moving average as late: a raised cosine has 0.63."""
 BEND_S = 0.05
+SHORT_ROWS = 25
 CELLS_AT_ONCE = 16
 """Few enough for the processor's cache."""
 FAST_SHARE = 1.0
@@ -91,6 +92,13 @@ class DelayErrors:
     def reversed_lag(self) -> np.ndarray:
         return np.flatnonzero(np.isin(self.form, FILTERS) & (self.delay_s <= 0))
 
+    def gathered(self, starts: np.ndarray) -> DelayErrors:
+        """In longer blocks, which begin with the blocks ``starts`` of these."""
+        blocks, unmoved, fast = (
+            np.add.reduceat(part, starts, axis=0) for part in (self.blocks, self.unmoved, self.fast)
+        )
+        return replace(self, blocks=blocks, unmoved=unmoved, take=self.take[starts], fast=fast)
+
     def cells(self, form: DelayForm) -> np.ndarray:
         """Those of one form, by rising delay."""
         return np.flatnonzero(self.form == form)
@@ -115,10 +123,35 @@ def delay_errors(problem: Problem) -> tuple[DelayErrors, ...]:
     return problem.once("delays", lambda: _delay_errors(problem))
 
 
+def short_delay_errors(problem: Problem) -> tuple[DelayErrors, ...]:
+    """The same in blocks of about a second: fast motion seldom lasts for more."""
+    return problem.once("delays in short blocks", lambda: _short_delay_errors(problem))
+
+
 def _delay_errors(problem: Problem) -> tuple[DelayErrors, ...]:
+    return tuple(
+        item.gathered(_split(_long_starts(problem, joint))[1])
+        for joint, item in enumerate(short_delay_errors(problem))
+    )
+
+
+def _short_delay_errors(problem: Problem) -> tuple[DelayErrors, ...]:
     form, delay = _cells()
     fine = [_Fine.of(take.time_s, take.own) for take in problem.signals]
     return tuple(_joint(problem, fine, joint, form, delay) for joint in range(len(problem.rotations)))
+
+
+def _long_starts(problem: Problem, joint: int) -> tuple[np.ndarray, int]:
+    """Of the blocks of all effects, and the rows of all."""
+    lengths = [len(rows) for _, rows in problem.units(joint)]
+    return block_starts(lengths), int(sum(lengths))
+
+
+def _split(long: tuple[np.ndarray, int]) -> tuple[np.ndarray, np.ndarray]:
+    """First rows of short blocks, and which of them begins each long one."""
+    starts, rows = long
+    short = block_starts(np.diff(np.append(starts, rows)).tolist(), SHORT_ROWS)
+    return short, np.searchsorted(short, starts)
 
 
 def held_out_beside(
@@ -164,9 +197,8 @@ def _joint(
     slope = _slope(base, products.whole, own)
     bend = _bend(moved, form, delay, slope)
     left = target - orthogonal @ (orthogonal.T @ target)
-    lengths = [len(rows) for _, rows in used]
-    starts = block_starts(lengths)
-    ends = np.cumsum(lengths)
+    starts, _ = _split(_long_starts(problem, joint))
+    ends = np.cumsum([len(rows) for _, rows in used])
     blocks = np.empty((len(starts), len(moved)))
     for first in range(0, len(moved), CELLS_AT_ONCE):
         some = moved[first : first + CELLS_AT_ONCE]

@@ -18,7 +18,7 @@ from glovecal_models.effects.base.assessment import over_joints
 from glovecal_models.effects.base.limits import SIGNIFICANCE_LIMITS, SignificanceLimits
 from glovecal_models.effects.base.problem import Problem
 from glovecal_models.effects.delay.clock_path import cells_of_others
-from glovecal_models.effects.delay.delay_grid import DelayErrors, DelayForm, delay_errors
+from glovecal_models.effects.delay.delay_grid import DelayErrors, DelayForm, delay_errors, short_delay_errors
 from glovecal_models.takes.known_latency import KnownLatency
 from glovecal_models.takes.tap_latency import usual_key
 
@@ -36,8 +36,8 @@ MEASURED_SE = 2.0
 ASKED_SE = 3.0
 """Taps are asked for where the delay of takes is so many: it will hardly come out in between."""
 FAST_DECIDES_S = 0.02
-"""Shorter filters look like mere delays in 25 s of fast motion too (simulated gloves: of 5 with 10 to 12 ms
-one became clear, of 10 with 22 to 25 ms nine within two such takes)."""
+"""Shorter filters look like mere delays in fast motion too (simulated gloves: of 5 with 10 to 12 ms one became
+clear; of 10 with 22 to 25 ms all within one take of 45 s)."""
 STOP_SD_S = 0.003
 """Taps find the finger's stop 2 to 4 ms late (simulated)."""
 ACCOUNTS_FOR = {
@@ -136,7 +136,7 @@ def first_delay(problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]
     """The delay to be named first, and all that remain possible; ``problem`` by the rows smoothed over."""
     usual = problem(SMOOTHING)
     grids = delay_errors(usual)
-    possible = possible_delays(grids, usual.limits)
+    possible = possible_delays(grids, usual.limits, short_delay_errors(usual))
     latency = usual.signals[0].glove_latency
     if latency is not None and {CLOCK, LATENCY} <= set(possible):
         possible = _told_by_latency(possible, common_delay(grids), latency)
@@ -144,9 +144,12 @@ def first_delay(problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]
 
 
 def possible_delays(
-    grids: Sequence[DelayErrors], limits: SignificanceLimits = SIGNIFICANCE_LIMITS
+    grids: Sequence[DelayErrors],
+    limits: SignificanceLimits = SIGNIFICANCE_LIMITS,
+    short: Sequence[DelayErrors] | None = None,
 ) -> tuple[str, ...]:
-    """The effects that these delays may come from, the likeliest first."""
+    """The effects that these delays may come from, the likeliest first. ``short``: the same errors in short
+    blocks."""
     clear = limits.delay_clear_se
     clock = clock_choice(grids, limits)
     if np.median(clock.offset_s) < 0 or clock.within is not None:
@@ -158,7 +161,8 @@ def possible_delays(
             return (CLOCK,)
     if _score(together[DelayForm.PURE], _apart(grids, DelayForm.PURE)) > APART_TIMES * clear:
         return (LAG,)
-    kept = forms_kept(grids, together, clear)
+    short = short or grids
+    kept = forms_kept(short, {form: _together(short, form) for form in DelayForm}, clear)
     if DelayForm.PURE in kept and DelayForm.DELAYED_WINDOW in kept:
         kept.remove(DelayForm.DELAYED_WINDOW)  # hardly told from a mere delay
     # A filter may gain by what noise it takes away: while a mere delay is not ruled out, it comes first.
