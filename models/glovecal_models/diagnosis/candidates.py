@@ -11,12 +11,14 @@ from glovecal_models.calibration.held_out import FittedColumns, HeldOut, held_ou
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.not_identifiable import NotIdentifiable, undecidable
 from glovecal_models.diagnosis.permutation_test import session_p_value
+from glovecal_models.diagnosis.smooth_column import smooth_assessment
 from glovecal_models.effects.base.assessment import (
     Assessment,
     JointErrors,
     block_starts,
     squared_in_blocks,
 )
+from glovecal_models.effects.base.context_effect import ContextEffect
 from glovecal_models.effects.base.control import control_columns
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Settings
@@ -83,7 +85,18 @@ def _assessed(
     if few is not None:
         return NotIdentifiable(effect.name, few.why, few.record, found)
     some = any(item.contrast >= design.limits.least_session_share for item in errors)
-    return replace(found, p_value=session_p_value(design, effect, generator) if some else 1.0)
+    found = replace(found, p_value=session_p_value(design, effect, generator) if some else 1.0)
+    return _in_any_form(design, effect, found, generator)
+
+
+def _in_any_form(
+    design: ForwardDesign, effect: Effect, usual: Assessment, generator: np.random.Generator
+) -> Assessment:
+    """Where its usual form is not significant, a smooth one may be."""
+    if usual.significant_joints or not isinstance(effect, ContextEffect) or not effect.has_any_form:
+        return usual
+    smooth = smooth_assessment(design, effect, usual, generator)
+    return smooth if smooth is not None and smooth.significant_joints else usual
 
 
 def _screened(design: ForwardDesign, effect: Effect, generator: np.random.Generator) -> tuple[Evidence, ...]:

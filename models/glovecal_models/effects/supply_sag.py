@@ -27,6 +27,7 @@ class SupplySag(ContextEffect):
     shown_by: ClassVar = CROSSED
     parameters: ClassVar = (Parameter("exponent", "1", 0.3, 3.0, "about 1"),)
     context: ClassVar = ("supply_v",)
+    has_any_form: ClassVar[bool] = True
 
     def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
         return np.repeat(np.array(EXPONENTS)[:, None, None], takes[0].own.shape[1], axis=1)

@@ -13,6 +13,8 @@ from glovecal_models.effects.base.motions import CROSSED
 from glovecal_models.effects.base.signals import Signals
 
 TAU_S = (45.0, 75.0, 120.0, 200.0, 330.0, 550.0, 900.0)
+SOON_S = 30.0
+"""After power-on: before that a second counts as much as any other."""
 COLDEST = 0.7
 """In time constants: so much earlier than any take of the training the exponential may go on to rise."""
 
@@ -28,9 +30,13 @@ class WarmupDrift(ContextEffect):
     drift_in_holds: ClassVar = "slows down"
     parameters: ClassVar = (Parameter("tau", "s", 30.0, 1200.0, "1 to 15 min"),)
     context: ClassVar = ("power_on_s",)
+    has_any_form: ClassVar[bool] = True
 
     def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
         return np.repeat(np.array(TAU_S)[:, None, None], takes[0].own.shape[1], axis=1)
+
+    def evenly(self, value: np.ndarray, settings: Settings) -> np.ndarray:
+        return np.log(np.maximum(value, 0.0) + SOON_S)
 
     def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
         """How cold it still is: any function of the time since power-on is one of it."""

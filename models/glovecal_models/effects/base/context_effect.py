@@ -25,6 +25,8 @@ class ContextEffect(InstantEffect):
     """
 
     control: ClassVar[Control] = "context of other takes"
+    has_any_form: ClassVar[bool] = False
+    """Whether the error may follow the column, which changes between takes, in any smooth form."""
     shown_over: ClassVar[ShownOver] = "context"
 
     @property
@@ -56,6 +58,10 @@ class ContextEffect(InstantEffect):
         value = np.where(np.isfinite(value), value, settings["usual"])
         beyond = BEYOND_SHARE * (settings["high"] - settings["low"])
         return np.clip(value, settings["low"] - beyond, settings["high"] + beyond)
+
+    def evenly(self, value: np.ndarray, settings: Settings) -> np.ndarray:
+        """The column (N,) on a scale on which the effect is about as lively everywhere."""
+        return value
 
     def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
         value = self.clipped(take, settings)

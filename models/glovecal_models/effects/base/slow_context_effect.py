@@ -32,6 +32,7 @@ class SlowContextEffect(ContextEffect):
     """Columns of the context column and its square, and one more: its mean slope over the past minutes."""
 
     has_memory: ClassVar[bool] = True
+    has_any_form: ClassVar[bool] = True
     take_sd_deg: ClassVar[float] = 0.5  # what came before the first frame is known by its slope only
 
     def transient_s(self, shape: np.ndarray) -> float:

@@ -1,0 +1,144 @@
+"""A cause that changes between takes in any smooth form: what a Gaussian process over its column explains.
+
+A usual form may miss a cause altogether, such as one that rings or turns back. The error of each joint, in
+means of ten seconds or so, is predicted in every take from the others by the column alone. The takes' errors
+are permuted for the p value: with the column left in place all permutations share one covariance matrix.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from glovecal_models.diagnosis.forward_design import ForwardDesign
+from glovecal_models.diagnosis.permutation_test import shares_as_large
+from glovecal_models.effects.base.assessment import (
+    Assessment,
+    JointErrors,
+    block_starts,
+    squared_in_blocks,
+)
+from glovecal_models.effects.base.context_effect import ContextEffect
+
+PIECES = 4
+"""Of each take."""
+FEWEST_TAKES = 8
+LENGTHS = (0.08, 0.15, 0.3, 0.6)
+"""Lengthscales, of the column's range."""
+NOISE_SHARES = (0.1, 0.4)
+"""Of the variance: of each piece, and the same again of each take."""
+LEVEL_SHARE = 2.0
+"""Of the variance: the prior of a constant."""
+DRAWS = 499
+TRIED = 2.0
+"""The usual form was tried before."""
+
+
+@dataclass(frozen=True)
+class _Pieces:
+    """Mean errors of one joint."""
+
+    error: np.ndarray
+    """(T, PIECES), degrees."""
+    column: np.ndarray
+    """(T, PIECES), evenly spread and scaled to 0..1."""
+    piece: tuple[np.ndarray, ...]
+    """For each unit (N,): the piece of each of its rows, counted through all takes."""
+
+
+def smooth_assessment(
+    design: ForwardDesign, effect: ContextEffect, usual: Assessment, generator: np.random.Generator
+) -> Assessment | None:
+    """``usual``, the effect in its usual form, with the errors that any smooth form leaves; None where takes
+    are too few, or some have no error of a joint or no column."""
+    takes = len(design.signals)
+    if takes < FEWEST_TAKES:
+        return None
+    settings = effect.fit_constants(design.signals)
+    columns = [effect.evenly(effect.clipped(take, settings), settings) for take in design.signals]
+    orders = np.stack([np.arange(takes), *(generator.permutation(takes) for _ in range(DRAWS))])
+    errors, explained = [], []
+    for joint, before in enumerate(usual.errors):
+        pieces = _pieces(design, joint, columns)
+        if pieces is None:
+            return None
+        left = _left_out(pieces, orders)
+        square = np.mean(left**2, axis=(2, 3))
+        best = square.argmin(axis=0)
+        whole = max(float(np.mean(pieces.error**2)), 1e-12)
+        explained.append(1.0 - square[best, np.arange(len(orders))] / whole)
+        middle = int(np.argsort(explained[-1][1:])[DRAWS // 2]) + 1
+        predicted = [pieces.error[order] - left[best[draw], draw]
+                     for draw, order in ((0, orders[0]), (middle, orders[middle]))]  # fmt: skip
+        errors.append(_errors(design, joint, pieces, before, *predicted))
+    every = np.array(explained)
+    shares = np.minimum(shares_as_large(every.sum(axis=0)), shares_as_large(every.max(axis=0)))
+    p_value = min(1.0, TRIED * float(np.mean(shares <= shares[0] * (1 + 1e-9))))
+    return replace(usual, errors=tuple(errors), p_value=p_value)
+
+
+def _pieces(design: ForwardDesign, joint: int, columns: Sequence[np.ndarray]) -> _Pieces | None:
+    takes = len(design.signals)
+    rows_of: list[list[np.ndarray]] = [[] for _ in range(takes)]
+    for take, rows in design.units(joint):
+        rows_of[take].append(rows)
+    error, column = np.zeros((takes, PIECES)), np.zeros((takes, PIECES))
+    count = np.zeros((takes, PIECES))
+    edges = []
+    for take, parts in enumerate(rows_of):
+        rows = np.sort(np.concatenate(parts)) if parts else np.empty(0, dtype=int)
+        if len(rows) < PIECES:
+            return None
+        cuts = [part[0] for part in np.array_split(rows, PIECES)]
+        edges.append(np.array(cuts[1:]))
+        column[take] = [float(np.mean(columns[take][part])) for part in np.array_split(rows, PIECES)]
+    piece = []
+    for (take, rows), residual in zip(design.units(joint), design.products[joint].residual, strict=True):
+        at = np.searchsorted(edges[take], rows, side="right")
+        np.add.at(error[take], at, residual)
+        np.add.at(count[take], at, 1.0)
+        piece.append(take * PIECES + at)
+    span = float(np.ptp(column))
+    if span <= 0 or not np.isfinite(span):
+        return None
+    return _Pieces(error / np.maximum(count, 1.0), (column - column.min()) / span, tuple(piece))
+
+
+def _left_out(pieces: _Pieces, orders: np.ndarray) -> np.ndarray:
+    """(K, D, T, PIECES), degrees: for K choices of lengthscale and noise, errors with takes in each of
+    ``orders`` (D, T), less what the other takes and the column predict of them."""
+    takes = len(pieces.error)
+    x, take = pieces.column.ravel(), np.repeat(np.arange(takes), PIECES)
+    target = pieces.error[orders].reshape(len(orders), -1).T
+    variance = max(float(np.mean(pieces.error**2)), 1e-12)
+    same = take[:, None] == take[None, :]
+    found = []
+    for length, share in product(LENGTHS, NOISE_SHARES):
+        cover = np.exp(-0.5 * ((x[:, None] - x[None, :]) / length) ** 2) + LEVEL_SHARE
+        precision = np.linalg.inv(variance * (cover + share * (same + np.eye(len(x)))))
+        weighted = (precision @ target).reshape(takes, PIECES, -1)
+        blocks = precision.reshape(takes, PIECES, takes, PIECES)[np.arange(takes), :, np.arange(takes), :]
+        found.append(np.linalg.solve(blocks, weighted).transpose(2, 0, 1))
+    return np.stack(found)
+
+
+def _errors(
+    design: ForwardDesign,
+    joint: int,
+    pieces: _Pieces,
+    before: JointErrors,
+    predicted: np.ndarray,
+    control: np.ndarray,
+) -> JointErrors:
+    residual = design.products[joint].residual
+    starts = block_starts([len(part) for part in residual])
+    added, mirrored = (
+        squared_in_blocks(
+            [part - each.ravel()[at] for part, at in zip(residual, pieces.piece, strict=True)], starts
+        )
+        for each in (predicted, control)
+    )
+    return replace(before, added=added, control=mirrored)
