@@ -32,9 +32,11 @@ NOISE_SHARES = (0.1, 0.4)
 """Of the variance: of each piece, and the same again of each take."""
 LEVEL_SHARE = 2.0
 """Of the variance: the prior of a constant."""
-DRAWS = 499
-TRIED = 2.0
-"""The usual form was tried before."""
+DRAWS = 1999
+STRICTER = 5.0
+"""Times the p value: the usual form was tried before, and wearings and slips go along with one smooth curve or
+other. On 96 simulated gloves that slip or sit otherwise after donning 0.004 to 0.012, on six with a cause that
+the usual forms miss 0.002, the least of so many draws (2026-11-24)."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,7 @@ def smooth_assessment(
         errors.append(_errors(design, joint, pieces, before, *predicted))
     every = np.array(explained)
     shares = np.minimum(shares_as_large(every.sum(axis=0)), shares_as_large(every.max(axis=0)))
-    p_value = min(1.0, TRIED * float(np.mean(shares <= shares[0] * (1 + 1e-9))))
+    p_value = min(1.0, STRICTER * float(np.mean(shares <= shares[0] * (1 + 1e-9))))
     return replace(usual, errors=tuple(errors), p_value=p_value)
 
 

@@ -13,6 +13,7 @@ from glovecal_models.effects.base.motions import CROSSED
 from glovecal_models.effects.base.signals import Signals
 
 TAU_S = (45.0, 75.0, 120.0, 200.0, 330.0, 550.0, 900.0)
+SINCE = "logarithm of the time since power-on"
 SOON_S = 30.0
 """After power-on: before that a second counts as much as any other."""
 COLDEST = 0.7
@@ -39,8 +40,9 @@ class WarmupDrift(ContextEffect):
         return np.log(np.maximum(value, 0.0) + SOON_S)
 
     def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
-        """How cold it still is: any function of the time since power-on is one of it."""
-        return {"coldness": columns[:, :, 0]}
+        """How cold it still is, and the time itself: what rings or turns back long after is flat in the first."""
+        minutes = self.evenly(self.clipped(take, settings), settings)
+        return {"coldness": columns[:, :, 0], SINCE: np.repeat(minutes[:, None], take.own.shape[1], axis=1)}
 
     def functions(self, value: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
         warm = np.maximum((value[:, None] - settings["low"]) / shape[None, :, 0], -COLDEST)
