@@ -40,9 +40,9 @@ class WarmupDrift(ContextEffect):
         return np.log(np.maximum(value, 0.0) + SOON_S)
 
     def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
-        """How cold it still is, and the time itself: what rings or turns back long after is flat in the first."""
-        minutes = self.evenly(self.clipped(take, settings), settings)
-        return {"coldness": columns[:, :, 0], SINCE: np.repeat(minutes[:, None], take.own.shape[1], axis=1)}
+        """How cold it still is, and the time itself: the first hardly changes when the glove is warm."""
+        since = self.evenly(self.clipped(take, settings), settings)
+        return {"coldness": columns[:, :, 0], SINCE: np.repeat(since[:, None], take.own.shape[1], axis=1)}
 
     def functions(self, value: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
         warm = np.maximum((value[:, None] - settings["low"]) / shape[None, :, 0], -COLDEST)
