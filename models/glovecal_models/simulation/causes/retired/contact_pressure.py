@@ -2,6 +2,8 @@
 
 A dome of cloth snaps in under some newtons, a strip that spans a gap between two bones is pressed into it
 in mid-bend only, and a soft layer is squeezed aside the faster the harder it is pressed.
+
+Padding first bulges and then goes flat, glue yields above a force, and a strip bends between two supports.
 """
 
 from __future__ import annotations
@@ -59,4 +61,55 @@ def _newtons(scene: Scene, draws: Draws) -> np.ndarray:
     return contact_column(scene, draws)[1][:, :, None]
 
 
-FORMS = (dome_gives_way, pressed_into_gap, squeezed_aside)
+@form(
+    Stage.MECHANICAL,
+    "Light pressure makes the padding bulge under the sensor, stronger pressure flattens it again (ours).",
+    only_by_name=True,
+    column=contact_column,
+)
+def bulges_then_flattens(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A rise and fall over the force that ends below where it began."""
+    ratio = _force(scene, draws) / draws.each("peak_n", 3.0, 6.0)
+    return signal + size * draws.signs() * 3 * (1 - draws.each("flat", 0.3, 0.6) * ratio) * ratio * np.exp(
+        1 - ratio
+    )
+
+
+@form(
+    Stage.MECHANICAL,
+    "Stitching holds the strip until a force is exceeded, and gives way in proportion above it (ours).",
+    only_by_name=True,
+    column=contact_column,
+)
+def gives_way_above(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """In proportion to the force above a threshold, nothing below."""
+    over = np.maximum(_force(scene, draws) - draws.each("holds_n", 3.0, 7.0), 0)
+    return signal + size * draws.sign() * 0.5 * over
+
+
+@form(
+    Stage.MECHANICAL,
+    "A half-bent strip spans a gap and is pressed through, others lie on (three-point bending).",
+    only_by_name=True,
+    column=contact_column,
+)
+def pressed_through(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The force times a bow over the bend: nothing at both ends of the range."""
+    bend = np.clip((signal - scene.low) / scene.span, 0, 1)
+    gap = np.sin(np.pi * bend ** draws.each("power", 0.7, 1.4))
+    return signal + size * draws.sign() * 0.4 * _force(scene, draws) * gap**2
+
+
+def _force(scene: Scene, draws: Draws) -> np.ndarray:
+    """The recorded force in newtons, shape (T, N, 1)."""
+    return contact_column(scene, draws)[1][:, :, None]
+
+
+FORMS = (
+    dome_gives_way,
+    pressed_into_gap,
+    squeezed_aside,
+    bulges_then_flattens,
+    gives_way_above,
+    pressed_through,
+)

@@ -2,6 +2,8 @@
 
 Every state here moves with the degrees travelled and never with the clock: a joint that rests changes
 nothing, and the same path run through twice as fast leaves the same loop.
+
+No form here knows the time: each state moves only when the joint moves, by how far it moves.
 """
 
 from __future__ import annotations
@@ -72,4 +74,57 @@ def creases_rubbed_out(signal: np.ndarray, scene: Scene, size: np.ndarray, draws
     return signal + size * draws.sign() * 10.0 * middle
 
 
-FORMS = (superelastic_flag, sticks_then_jumps, creases_rubbed_out)
+@form(
+    Stage.MECHANICAL,
+    "The deepest bend since is remembered and fades only along the way back (softening; Mullins 1969).",
+    only_by_name=True,
+)
+def deepest_bend(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Cloth stretched by the deepest bend hangs loose until part of the way has been opened again."""
+    fades = draws.each("fades", 0.25, 0.5)
+    deepest = np.empty_like(signal)
+    state = signal[:, 0]
+    for frame in range(signal.shape[1]):
+        now = signal[:, frame]
+        opened = np.maximum(signal[:, max(frame - 1, 0)] - now, 0)
+        state = np.maximum(now, state - fades * opened)
+        deepest[:, frame] = state
+    return signal - size * 0.1 * (deepest - signal)
+
+
+@form(
+    Stage.MECHANICAL,
+    "The strip sticks to the skin and jumps right after it once pulled far enough (stick-slip friction).",
+    only_by_name=True,
+)
+def sticks_and_jumps(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """What sticks stays behind by up to a width and then leaps all the way, not only to the edge."""
+    width = draws.each("width_deg", 6.0, 14.0)
+    stuck = np.empty_like(signal)
+    state = signal[:, 0]
+    for frame in range(signal.shape[1]):
+        now = signal[:, frame]
+        state = np.where(np.abs(now - state) > width, now, state)
+        stuck[:, frame] = state
+    return signal + size * (stuck - signal) / width
+
+
+@form(
+    Stage.MECHANICAL,
+    "Loops that cross in mid-range, low on the way in on one side, high on the other (butterfly).",
+    only_by_name=True,
+)
+def butterfly(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The lag of a friction element times the distance from a crossing point, as of ferroelectric strain."""
+    width = draws.each("width_deg", 4.0, 9.0)
+    behind = np.empty_like(signal)
+    state = signal[:, 0]
+    for frame in range(signal.shape[1]):
+        now = signal[:, frame]
+        state = np.clip(state, now - width, now + width)
+        behind[:, frame] = (now - state) / width
+    across = (signal - scene.low) / scene.span - draws.each("crossing", 0.38, 0.55)
+    return signal + size * draws.sign() * 4 * behind * across
+
+
+FORMS = (superelastic_flag, sticks_then_jumps, creases_rubbed_out, deepest_bend, sticks_and_jumps, butterfly)

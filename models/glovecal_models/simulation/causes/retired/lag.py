@@ -2,6 +2,8 @@
 
 The memory is fast and belongs to one channel: a capacitor that the sensor itself has to charge, the median
 of the last readings, or a rectifier that charges through a diode and discharges through a resistor.
+
+The memory may be a limit to the speed, unequal for rise and fall, or the flow through a hole.
 """
 
 from __future__ import annotations
@@ -80,4 +82,61 @@ def _median(values: np.ndarray, half: int) -> np.ndarray:
     return median_filter(values, size=(1, 2 * half + 1), mode="nearest", origin=(0, half))  # pyright: ignore
 
 
-FORMS = (own_resistance_charges, median_of_last, diode_detector)
+@form(
+    Stage.ELECTRICAL,
+    "An amplifier that cannot change faster than its slew rate (operational amplifiers with small currents).",
+    only_by_name=True,
+    sizes=(0.002, 0.8),
+)
+def slew_rate(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The output runs after the input at no more than a highest speed."""
+    step = 0.3 * scene.span * draws.each("speed", 0.8, 1.3) / size / scene.rate_hz
+    out = np.empty_like(signal)
+    state = signal[:, 0]
+    for frame in range(signal.shape[1]):
+        state = state + np.clip(signal[:, frame] - state, -step, step)
+        out[:, frame] = state
+    return out
+
+
+@form(
+    Stage.ELECTRICAL,
+    "Rises quickly and falls slowly, or the other way (peak detector: diode, capacitor, resistor).",
+    only_by_name=True,
+    sizes=(0.002, 0.8),
+)
+def peak_detector(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A first-order lag with one time while rising and several times that while falling."""
+    ratio = draws.each("ratio", 3.0, 6.0)
+    upward = draws.sign() > 0
+    slow, fast = 1 - np.exp(-1 / (size * scene.rate_hz)), 1 - np.exp(-ratio / (size * scene.rate_hz))
+    rise, fall = (fast, slow) if upward else (slow, fast)
+    out = np.empty_like(signal)
+    state = signal[:, 0]
+    for frame in range(signal.shape[1]):
+        away = signal[:, frame] - state
+        state = state + np.where(away > 0, rise, fall) * away
+        out[:, frame] = state
+    return out
+
+
+@form(
+    Stage.ELECTRICAL,
+    "Fluid in a bent tube passes an orifice at a speed with the root of the pressure (Torricelli 1643).",
+    only_by_name=True,
+    sizes=(0.002, 0.8),
+)
+def orifice(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The reading closes in with the root of what is missing, and so arrives in a finite time."""
+    per_frame = np.sqrt(0.25 * scene.span * draws.each("bore", 0.7, 1.4)) / size / scene.rate_hz
+    out = np.empty_like(signal)
+    state = signal[:, 0]
+    for frame in range(signal.shape[1]):
+        away = signal[:, frame] - state
+        missing = np.abs(away)
+        state = state + np.sign(away) * np.minimum(missing, per_frame * np.sqrt(missing))
+        out[:, frame] = state
+    return out
+
+
+FORMS = (own_resistance_charges, median_of_last, diode_detector, slew_rate, peak_detector, orifice)

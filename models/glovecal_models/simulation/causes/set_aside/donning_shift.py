@@ -1,6 +1,6 @@
-"""Donning shift: how the glove sits differs from wearing to wearing and stays so until it is taken off.
+"""Donning shift: the glove sits otherwise in every wearing, and stays so until it is taken off.
 
-A wrinkle is caught under a sensor, a finger's sheath is pulled along, or cloth is stretched before it bends.
+A strap with holes, cloth that stretches with each donning, or loops that guide the strip.
 """
 
 from __future__ import annotations
@@ -13,51 +13,48 @@ from glovecal_models.simulation.scene import Scene
 
 @form(
     Stage.WEARING,
-    "A wrinkle is caught somewhere along the bend, elsewhere in every wearing, and lifts the sensor (ours).",
+    "A strap with five holes is closed in another one each time, and takes all sensors along (ours).",
     set_aside=True,
 )
-def caught_wrinkle(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """A hump of a place, width and height of its own in each wearing."""
-    place, width = _worn(scene, draws, "place", 0.2, 0.75), _worn(scene, draws, "width", 0.08, 0.2)
-    height = _worn(scene, draws, "height", -1.5, 1.5)
-    return signal + size * 2 * height * np.exp(-(((_bend(signal, scene) - place) / width) ** 2))
+def holes_of_strap(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """All sensors are shifted by the same number of notches per wearing, each by a notch of its own."""
+    holes = draws.stream("holes").permutation(np.linspace(-1.0, 1.0, 5))
+    used = np.array([holes[start.wearing % 5] for start in scene.starts])
+    notch = draws.each("notch", 0.7, 1.4) * draws.signs()
+    return signal + size * 1.5 * used[:, None, None] * notch
 
 
 @form(
     Stage.WEARING,
-    "A finger's sheath sits further up or down per wearing: what one joint gains the next one loses (ours).",
+    "Cloth gives a little with each donning and never takes it back: bends count ever less (ours).",
     set_aside=True,
 )
-def sheath_moved(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """One number per finger and wearing, with the other sign at every other joint of the finger."""
-    fingers = [name.split("_")[0] for name in scene.sensors]
-    heads = [fingers.index(finger) for finger in fingers]
-    order = np.array([fingers[:place].count(finger) for place, finger in enumerate(fingers)])
-    moved = _worn(scene, draws, "moved", -1.5, 1.5)[:, :, heads]
-    return signal + size * 2 * np.where(order % 2 == 0, 1.0, -1.0) * draws.each("lever", 0.7, 1.3) * moved
+def wider_each_time(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Each sensor falls short by a part that grows from wearing to wearing and levels off."""
+    wearings = draws.one("wearings", 1.0, 3.0)
+    own, gain = draws.each("own", 0.7, 1.3), draws.each("gain", 0.3, 0.9)
+    donned = np.array([start.wearing for start in scene.starts])
+    wide = 1 - np.exp(-donned / wearings)
+    bend = _bend(signal, scene)
+    return signal - size * 4 * own * wide[:, None, None] * (1 - gain + gain * bend)
 
 
 @form(
     Stage.WEARING,
-    "Cloth stretched on putting on answers with another power of the bend in each wearing (ours).",
+    "The strip runs through loops of thread that sit elsewhere along it in every wearing (ours).",
     set_aside=True,
 )
-def stretched_beforehand(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """A power curve per wearing that is right at both ends of the range."""
-    bend = np.clip(_bend(signal, scene), 0.0, 1.0)
-    power = np.exp(_worn(scene, draws, "power", -0.7, 0.7))
-    return signal + size * 10 * (bend**power - bend)
-
-
-def _worn(scene: Scene, draws: Draws, name: str, low: float, high: float) -> np.ndarray:
-    """A number per wearing and sensor, shape (T, 1, S)."""
-    sensors = len(scene.sensors)
-    drawn = [draws.stream(name, start.wearing).uniform(low, high, sensors) for start in scene.starts]
-    return np.stack(drawn)[:, None, :]
+def loops_of_thread(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A ripple over the bend, the place of which is another in every wearing."""
+    loops = draws.each("loops", 1.0, 2.2)
+    phase = [draws.stream("place", start.wearing).uniform(0, 1, signal.shape[2]) for start in scene.starts]
+    bend = _bend(signal, scene)
+    return signal + size * 1.5 * np.sin(2 * np.pi * (loops * bend + np.stack(phase)[:, None]))
 
 
 def _bend(signal: np.ndarray, scene: Scene) -> np.ndarray:
+    """Each sensor's bend as a share of its range."""
     return (signal - scene.low) / scene.span
 
 
-FORMS = (caught_wrinkle, sheath_moved, stretched_beforehand)
+FORMS = (holes_of_strap, wider_each_time, loops_of_thread)

@@ -1,6 +1,6 @@
-"""Garment slip: how the glove sits changes within a wearing and is not brought back before it is taken off.
+"""Garment slip: the glove moves on the hand while it is worn, and stays so until the next donning.
 
-A strap lets go, a wrinkle travels along the finger, and every fist pulls the glove on by another notch.
+A seam that ravels, cloth that sags from straight fingers, or a sheath that turns round its finger.
 """
 
 from __future__ import annotations
@@ -13,64 +13,55 @@ from glovecal_models.simulation.scene import Scene
 
 @form(
     Stage.WEARING,
-    "Once in each wearing a strap lets go, and the glove sits elsewhere from then on (ours).",
+    "A seam ravels stitch by stitch, quicker and quicker, as each one lost loads the next more (ours).",
     set_aside=True,
 )
-def strap_lets_go(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """One slip per wearing, during one of its takes, of a size and direction of its own per sensor."""
-    slipped = np.empty((len(scene.starts), len(scene.time_s), len(scene.sensors)))
-    for row, start in enumerate(scene.starts):
-        random = draws.stream("slip", start.wearing)
-        takes = [other for other in scene.starts if other.wearing == start.wearing]
-        during = takes[int(random.random() * len(takes))]
-        moment_s = during.since_donned_s + random.uniform(0.15, 0.85) * during.take_s
-        far = random.choice([-1.0, 1.0], len(scene.sensors)) * random.uniform(0.6, 1.4, len(scene.sensors))
-        after = np.clip((scene.since_donned_s[row] - moment_s) / random.uniform(0.2, 1.0), -30, 30)
-        slipped[row] = far / (1 + np.exp(-after[:, None]))
-    return signal + size * 2 * slipped
+def seam_ravels(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """All sensors move on by a step with each stitch, and stitches follow each other ever sooner."""
+    quickens = _per_wearing(scene, draws, "quickens_s", 150.0, 350.0)[:, None]
+    stitches = draws.one("stitches", 4.0, 9.0)
+    own = draws.each("own", 0.6, 1.4) * draws.signs()
+    gone = np.expm1(_worn(scene) / quickens) / np.expm1(600.0 / quickens)
+    return signal + size * 3 * own * (np.floor(stitches * gone + 0.5) / stitches)[:, :, None]
 
 
 @form(
     Stage.WEARING,
-    "A wrinkle travels along the finger from donning on, and lifts the sensor at ever larger bends (ours).",
+    "Cloth grown slack sags from straight fingers, with the root of the time worn (diffusive give; ours).",
     set_aside=True,
 )
-def wrinkle_travels(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """A hump over the bend whose place moves on with the time since donning, ever more slowly."""
-    since = np.maximum(scene.since_donned_s, 0)[:, :, None]
-    moved = draws.each("way", 0.4, 0.7) * -np.expm1(-since / draws.each("slows_s", 60.0, 200.0))
-    place = draws.each("first", 0.1, 0.25) + moved
+def sags_when_straight(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Below a certain bend each sensor falls off, by more and more since donning."""
+    below = draws.each("below_bend", 0.35, 0.6)
+    pace = _per_wearing(scene, draws, "pace", 0.6, 1.4)[:, None]
+    slack = pace * np.sqrt(_worn(scene) / 600.0)
     bend = (signal - scene.low) / scene.span
-    hump = np.exp(-(((bend - place) / draws.each("width", 0.12, 0.2)) ** 2))
-    return signal + size * draws.signs() * 3 * hump
+    return signal + size * 8 * draws.signs() * slack[:, :, None] * np.maximum(below - bend, 0.0)
 
 
 @form(
     Stage.WEARING,
-    "Every fist pulls the glove on by a notch that is not given back, the first ones most (ratchet; ours).",
+    "A finger's sheath turns slowly round it, so that the strip sees the bend by the cosine (geometry; ours).",
     set_aside=True,
 )
-def notch_by_fist(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """A power of the number of fists made since donning."""
-    made = _fists(scene, draws.one("closed", 0.52, 0.6), draws.one("opened", 0.4, 0.46))
-    return signal + size * draws.signs() * made[:, :, None] ** draws.each("power", 0.5, 0.9)
+def sheath_turns(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Each sheath turns from where it was put on, one way or the other, and swings a little on its way."""
+    swing_s, own = draws.one("swing_s", 90.0, 200.0), draws.each("own", 0.5, 1.0)
+    rate = _per_wearing(scene, draws, "turn", 0.7, 1.5)[:, None]
+    worn = _worn(scene)
+    turned = rate * (worn / 600.0 + 0.25 * np.sin(2 * np.pi * worn / swing_s))
+    seen = np.cos(np.clip(turned[:, :, None] * own, -1.5, 1.5)) - 1
+    return signal + size * 8 * (signal - scene.low) / scene.span * seen
 
 
-def _fists(scene: Scene, closed: float, opened: float) -> np.ndarray:
-    """How often the hand has closed since donning, shape (T, N); a fist counts once until reopened."""
-    shut = np.zeros(len(scene.starts), dtype=bool)
-    made = np.zeros(scene.closing.shape)
-    for frame in range(1, made.shape[1]):
-        now = scene.closing[:, frame]
-        begins = ~shut & (now > closed)
-        shut = (shut | begins) & (now > opened)
-        made[:, frame] = made[:, frame - 1] + begins
-    last = made[:, scene.recorded.stop - 1].copy()
-    for row, start in enumerate(scene.starts):
-        for earlier, other in enumerate(scene.starts):
-            if other.wearing == start.wearing and other.session_s < start.session_s:
-                made[row] += last[earlier]
-    return made
+def _worn(scene: Scene) -> np.ndarray:
+    """Seconds since donning, between putting on and half an hour."""
+    return np.clip(scene.since_donned_s, 0.0, 1800.0)
 
 
-FORMS = (strap_lets_go, wrinkle_travels, notch_by_fist)
+def _per_wearing(scene: Scene, draws: Draws, name: str, low: float, high: float) -> np.ndarray:
+    """One number for every take, the same within a wearing."""
+    return np.array([draws.stream(name, start.wearing).uniform(low, high) for start in scene.starts])
+
+
+FORMS = (seam_ravels, sags_when_straight, sheath_turns)

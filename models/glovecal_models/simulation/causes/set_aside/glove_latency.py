@@ -1,12 +1,11 @@
-"""Glove latency: all channels of the glove come late together, by a time that stays the same.
+"""Glove latency: all readings come late by the same time, without being smoothed.
 
-A network of equal group delay, a receiver that plays packets back late, and a multiplexer that takes turns.
+The time is settled at pairing, grows as a queue fills, or changes with the way the packets take.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import bilinear, lfilter, lfilter_zi
 
 from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
@@ -15,61 +14,54 @@ from glovecal_models.simulation.signals import at_times
 
 @form(
     Stage.COUNTS,
-    "A network that passes all frequencies and delays them alike (all-pass of Pade's approximants).",
+    "Glove and receiver agree on a buffer each time they pair, so every wearing is late by its own time (ours).",
     set_aside=True,
     sizes=(0.002, 0.4),
     shared=True,
 )
-def allpass_network(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Two equal second-order all-pass sections in a row, each with half of the delay."""
-    half = size[0] / 2
-    above, below = bilinear([half**2 / 12, -half / 2, 1.0], [half**2 / 12, half / 2, 1.0], fs=scene.rate_hz)
-    late = signal
-    for _ in range(2):
-        settled = lfilter_zi(above, below)[None, :, None] * late[:, :1]
-        late = lfilter(above, below, late, axis=1, zi=settled)[0]
-    return np.asarray(late)
-
-
-@form(
-    Stage.TRANSPORT,
-    "The receiver plays sparse packets back late, with straight lines between them (as games over networks).",
-    set_aside=True,
-    sizes=(0.002, 0.4),
-    shared=True,
-)
-def interpolation_buffer(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """What is shown lies one delay back, on the straight line between the packets about that time."""
-    spacing = max(size[0] * draws.one("spacing", 0.3, 0.5), 1 / scene.rate_hz)
-    first = scene.time_s[0] - size[0] - spacing
-    packets = np.arange(first, scene.time_s[-1] + spacing, spacing)
-    late = np.empty_like(signal, dtype=float)
-    for take in range(signal.shape[0]):
-        for channel in range(signal.shape[2]):
-            sent = np.interp(packets, scene.time_s, signal[take, :, channel])
-            late[take, :, channel] = np.interp(scene.time_s - size[0], packets, sent)
-    return late
+def agreed_at_pairing(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """One delay within each wearing, another one in the next."""
+    share = [draws.stream("share", start.wearing).uniform(0.6, 1.5) for start in scene.starts]
+    return _late(signal, scene, size[0] * np.array(share)[:, None])
 
 
 @form(
     Stage.COUNTS,
-    "A slow multiplexer reads the sensors in turn and sends when the round is done: late by place (ours).",
+    "Each hiccup of the reader leaves more in its queue, which is emptied only at the next start (bufferbloat).",
     set_aside=True,
     sizes=(0.002, 0.4),
     shared=True,
 )
-def scanned_in_turn(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Every reading is late; those read early in the round wait a little longer to be sent."""
-    spread = draws.one("spread", 0.2, 0.4)
-    places = np.linspace(1 + spread / 2, 1 - spread / 2, signal.shape[2])
-    late = np.empty_like(signal)
-    for take in range(signal.shape[0]):
-        for channel, place in enumerate(places):
-            times = scene.time_s - size[0] * place
-            late[take, :, channel] = at_times(scene.time_s, signal[take, :, channel : channel + 1], times)[
-                :, 0
-            ]
-    return late
+def queue_fills(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The delay begins alike in all takes and grows by a notch at random moments."""
+    every, notch = draws.one("every_s", 7.0, 14.0), draws.one("notch", 0.12, 0.25)
+    moments = [draws.stream("moments", start.key).exponential(every, 8).cumsum() for start in scene.starts]
+    hiccups = np.stack([np.searchsorted(take, scene.time_s) for take in moments])
+    return _late(signal, scene, size[0] * (0.7 + notch * hiccups))
 
 
-FORMS = (allpass_network, interpolation_buffer, scanned_in_turn)
+@form(
+    Stage.COUNTS,
+    "At times packets reach the receiver only by way of a second node and take longer (mesh network).",
+    set_aside=True,
+    sizes=(0.002, 0.4),
+    shared=True,
+)
+def by_way_of_second_node(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The delay changes between two values, each of which lasts for seconds."""
+    longer, lasts = draws.one("longer", 1.4, 2.2), draws.one("lasts_s", 4.0, 10.0)
+    delay = np.empty((signal.shape[0], signal.shape[1]))
+    for take, start in enumerate(scene.starts):
+        changes = scene.time_s[0] + draws.stream("changes", start.key).exponential(lasts, 80).cumsum()
+        indirect = np.searchsorted(changes, scene.time_s) % 2 == 1
+        delay[take] = np.where(indirect, longer, 0.7)
+    return _late(signal, scene, size[0] * delay)
+
+
+def _late(signal: np.ndarray, scene: Scene, delay_s: np.ndarray) -> np.ndarray:
+    """All sensors as they were a delay ago, given for every take and time."""
+    moved = zip(signal, scene.time_s - delay_s, strict=True)
+    return np.stack([at_times(scene.time_s, take, times) for take, times in moved])
+
+
+FORMS = (agreed_at_pairing, queue_fills, by_way_of_second_node)

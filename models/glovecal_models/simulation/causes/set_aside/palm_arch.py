@@ -1,6 +1,6 @@
-"""Palm arch: cupping the palm moves the cloth over the knuckles, at once and the same way every time.
+"""Palm arch: cupping the palm pulls on sensors near it, beside their own joints.
 
-The arch is a rotation of the hand that no sensor of the glove sees directly.
+The cloth folds bit by bit, sticks to the palm, or is slackened by the finger's own bend.
 """
 
 from __future__ import annotations
@@ -13,46 +13,48 @@ from glovecal_models.simulation.scene import Scene
 
 @form(
     Stage.MECHANICAL,
-    "Cloth across the back of the hand stiffens as it is stretched by the arch (J-curve; Fung 1967).",
+    "Folds spring up across the palm one by one, each of which lets go what the arch has pulled (ours).",
     set_aside=True,
     touches="palm",
 )
-def stiffening_cloth(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """An exponential of the arch, as of collagen and knit: soft at first, then stiff."""
-    arch = scene.rotation("PALM_ARCH")[:, :, None]
-    scale = draws.each("scale_deg", 5.0, 9.0)
-    return signal + size * _side(scene, draws) * 0.3 * np.expm1(arch / scale)
+def folds_one_by_one(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The pull rises with the arch and falls back at once whenever another fold springs up."""
+    folds = draws.each("folds", 1.8, 3.5)
+    first = draws.each("taken_before", 0.1, 0.6)
+    taken = first + folds * scene.bent("PALM_ARCH")[:, :, None]
+    return signal + size * 4 * draws.signs() * (taken % 1.0)
 
 
 @form(
     Stage.MECHANICAL,
-    "The arch lifts the cloth off the knuckle and then draws it down again at its sides (ours).",
+    "Damp cloth sticks to the palm and is taken along only once the arch has moved some way (Coulomb; ours).",
     set_aside=True,
     touches="palm",
 )
-def lifts_then_draws_down(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """A rise and fall over the arch, largest at a middling arch."""
-    ratio = np.maximum(scene.rotation("PALM_ARCH"), 0)[:, :, None] / draws.each("peak_deg", 5.0, 9.0)
-    return signal + size * _side(scene, draws) * ratio**2 * np.exp(1 - ratio**2)
+def sticks_to_palm(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The pull follows the arch behind a slack, whichever way the arch moves."""
+    slack = draws.each("slack", 0.08, 0.2)
+    arch = scene.bent("PALM_ARCH")[:, :, None]
+    out = np.empty_like(signal)
+    place = np.repeat(arch[:, 0], signal.shape[2], axis=1)
+    for frame in range(signal.shape[1]):
+        place = np.clip(place, arch[:, frame] - slack, arch[:, frame] + slack)
+        out[:, frame] = place
+    return signal + size * 4 * draws.signs() * out
 
 
 @form(
     Stage.MECHANICAL,
-    "Cupping moves the knuckle's crest sideways under the strip, which only a half-bent strip feels (ours).",
+    "A bent finger gives cloth to the palm, so only the arch beyond what it gave can pull (ours).",
     set_aside=True,
     touches="palm",
 )
-def crest_moves_sideways(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """The arch times a bow over the own bend: nothing while straight or fully bent."""
-    arch = scene.rotation("PALM_ARCH")[:, :, None] / 10
-    bend = np.clip((signal - scene.low) / scene.span, 0, 1)
-    top = draws.each("power", 0.7, 1.6)
-    return signal + size * _side(scene, draws) * arch * np.sin(np.pi * bend**top)
+def finger_gives_cloth(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The arch pulls only as far as it exceeds a share of the sensor's own bend."""
+    given = draws.each("given", 0.3, 0.8)
+    bend = np.clip((scene.own - scene.low) / scene.span, 0.0, 1.0)
+    beyond = np.maximum(scene.bent("PALM_ARCH")[:, :, None] - given * bend, 0.0)
+    return signal + size * 4 * draws.signs() * beyond
 
 
-def _side(scene: Scene, draws: Draws) -> np.ndarray:
-    """The thumb's side of the arch moves the other way than the little finger's."""
-    return draws.sign() * np.array([-1.0 if name.startswith("T") else 1.0 for name in scene.sensors])
-
-
-FORMS = (stiffening_cloth, lifts_then_draws_down, crest_moves_sideways)
+FORMS = (folds_one_by_one, sticks_to_palm, finger_gives_cloth)

@@ -1,6 +1,6 @@
-"""Temperature: the sensor's answer moves with the temperature of the air in the glove.
+"""Temperature: readings follow the air's temperature.
 
-Crystals have cubic curves, gaps close as parts expand, and bonded layers warp as a bimetal does.
+A carrier may change its crystals, light in a fibre may interfere, or a correction may end too early.
 """
 
 from __future__ import annotations
@@ -13,40 +13,49 @@ from glovecal_models.simulation.scene import Scene
 
 @form(
     Stage.ELECTRICAL,
-    "Zero points follow a cubic with two turning points (frequency of AT-cut quartz over temperature).",
+    "A polymer changes its crystals, and so its volume, at one temperature (as PTFE does at 19 degC).",
     set_aside=True,
 )
-def quartz_cubic(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """A count made against a quartz: down, up and down again over the temperature."""
-    scaled = _from_usual(scene) / draws.each("scale_c", 0.7, 1.1) - draws.each("turn", -0.3, 0.3)
-    return signal + size * draws.signs() * (scaled**3 / 3 - scaled)
+def crystals_change(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Zero points go from one level to another within tenths of a degree."""
+    at = draws.one("from_usual_c", -0.6, 0.6)
+    width = draws.each("width_c", 0.1, 0.3)
+    state = np.tanh((_warmer(scene) - at) / width)
+    return signal + size * draws.signs() * state
 
 
 @form(
     Stage.ELECTRICAL,
-    "Nothing moves until a gap has closed; from there parts press on each other as they expand (ours).",
+    "Reflections in a fibre interfere, and the fringes walk as the fibre expands (Fabry-Perot).",
     set_aside=True,
 )
-def gap_closes(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """In proportion to the temperature above where the gap closes, nothing below."""
-    closes_c = draws.one("closes_c", -0.7, 0.4)
-    return signal + size * draws.signs() * 2 * np.maximum(_from_usual(scene) - closes_c, 0)
+def fringes_walk(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A wave over the bend whose phase moves with the temperature."""
+    along, period = draws.each("fringes", 0.4, 1.6), draws.each("period_c", 1.8, 5.0)
+    phase = draws.each("phase", 0.0, 1.0)
+    bend = (signal - scene.low) / scene.span
+    warmer = _warmer(scene)
+    return signal + size * 1.5 * np.sin(2 * np.pi * (along * bend + warmer / period + phase))
 
 
 @form(
     Stage.ELECTRICAL,
-    "Two bonded layers warp while the strip is straight; a bend holds them flat (bimetal; Timoshenko 1925).",
+    "Firmware corrects for temperature within a band only, and keeps its last value beyond it (ours).",
     set_aside=True,
 )
-def bimetal_strip(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """In proportion to the temperature, less and less with the square of the bend."""
-    bend = np.clip((signal - scene.low) / scene.span, 0, 1)
-    held = 1 / (1 + (bend / draws.each("half_bend", 0.25, 0.5)) ** 2)
-    return signal + size * draws.signs() * 3 * _from_usual(scene) * held
+def correction_ends(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Zero points and gains are right within a band of temperatures and drift off on both sides of it."""
+    below, above = draws.one("below_c", 0.2, 0.9), draws.one("above_c", 0.2, 0.9)
+    gain = draws.each("gain", 0.0, 0.8)
+    warmer = _warmer(scene)
+    beyond = warmer - np.clip(warmer, -below, above)
+    bend = (signal - scene.low) / scene.span
+    return signal + size * draws.signs() * beyond * (1 - gain + gain * bend)
 
 
-def _from_usual(scene: Scene) -> np.ndarray:
+def _warmer(scene: Scene) -> np.ndarray:
+    """By how much the air is warmer than usual, shape (T, N, 1)."""
     return (scene.temperature_c - scene.usual_air[0])[:, :, None]
 
 
-FORMS = (quartz_cubic, gap_closes, bimetal_strip)
+FORMS = (crystals_change, fringes_walk, correction_ends)
