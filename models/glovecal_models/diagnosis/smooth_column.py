@@ -33,6 +33,8 @@ NOISE_SHARES = (0.1, 0.4)
 LEVEL_SHARE = 2.0
 """Of the variance: the prior of a constant."""
 DRAWS = 1999
+JOINT_P_VALUE = 0.05
+"""Of a joint by itself; all joints together are judged more strictly."""
 STRICTER = 5.0
 """Times the p value: the usual form was tried before, and wearings and slips go along with one smooth curve
 or other. Of 96 simulated gloves that slip or sit otherwise after donning nine had 0.004 to 0.012 without it,
@@ -40,7 +42,7 @@ six with a cause that the usual forms miss 0.002, the least of so many draws (20
 
 
 @dataclass(frozen=True)
-class _Pieces:
+class Pieces:
     """Mean errors of one joint."""
 
     error: np.ndarray
@@ -54,8 +56,8 @@ class _Pieces:
 def smooth_assessment(
     design: ForwardDesign, effect: ContextEffect, usual: Assessment, generator: np.random.Generator
 ) -> Assessment | None:
-    """``usual``, the effect in its usual form, with the errors that any smooth form leaves; None where takes
-    are too few, or some have no error of a joint or no column."""
+    """``usual``, the effect in its usual form, with the errors that any smooth form leaves on the joints that
+    go along with it; None where takes are too few, or some have no error of a joint or no column."""
     takes = len(design.signals)
     if takes < FEWEST_TAKES:
         return None
@@ -67,11 +69,14 @@ def smooth_assessment(
         pieces = _pieces(design, joint, columns)
         if pieces is None:
             return None
-        left = _left_out(pieces, orders)
+        left = left_out(pieces, orders)
         square = np.mean(left**2, axis=(2, 3))
         best = square.argmin(axis=0)
         whole = max(float(np.mean(pieces.error**2)), 1e-12)
         explained.append(1.0 - square[best, np.arange(len(orders))] / whole)
+        if np.mean(explained[-1] >= explained[-1][0]) > JOINT_P_VALUE:
+            errors.append(replace(before, added=before.base, control=before.base))
+            continue
         middle = int(np.argsort(explained[-1][1:])[DRAWS // 2]) + 1
         predicted = [pieces.error[order] - left[best[draw], draw]
                      for draw, order in ((0, orders[0]), (middle, orders[middle]))]  # fmt: skip
@@ -82,7 +87,7 @@ def smooth_assessment(
     return replace(usual, errors=tuple(errors), p_value=p_value)
 
 
-def _pieces(design: ForwardDesign, joint: int, columns: Sequence[np.ndarray]) -> _Pieces | None:
+def _pieces(design: ForwardDesign, joint: int, columns: Sequence[np.ndarray]) -> Pieces | None:
     takes = len(design.signals)
     rows_of: list[list[np.ndarray]] = [[] for _ in range(takes)]
     for take, rows in design.units(joint):
@@ -106,10 +111,10 @@ def _pieces(design: ForwardDesign, joint: int, columns: Sequence[np.ndarray]) ->
     span = float(np.ptp(column))
     if span <= 0 or not np.isfinite(span):
         return None
-    return _Pieces(error / np.maximum(count, 1.0), (column - column.min()) / span, tuple(piece))
+    return Pieces(error / np.maximum(count, 1.0), (column - column.min()) / span, tuple(piece))
 
 
-def _left_out(pieces: _Pieces, orders: np.ndarray) -> np.ndarray:
+def left_out(pieces: Pieces, orders: np.ndarray) -> np.ndarray:
     """(K, D, T, PIECES), degrees: for K choices of lengthscale and noise, errors with takes in each of
     ``orders`` (D, T), less what the other takes and the column predict of them."""
     takes = len(pieces.error)
@@ -130,7 +135,7 @@ def _left_out(pieces: _Pieces, orders: np.ndarray) -> np.ndarray:
 def _errors(
     design: ForwardDesign,
     joint: int,
-    pieces: _Pieces,
+    pieces: Pieces,
     before: JointErrors,
     predicted: np.ndarray,
     control: np.ndarray,

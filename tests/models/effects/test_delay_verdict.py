@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from glovecal_models.diagnosis.problem import DiagnosisProblem
-from glovecal_models.effects.delay.delay_grid import DelayErrors, DelayForm, delay_errors
+from glovecal_models.effects.delay.delay_grid import DelayErrors, DelayForm, delay_errors, short_delay_errors
 from glovecal_models.effects.delay.delay_verdict import possible_delays
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
@@ -52,3 +52,14 @@ def test_in_fast_motion_20_ms_are_told_from_a_filter(form, ruled_out):
     possible = possible_delays(delay_errors(problem))
     assert "glove_latency" in possible
     assert ruled_out not in possible
+
+
+def test_short_blocks_make_up_the_long_ones():
+    takes = record_session(SessionPlan(seed=5, wearings=1, takes_per_wearing=2, take_s=23.0)).takes
+    problem = DiagnosisProblem.of(takes, LAYOUT, False, ()).design()
+    for short, long in zip(short_delay_errors(problem), delay_errors(problem), strict=True):
+        assert len(short.take) > 4 * len(long.take)
+        for take in range(2):
+            some, all_of_it = short.blocks[short.take == take], long.blocks[long.take == take]
+            np.testing.assert_allclose(some.sum(axis=0), all_of_it.sum(axis=0))
+        np.testing.assert_allclose(short.unmoved.sum(), long.unmoved.sum())
