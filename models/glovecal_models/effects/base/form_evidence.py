@@ -37,7 +37,7 @@ class FormEvidence:
         least_variance: float,
     ) -> None:
         """``free`` (N, P), ``plain`` (C, N) for weights expected of size 1, each input (N, 1), ``target``
-        (N,) degrees; so many ``alike_rows`` count for one, and the noise has the ``least_variance`` at least."""
+        (N,) degrees; so many ``alike_rows`` count for one, and the noise has ``least_variance`` at least."""
         self._alike_rows, self._least = alike_rows, least_variance
         self._free = np.linalg.qr(free)[0]
         ranges = LearnedForm.over([FormTerm((name,), 1.0, 1.0) for name in inputs], [inputs])
