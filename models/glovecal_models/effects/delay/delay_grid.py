@@ -33,8 +33,6 @@ FIRST_POLE_SHARE = 0.65
 WINDOW_SHARE = 0.6
 """Length of a delayed window, of that of a moving average as late: a raised cosine has 0.63."""
 BEND_S = 0.05
-CELLS_AT_ONCE = 16
-"""Few enough for the processor's cache."""
 FAST_SHARE = 1.0
 """Per second: a joint is moved fast when its speed reaches so many of its own standard deviations."""
 
@@ -162,34 +160,53 @@ def _joint(
     moved = _moved([fine[take].track(joint, rows) for take, rows in used], form, delay)
     own = np.concatenate([problem.signals[take].own[rows, joint] for take, rows in used])
     slope = _slope(base, products.whole, own)
-    bend = _bend(moved, form, delay, slope)
     left = target - orthogonal @ (orthogonal.T @ target)
     lengths = [len(rows) for _, rows in used]
     starts = block_starts(lengths)
-    ends = np.cumsum(lengths)
-    blocks = np.empty((len(starts), len(moved)))
-    for first in range(0, len(moved), CELLS_AT_ONCE):
-        some = moved[first : first + CELLS_AT_ONCE]
-        some *= slope
-        some -= (some @ orthogonal) @ orthogonal.T
-        np.subtract(left, some, out=some)
-        np.square(some, out=some)
-        blocks[:, first : first + CELLS_AT_ONCE] = np.add.reduceat(some, starts, axis=1).T
+    bend = _bend(moved, form, delay, slope, own)
     return DelayErrors(
         form,
         delay,
-        blocks,
+        squared_beside(left + slope * own, moved, slope, orthogonal, starts),
         np.add.reduceat(left * left, starts),
-        np.array(problem.unit_take)[np.searchsorted(ends, starts, side="right")],
+        np.array(problem.unit_take)[np.searchsorted(np.cumsum(lengths), starts, side="right")],
         np.add.reduceat(bend * bend, starts),
         len(target),
     )
 
 
-def _bend(moved: np.ndarray, form: np.ndarray, delay: np.ndarray, slope: np.ndarray) -> np.ndarray:
+def squared_beside(
+    target: np.ndarray, moved: np.ndarray, slope: np.ndarray, orthogonal: np.ndarray, starts: np.ndarray
+) -> np.ndarray:
+    """(B, K): squares, summed over the rows of each block, of what an ``orthogonal`` base (N, P) leaves of
+    ``target`` (N,) less ``slope`` (N,) times each of ``moved`` (K, N).
+
+    Each block is read once, while it lies in the processor's cache: what the base takes away is known from
+    its products with the blocks.
+    """
+    ends = [*starts[1:].tolist(), len(target)]
+    square = np.empty((len(starts), len(moved)))
+    crossed = np.empty((len(starts), len(moved), orthogonal.shape[1]))
+    for block, (start, end) in enumerate(zip(starts.tolist(), ends, strict=True)):
+        left = moved[:, start:end] * slope[start:end]
+        np.subtract(target[start:end], left, out=left)
+        np.einsum("kn,kn->k", left, left, out=square[block])
+        np.matmul(left, orthogonal[start:end], out=crossed[block])
+    whole = crossed.sum(axis=0)
+    for block, (start, end) in enumerate(zip(starts.tolist(), ends, strict=True)):
+        rows = orthogonal[start:end]
+        taken = whole @ (rows.T @ rows)
+        taken -= 2.0 * crossed[block]
+        square[block] += np.einsum("kp,kp->k", taken, whole)
+    return np.maximum(square, 0.0)
+
+
+def _bend(
+    moved: np.ndarray, form: np.ndarray, delay: np.ndarray, slope: np.ndarray, own: np.ndarray
+) -> np.ndarray:
     """(rows,): the angle ``BEND_S`` before and after, less twice itself."""
     either = (form == DelayForm.PURE) & (np.abs(np.abs(delay) - BEND_S) < 0.5 * STEP_S)
-    return (moved[either] * slope).sum(axis=0)
+    return (moved[either] - own).sum(axis=0) * slope
 
 
 def _slope(base: np.ndarray, coefficients: np.ndarray, own: np.ndarray) -> np.ndarray:
@@ -243,18 +260,17 @@ class _Track:
 
 
 def _moved(tracks: Sequence[_Track], form: np.ndarray, delay: np.ndarray) -> np.ndarray:
-    """(K, rows of all tracks): the angle after each form of delay, minus the angle itself."""
+    """(K, rows of all tracks): the angle after each form of delay."""
     own = np.concatenate([track.fine[track.at] for track in tracks])
-    result = np.zeros((len(form), len(own)))
+    result = np.empty((len(form), len(own)))
     pure, late, early = form == DelayForm.PURE, delay > 0, delay < 0
     shifts = np.round(delay[pure] / STEP_S).astype(int)[:, None]
-    result[pure] = np.concatenate(
-        [track.fine[np.clip(track.at - shifts, 0, len(track.fine) - 1)] for track in tracks], axis=1
-    )
+    ends = np.cumsum([len(track.at) for track in tracks]).tolist()
+    for track, start, end in zip(tracks, [0, *ends], ends, strict=False):
+        result[pure, start:end] = track.fine[np.clip(track.at - shifts, 0, len(track.fine) - 1)]
     _filter(result, tracks, form, np.where(late, delay, 0.0))
     _filter(result, [track.backwards for track in tracks], form, np.where(early, -delay, 0.0))
     result[~(pure | late | early)] = own
-    result -= own
     return result
 
 
