@@ -212,17 +212,15 @@ def held_out(
             own = slice(g * added, (g + 1) * added)
             joint[unit, g, size:, size:] = counted[:, own].T @ flat[:, own]
     total, total_right = joint.sum(axis=0), right.sum(axis=0)
-    ridge = np.zeros((shapes, size + added, size + added))
-    ridge[:, :size, :size] = products.ridge
-    diagonal = np.arange(size, size + added)
+    ridge = np.zeros((shapes, size + added))
+    ridge[:, :size] = np.diagonal(products.ridge)
     variance = products.error.sum() / products.count.sum() if noise_variance is None else noise_variance
     variance = max(variance, LEAST_VARIANCE_DEG2)
-    ridge[:, diagonal, diagonal] = np.maximum(
-        ALIKE_ROWS * variance / prior_sd**2, LEAST_RIDGE * total[:, diagonal, diagonal]
-    )
-    beta = _solved(total - joint + ridge, total_right - right)
+    own_square = np.diagonal(total, axis1=1, axis2=2)[:, size:]
+    ridge[:, size:] = np.maximum(ALIKE_ROWS * variance / prior_sd**2, LEAST_RIDGE * own_square)
+    beta = _solved(total - joint, total_right - right, ridge)
     training = (products.square.sum() - products.square)[:, None] + _quadratic(
-        total - joint, total_right - right, beta
+        total_right - right, beta, ridge
     )
     best = np.argmin(training, axis=1)
     chosen = beta[np.arange(len(columns)), best]
@@ -230,8 +228,8 @@ def held_out(
         rows.rooted(rows.target - rows.base @ b[:size] - extra[:, g, :] @ b[size:])
         for rows, extra, g, b in zip(products.units, columns, best, chosen, strict=True)
     )
-    whole = _solved(total + ridge, total_right)
-    fit = products.square.sum() + _quadratic(total, total_right, whole)
+    whole = _solved(total, total_right, ridge)  # the last use of ``total``
+    fit = products.square.sum() + _quadratic(total_right, whole, ridge)
     shape = int(np.argmin(fit))
     return HeldOut(
         base=products.error,
@@ -283,7 +281,7 @@ def weight_posterior(
         prior = ALIKE_ROWS * variance / prior_sd**2
         ridge[size:] = np.maximum(prior, LEAST_RIDGE * np.diagonal(gram)[size:])
         held = gram + np.diag(ridge)
-        beta = _solved(held, right)
+        beta = _solved(gram.copy(), right, ridge)
         left = square + float(beta @ gram @ beta - 2 * beta @ right)
     own, pull = held[size:, size:], ridge[size:]
     scale = np.sqrt(np.diagonal(own))
@@ -303,16 +301,20 @@ def _effective_ratio(error: Sequence[np.ndarray]) -> float:
     return effective_sample_ratio(np.concatenate(error), unit, np.arange(len(unit)))
 
 
-def _solved(gram: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """With columns of any size: each is brought to a square of one first."""
-    size = np.sqrt(np.diagonal(gram, axis1=-2, axis2=-1))
-    scaled = gram / (size[..., :, None] * size[..., None, :])
-    return np.linalg.solve(scaled, (right / size)[..., None])[..., 0] / size
+def _solved(gram: np.ndarray, right: np.ndarray, ridge: np.ndarray) -> np.ndarray:
+    """With ``ridge`` (..., K) on the diagonal of ``gram`` (..., K, K), which is overwritten; with columns of
+    any size: each is brought to a square of one first."""
+    diagonal = np.einsum("...ii->...i", gram)
+    diagonal += ridge
+    size = np.sqrt(diagonal)
+    gram /= size[..., :, None]
+    gram /= size[..., None, :]
+    return np.linalg.solve(gram, (right / size)[..., None])[..., 0] / size
 
 
-def _quadratic(gram: np.ndarray, right: np.ndarray, beta: np.ndarray) -> np.ndarray:
-    """Squared error of ``beta`` without the target's own square."""
-    return np.einsum("...i,...ij,...j->...", beta, gram, beta) - 2 * np.einsum("...i,...i->...", beta, right)
+def _quadratic(right: np.ndarray, beta: np.ndarray, ridge: np.ndarray) -> np.ndarray:
+    """Squared error, without the target's own square, of ``beta`` that solves the products with ``ridge``."""
+    return -np.einsum("...i,...i->...", right + ridge * beta, beta)
 
 
 @dataclass(frozen=True)
