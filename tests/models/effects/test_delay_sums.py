@@ -17,7 +17,7 @@ def test_filters_at_the_rows_are_those_of_the_whole_signal() -> None:
     rows = [np.arange(4, 230, 6), np.arange(140, 0, -8)]
     tau = np.array([1.5, 9.0, 40.0])
     found = low_passed(signals, rows, tau)
-    for each, constant in zip(found, tau, strict=True):
+    for each, constant in zip(found.T, tau, strict=True):
         h = 2.0 / constant
         e = np.exp(-h)
         gain = (1 - e) / h

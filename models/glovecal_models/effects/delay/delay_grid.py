@@ -285,13 +285,17 @@ def _filter(result: np.ndarray, tracks: Sequence[_Track], form: np.ndarray, late
         [track.at for track in tracks],
         np.concatenate([late_s[one], first, second]) / STEP_S,
     )
-    result[one] = passed[: len(one)]
+    result[one] = passed[:, : len(one)].T
     # Two first-order filters in a row, in partial fractions.
-    by_first, by_second = np.split(passed[len(one) :], 2)
-    apart = first - second
-    result[two] = (first / apart)[:, None] * by_first - (second / apart)[:, None] * by_second
+    by_first, by_second = np.split(passed[:, len(one) :], 2, axis=1)
+    by_first *= first / (first - second)
+    by_second *= second / (first - second)
+    by_first -= by_second
+    result[two] = by_first.T
     is_window = np.isin(form, (DelayForm.MOVING_AVERAGE, DelayForm.DELAYED_WINDOW)) & (late_s > 0)
     length = 2 * late_s * np.where(form == DelayForm.DELAYED_WINDOW, WINDOW_SHARE, 1.0)
     from_s, to_s = (late_s - length / 2)[is_window], (late_s + length / 2)[is_window]
-    means = [window_means(track.fine, track.at, from_s / STEP_S, to_s / STEP_S) for track in tracks]
-    result[is_window] = np.concatenate(means, axis=1)
+    ends = np.cumsum([len(track.at) for track in tracks]).tolist()
+    for track, start, end in zip(tracks, [0, *ends], ends, strict=False):
+        means = window_means(track.fine, track.at, from_s / STEP_S, to_s / STEP_S)
+        result[is_window, start:end] = means

@@ -13,7 +13,7 @@ import numpy as np
 
 
 def low_passed(signals: Sequence[np.ndarray], rows: Sequence[np.ndarray], tau: np.ndarray) -> np.ndarray:
-    """(K, rows of all signals): first-order filters with time constants ``tau`` (K,).
+    """(rows of all signals, K): first-order filters with time constants ``tau`` (K,).
 
     ``signals`` (F,) each with its own ``rows`` (N,), rising or falling. Exact for straight lines between
     every second sample, where all rows lie on such, and at rest before the first.
@@ -31,8 +31,8 @@ def low_passed(signals: Sequence[np.ndarray], rows: Sequence[np.ndarray], tau: n
     decay, remembered = np.tile(e**step, blocks.shape[1]), np.empty(passed.shape[1])
     for before, now in pairwise(passed):
         now += np.multiply(decay, before, out=remembered)
-    result = np.ascontiguousarray(passed.reshape(-1, len(tau))[place].T)
-    result += np.repeat([signal[:1].sum() for signal in signals], [len(part) for part in rows])
+    result = passed.reshape(-1, len(tau))[place]
+    result += np.repeat([signal[:1].sum() for signal in signals], [len(part) for part in rows])[:, None]
     return result
 
 
