@@ -1,4 +1,4 @@
-"""Sums that delays are judged by equal what they stand for, worked out directly."""
+"""Sums that delays and faults are judged by equal what they stand for, worked out directly."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from scipy.signal import lfilter
 
 from glovecal_models.effects.delay.delay_grid import squared_beside
 from glovecal_models.effects.delay.row_filters import low_passed
+from glovecal_models.effects.sensor_fault.short_faults import straight_line
 
 
 def test_filters_at_the_rows_are_those_of_the_whole_signal() -> None:
@@ -37,3 +38,8 @@ def test_squares_in_blocks_are_those_of_the_residual_of_a_base() -> None:
     left -= (left @ orthogonal) @ orthogonal.T
     expected = np.add.reduceat(left**2, starts, axis=1).T
     np.testing.assert_allclose(squared_beside(target, moved, slope, orthogonal, starts), expected, rtol=1e-10)
+
+
+def test_a_straight_line_is_that_of_polyfit() -> None:
+    x, y = np.random.default_rng(4).uniform(20, 90, (2, 50))
+    np.testing.assert_allclose(straight_line(x, y), np.polyfit(x, y, 1), rtol=1e-9)

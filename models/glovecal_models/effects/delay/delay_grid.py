@@ -164,11 +164,14 @@ def _joint(
     lengths = [len(rows) for _, rows in used]
     starts = block_starts(lengths)
     bend = _bend(moved, form, delay, slope, own)
+    blocks = squared_beside(left + slope * own, moved, slope, orthogonal, starts)
+    unmoved = np.add.reduceat(left * left, starts)
+    blocks[:, delay == 0.0] = unmoved[:, None]  # to the last bit: no delay saves nothing
     return DelayErrors(
         form,
         delay,
-        squared_beside(left + slope * own, moved, slope, orthogonal, starts),
-        np.add.reduceat(left * left, starts),
+        blocks,
+        unmoved,
         np.array(problem.unit_take)[np.searchsorted(np.cumsum(lengths), starts, side="right")],
         np.add.reduceat(bend * bend, starts),
         len(target),
