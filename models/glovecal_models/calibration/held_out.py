@@ -152,20 +152,20 @@ class FittedColumns:
 
     @classmethod
     def of(
-        cls, columns: Sequence[np.ndarray], units: Sequence[Sequence[tuple[int, np.ndarray]]]
+        cls,
+        columns: Sequence[np.ndarray],
+        units: Sequence[Sequence[tuple[int, np.ndarray]]],
+        fitted: Sequence[np.ndarray] | None = None,
     ) -> FittedColumns:
         """``columns``: for each take (N, G L, C), lane by lane within each of the G shapes; ``units``: for
-        each lane the take and the rows of each of its units."""
-        fitted = []
-        for number, part in enumerate(columns):
-            is_fitted = np.zeros(len(part), dtype=bool)
-            for take, index in (unit for of_lane in units for unit in of_lane):
-                if take == number:
-                    is_fitted[index] = True
-            fitted.append(np.flatnonzero(is_fitted))
+        each lane the take and the rows of each of its units. ``fitted``: the columns are at these
+        ``fitted_rows`` only."""
+        rows = fitted_rows([len(part) for part in columns], units) if fitted is None else fitted
+        # One take after the other: all at once would be too much for the processor's cache.
+        some = (part[at] for part, at in zip(columns, rows, strict=True)) if fitted is None else columns
         return cls(
-            tuple(_by_lane(part, rows, len(units)) for part, rows in zip(columns, fitted, strict=True)),
-            tuple(tuple((take, _place(index, fitted[take])) for take, index in of_lane) for of_lane in units),
+            tuple(_by_lane(part, len(units)) for part in some),
+            tuple(tuple((take, _place(index, rows[take])) for take, index in of_lane) for of_lane in units),
         )
 
     def units(self, lane: int) -> list[np.ndarray]:
@@ -173,10 +173,19 @@ class FittedColumns:
         return [self.columns[take][lane, rows] for take, rows in self.places[lane]]
 
 
-def _by_lane(columns: np.ndarray, rows: np.ndarray, lanes: int) -> np.ndarray:
-    """(L, M, G, C) of (N, G L, C), at ``rows`` (M,)."""
-    some = columns[rows]
-    apart = some.reshape(len(rows), some.shape[1] // lanes, lanes, some.shape[2])
+def fitted_rows(
+    lengths: Sequence[int], units: Sequence[Sequence[tuple[int, np.ndarray]]]
+) -> list[np.ndarray]:
+    """For each take (M,), of so many rows, those that some unit of some lane is fitted on."""
+    is_fitted = [np.zeros(length, dtype=bool) for length in lengths]
+    for take, index in (unit for of_lane in units for unit in of_lane):
+        is_fitted[take][index] = True
+    return [np.flatnonzero(mask) for mask in is_fitted]
+
+
+def _by_lane(columns: np.ndarray, lanes: int) -> np.ndarray:
+    """(L, M, G, C) of (M, G L, C)."""
+    apart = columns.reshape(len(columns), columns.shape[1] // lanes, lanes, columns.shape[2])
     return np.ascontiguousarray(apart.transpose(2, 0, 1, 3))
 
 
