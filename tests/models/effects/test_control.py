@@ -90,7 +90,8 @@ def test_what_does_not_remember_is_the_same_at_some_rows_only(signals, name):
     settings = effect.fit_constants(signals)
     shape = effect.grid(signals, settings)[0]
     rows = [slice(1, len(take), 2) for take in signals]
-    assert effect.control != "time-reversed" and not effect.needs_time
+    assert effect.control != "time-reversed"
+    assert not effect.needs_time
     every = control_columns(effect, signals, settings, shape, np.random.default_rng(5))
     some = control_columns(effect, signals, settings, shape, np.random.default_rng(5), rows)
     for whole, part, at in zip(every, some, rows, strict=True):
