@@ -152,20 +152,20 @@ class FittedColumns:
 
     @classmethod
     def of(
-        cls, columns: Sequence[np.ndarray], units: Sequence[Sequence[tuple[int, np.ndarray]]]
+        cls,
+        columns: Sequence[np.ndarray],
+        units: Sequence[Sequence[tuple[int, np.ndarray]]],
+        fitted: Sequence[np.ndarray] | None = None,
     ) -> FittedColumns:
         """``columns``: for each take (N, G L, C), lane by lane within each of the G shapes; ``units``: for
-        each lane the take and the rows of each of its units."""
-        fitted = []
-        for number, part in enumerate(columns):
-            is_fitted = np.zeros(len(part), dtype=bool)
-            for take, index in (unit for of_lane in units for unit in of_lane):
-                if take == number:
-                    is_fitted[index] = True
-            fitted.append(np.flatnonzero(is_fitted))
+        each lane the take and the rows of each of its units. ``fitted``: the columns are at these
+        ``fitted_rows`` only."""
+        rows = fitted_rows([len(part) for part in columns], units) if fitted is None else fitted
+        # One take after the other: all at once would be too much for the processor's cache.
+        some = (part[at] for part, at in zip(columns, rows, strict=True)) if fitted is None else columns
         return cls(
-            tuple(_by_lane(part, rows, len(units)) for part, rows in zip(columns, fitted, strict=True)),
-            tuple(tuple((take, _place(index, fitted[take])) for take, index in of_lane) for of_lane in units),
+            tuple(_by_lane(part, len(units)) for part in some),
+            tuple(tuple((take, _place(index, rows[take])) for take, index in of_lane) for of_lane in units),
         )
 
     def units(self, lane: int) -> list[np.ndarray]:
@@ -173,10 +173,19 @@ class FittedColumns:
         return [self.columns[take][lane, rows] for take, rows in self.places[lane]]
 
 
-def _by_lane(columns: np.ndarray, rows: np.ndarray, lanes: int) -> np.ndarray:
-    """(L, M, G, C) of (N, G L, C), at ``rows`` (M,)."""
-    some = columns[rows]
-    apart = some.reshape(len(rows), some.shape[1] // lanes, lanes, some.shape[2])
+def fitted_rows(
+    lengths: Sequence[int], units: Sequence[Sequence[tuple[int, np.ndarray]]]
+) -> list[np.ndarray]:
+    """For each take (M,), of so many rows, those that some unit of some lane is fitted on."""
+    is_fitted = [np.zeros(length, dtype=bool) for length in lengths]
+    for take, index in (unit for of_lane in units for unit in of_lane):
+        is_fitted[take][index] = True
+    return [np.flatnonzero(mask) for mask in is_fitted]
+
+
+def _by_lane(columns: np.ndarray, lanes: int) -> np.ndarray:
+    """(L, M, G, C) of (M, G L, C)."""
+    apart = columns.reshape(len(columns), columns.shape[1] // lanes, lanes, columns.shape[2])
     return np.ascontiguousarray(apart.transpose(2, 0, 1, 3))
 
 
@@ -212,17 +221,15 @@ def held_out(
             own = slice(g * added, (g + 1) * added)
             joint[unit, g, size:, size:] = counted[:, own].T @ flat[:, own]
     total, total_right = joint.sum(axis=0), right.sum(axis=0)
-    ridge = np.zeros((shapes, size + added, size + added))
-    ridge[:, :size, :size] = products.ridge
-    diagonal = np.arange(size, size + added)
+    ridge = np.zeros((shapes, size + added))
+    ridge[:, :size] = np.diagonal(products.ridge)
     variance = products.error.sum() / products.count.sum() if noise_variance is None else noise_variance
     variance = max(variance, LEAST_VARIANCE_DEG2)
-    ridge[:, diagonal, diagonal] = np.maximum(
-        ALIKE_ROWS * variance / prior_sd**2, LEAST_RIDGE * total[:, diagonal, diagonal]
-    )
-    beta = _solved(total - joint + ridge, total_right - right)
+    own_square = np.diagonal(total, axis1=1, axis2=2)[:, size:]
+    ridge[:, size:] = np.maximum(ALIKE_ROWS * variance / prior_sd**2, LEAST_RIDGE * own_square)
+    beta = _solved(total - joint, total_right - right, ridge)
     training = (products.square.sum() - products.square)[:, None] + _quadratic(
-        total - joint, total_right - right, beta
+        total_right - right, beta, ridge
     )
     best = np.argmin(training, axis=1)
     chosen = beta[np.arange(len(columns)), best]
@@ -230,8 +237,8 @@ def held_out(
         rows.rooted(rows.target - rows.base @ b[:size] - extra[:, g, :] @ b[size:])
         for rows, extra, g, b in zip(products.units, columns, best, chosen, strict=True)
     )
-    whole = _solved(total + ridge, total_right)
-    fit = products.square.sum() + _quadratic(total, total_right, whole)
+    whole = _solved(total, total_right, ridge)  # the last use of ``total``
+    fit = products.square.sum() + _quadratic(total_right, whole, ridge)
     shape = int(np.argmin(fit))
     return HeldOut(
         base=products.error,
@@ -283,7 +290,7 @@ def weight_posterior(
         prior = ALIKE_ROWS * variance / prior_sd**2
         ridge[size:] = np.maximum(prior, LEAST_RIDGE * np.diagonal(gram)[size:])
         held = gram + np.diag(ridge)
-        beta = _solved(held, right)
+        beta = _solved(gram.copy(), right, ridge)
         left = square + float(beta @ gram @ beta - 2 * beta @ right)
     own, pull = held[size:, size:], ridge[size:]
     scale = np.sqrt(np.diagonal(own))
@@ -303,16 +310,20 @@ def _effective_ratio(error: Sequence[np.ndarray]) -> float:
     return effective_sample_ratio(np.concatenate(error), unit, np.arange(len(unit)))
 
 
-def _solved(gram: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """With columns of any size: each is brought to a square of one first."""
-    size = np.sqrt(np.diagonal(gram, axis1=-2, axis2=-1))
-    scaled = gram / (size[..., :, None] * size[..., None, :])
-    return np.linalg.solve(scaled, (right / size)[..., None])[..., 0] / size
+def _solved(gram: np.ndarray, right: np.ndarray, ridge: np.ndarray) -> np.ndarray:
+    """With ``ridge`` (..., K) on the diagonal of ``gram`` (..., K, K), which is overwritten; with columns of
+    any size: each is brought to a square of one first."""
+    diagonal = np.einsum("...ii->...i", gram)
+    diagonal += ridge
+    size = np.sqrt(diagonal)
+    gram /= size[..., :, None]
+    gram /= size[..., None, :]
+    return np.linalg.solve(gram, (right / size)[..., None])[..., 0] / size
 
 
-def _quadratic(gram: np.ndarray, right: np.ndarray, beta: np.ndarray) -> np.ndarray:
-    """Squared error of ``beta`` without the target's own square."""
-    return np.einsum("...i,...ij,...j->...", beta, gram, beta) - 2 * np.einsum("...i,...i->...", beta, right)
+def _quadratic(right: np.ndarray, beta: np.ndarray, ridge: np.ndarray) -> np.ndarray:
+    """Squared error, without the target's own square, of ``beta`` that solves the products with ``ridge``."""
+    return -np.einsum("...i,...i->...", right + ridge * beta, beta)
 
 
 @dataclass(frozen=True)

@@ -75,15 +75,22 @@ def _apart_s(take: Take, measured: np.ndarray, limits: ComparisonLimits) -> floa
     for column in usable:
         known = np.isfinite(measured[:, column])
         angles = np.interp(every, take.time_s[known], measured[known, column])
-        angle = sliding_window_view(angles, len(time))
-        angle = angle - angle.mean(axis=1, keepdims=True)
-        square = np.einsum("dn,dn->d", angle, angle)
-        crossed = angle @ read
-        explained = np.einsum("dp,pq,dq->d", crossed, inverse, crossed)
+        angles -= angles.mean()
+        # The readings have no mean: what an angle's is does not matter to their products.
+        crossed = np.ascontiguousarray(sliding_window_view(angles, len(time))) @ read
+        square = _squares_about_means(angles, len(time))
+        explained = np.einsum("dp,dp->d", crossed @ inverse, crossed)
         left += 1.0 - explained / np.maximum(square, 1e-9)
     best = int(np.argmin(left))
     saved = 1.0 - left[best] / max(left[count], 1e-12)
     return float(shifts[best]) if saved >= limits.clock_least_share else 0.0
+
+
+def _squares_about_means(values: np.ndarray, width: int) -> np.ndarray:
+    """Of each window of ``width`` values (N,), (N - width + 1,): the sum of squares about its mean."""
+    sums, squares = (np.concatenate([[0.0], np.cumsum(part)]) for part in (values, values**2))
+    means = (sums[width:] - sums[:-width]) / width
+    return np.maximum(squares[width:] - squares[:-width] - width * means**2, 0.0)
 
 
 def hold_doubts(still: Sequence[Hold], floor_deg: float, limits: ComparisonLimits) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.calibration.held_out import FittedColumns, HeldOut, held_out
+from glovecal_models.calibration.held_out import FittedColumns, HeldOut, fitted_rows, held_out
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.not_identifiable import NotIdentifiable, undecidable
 from glovecal_models.diagnosis.permutation_test import session_p_value
@@ -157,17 +157,32 @@ def _screen(
     prior = effect.prior_sd(settings)
     units = [list(design.units(joint)) for joint in joints]
 
+    fitted = fitted_rows([len(take) for take in signals], units)
+    # What does not remember is worked out on the rows that are fitted, which are every second one.
+    is_instant = not effect.needs_time and effect.control != "time-reversed"
+    rows = [_as_slice(part) for part in fitted] if is_instant else None
+    right = tiled if rows is None else [take.at(some) for take, some in zip(tiled, rows, strict=True)]
+
     def held_out_of(columns: Sequence[np.ndarray]) -> list[HeldOut]:
-        """Of each joint; ``columns`` (N, G L, C) of each take."""
-        by_lane = FittedColumns.of(columns, units)
+        """Of each joint; ``columns`` (N, G L, C) of each take, or of its fitted rows."""
+        by_lane = FittedColumns.of(columns, units, fitted if is_instant else None)
         return [
             held_out(design.products[joint], by_lane.units(lane), prior) for lane, joint in enumerate(joints)
         ]
 
-    true = held_out_of(effect.columns_of_takes(tiled, settings, flat))
-    tried = [held_out_of(control_columns(effect, tiled, settings, flat, generator)) for _ in range(controls)]
+    true = held_out_of(effect.columns_of_takes(right, settings, flat))
+    tried = [
+        held_out_of(control_columns(effect, tiled, settings, flat, generator, rows)) for _ in range(controls)
+    ]
     middle = [sorted(items, key=lambda item: item.saved)[controls // 2] for items in zip(*tried, strict=True)]
     return tuple(
         Evidence(right, wrong, grid[right.shape, lane], settings)
         for lane, (right, wrong) in enumerate(zip(true, middle, strict=True))
     )
+
+
+def _as_slice(rows: np.ndarray) -> np.ndarray | slice:
+    """Evenly spaced rows (M,) as a slice, which copies nothing."""
+    steps = np.diff(rows)
+    is_even = len(rows) > 1 and bool((steps == steps[0]).all())
+    return slice(int(rows[0]), int(rows[-1]) + 1, int(steps[0])) if is_even else rows

@@ -32,7 +32,7 @@ def session_p_value(design: ForwardDesign, effect: Effect, generator: np.random.
     joints = range(len(design.rotations))
     permutations = _permutations(design, effect, generator)
     rows = [_thinned(take.time_s) for take in design.signals]
-    thin = [_some(take, some) for take, some in zip(design.signals, rows, strict=True)]
+    thin = [take.at(some) for take, some in zip(design.signals, rows, strict=True)]
     settings, left = (
         effect.fit_constants(design.signals),
         [_projected(design, joint, rows) for joint in joints],
@@ -188,16 +188,6 @@ def _thinned(time_s: np.ndarray) -> np.ndarray:
     length = len(time_s)
     wanted = max(ROWS_PER_TAKE, round(2.0 * float(time_s[-1] - time_s[0]) / LONGEST_GAP_S)) if length else 0
     return np.unique(np.linspace(0, length - 1, min(wanted, length)).astype(int))
-
-
-def _some(take: Signals, rows: np.ndarray) -> Signals:
-    return replace(
-        take,
-        time_s=take.time_s[rows],
-        own=take.own[rows],
-        others={name: values[rows] for name, values in take.others.items()},
-        context={name: values[rows] for name, values in take.context.items()},
-    )
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,9 @@ NOISE_SHARES = (0.1, 0.4)
 """Of the variance: of each piece, and the same again of each take."""
 LEVEL_SHARE = 2.0
 """Of the variance: the prior of a constant."""
-DRAWS = 1999
+FEW_DRAWS, DRAWS = 199, 1999
+HOPELESS = 0.1
+"""A p value of few draws with which more are not worth their time."""
 JOINT_P_VALUE = 0.05
 """Of a joint by itself; all joints together are judged more strictly."""
 STRICTER = 5.0
@@ -63,28 +65,55 @@ def smooth_assessment(
         return None
     settings = effect.fit_constants(design.signals)
     columns = [effect.evenly(effect.clipped(take, settings), settings) for take in design.signals]
-    orders = np.stack([np.arange(takes), *(generator.permutation(takes) for _ in range(DRAWS))])
-    errors, explained = [], []
-    for joint, before in enumerate(usual.errors):
-        pieces = _pieces(design, joint, columns)
-        if pieces is None:
+    pieces = [_pieces(design, joint, columns) for joint in range(len(usual.errors))]
+    known = [item for item in pieces if item is not None]
+    if len(known) < len(pieces):
+        return None
+    orders, left, p_value = np.arange(takes)[None, :], [], 1.0
+    for draws in (FEW_DRAWS, DRAWS):
+        more = [generator.permutation(takes) for _ in range(draws + 1 - len(orders))]
+        orders = np.concatenate([orders, more])
+        left = [_Left.of(item, orders) for item in known]
+        p_value = min(1.0, STRICTER * _share_as_large(np.array([item.explained for item in left])))
+        if draws < DRAWS and p_value > HOPELESS:
             return None
+    errors = []
+    for joint, before in enumerate(usual.errors):
+        found = left[joint]
+        if np.mean(found.explained >= found.explained[0]) > JOINT_P_VALUE:
+            errors.append(replace(before, added=before.base, control=before.base))
+        else:
+            errors.append(_errors(design, joint, known[joint], before, found))
+    return replace(usual, errors=tuple(errors), p_value=p_value)
+
+
+def _share_as_large(explained: np.ndarray) -> float:
+    """Of draws (J, D), the first of which is as it was recorded: those that explain as much of all joints
+    together or of one, as in ``session_p_value``."""
+    shares = np.minimum(shares_as_large(explained.sum(axis=0)), shares_as_large(explained.max(axis=0)))
+    return float(np.mean(shares <= shares[0] * (1 + 1e-9)))
+
+
+@dataclass(frozen=True)
+class _Left:
+    """What is explained of one joint, at the best lengthscale and noise of each draw."""
+
+    explained: np.ndarray
+    """(D,) share of the square of the takes' errors."""
+    predicted: np.ndarray
+    """(T, PIECES), degrees, as the takes were recorded."""
+    control: np.ndarray
+    """The same in a draw that explains neither much nor little."""
+
+    @classmethod
+    def of(cls, pieces: Pieces, orders: np.ndarray) -> _Left:
         left = left_out(pieces, orders)
         square = np.mean(left**2, axis=(2, 3))
-        best = square.argmin(axis=0)
-        whole = max(float(np.mean(pieces.error**2)), 1e-12)
-        explained.append(1.0 - square[best, np.arange(len(orders))] / whole)
-        if np.mean(explained[-1] >= explained[-1][0]) > JOINT_P_VALUE:
-            errors.append(replace(before, added=before.base, control=before.base))
-            continue
-        middle = int(np.argsort(explained[-1][1:])[DRAWS // 2]) + 1
-        predicted = [pieces.error[order] - left[best[draw], draw]
-                     for draw, order in ((0, orders[0]), (middle, orders[middle]))]  # fmt: skip
-        errors.append(_errors(design, joint, pieces, before, *predicted))
-    every = np.array(explained)
-    shares = np.minimum(shares_as_large(every.sum(axis=0)), shares_as_large(every.max(axis=0)))
-    p_value = min(1.0, STRICTER * float(np.mean(shares <= shares[0] * (1 + 1e-9))))
-    return replace(usual, errors=tuple(errors), p_value=p_value)
+        best, every = square.argmin(axis=0), np.arange(len(orders))
+        explained = 1.0 - square[best, every] / max(float(np.mean(pieces.error**2)), 1e-12)
+        middle = int(np.argsort(explained[1:])[len(explained[1:]) // 2]) + 1
+        predicted, control = (pieces.error[orders[draw]] - left[best[draw], draw] for draw in (0, middle))
+        return cls(explained, predicted, control)
 
 
 def _pieces(design: ForwardDesign, joint: int, columns: Sequence[np.ndarray]) -> Pieces | None:
@@ -126,9 +155,10 @@ def left_out(pieces: Pieces, orders: np.ndarray) -> np.ndarray:
     for length, share in product(LENGTHS, NOISE_SHARES):
         cover = np.exp(-0.5 * ((x[:, None] - x[None, :]) / length) ** 2) + LEVEL_SHARE
         precision = np.linalg.inv(variance * (cover + share * (same + np.eye(len(x)))))
-        weighted = (precision @ target).reshape(takes, PIECES, -1)
-        blocks = precision.reshape(takes, PIECES, takes, PIECES)[np.arange(takes), :, np.arange(takes), :]
-        found.append(np.linalg.solve(blocks, weighted).transpose(2, 0, 1))
+        of_take = precision.reshape(takes, PIECES, -1)
+        blocks = of_take.reshape(takes, PIECES, takes, PIECES)[np.arange(takes), :, np.arange(takes), :]
+        leave = np.linalg.solve(blocks, of_take).reshape(precision.shape)
+        found.append((leave @ target).T.reshape(len(orders), takes, PIECES))
     return np.stack(found)
 
 
@@ -137,8 +167,7 @@ def _errors(
     joint: int,
     pieces: Pieces,
     before: JointErrors,
-    predicted: np.ndarray,
-    control: np.ndarray,
+    left: _Left,
 ) -> JointErrors:
     residual = design.products[joint].residual
     starts = block_starts([len(part) for part in residual])
@@ -146,6 +175,6 @@ def _errors(
         squared_in_blocks(
             [part - each.ravel()[at] for part, at in zip(residual, pieces.piece, strict=True)], starts
         )
-        for each in (predicted, control)
+        for each in (left.predicted, left.control)
     )
     return replace(before, added=added, control=mirrored)

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from glovecal_models.calibration.held_out import ALIKE_ROWS, BaseProducts, Rows, held_out
+from glovecal_models.calibration.held_out import (
+    ALIKE_ROWS,
+    BaseProducts,
+    FittedColumns,
+    Rows,
+    fitted_rows,
+    held_out,
+)
 
 
 @pytest.fixture
@@ -52,3 +59,19 @@ def test_the_shape_is_chosen_by_training_error(units):
     assert found.shape == 1
     assert found.weights == pytest.approx([4.0], abs=0.3)
     assert found.saved > 0.8
+
+
+def test_columns_at_fitted_rows_are_those_of_all_rows():
+    random = np.random.default_rng(6)
+    columns = [random.normal(size=(20, 6, 2)) for _ in range(2)]  # three shapes of two lanes
+    units = [
+        [(0, np.arange(0, 20, 2)), (1, np.arange(1, 9))],
+        [(0, np.arange(4, 20, 2)), (1, np.array([3, 15]))],
+    ]
+    fitted = fitted_rows([20, 20], units)
+    every = FittedColumns.of(columns, units)
+    some = FittedColumns.of([part[at] for part, at in zip(columns, fitted, strict=True)], units, fitted)
+    for lane, of_lane in enumerate(units):
+        for (take, index), whole, part in zip(of_lane, every.units(lane), some.units(lane), strict=True):
+            np.testing.assert_array_equal(whole, columns[take][index][:, lane::2])
+            np.testing.assert_array_equal(part, whole)

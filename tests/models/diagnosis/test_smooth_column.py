@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -21,6 +23,7 @@ from glovecal_models.improvement.improve import improve
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
+from glovecal_models.simulation.session_glove import SessionGlove
 from glovecal_models.simulation.session_plan import FIVE_SENSORS, SessionPlan
 
 LAYOUT = Layout.from_columns("five", FIVE_SENSORS, FIVE_SENSORS)
@@ -46,9 +49,7 @@ def test_what_takes_left_out_leave_is_that_of_the_process_without_them():
             assert found[len(NOISE_SHARES), draw, out] == pytest.approx(expected)
 
 
-@pytest.mark.parametrize(
-    ("cause", "form"), [("warmup_drift", "oven_rings"), ("temperature", "quartz_cubic")]
-)
+@pytest.mark.parametrize(("cause", "form"), [("warmup_drift", "oven_rings"), ("temperature", "quartz_cubic")])
 def test_a_slow_cause_that_turns_back_is_named(cause, form):
     takes = record_session(PLAN, [Cause(cause, form, 2.0, ("M_PIP",))]).takes
     named = diagnose(takes, LAYOUT, judge_residual=False).named
@@ -67,15 +68,20 @@ def test_equal_times_since_power_on_are_further_apart_soon_after_it():
 
 
 def test_pressure_in_a_form_of_its_own_is_named_by_its_column_and_added_at_once():
-    found = record_session(PLAN, [Cause("contact_pressure", "bulges_then_flattens", 1.5)])
-    diagnosis = diagnose(found.takes, LAYOUT)
+    """Two and a half waves over the grip: no usual form goes along with that."""
+    takes = []
+    for take in record_session(PLAN, [Cause("contact_pressure", "additive", 1e-3)]).takes:
+        wave = np.sin(2 * np.pi * 2.5 * take.context["contact_n"] / 8.0)
+        readings = take.readings + 2.5 * SessionGlove(PLAN).gain * wave[:, None]
+        takes.append(replace(take, readings=readings))
+    diagnosis = diagnose(takes, LAYOUT)
     named = diagnosis.named
     assert named is not None
     assert (named.effect, named.verdict) == ("contact_pressure", "named")
     assert not diagnosis.naming.ranked
     assert len(named.where) > 1
     assert named_sentence(diagnosis) in diagnosis_sentences(diagnosis)
-    steps = improve(found.takes, LAYOUT, "anna").steps
+    steps = improve(takes, LAYOUT, "anna").steps
     first = steps[1].added
     assert first is not None
     assert (first.effect, first.verdict, set(first.where)) == ("contact_pressure", "named", set(named.where))

@@ -82,3 +82,23 @@ def test_wearings_that_have_no_other_permutation_are_refused(signals):
     takes = [replace(take, wearing=str(number)) for number, take in enumerate(signals)]
     with pytest.raises(BadInput, match="have no other permutation; record two takes in a wearing"):
         permuted(takes, 0)
+
+
+@pytest.mark.parametrize("name", ["cross_coupling", "palm_arch", "donning_shift", "nonlinearity"])
+def test_what_does_not_remember_is_the_same_at_some_rows_only(signals, name):
+    effect = catalogue()[name]
+    settings = effect.fit_constants(signals)
+    shape = effect.grid(signals, settings)[0]
+    rows = [slice(1, len(take), 2) for take in signals]
+    assert effect.control != "time-reversed"
+    assert not effect.needs_time
+    every = control_columns(effect, signals, settings, shape, np.random.default_rng(5))
+    some = control_columns(effect, signals, settings, shape, np.random.default_rng(5), rows)
+    for whole, part, at in zip(every, some, rows, strict=True):
+        np.testing.assert_array_equal(whole[at], part)
+    true = effect.columns_of_takes(signals, settings, shape)
+    thinned = effect.columns_of_takes(
+        [take.at(at) for take, at in zip(signals, rows, strict=True)], settings, shape
+    )
+    for whole, part, at in zip(true, thinned, rows, strict=True):
+        np.testing.assert_array_equal(whole[at], part)

@@ -54,7 +54,7 @@ def test_in_fast_motion_20_ms_are_told_from_a_filter(form, ruled_out):
     assert ruled_out not in possible
 
 
-def test_short_blocks_make_up_the_long_ones():
+def test_short_blocks_hold_the_same_errors_as_long_ones():
     takes = record_session(SessionPlan(seed=5, wearings=1, takes_per_wearing=2, take_s=23.0)).takes
     problem = DiagnosisProblem.of(takes, LAYOUT, False, ()).design()
     for short, long in zip(short_delay_errors(problem), delay_errors(problem), strict=True):

@@ -27,15 +27,19 @@ def control_columns(
     settings: Settings,
     shape: np.ndarray,
     generator: np.random.Generator,
+    rows: Sequence[np.ndarray | slice] | None = None,
 ) -> list[np.ndarray]:
     """Columns (N, L, C) of the effect's control for each take, for the same settings and shape (L, P).
 
+    ``rows``: at these of each take only, for effects that do not remember and are not played backwards.
     Raises BadInput when the takes allow no control: wearings with no other permutation.
     """
-    if effect.control == "none":
-        return [np.zeros_like(part) for part in effect.columns_of_takes(takes, settings, shape)]
-    step = -1 if effect.control == "time-reversed" else 1
     wrong = control_signals(effect, takes, generator)
+    if rows is not None:
+        wrong = [take.at(some) for take, some in zip(wrong, rows, strict=True)]
+    if effect.control == "none":
+        return [np.zeros_like(part) for part in effect.columns_of_takes(wrong, settings, shape)]
+    step = -1 if effect.control == "time-reversed" else 1
     return [part[::step] for part in effect.columns_of_takes(wrong, settings, shape)]
 
 

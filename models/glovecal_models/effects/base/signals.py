@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import overload
 
 import numpy as np
@@ -33,6 +33,16 @@ class Signals:
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+    def at(self, rows: np.ndarray | slice) -> Signals:
+        """Some of its frames."""
+        return replace(
+            self,
+            time_s=self.time_s[rows],
+            own=self.own[rows],
+            others={name: values[rows] for name, values in self.others.items()},
+            context={name: values[rows] for name, values in self.context.items()},
+        )
 
 
 class GloveFrames(Sequence[Signals]):

@@ -10,12 +10,17 @@ slope. All cells are compared at once by projecting them off the base.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 
-from glovecal_models.effects.base.assessment import JointErrors, block_starts, squared_in_blocks
+from glovecal_models.effects.base.assessment import (
+    BLOCK_ROWS,
+    JointErrors,
+    block_starts,
+    squared_in_blocks,
+)
 from glovecal_models.effects.base.problem import Problem
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.delay.row_filters import low_passed, window_means
@@ -34,8 +39,6 @@ WINDOW_SHARE = 0.6
 """Length of a delayed window, of that of a moving average as late: a raised cosine has 0.63."""
 BEND_S = 0.05
 SHORT_ROWS = 25
-CELLS_AT_ONCE = 16
-"""Few enough for the processor's cache."""
 FAST_SHARE = 1.0
 """Per second: a joint is moved fast when its speed reaches so many of its own standard deviations."""
 
@@ -92,13 +95,6 @@ class DelayErrors:
     def reversed_lag(self) -> np.ndarray:
         return np.flatnonzero(np.isin(self.form, FILTERS) & (self.delay_s <= 0))
 
-    def gathered(self, starts: np.ndarray) -> DelayErrors:
-        """In longer blocks, which begin with the blocks ``starts`` of these."""
-        blocks, unmoved, fast = (
-            np.add.reduceat(part, starts, axis=0) for part in (self.blocks, self.unmoved, self.fast)
-        )
-        return replace(self, blocks=blocks, unmoved=unmoved, take=self.take[starts], fast=fast)
-
     def cells(self, form: DelayForm) -> np.ndarray:
         """Those of one form, by rising delay."""
         return np.flatnonzero(self.form == form)
@@ -124,34 +120,15 @@ def delay_errors(problem: Problem) -> tuple[DelayErrors, ...]:
 
 
 def short_delay_errors(problem: Problem) -> tuple[DelayErrors, ...]:
-    """The same in blocks of about a second: fast motion seldom lasts for more."""
-    return problem.once("delays in short blocks", lambda: _short_delay_errors(problem))
+    """The same in blocks of a second: fast motion seldom lasts for more."""
+    return problem.once("delays in short blocks", lambda: _delay_errors(problem, SHORT_ROWS))
 
 
-def _delay_errors(problem: Problem) -> tuple[DelayErrors, ...]:
-    return tuple(
-        item.gathered(_split(_long_starts(problem, joint))[1])
-        for joint, item in enumerate(short_delay_errors(problem))
-    )
-
-
-def _short_delay_errors(problem: Problem) -> tuple[DelayErrors, ...]:
+def _delay_errors(problem: Problem, block_rows: int = BLOCK_ROWS) -> tuple[DelayErrors, ...]:
     form, delay = _cells()
     fine = [_Fine.of(take.time_s, take.own) for take in problem.signals]
-    return tuple(_joint(problem, fine, joint, form, delay) for joint in range(len(problem.rotations)))
-
-
-def _long_starts(problem: Problem, joint: int) -> tuple[np.ndarray, int]:
-    """Of the blocks of all effects, and the rows of all."""
-    lengths = [len(rows) for _, rows in problem.units(joint)]
-    return block_starts(lengths), int(sum(lengths))
-
-
-def _split(long: tuple[np.ndarray, int]) -> tuple[np.ndarray, np.ndarray]:
-    """First rows of short blocks, and which of them begins each long one."""
-    starts, rows = long
-    short = block_starts(np.diff(np.append(starts, rows)).tolist(), SHORT_ROWS)
-    return short, np.searchsorted(short, starts)
+    joints = range(len(problem.rotations))
+    return tuple(_joint(problem, fine, joint, form, delay, block_rows) for joint in joints)
 
 
 def held_out_beside(
@@ -185,7 +162,12 @@ def _cells() -> tuple[np.ndarray, np.ndarray]:
 
 
 def _joint(
-    problem: Problem, fine: Sequence[_Fine], joint: int, form: np.ndarray, delay: np.ndarray
+    problem: Problem,
+    fine: Sequence[_Fine],
+    joint: int,
+    form: np.ndarray,
+    delay: np.ndarray,
+    block_rows: int,
 ) -> DelayErrors:
     products = problem.products[joint]
     base = np.concatenate([unit.base for unit in products.units])
@@ -195,33 +177,56 @@ def _joint(
     moved = _moved([fine[take].track(joint, rows) for take, rows in used], form, delay)
     own = np.concatenate([problem.signals[take].own[rows, joint] for take, rows in used])
     slope = _slope(base, products.whole, own)
-    bend = _bend(moved, form, delay, slope)
     left = target - orthogonal @ (orthogonal.T @ target)
-    starts, _ = _split(_long_starts(problem, joint))
-    ends = np.cumsum([len(rows) for _, rows in used])
-    blocks = np.empty((len(starts), len(moved)))
-    for first in range(0, len(moved), CELLS_AT_ONCE):
-        some = moved[first : first + CELLS_AT_ONCE]
-        some *= slope
-        some -= (some @ orthogonal) @ orthogonal.T
-        np.subtract(left, some, out=some)
-        np.square(some, out=some)
-        blocks[:, first : first + CELLS_AT_ONCE] = np.add.reduceat(some, starts, axis=1).T
+    lengths = [len(rows) for _, rows in used]
+    starts, ends = block_starts(lengths, block_rows), np.cumsum(lengths)
+    bend = _bend(moved, form, delay, slope, own)
+    blocks = squared_beside(left + slope * own, moved, slope, orthogonal, starts)
+    unmoved = np.add.reduceat(left * left, starts)
+    blocks[:, delay == 0.0] = unmoved[:, None]  # to the last bit: no delay saves nothing
     return DelayErrors(
         form,
         delay,
         blocks,
-        np.add.reduceat(left * left, starts),
+        unmoved,
         np.array(problem.unit_take)[np.searchsorted(ends, starts, side="right")],
         np.add.reduceat(bend * bend, starts),
         len(target),
     )
 
 
-def _bend(moved: np.ndarray, form: np.ndarray, delay: np.ndarray, slope: np.ndarray) -> np.ndarray:
+def squared_beside(
+    target: np.ndarray, moved: np.ndarray, slope: np.ndarray, orthogonal: np.ndarray, starts: np.ndarray
+) -> np.ndarray:
+    """(B, K): squares, summed over the rows of each block, of what an ``orthogonal`` base (N, P) leaves of
+    ``target`` (N,) less ``slope`` (N,) times each of ``moved`` (K, N).
+
+    Each block is read once, while it lies in the processor's cache: what the base takes away is known from
+    its products with the blocks.
+    """
+    ends = [*starts[1:].tolist(), len(target)]
+    square = np.empty((len(starts), len(moved)))
+    crossed = np.empty((len(starts), len(moved), orthogonal.shape[1]))
+    for block, (start, end) in enumerate(zip(starts.tolist(), ends, strict=True)):
+        left = moved[:, start:end] * slope[start:end]
+        np.subtract(target[start:end], left, out=left)
+        np.einsum("kn,kn->k", left, left, out=square[block])
+        np.matmul(left, orthogonal[start:end], out=crossed[block])
+    whole = crossed.sum(axis=0)
+    for block, (start, end) in enumerate(zip(starts.tolist(), ends, strict=True)):
+        rows = orthogonal[start:end]
+        taken = whole @ (rows.T @ rows)
+        taken -= 2.0 * crossed[block]
+        square[block] += np.einsum("kp,kp->k", taken, whole)
+    return np.maximum(square, 0.0)
+
+
+def _bend(
+    moved: np.ndarray, form: np.ndarray, delay: np.ndarray, slope: np.ndarray, own: np.ndarray
+) -> np.ndarray:
     """(rows,): the angle ``BEND_S`` before and after, less twice itself."""
     either = (form == DelayForm.PURE) & (np.abs(np.abs(delay) - BEND_S) < 0.5 * STEP_S)
-    return (moved[either] * slope).sum(axis=0)
+    return (moved[either] - own).sum(axis=0) * slope
 
 
 def _slope(base: np.ndarray, coefficients: np.ndarray, own: np.ndarray) -> np.ndarray:
@@ -275,18 +280,17 @@ class _Track:
 
 
 def _moved(tracks: Sequence[_Track], form: np.ndarray, delay: np.ndarray) -> np.ndarray:
-    """(K, rows of all tracks): the angle after each form of delay, minus the angle itself."""
+    """(K, rows of all tracks): the angle after each form of delay."""
     own = np.concatenate([track.fine[track.at] for track in tracks])
-    result = np.zeros((len(form), len(own)))
+    result = np.empty((len(form), len(own)))
     pure, late, early = form == DelayForm.PURE, delay > 0, delay < 0
     shifts = np.round(delay[pure] / STEP_S).astype(int)[:, None]
-    result[pure] = np.concatenate(
-        [track.fine[np.clip(track.at - shifts, 0, len(track.fine) - 1)] for track in tracks], axis=1
-    )
+    ends = np.cumsum([len(track.at) for track in tracks]).tolist()
+    for track, start, end in zip(tracks, [0, *ends], ends, strict=False):
+        result[pure, start:end] = track.fine[np.clip(track.at - shifts, 0, len(track.fine) - 1)]
     _filter(result, tracks, form, np.where(late, delay, 0.0))
     _filter(result, [track.backwards for track in tracks], form, np.where(early, -delay, 0.0))
     result[~(pure | late | early)] = own
-    result -= own
     return result
 
 
@@ -301,13 +305,17 @@ def _filter(result: np.ndarray, tracks: Sequence[_Track], form: np.ndarray, late
         [track.at for track in tracks],
         np.concatenate([late_s[one], first, second]) / STEP_S,
     )
-    result[one] = passed[: len(one)]
+    result[one] = passed[:, : len(one)].T
     # Two first-order filters in a row, in partial fractions.
-    by_first, by_second = np.split(passed[len(one) :], 2)
-    apart = first - second
-    result[two] = (first / apart)[:, None] * by_first - (second / apart)[:, None] * by_second
+    by_first, by_second = np.split(passed[:, len(one) :], 2, axis=1)
+    by_first *= first / (first - second)
+    by_second *= second / (first - second)
+    by_first -= by_second
+    result[two] = by_first.T
     is_window = np.isin(form, (DelayForm.MOVING_AVERAGE, DelayForm.DELAYED_WINDOW)) & (late_s > 0)
     length = 2 * late_s * np.where(form == DelayForm.DELAYED_WINDOW, WINDOW_SHARE, 1.0)
     from_s, to_s = (late_s - length / 2)[is_window], (late_s + length / 2)[is_window]
-    means = [window_means(track.fine, track.at, from_s / STEP_S, to_s / STEP_S) for track in tracks]
-    result[is_window] = np.concatenate(means, axis=1)
+    ends = np.cumsum([len(track.at) for track in tracks]).tolist()
+    for track, start, end in zip(tracks, [0, *ends], ends, strict=False):
+        means = window_means(track.fine, track.at, from_s / STEP_S, to_s / STEP_S)
+        result[is_window, start:end] = means

@@ -136,7 +136,7 @@ def first_delay(problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]
     """The delay to be named first, and all that remain possible; ``problem`` by the rows smoothed over."""
     usual = problem(SMOOTHING)
     grids = delay_errors(usual)
-    possible = possible_delays(grids, usual.limits, short_delay_errors(usual))
+    possible = possible_delays(grids, usual.limits, lambda: short_delay_errors(usual))
     latency = usual.signals[0].glove_latency
     if latency is not None and {CLOCK, LATENCY} <= set(possible):
         possible = _told_by_latency(possible, common_delay(grids), latency)
@@ -146,10 +146,10 @@ def first_delay(problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]
 def possible_delays(
     grids: Sequence[DelayErrors],
     limits: SignificanceLimits = SIGNIFICANCE_LIMITS,
-    short: Sequence[DelayErrors] | None = None,
+    in_short_blocks: Callable[[], Sequence[DelayErrors]] | None = None,
 ) -> tuple[str, ...]:
-    """The effects that these delays may come from, the likeliest first. ``short``: the same errors in short
-    blocks."""
+    """The effects that these delays may come from, the likeliest first. ``in_short_blocks``: gives the same
+    errors for forms to be told apart by."""
     clear = limits.delay_clear_se
     clock = clock_choice(grids, limits)
     if np.median(clock.offset_s) < 0 or clock.within is not None:
@@ -161,7 +161,7 @@ def possible_delays(
             return (CLOCK,)
     if _score(together[DelayForm.PURE], _apart(grids, DelayForm.PURE)) > APART_TIMES * clear:
         return (LAG,)
-    short = short or grids
+    short = in_short_blocks() if in_short_blocks else grids
     kept = forms_kept(short, {form: _together(short, form) for form in DelayForm}, clear)
     if DelayForm.PURE in kept and DelayForm.DELAYED_WINDOW in kept:
         kept.remove(DelayForm.DELAYED_WINDOW)  # hardly told from a mere delay

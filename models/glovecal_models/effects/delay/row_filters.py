@@ -7,18 +7,17 @@ between them, the same weights for all rows, and a recursion over rows. Times ar
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
 
 def low_passed(signals: Sequence[np.ndarray], rows: Sequence[np.ndarray], tau: np.ndarray) -> np.ndarray:
-    """(K, rows of all signals): first-order filters with time constants ``tau`` (K,).
+    """(rows of all signals, K): first-order filters with time constants ``tau`` (K,).
 
     ``signals`` (F,) each with its own ``rows`` (N,), rising or falling. Exact for straight lines between
     every second sample, where all rows lie on such, and at rest before the first.
     """
-    from scipy.signal import lfilter  # takes a second to load, which a model that only predicts does not have
-
     every = 2 if all(not (part % 2).any() for part in rows) else 1
     at = [part // every for part in rows]
     step = max(1, int(np.gcd.reduce(np.concatenate([np.diff(part) for part in at]), initial=0)))
@@ -27,18 +26,21 @@ def low_passed(signals: Sequence[np.ndarray], rows: Sequence[np.ndarray], tau: n
     e = np.exp(-h)
     gain = (1 - e) / h
     weights = _weights(1 - gain, gain - e, e, step)
-    driven = (weights @ blocks.reshape(-1, step + 1).T).reshape(len(tau), *blocks.shape[:2])
-    result = np.empty((len(tau), len(place)))
-    for each, signal, decay in zip(result, driven, e**step, strict=True):
-        np.take(lfilter([1.0], [1.0, -decay], signal), place, out=each)
-    return result + np.repeat([signal[:1].sum() for signal in signals], [len(part) for part in rows])
+    passed = (blocks.reshape(-1, step + 1) @ weights.T).reshape(len(blocks), -1)
+    # Half a second to load scipy.signal, whose recursion is no faster than one over rows of all filters.
+    decay, remembered = np.tile(e**step, blocks.shape[1]), np.empty(passed.shape[1])
+    for before, now in pairwise(passed):
+        now += np.multiply(decay, before, out=remembered)
+    result = passed.reshape(-1, len(tau))[place]
+    result += np.repeat([signal[:1].sum() for signal in signals], [len(part) for part in rows])[:, None]
+    return result
 
 
 def _blocks(
     signals: Sequence[np.ndarray], at: Sequence[np.ndarray], step: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(T, M, step + 1) samples up to every ``step``-th of each signal, less its first, and where the rows
-    ``at`` lie in (T, M): signals side by side, filled up behind their ends, where nothing is read."""
+    """(M, T, step + 1) samples up to every ``step``-th of each signal, less its first, and where the rows
+    ``at`` lie in (M, T): signals side by side, filled up behind their ends, where nothing is read."""
     ahead = [step + int(-part[:1].sum()) % step for part in at]
     count = max((len(signal) + more) // step for signal, more in zip(signals, ahead, strict=True)) + 1
     together = np.zeros((len(signals), count * step + 1))
@@ -46,10 +48,10 @@ def _blocks(
         row[more : more + len(signal)] = signal - signal[:1]
     blocks = np.lib.stride_tricks.sliding_window_view(together, step + 1, axis=1)[:, ::step]
     place = [
-        number * blocks.shape[1] + (part + more) // step - 1
+        ((part + more) // step - 1) * len(signals) + number
         for number, (part, more) in enumerate(zip(at, ahead, strict=True))
     ]
-    return np.ascontiguousarray(blocks), np.concatenate(place)
+    return np.ascontiguousarray(blocks.swapaxes(0, 1)), np.concatenate(place)
 
 
 def _weights(now: np.ndarray, before: np.ndarray, decay: np.ndarray, step: int) -> np.ndarray:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import fdtrc
 
+from glovecal_models.effects.sensor_fault.short_faults import straight_line
 from glovecal_models.takes.take import Take
 
 CURVE_DEGREE = 5
@@ -120,14 +121,13 @@ class _Slopes:
     def of(cls, readings: Sequence[np.ndarray], angles: Sequence[np.ndarray]) -> _Slopes | None:
         every, counts = np.concatenate(angles), np.concatenate(readings)
         centre, spread = float(every.mean()), float(every.std())
-        usual = float(np.polyfit(every, counts, 1)[0])
+        usual = straight_line(every, counts)[0]
         if usual == 0.0:
             return None
-        curve = np.polyfit((every - centre) / (2.0 * spread), counts, CURVE_DEGREE)
-        values = []
-        for reading, angle in zip(readings, angles, strict=True):
-            left = reading - np.polyval(curve, (angle - centre) / (2.0 * spread))
-            values.append(float(np.polyfit(angle, left, 1)[0]) / usual)
+        powers = np.vander((every - centre) / (2.0 * spread), CURVE_DEGREE + 1)
+        curve = np.linalg.lstsq(powers.T @ powers, powers.T @ counts, rcond=None)[0]
+        left = np.split(counts - powers @ curve, np.cumsum([len(angle) for angle in angles])[:-1])
+        values = [straight_line(*pair)[0] / usual for pair in zip(angles, left, strict=True)]
         return cls(np.array(values), np.array([angle.std() for angle in angles]), spread)
 
     def fitted(self, columns: np.ndarray) -> _Fit:

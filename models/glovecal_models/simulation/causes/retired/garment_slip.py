@@ -128,7 +128,7 @@ def notch_by_fist(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Dra
 def _fists(scene: Scene, closed: float, opened: float) -> np.ndarray:
     """How often the hand has closed since donning, shape (T, N); a fist counts once until reopened."""
     shut = np.zeros(len(scene.starts), dtype=bool)
-    made = np.zeros(scene.closing.shape)
+    made = np.zeros_like(scene.closing)
     for frame in range(1, made.shape[1]):
         now = scene.closing[:, frame]
         begins = ~shut & (now > closed)
