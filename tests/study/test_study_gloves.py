@@ -14,7 +14,7 @@ from wandering_reference import WANDER_DEG
 
 from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES, forms
 
-FEW = StudyChoices(gloves=3, clean=6, repairs=2, pairs=6, second_names=36, ceilings=48, recorded=28)
+FEW = StudyChoices(gloves=3, clean=6, repairs=2, pairs=6, second_names=36, ceilings=48, recorded=44)
 
 
 def open_forms(name: str) -> set[str]:
@@ -22,10 +22,10 @@ def open_forms(name: str) -> set[str]:
 
 
 def test_every_form_and_device_comes_in_turn() -> None:
-    made = [with_cause("names", "hysteresis", 1.3, number) for number in range(12)]
+    made = [with_cause("names", "hysteresis", 1.3, number) for number in range(len(open_forms("hysteresis")))]
     gloves = [glove for glove in made if glove is not None]
-    assert gloves == [with_cause("names", "hysteresis", 1.3, number) for number in range(12)]
-    assert len({glove.seed for glove in gloves}) == 12
+    assert gloves == [with_cause("names", "hysteresis", 1.3, number) for number in range(len(made))]
+    assert len({glove.seed for glove in gloves}) == len(made)
     for begin in (0, 3, 6, 9):
         three = gloves[begin : begin + 3]
         assert {glove.bits for glove in three} == set(BITS) == {8, 10, 12}
@@ -49,7 +49,8 @@ def test_an_early_stop_has_a_little_of_everything() -> None:
     assert [glove.truth for glove in names[: len(KNOWN_CAUSES)]] == list(KNOWN_CAUSES)
     every = PARTS["second-names"].gloves(StudyChoices())
     for name in KNOWN_CAUSES:
-        assert {glove.causes[0].form for glove in every if glove.truth == name} == open_forms(name)
+        found = [glove.causes[0].form for glove in every if glove.truth == name]
+        assert set(found) == open_forms(name)
     ceilings = PARTS["ceiling"].gloves(FEW)
     assert [bool(glove.causes) for glove in ceilings] == [True, False] * 24
     assert {glove.truth for glove in ceilings[: 2 * len(RECORDED_INPUTS)]} == {*RECORDED_INPUTS, "none"}

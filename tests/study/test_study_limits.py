@@ -52,7 +52,7 @@ def test_answers_with_other_limits_are_kept_apart():
 
 
 def test_other_limits_reach_the_diagnosis():
-    glove = with_cause("short", "hysteresis", 2.6, 0)
+    glove = with_cause("short", "hysteresis", 2.6, 1)
     assert glove is not None
     glove = replace(glove, rate_hz=30.0, takes_per_wearing=3, take_s=20.0)
     assert diagnosis_answer(glove)["first"] == "hysteresis"

@@ -23,9 +23,9 @@ from glovecal_models.effects.base.assessment import (
 )
 from glovecal_models.effects.base.context_effect import ContextEffect
 
-PIECES = 4
+PIECES_OF_A_TAKE = 4
 """Of each take."""
-FEWEST_TAKES = 8
+FEWEST_TAKES_OF_A_CURVE = 8
 LENGTHS = (0.08, 0.15, 0.3, 0.6)
 """Lengthscales, of the column's range."""
 NOISE_SHARES = (0.1, 0.4)
@@ -33,7 +33,7 @@ NOISE_SHARES = (0.1, 0.4)
 LEVEL_SHARE = 2.0
 """Of the variance: the prior of a constant."""
 FEW_DRAWS, DRAWS = 199, 1999
-HOPELESS = 0.1
+HOPELESS_P_VALUE = 0.1
 """A p value of few draws with which more are not worth their time."""
 JOINT_P_VALUE = 0.05
 """Of a joint by itself; all joints together are judged more strictly."""
@@ -48,9 +48,9 @@ class Pieces:
     """Mean errors of one joint."""
 
     error: np.ndarray
-    """(T, PIECES), degrees."""
+    """(T, PIECES_OF_A_TAKE), degrees."""
     column: np.ndarray
-    """(T, PIECES), evenly spread and scaled to 0..1."""
+    """(T, PIECES_OF_A_TAKE), evenly spread and scaled to 0..1."""
     piece: tuple[np.ndarray, ...]
     """For each unit (N,): the piece of each of its rows, counted through all takes."""
 
@@ -61,7 +61,7 @@ def smooth_assessment(
     """``usual``, the effect in its usual form, with the errors that any smooth form leaves on the joints that
     go along with it; None where takes are too few, or some have no error of a joint or no column."""
     takes = len(design.signals)
-    if takes < FEWEST_TAKES:
+    if takes < FEWEST_TAKES_OF_A_CURVE:
         return None
     settings = effect.fit_constants(design.signals)
     columns = [effect.evenly(effect.clipped(take, settings), settings) for take in design.signals]
@@ -75,7 +75,7 @@ def smooth_assessment(
         orders = np.concatenate([orders, more])
         left = [_Left.of(item, orders) for item in known]
         p_value = min(1.0, STRICTER * _share_as_large(np.array([item.explained for item in left])))
-        if draws < DRAWS and p_value > HOPELESS:
+        if draws < DRAWS and p_value > HOPELESS_P_VALUE:
             return None
     errors = []
     for joint, before in enumerate(usual.errors):
@@ -101,7 +101,7 @@ class _Left:
     explained: np.ndarray
     """(D,) share of the square of the takes' errors."""
     predicted: np.ndarray
-    """(T, PIECES), degrees, as the takes were recorded."""
+    """(T, PIECES_OF_A_TAKE), degrees, as the takes were recorded."""
     control: np.ndarray
     """The same in a draw that explains neither much nor little."""
 
@@ -121,22 +121,24 @@ def _pieces(design: ForwardDesign, joint: int, columns: Sequence[np.ndarray]) ->
     rows_of: list[list[np.ndarray]] = [[] for _ in range(takes)]
     for take, rows in design.units(joint):
         rows_of[take].append(rows)
-    error, column = np.zeros((takes, PIECES)), np.zeros((takes, PIECES))
-    count = np.zeros((takes, PIECES))
+    error, column = np.zeros((takes, PIECES_OF_A_TAKE)), np.zeros((takes, PIECES_OF_A_TAKE))
+    count = np.zeros((takes, PIECES_OF_A_TAKE))
     edges = []
     for take, parts in enumerate(rows_of):
         rows = np.sort(np.concatenate(parts)) if parts else np.empty(0, dtype=int)
-        if len(rows) < PIECES:
+        if len(rows) < PIECES_OF_A_TAKE:
             return None
-        cuts = [part[0] for part in np.array_split(rows, PIECES)]
+        cuts = [part[0] for part in np.array_split(rows, PIECES_OF_A_TAKE)]
         edges.append(np.array(cuts[1:]))
-        column[take] = [float(np.mean(columns[take][part])) for part in np.array_split(rows, PIECES)]
+        column[take] = [
+            float(np.mean(columns[take][part])) for part in np.array_split(rows, PIECES_OF_A_TAKE)
+        ]
     piece = []
     for (take, rows), residual in zip(design.units(joint), design.products[joint].residual, strict=True):
         at = np.searchsorted(edges[take], rows, side="right")
         np.add.at(error[take], at, residual)
         np.add.at(count[take], at, 1.0)
-        piece.append(take * PIECES + at)
+        piece.append(take * PIECES_OF_A_TAKE + at)
     span = float(np.ptp(column))
     if span <= 0 or not np.isfinite(span):
         return None
@@ -144,10 +146,10 @@ def _pieces(design: ForwardDesign, joint: int, columns: Sequence[np.ndarray]) ->
 
 
 def left_out(pieces: Pieces, orders: np.ndarray) -> np.ndarray:
-    """(K, D, T, PIECES), degrees: for K choices of lengthscale and noise, errors with takes in each of
-    ``orders`` (D, T), less what the other takes and the column predict of them."""
+    """(K, D, T, P), degrees: for K choices of lengthscale and noise, errors with takes in each of ``orders``
+    (D, T), less what the other takes and the column predict of them."""
     takes = len(pieces.error)
-    x, take = pieces.column.ravel(), np.repeat(np.arange(takes), PIECES)
+    x, take = pieces.column.ravel(), np.repeat(np.arange(takes), PIECES_OF_A_TAKE)
     target = pieces.error[orders].reshape(len(orders), -1).T
     variance = max(float(np.mean(pieces.error**2)), 1e-12)
     same = take[:, None] == take[None, :]
@@ -155,10 +157,12 @@ def left_out(pieces: Pieces, orders: np.ndarray) -> np.ndarray:
     for length, share in product(LENGTHS, NOISE_SHARES):
         cover = np.exp(-0.5 * ((x[:, None] - x[None, :]) / length) ** 2) + LEVEL_SHARE
         precision = np.linalg.inv(variance * (cover + share * (same + np.eye(len(x)))))
-        of_take = precision.reshape(takes, PIECES, -1)
-        blocks = of_take.reshape(takes, PIECES, takes, PIECES)[np.arange(takes), :, np.arange(takes), :]
+        of_take = precision.reshape(takes, PIECES_OF_A_TAKE, -1)
+        blocks = of_take.reshape(takes, PIECES_OF_A_TAKE, takes, PIECES_OF_A_TAKE)[
+            np.arange(takes), :, np.arange(takes), :
+        ]
         leave = np.linalg.solve(blocks, of_take).reshape(precision.shape)
-        found.append((leave @ target).T.reshape(len(orders), takes, PIECES))
+        found.append((leave @ target).T.reshape(len(orders), takes, PIECES_OF_A_TAKE))
     return np.stack(found)
 
 

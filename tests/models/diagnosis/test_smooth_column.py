@@ -12,7 +12,7 @@ from glovecal_models.diagnosis.smooth_column import (
     LENGTHS,
     LEVEL_SHARE,
     NOISE_SHARES,
-    PIECES,
+    PIECES_OF_A_TAKE,
     Pieces,
     left_out,
 )
@@ -32,11 +32,11 @@ PLAN = SessionPlan(seed=5, bits=12, nuisance="white")
 
 def test_what_takes_left_out_leave_is_that_of_the_process_without_them():
     random = np.random.default_rng(2)
-    pieces = Pieces(random.standard_normal((6, PIECES)), random.random((6, PIECES)), ())
+    pieces = Pieces(random.standard_normal((6, PIECES_OF_A_TAKE)), random.random((6, PIECES_OF_A_TAKE)), ())
     orders = np.array([np.arange(6), random.permutation(6)])
     found = left_out(pieces, orders)
     x, variance = pieces.column.ravel(), float(np.mean(pieces.error**2))
-    take = np.repeat(np.arange(6), PIECES)
+    take = np.repeat(np.arange(6), PIECES_OF_A_TAKE)
     length, share = LENGTHS[1], NOISE_SHARES[0]
     for draw, order in enumerate(orders):
         target = pieces.error[order].ravel()

@@ -38,9 +38,15 @@ def slip(*accounts_for: str) -> Finding:
 def test_a_slip_is_behind_what_explains_a_part_of_it_only():
     garment_slip = effect("garment_slip")
     assert may_explain(garment_slip, naming(), [slip()], catalogue())
-    assert may_explain(garment_slip, naming(ranked("temperature", 0.4)), [slip()], catalogue())
+    assert may_explain(garment_slip, naming(ranked("temperature", 0.4, square=1.0)), [slip()], catalogue())
     assert not may_explain(garment_slip, naming(ranked("temperature", 0.7)), [slip()], catalogue())
     assert not may_explain(garment_slip, naming(ranked("hysteresis", 0.2)), [slip()], catalogue())
+
+
+def test_a_slip_is_not_behind_what_explains_far_more_than_it_is_large():
+    both = naming(ranked("warmup_drift", 0.4), ranked("temperature", 0.2))
+    assert not may_explain(effect("garment_slip"), both, [slip()], catalogue())
+    assert may_explain(effect("garment_slip"), both, [replace(slip(), size_deg=1.5)], catalogue())
 
 
 def test_offsets_of_wearings_that_are_not_needed_beside_a_slip_do_not_hide_it():

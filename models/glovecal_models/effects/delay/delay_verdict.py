@@ -161,8 +161,11 @@ def possible_delays(
             return (CLOCK,)
     if _score(together[DelayForm.PURE], _apart(grids, DelayForm.PURE)) > APART_TIMES * clear:
         return (LAG,)
-    short = in_short_blocks() if in_short_blocks else grids
-    kept = forms_kept(short, {form: _together(short, form) for form in DelayForm}, clear)
+    kept = forms_kept(grids, together, clear)
+    if in_short_blocks and len(kept) > 1:
+        short = in_short_blocks()
+        also = forms_kept(short, {form: _together(short, form) for form in DelayForm}, clear)
+        kept = [form for form in kept if form in also] or kept
     if DelayForm.PURE in kept and DelayForm.DELAYED_WINDOW in kept:
         kept.remove(DelayForm.DELAYED_WINDOW)  # hardly told from a mere delay
     # A filter may gain by what noise it takes away: while a mere delay is not ruled out, it comes first.
