@@ -29,7 +29,7 @@ from glovecal_models.effects.base.signature_effect import (
     named,
     stretches_of,
 )
-from glovecal_models.effects.sensor_fault.common_jumps import without_common_jumps
+from glovecal_models.effects.sensor_fault.common_faults import without_common_faults
 from glovecal_models.effects.sensor_fault.fault_watch import FaultHold
 from glovecal_models.effects.sensor_fault.gain_change import GainChange, gain_change
 from glovecal_models.effects.sensor_fault.gain_jump import gain_jump
@@ -85,7 +85,7 @@ class SensorFault(SignatureEffect):
         found: list[Finding] = []
         for sensor, rotation in rotation_of.items():
             found += _faults(takes, changes, sensor, rotation, len(rotation_of))
-        found = _with_unsteady(takes, without_common_jumps(found, len(rotation_of)), rotation_of)
+        found = _with_unsteady(takes, without_common_faults(found, len(rotation_of)), rotation_of)
         return tuple(sorted(found, key=lambda item: (-len(item.stretches), item.where)))
 
     def find_between_levels(self, takes: Sequence[Take], sensor_of: Mapping[str, str]) -> tuple[Finding, ...]:
