@@ -25,6 +25,8 @@ from glovecal_models.effects.base.context_effect import ContextEffect
 
 PIECES_OF_A_TAKE = 4
 """Of each take."""
+MOST_PIECES = 480
+"""Of all takes: many takes are cut into fewer pieces, more than these are not judged."""
 FEWEST_TAKES_OF_A_CURVE = 8
 LENGTHS = (0.08, 0.15, 0.3, 0.6)
 """Lengthscales, of the column's range."""
@@ -48,9 +50,9 @@ class Pieces:
     """Mean errors of one joint."""
 
     error: np.ndarray
-    """(T, PIECES_OF_A_TAKE), degrees."""
+    """(T, P), degrees; of rows that count by their weights as ``Rows.rooted``."""
     column: np.ndarray
-    """(T, PIECES_OF_A_TAKE), evenly spread and scaled to 0..1."""
+    """(T, P), evenly spread and scaled to 0..1."""
     piece: tuple[np.ndarray, ...]
     """For each unit (N,): the piece of each of its rows, counted through all takes."""
 
@@ -59,13 +61,15 @@ def smooth_assessment(
     design: ForwardDesign, effect: ContextEffect, usual: Assessment, generator: np.random.Generator
 ) -> Assessment | None:
     """``usual``, the effect in its usual form, with the errors that any smooth form leaves on the joints that
-    go along with it; None where takes are too few, or some have no error of a joint or no column."""
+    go along with it; None where takes are too few or too many, or some have no error of a joint or no
+    column."""
     takes = len(design.signals)
-    if takes < FEWEST_TAKES_OF_A_CURVE:
+    count = min(PIECES_OF_A_TAKE, MOST_PIECES // max(takes, 1))
+    if takes < FEWEST_TAKES_OF_A_CURVE or count < 1:
         return None
     settings = effect.fit_constants(design.signals)
     columns = [effect.evenly(effect.clipped(take, settings), settings) for take in design.signals]
-    pieces = [_pieces(design, joint, columns) for joint in range(len(usual.errors))]
+    pieces = [_pieces(design, joint, columns, count) for joint in range(len(usual.errors))]
     known = [item for item in pieces if item is not None]
     if len(known) < len(pieces):
         return None
@@ -101,7 +105,7 @@ class _Left:
     explained: np.ndarray
     """(D,) share of the square of the takes' errors."""
     predicted: np.ndarray
-    """(T, PIECES_OF_A_TAKE), degrees, as the takes were recorded."""
+    """(T, P), degrees, as the takes were recorded."""
     control: np.ndarray
     """The same in a draw that explains neither much nor little."""
 
@@ -116,29 +120,26 @@ class _Left:
         return cls(explained, predicted, control)
 
 
-def _pieces(design: ForwardDesign, joint: int, columns: Sequence[np.ndarray]) -> Pieces | None:
+def _pieces(design: ForwardDesign, joint: int, columns: Sequence[np.ndarray], pieces: int) -> Pieces | None:
     takes = len(design.signals)
     rows_of: list[list[np.ndarray]] = [[] for _ in range(takes)]
     for take, rows in design.units(joint):
         rows_of[take].append(rows)
-    error, column = np.zeros((takes, PIECES_OF_A_TAKE)), np.zeros((takes, PIECES_OF_A_TAKE))
-    count = np.zeros((takes, PIECES_OF_A_TAKE))
-    edges = []
+    error, column = np.zeros((takes, pieces)), np.zeros((takes, pieces))
+    count = np.zeros((takes, pieces))
+    edges, piece = [], []
     for take, parts in enumerate(rows_of):
         rows = np.sort(np.concatenate(parts)) if parts else np.empty(0, dtype=int)
-        if len(rows) < PIECES_OF_A_TAKE:
+        if len(rows) < pieces:
             return None
-        cuts = [part[0] for part in np.array_split(rows, PIECES_OF_A_TAKE)]
-        edges.append(np.array(cuts[1:]))
-        column[take] = [
-            float(np.mean(columns[take][part])) for part in np.array_split(rows, PIECES_OF_A_TAKE)
-        ]
-    piece = []
+        cut = np.array_split(rows, pieces)
+        edges.append(np.array([part[0] for part in cut[1:]]))
+        column[take] = [float(np.mean(columns[take][part])) for part in cut]
     for (take, rows), residual in zip(design.units(joint), design.products[joint].residual, strict=True):
         at = np.searchsorted(edges[take], rows, side="right")
         np.add.at(error[take], at, residual)
         np.add.at(count[take], at, 1.0)
-        piece.append(take * PIECES_OF_A_TAKE + at)
+        piece.append(take * pieces + at)
     span = float(np.ptp(column))
     if span <= 0 or not np.isfinite(span):
         return None
@@ -148,8 +149,8 @@ def _pieces(design: ForwardDesign, joint: int, columns: Sequence[np.ndarray]) ->
 def left_out(pieces: Pieces, orders: np.ndarray) -> np.ndarray:
     """(K, D, T, P), degrees: for K choices of lengthscale and noise, errors with takes in each of ``orders``
     (D, T), less what the other takes and the column predict of them."""
-    takes = len(pieces.error)
-    x, take = pieces.column.ravel(), np.repeat(np.arange(takes), PIECES_OF_A_TAKE)
+    takes, each = pieces.error.shape
+    x, take = pieces.column.ravel(), np.repeat(np.arange(takes), each)
     target = pieces.error[orders].reshape(len(orders), -1).T
     variance = max(float(np.mean(pieces.error**2)), 1e-12)
     same = take[:, None] == take[None, :]
@@ -157,12 +158,10 @@ def left_out(pieces: Pieces, orders: np.ndarray) -> np.ndarray:
     for length, share in product(LENGTHS, NOISE_SHARES):
         cover = np.exp(-0.5 * ((x[:, None] - x[None, :]) / length) ** 2) + LEVEL_SHARE
         precision = np.linalg.inv(variance * (cover + share * (same + np.eye(len(x)))))
-        of_take = precision.reshape(takes, PIECES_OF_A_TAKE, -1)
-        blocks = of_take.reshape(takes, PIECES_OF_A_TAKE, takes, PIECES_OF_A_TAKE)[
-            np.arange(takes), :, np.arange(takes), :
-        ]
+        of_take = precision.reshape(takes, each, -1)
+        blocks = of_take.reshape(takes, each, takes, each)[np.arange(takes), :, np.arange(takes), :]
         leave = np.linalg.solve(blocks, of_take).reshape(precision.shape)
-        found.append((leave @ target).T.reshape(len(orders), takes, PIECES_OF_A_TAKE))
+        found.append((leave @ target).T.reshape(len(orders), takes, each))
     return np.stack(found)
 
 
