@@ -16,7 +16,7 @@ from glovecal_models.effects.garment_slip.garment_slip import (
     SlipInterval,
     slip_growth,
 )
-from glovecal_models.effects.garment_slip.slip_walk import slip_walk
+from glovecal_models.effects.garment_slip.slip_rate import slip_rate
 
 SLIP = GarmentSlip()
 
@@ -69,7 +69,7 @@ def test_without_errors_or_with_short_takes_nothing_is_said(glove):
     takes = glove.takes(count=2, seconds=15, shape_counts=slipping(4.0))
     assert SLIP.find(takes, glove.sensor_of) == ()
     times, errors = [take.time_s for take in takes], [error[:, 1] for error in glove.errors(takes)]
-    assert slip_walk(times, errors, [take.reference[:, 1] for take in takes]) is None
+    assert slip_rate(times, errors, [take.reference[:, 1] for take in takes]) is None
 
 
 def test_references_that_are_measured_here_and_there_tell_no_slip(glove):

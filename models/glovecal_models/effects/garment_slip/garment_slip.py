@@ -33,7 +33,7 @@ from glovecal_models.effects.garment_slip.slip_components import (
     SlipComponents,
     slip_components,
 )
-from glovecal_models.effects.garment_slip.slip_walk import SlipWalk, frame_noise, slip_walk, without_posture
+from glovecal_models.effects.garment_slip.slip_rate import frame_noise, slip_rate, without_posture
 from glovecal_models.effects.garment_slip.take_means import is_common
 from glovecal_models.takes.take import Take
 
@@ -71,8 +71,7 @@ def slip_growth(held_out: Sequence[ClaimedErrors]) -> SlipGrowth:
     times, errors, angles = zip(
         *((item.since_start_s, item.error, item.measured) for item in held_out), strict=True
     )
-    walk = slip_walk(times, errors, angles)
-    return SlipGrowth(0.0 if walk is None else walk.rate_deg_per_sqrt_min)
+    return SlipGrowth(slip_rate(times, errors, angles) or 0.0)
 
 
 class GarmentSlip(IntervalEffect):
@@ -116,7 +115,7 @@ class GarmentSlip(IntervalEffect):
             if slip is None or not slip.is_slip(len(sensor_of)):
                 continue
             if slip.size_deg > OVER_NOISE * frame_noise(plain, times):
-                found.append((_finding(rotation, slip, slip_walk(times, own, angles)), plain))
+                found.append((_finding(rotation, slip, slip_rate(times, own, angles)), plain))
         between = [plain for finding, plain in found if finding.kind == BETWEEN]
         if is_common(takes, between):
             found = [(finding, plain) for finding, plain in found if finding.kind != BETWEEN]
@@ -168,8 +167,8 @@ HOW = {
 }
 
 
-def _finding(rotation: str, slip: SlipComponents, walk: SlipWalk | None) -> Finding:
-    rate = "" if walk is None else f", {walk.rate_deg_per_sqrt_min:.1f} deg in a minute"
+def _finding(rotation: str, slip: SlipComponents, rate_deg_per_sqrt_min: float | None) -> Finding:
+    rate = "" if rate_deg_per_sqrt_min is None else f", {rate_deg_per_sqrt_min:.1f} deg in a minute"
     advice = (
         "start every take with a known pose" if slip.kind == BETWEEN else "hold a known pose now and then"
     )
@@ -178,8 +177,8 @@ def _finding(rotation: str, slip: SlipComponents, walk: SlipWalk | None) -> Find
         f"No recorded column goes along with it."
     )
     evidence = {"likelihood_ratio_2ln": slip.likelier, "pieces_count": float(slip.pieces)}
-    if walk is not None:
-        evidence["rate_deg_per_sqrt_min"] = walk.rate_deg_per_sqrt_min
+    if rate_deg_per_sqrt_min is not None:
+        evidence["rate_deg_per_sqrt_min"] = rate_deg_per_sqrt_min
     return Finding(
         GarmentSlip.name, (rotation,), sentence, kind=slip.kind, size_deg=slip.size_deg, count=slip.pieces,
         evidence=evidence,

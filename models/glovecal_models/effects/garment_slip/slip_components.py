@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-from glovecal_models.effects.garment_slip.slip_walk import MEAN_S
+from glovecal_models.effects.garment_slip.slip_rate import MEAN_S
 from glovecal_models.regression.lapack_routines import potrf, potri
 from glovecal_models.takes.take import Take
 

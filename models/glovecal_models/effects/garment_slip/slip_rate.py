@@ -8,7 +8,6 @@ they vary by beyond it is the walk's.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,20 +18,11 @@ LEAST_MEANS = 3
 POSTURE_DEGREE = 3
 
 
-@dataclass(frozen=True)
-class SlipWalk:
-    """How the error of one rotation wanders."""
-
-    size_deg: float
-    """Standard deviation of the wandering inside a take."""
-    rate_deg_per_sqrt_min: float
-    means: int
-
-
-def slip_walk(
+def slip_rate(
     times: Sequence[np.ndarray], errors: Sequence[np.ndarray], angles: Sequence[np.ndarray]
-) -> SlipWalk | None:
-    """How the errors (N,) of each take wander; None when the takes are too short to say.
+) -> float | None:
+    """By how many degrees the errors (N,) of each take wander in a minute, with the root of the time; None
+    when the takes are too short to say.
 
     ``times`` (N,) in seconds, ``angles`` (N,) measured, degrees.
     """
@@ -47,7 +37,7 @@ def slip_walk(
     excess = max(squares / free - _stationary_variance(np.concatenate(groups)), 0.0)
     # A walk of rate q gives J means of length T a variance of q² T (J + 1) / 6.
     walked = sum(MEAN_S * (len(means) + 1) / 6.0 * (len(means) - 1) for means in long) / free
-    return SlipWalk(float(np.sqrt(excess)), float(np.sqrt(60.0 * excess / walked)), sum(map(len, long)))
+    return float(np.sqrt(60.0 * excess / walked))
 
 
 def without_posture(errors: Sequence[np.ndarray], angles: Sequence[np.ndarray]) -> list[np.ndarray]:
