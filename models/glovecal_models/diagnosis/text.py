@@ -7,16 +7,14 @@ from collections.abc import Sequence
 from glovecal_models.diagnosis.actions import Action, together
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.floor_ratio import FloorRatio
-from glovecal_models.diagnosis.hold_drift import HAND, HoldDrift, PoseDrift, drifting
+from glovecal_models.diagnosis.hold_text import hold_sentence
 from glovecal_models.diagnosis.next_take import NextTake
 from glovecal_models.diagnosis.not_identifiable import SINGLE_POSES, NotIdentifiable
 from glovecal_models.diagnosis.residual_association import ResidualAssociation
 from glovecal_models.diagnosis.unexplained_residual import SlowExcess, UnexplainedResidual
 from glovecal_models.effects.base.assessment import Assessment
-from glovecal_models.effects.catalogue import effect
 
 MOST_ASSOCIATIONS = 3
-MOST_SENSORS = 3
 UNITS = "The reference only names poses: errors are shares of the step from 0 to 1, not degrees."
 
 
@@ -36,7 +34,7 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
     sentences += [part_sentence(item) for item in diagnosis.assessments if item.part_of]
     if diagnosis.next_take is not None:
         sentences.append(next_take_sentence(diagnosis.next_take))
-    sentences.append(residual_sentence(diagnosis.residual))
+    sentences.append(residual_sentence(diagnosis.residual, by_column=diagnosis.by_column))
     return sentences + not_identifiable_sentences(diagnosis.not_identifiable)
 
 
@@ -146,11 +144,13 @@ def not_identifiable_sentences(items: Sequence[NotIdentifiable]) -> list[str]:
     return [f"Not identifiable: {', '.join(effects)}. Reason: {why}." for why, effects in reasons.items()]
 
 
-def residual_sentence(residual: UnexplainedResidual, is_noise: bool | None = None) -> str:
+def residual_sentence(
+    residual: UnexplainedResidual, is_noise: bool | None = None, by_column: Sequence[Action] = ()
+) -> str:
     """Whether the residual is significant, and what it is associated with.
 
     ``is_noise``: whether every error that a reader sees beside it lies within its floor's interval; None: the
-    residual's own errors.
+    residual's own errors. ``by_column``: of an effect that is named by it, and so still in it.
     """
     obstacle = residual_obstacle(residual)
     if obstacle is not None:
@@ -163,9 +163,10 @@ def residual_sentence(residual: UnexplainedResidual, is_noise: bool | None = Non
         shared = residual.shared
         parts.append(f"joints share an error of {shared.size_deg:.1f} degrees (p = {shared.p_value:.2g})")
     known = "identifiable effect" if residual.undecided else "known effect"
-    sentence = (
-        f"No {known} explains the residual: {' and '.join(parts)}; {_associated(residual.associations)}."
-    )
+    start = f"No {known} explains the residual"
+    if by_column:
+        start = f"Until {by_column[0].effect} is added, its error is in the residual"
+    sentence = f"{start}: {' and '.join(parts)}; {_associated(residual.associations)}."
     undecided = " or ".join(residual.undecided)
     return (
         f"{sentence} Possible cause that these takes cannot decide: {undecided}." if undecided else sentence
@@ -254,73 +255,3 @@ def _associated(columns: Sequence[ResidualAssociation]) -> str:
         for item in columns[:MOST_ASSOCIATIONS]
     ]
     return f"it is associated with {', '.join(each)}"
-
-
-def hold_sentence(drift: HoldDrift) -> str:
-    """What drifts within held poses, how much, and what it is consistent with."""
-    if drift.why_not is not None:
-        return f"Drift within held poses cannot be judged: {drift.why_not}."
-    if not drift.confidence_set:
-        return (
-            f"While a pose is held the readings do not drift significantly ({drift.holds} holds, p = "
-            f"{drift.p_value:.2g} by flipping the sign of whole holds)."
-        )
-    poses = [pose for pose in drift.poses if drift.consistent(pose)] or [drift.poses[0]]
-    each = "; ".join(_pose(drift, pose) for pose in poses)
-    return f"{_headline(drift)}: {each}. {_reason(drift)} {_limits(drift)}".strip()
-
-
-def _headline(drift: HoldDrift) -> str:
-    causes = ["the hand relaxing" if name == HAND else effect(name).spoken for name in drift.confidence_set]
-    if len(causes) == 1:
-        return f"While a pose is held the readings drift: {causes[0]}"
-    return (
-        f"While a pose is held the readings drift, consistent with {', '.join(causes[:-1])}, or {causes[-1]}"
-    )
-
-
-def _pose(drift: HoldDrift, pose: PoseDrift) -> str:
-    largest = drift.consistent(pose)
-    parts = [_change(drift, name, share) for name, share in largest[:MOST_SENSORS]]
-    more = len(largest) - len(parts)
-    sensors = ", ".join(parts) + (f" ({more} more by less)" if more > 0 else "")
-    tau = f"more than {pose.duration_s:.0f} s" if pose.tau_is_long else f"about {pose.tau_s:.2g} s"
-    return (
-        f"in {pose.holds} holds of {pose.pose}, within {pose.duration_s:.0f} s each, and with a time constant"
-        f" of {tau}, the reading of {sensors} of {'their spans' if len(largest) > 1 else 'its span'}"
-    )
-
-
-def _change(drift: HoldDrift, name: str, share: float) -> str:
-    degrees = drift.change_deg(name, share)
-    also = "" if degrees is None else f" ({abs(degrees):.1f} degrees)"
-    return f"{name} {'rises' if share > 0 else 'falls'} by {100 * abs(share):.1f} %{also}"
-
-
-def _reason(drift: HoldDrift) -> str:
-    p_value = f"p = {drift.p_value:.2g} by flipping the sign of whole holds"
-    if drift.recovery is not None:
-        gone = 100 * min(max(drift.recovery, 0.0), 1.0)
-        return f"{gone:.0f} % of it has recovered when the pose comes back ({p_value})."
-    if drift.elsewhere is not None:
-        speed, where = 100 * drift.elsewhere, ", ".join(drift.far)
-        if speed < 0:
-            return f"In {where} they drift in the opposite direction, unlike warm-up ({p_value})."
-        like = "unlike warm-up" if speed < 50 else "like warm-up"
-        return f"In {where} they drift at {speed:.0f} % of this speed, {like} ({p_value})."
-    return f"The drift is significant ({p_value})."
-
-
-def _limits(drift: HoldDrift) -> str:
-    if drift.confidence_set == drifting("begins anew with each hold"):
-        return "It is there around a rigid form too, where the hand cannot relax: the sensors creep."
-    if drift.confidence_set == (HAND,):
-        return "Around a rigid form, where the hand cannot relax, it is not there: the sensors do not creep."
-    if HAND in drift.confidence_set and drift.deg_of_span:
-        return "With measured angles glovecal diagnose separates them; without, hold a rigid form."
-    if HAND in drift.confidence_set:
-        return (
-            "Without a measured angle these cannot be separated; hold a rigid form for 20 s, several times,"
-            " to decide."
-        )
-    return "It goes on in one direction and does not begin anew with each hold, so it is not creep."

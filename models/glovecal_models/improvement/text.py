@@ -10,9 +10,9 @@ from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.noise_floor import is_at_floor
 from glovecal_models.comparison.text import floor_text
 from glovecal_models.diagnosis.diagnosis import Diagnosis
+from glovecal_models.diagnosis.hold_text import hold_sentence
 from glovecal_models.diagnosis.text import (
     UNITS,
-    hold_sentence,
     not_identifiable_sentences,
     nothing_named_sentence,
     ranked_sentence,

@@ -232,11 +232,17 @@ class UnexplainedResidualView(View):
     floor_ratios: dict[str, FloorRatioView] = Field({}, description="For each rotation with a known floor.")
 
     @classmethod
-    def of(cls, residual: UnexplainedResidual, is_noise: bool | None = None) -> UnexplainedResidualView:
-        """``is_noise``: of the errors shown beside it; None: the residual's own."""
+    def of(
+        cls,
+        residual: UnexplainedResidual,
+        is_noise: bool | None = None,
+        by_column: Sequence[Action] = (),
+    ) -> UnexplainedResidualView:
+        """``is_noise``: of the errors shown beside it; None: the residual's own. ``by_column``: of an effect
+        that is named by it."""
         return cls(
             is_significant=residual.is_significant,
-            sentence=residual_sentence(residual, is_noise),
+            sentence=residual_sentence(residual, is_noise, by_column),
             floor_ratios={name: FloorRatioView.of(item) for name, item in residual.floor_ratios.items()},
             not_identifiable=residual_obstacle(residual),
             associations=[
@@ -288,7 +294,9 @@ class DiagnosisView(View):
             ],
             reference_problems=list(diagnosis.reference_problems),
             hold_drift=None if held is None else HoldDriftView.of(held),
-            unexplained_residual=UnexplainedResidualView.of(diagnosis.residual),
+            unexplained_residual=UnexplainedResidualView.of(
+                diagnosis.residual, by_column=diagnosis.by_column
+            ),
             next_take=NextTakeView.of(diagnosis.next_take),
             actions=[ActionView.of(item) for item in diagnosis.actions],
             sentences=diagnosis_sentences(diagnosis),

@@ -8,8 +8,8 @@ from pydantic import BeforeValidator, Field
 
 from glovecal_models.diagnosis.hold_drift import HoldDrift, HoldVerdict
 from glovecal_models.diagnosis.hold_fit import PoseDrift
+from glovecal_models.diagnosis.hold_text import hold_sentence
 from glovecal_models.diagnosis.next_take import hold_next_take
-from glovecal_models.diagnosis.text import hold_sentence
 from glovecal_service.views.next_take import NextTakeView
 from glovecal_service.views.renamed_keys import current_verdict
 from glovecal_service.views.view import View

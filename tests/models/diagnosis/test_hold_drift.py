@@ -12,9 +12,9 @@ import pytest
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.hold_drift import hold_drift
+from glovecal_models.diagnosis.hold_text import hold_sentence
 from glovecal_models.diagnosis.next_take import hold_next_take
 from glovecal_models.diagnosis.posed_holds import degrees_of_spans, posed_holds
-from glovecal_models.diagnosis.text import hold_sentence
 from glovecal_models.improvement.improve import improve
 from glovecal_models.improvement.text import improvement_sentences
 from glovecal_models.layout import Layout
