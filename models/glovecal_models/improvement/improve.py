@@ -149,9 +149,9 @@ class _Loop:
             limits=self.limits.diagnosis, cancelled=self.cancelled,
         )  # fmt: skip
         self.diagnosed = takes
-        tried = self._tried
-        if self._is_named_last(self.diagnosis):
-            return self._add_widenings()
+        if self._is_named_last(self.diagnosis) and self._add_widenings():
+            return True
+        tried = self._refused
         for item in self.diagnosis.naming.ranked:
             if item.effect in tried:
                 continue
@@ -310,6 +310,17 @@ class _Loop:
             for trial in self.trials
             if not trial.addition.added and trial.action is None
         }
+
+    @property
+    def _refused(self) -> set[str]:
+        """Those tried since the last step: beside another effect one may do what it could not do alone."""
+        found: set[str] = set()
+        for trial in self.trials:
+            if trial.addition.added:
+                found.clear()
+            elif trial.action is None:
+                found.add(trial.addition.effect)
+        return found
 
     def _repaired(self) -> list[Take]:
         return repaired_takes(self.takes, requested_effects(self.steps[-1].model))
