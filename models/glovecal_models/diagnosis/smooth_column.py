@@ -25,7 +25,7 @@ from glovecal_models.effects.base.context_effect import ContextEffect
 
 PIECES_OF_A_TAKE = 4
 """Of each take."""
-MOST_PIECES = 480
+MOST_PIECES_OF_ALL = 480
 """Of all takes: many takes are cut into fewer pieces, more than these are not judged."""
 FEWEST_TAKES_OF_A_CURVE = 8
 LENGTHS = (0.08, 0.15, 0.3, 0.6)
@@ -64,7 +64,7 @@ def smooth_assessment(
     go along with it; None where takes are too few or too many, or some have no error of a joint or no
     column."""
     takes = len(design.signals)
-    count = min(PIECES_OF_A_TAKE, MOST_PIECES // max(takes, 1))
+    count = min(PIECES_OF_A_TAKE, MOST_PIECES_OF_ALL // max(takes, 1))
     if takes < FEWEST_TAKES_OF_A_CURVE or count < 1:
         return None
     settings = effect.fit_constants(design.signals)

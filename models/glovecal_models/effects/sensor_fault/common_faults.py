@@ -13,7 +13,7 @@ from glovecal_models.effects.base.signature_effect import Finding, Stretch
 FEWEST_TOGETHER = 3
 TOGETHER_S = {"jump": 0.5, "dropouts": 0.05, "spikes": 0.05}
 """So far apart they may begin, by kind; other kinds are not looked at."""
-MOSTLY = 0.5
+MOSTLY_SHARED = 0.5
 """Share of a sensor's moments."""
 
 
@@ -32,7 +32,7 @@ def without_common_faults(found: Sequence[Finding], sensors: int) -> list[Findin
 def _is_shared(item: Finding, alike: Sequence[Finding]) -> bool:
     others = [stretch for other in alike if other is not item for stretch in other.stretches]
     together = [any(_begin_alike(stretch, each, item.kind) for each in others) for stretch in item.stretches]
-    return sum(together) > MOSTLY * len(together)
+    return sum(together) > MOSTLY_SHARED * len(together)
 
 
 def _begin_alike(one: Stretch, other: Stretch, kind: str) -> bool:
