@@ -111,6 +111,14 @@ def test_ctrl_c_ends_it_and_leaves_nothing_behind(call: str, tmp_path: Path):
         time.sleep(0.05)
 
 
+def none_stays() -> bool:
+    """Whether no worker is there any more within ten seconds: on a busy machine an end takes its time."""
+    end = time.monotonic() + 10.0
+    while active_children() and time.monotonic() < end:
+        time.sleep(0.05)
+    return not active_children()
+
+
 def test_workers_give_the_same_model_to_the_byte(model, takes):
     told: list[float] = []
     ours = glovecal.train(
@@ -118,10 +126,10 @@ def test_workers_give_the_same_model_to_the_byte(model, takes):
     )
     assert ours.id == model.id
     assert told == sorted(told)
-    assert not active_children()
+    assert none_stays()
     with pytest.raises(glovecal.Cancelled):
         glovecal.train(takes, workers=2, cancelled=lambda: True)
-    assert not active_children()
+    assert none_stays()
 
 
 def test_a_script_that_cannot_be_imported_is_told_so(tmp_path: Path):
