@@ -22,6 +22,7 @@ from glovecal_models.takes.tap_latency import USUAL_KEY_S, usual_key
 MOST_TAKES = 2
 NEW_WEARING_S = 40.0
 DELAYS_S = np.arange(0.0, 0.1, 0.001)
+"""That frames which come again are tried for."""
 TAPS_SD_S = 0.003
 """What taps scatter and the finger's stop is misjudged by."""
 

@@ -40,7 +40,13 @@ def session_p_value(design: ForwardDesign, effect: Effect, generator: np.random.
     given = _Given(effect, settings, effect.grid(design.signals, settings), thin, left)
     own = _own_givers(thin, effect)
     every = np.array([given.explained(order) for order in (own, *permutations)])
-    shares = np.minimum(shares_as_large(every.sum(axis=1)), shares_as_large(every.max(axis=1)))
+    return share_as_large(every)
+
+
+def share_as_large(explained: np.ndarray) -> float:
+    """Of draws (D, J), the first of which is as it was recorded: those that explain as much of all joints
+    together, or of one."""
+    shares = np.minimum(_shares_as_large(explained.sum(axis=1)), _shares_as_large(explained.max(axis=1)))
     return float(np.mean(shares <= shares[0] * (1 + 1e-9)))
 
 
@@ -122,7 +128,7 @@ def _sum(parts: Sequence[np.ndarray]) -> np.ndarray:
     return total
 
 
-def shares_as_large(values: np.ndarray) -> np.ndarray:
+def _shares_as_large(values: np.ndarray) -> np.ndarray:
     """For each of (D,): the share of all that are as large."""
     return np.mean(values[None, :] >= values[:, None] * (1 - 1e-9), axis=1)
 

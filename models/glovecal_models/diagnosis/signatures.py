@@ -63,8 +63,8 @@ def _is_asked(effect: Effect, naming: Naming, effects: Mapping[str, Effect]) -> 
 
 LEAST_SIZE = 0.35
 """Of the square that a ranking saves: a slip that is smaller cannot be what it seems to explain. Two slow
-causes at once saved four times as much as the slip that they looked like; of 36 simulated slips of every size
-beside a ranking none was as small."""
+causes at once saved nearly four times as much as the slip that they looked like; of 36 simulated slips none
+was as small beside a ranking."""
 OUTWEIGHED = 3.0
 """Times the squared error where findings are: what saves so much more is named before them."""
 

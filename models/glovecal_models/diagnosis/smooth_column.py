@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from glovecal_models.diagnosis.forward_design import ForwardDesign
-from glovecal_models.diagnosis.permutation_test import shares_as_large
+from glovecal_models.diagnosis.permutation_test import share_as_large
 from glovecal_models.effects.base.assessment import (
     Assessment,
     JointErrors,
@@ -24,7 +24,7 @@ from glovecal_models.effects.base.assessment import (
 from glovecal_models.effects.base.context_effect import ContextEffect
 
 PIECES_OF_A_TAKE = 4
-"""Of each take."""
+"""At most."""
 MOST_PIECES_OF_ALL = 480
 """Of all takes: many takes are cut into fewer pieces, more than these are not judged."""
 FEWEST_TAKES_OF_A_CURVE = 8
@@ -78,7 +78,7 @@ def smooth_assessment(
         more = [generator.permutation(takes) for _ in range(draws + 1 - len(orders))]
         orders = np.concatenate([orders, more])
         left = [_Left.of(item, orders) for item in known]
-        p_value = min(1.0, STRICTER * _share_as_large(np.array([item.explained for item in left])))
+        p_value = min(1.0, STRICTER * share_as_large(np.column_stack([item.explained for item in left])))
         if draws < DRAWS and p_value > HOPELESS_P_VALUE:
             return None
     errors = []
@@ -89,13 +89,6 @@ def smooth_assessment(
         else:
             errors.append(_errors(design, joint, known[joint], before, found))
     return replace(usual, errors=tuple(errors), p_value=p_value)
-
-
-def _share_as_large(explained: np.ndarray) -> float:
-    """Of draws (J, D), the first of which is as it was recorded: those that explain as much of all joints
-    together or of one, as in ``session_p_value``."""
-    shares = np.minimum(shares_as_large(explained.sum(axis=0)), shares_as_large(explained.max(axis=0)))
-    return float(np.mean(shares <= shares[0] * (1 + 1e-9)))
 
 
 @dataclass(frozen=True)

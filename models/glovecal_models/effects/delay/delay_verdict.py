@@ -37,7 +37,7 @@ ASKED_SE = 3.0
 """Taps are asked for where the delay of takes is so many: it will hardly come out in between."""
 FAST_DECIDES_S = 0.02
 """Shorter filters look like mere delays in fast motion too (simulated gloves: of 5 with 10 to 12 ms one
-became clear; of 10 with 22 to 25 ms all within one take of 45 s)."""
+became clear; of 19 with about 22 ms 17 within one take of 45 s)."""
 STOP_SD_S = 0.003
 """Taps find the finger's stop 2 to 4 ms late (simulated)."""
 ACCOUNTS_FOR = {

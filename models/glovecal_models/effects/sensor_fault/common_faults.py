@@ -6,9 +6,10 @@ order, or twice, make them drop out and spike together.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 
-from glovecal_models.effects.base.signature_effect import Finding, Stretch
+from glovecal_models.effects.base.signature_effect import Finding
 
 FEWEST_TOGETHER = 3
 TOGETHER_S = {"jump": 0.5, "dropouts": 0.05, "spikes": 0.05}
@@ -30,10 +31,18 @@ def without_common_faults(found: Sequence[Finding], sensors: int) -> list[Findin
 
 
 def _is_shared(item: Finding, alike: Sequence[Finding]) -> bool:
-    others = [stretch for other in alike if other is not item for stretch in other.stretches]
-    together = [any(_begin_alike(stretch, each, item.kind) for each in others) for stretch in item.stretches]
+    begins: dict[str, list[float]] = {}
+    for other in alike:
+        for stretch in other.stretches if other is not item else ():
+            begins.setdefault(stretch.take, []).append(stretch.start_s)
+    for starts in begins.values():
+        starts.sort()
+    within = TOGETHER_S[item.kind]
+    together = [_is_near(each.start_s, begins.get(each.take, []), within) for each in item.stretches]
     return sum(together) > MOSTLY_SHARED * len(together)
 
 
-def _begin_alike(one: Stretch, other: Stretch, kind: str) -> bool:
-    return one.take == other.take and abs(one.start_s - other.start_s) <= TOGETHER_S[kind]
+def _is_near(moment_s: float, starts: Sequence[float], within_s: float) -> bool:
+    """Whether one of rising ``starts`` is; a noisy sensor has thousands."""
+    place = bisect_left(starts, moment_s - within_s)
+    return place < len(starts) and starts[place] <= moment_s + within_s
