@@ -4,6 +4,8 @@ A strap gives way once, a seam wanders over its knuckle, and every opening of a 
 on by a notch. Each begins anew when the glove is put on again.
 
 A strap lets go, a wrinkle travels along the finger, and every fist pulls the glove on by another notch.
+
+A seam that ravels, cloth that sags from straight fingers, or a sheath that turns round its finger.
 """
 
 from __future__ import annotations
@@ -142,4 +144,68 @@ def _fists(scene: Scene, closed: float, opened: float) -> np.ndarray:
     return made
 
 
-FORMS = (strap_gives_way, seam_wanders, notch_at_each_opening, strap_lets_go, wrinkle_travels, notch_by_fist)
+@form(
+    Stage.WEARING,
+    "A seam ravels stitch by stitch, quicker and quicker, as each one lost loads the next more (ours).",
+    only_by_name=True,
+)
+def seam_ravels(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """All sensors move on by a step with each stitch, and stitches follow each other ever sooner."""
+    quickens = _per_wearing(scene, draws, "quickens_s", 150.0, 350.0)[:, None]
+    stitches = draws.one("stitches", 4.0, 9.0)
+    own = draws.each("own", 0.6, 1.4) * draws.signs()
+    gone = np.expm1(_worn(scene) / quickens) / np.expm1(600.0 / quickens)
+    return signal + size * 3 * own * (np.floor(stitches * gone + 0.5) / stitches)[:, :, None]
+
+
+@form(
+    Stage.WEARING,
+    "Cloth grown slack sags from straight fingers, with the root of the time worn (diffusive give; ours).",
+    only_by_name=True,
+)
+def sags_when_straight(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Below a certain bend each sensor falls off, by more and more since donning."""
+    below = draws.each("below_bend", 0.35, 0.6)
+    pace = _per_wearing(scene, draws, "pace", 0.6, 1.4)[:, None]
+    slack = pace * np.sqrt(_worn(scene) / 600.0)
+    bend = (signal - scene.low) / scene.span
+    return signal + size * 8 * draws.signs() * slack[:, :, None] * np.maximum(below - bend, 0.0)
+
+
+@form(
+    Stage.WEARING,
+    "A finger's sheath turns slowly round it, so that the strip sees the bend by the cosine"
+    " (geometry; ours).",
+    only_by_name=True,
+)
+def sheath_turns(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Each sheath turns from where it was put on, one way or the other, and swings a little on its way."""
+    swing_s, own = draws.one("swing_s", 90.0, 200.0), draws.each("own", 0.5, 1.0)
+    rate = _per_wearing(scene, draws, "turn", 0.7, 1.5)[:, None]
+    worn = _worn(scene)
+    turned = rate * (worn / 600.0 + 0.25 * np.sin(2 * np.pi * worn / swing_s))
+    seen = np.cos(np.clip(turned[:, :, None] * own, -1.5, 1.5)) - 1
+    return signal + size * 8 * (signal - scene.low) / scene.span * seen
+
+
+def _worn(scene: Scene) -> np.ndarray:
+    """Seconds since donning, between putting on and half an hour."""
+    return np.clip(scene.since_donned_s, 0.0, 1800.0)
+
+
+def _per_wearing(scene: Scene, draws: Draws, name: str, low: float, high: float) -> np.ndarray:
+    """One number for every take, the same within a wearing."""
+    return np.array([draws.stream(name, start.wearing).uniform(low, high) for start in scene.starts])
+
+
+FORMS = (
+    strap_gives_way,
+    seam_wanders,
+    notch_at_each_opening,
+    strap_lets_go,
+    wrinkle_travels,
+    notch_by_fist,
+    seam_ravels,
+    sags_when_straight,
+    sheath_turns,
+)

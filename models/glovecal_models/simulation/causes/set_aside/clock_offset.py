@@ -1,72 +1,59 @@
-"""Clock offset: the reference's times differ from the glove's.
-
-By a crystal that follows the air, a correction at one moment, or a solver that is slow for a closed hand.
-"""
+"""Clock offset: the reference's clock differs from the glove's."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import lfilter
 
 from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 from glovecal_models.simulation.signals import at_times
 
 
-@form(
-    Stage.CLOCK,
-    "A tuning-fork crystal loses time by the square of its distance from about 25 degC (data sheets of 32 kHz).",
-    set_aside=True,
-    sizes=(0.002, 1.2),
-    shared=True,
-)
-def tuning_fork_crystal(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """The time lost adds up through the session, more the further the air is from the turnover point."""
-    turnover = draws.one("turnover_c", 20.0, 30.0)
-    middle = scene.session_s.mean(axis=1)
-    order = np.argsort(middle)
-    rate = (scene.temperature_c.mean(axis=1)[order] - turnover) ** 2 + 1.0
-    knots = np.r_[np.minimum(scene.session_s.min(), 0.0), middle[order], scene.session_s.max()]
-    rates = np.r_[rate[0], rate, rate[-1]]
-    lost = np.r_[0.0, np.cumsum(np.diff(knots) * (rates[1:] + rates[:-1]) / 2)]
-    offset = draws.sign() * size[0] * np.interp(scene.session_s, knots, lost) / 15000
-    return _shifted(signal, scene, offset)
+def _seen(signal: np.ndarray, scene: Scene, offset_s: np.ndarray) -> np.ndarray:
+    """The angles at times that are off by ``offset_s`` (T, N) or (T, 1)."""
+    shifted = scene.time_s + offset_s
+    seen = [at_times(scene.time_s, take, times) for take, times in zip(signal, shifted, strict=True)]
+    return np.stack(seen)
 
 
 @form(
     Stage.CLOCK,
-    "A network clock is off by too much to be slewed and is set right at one moment (NTP's step threshold).",
+    "Both clocks were set once, not quite alike: the same offset for the whole session (ours).",
     set_aside=True,
-    sizes=(0.002, 1.2),
     shared=True,
+    sizes=(0.002, 1.2),
 )
-def stepped_once(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """One time difference up to a moment of the session, a small one of the other sign from then on."""
-    moment = draws.one("moment_s", 600.0, 1500.0)
-    after = draws.one("after", -0.4, -0.1)
-    offset = draws.sign() * size[0] * np.where(scene.session_s < moment, 1.2, after)
-    return _shifted(signal, scene, offset)
+def clocks_set_apart(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Size is the offset in seconds."""
+    return _seen(signal, scene, np.full((len(signal), 1), draws.sign() * size[0]))
 
 
 @form(
     Stage.CLOCK,
-    "Solving takes longer while a closed hand hides its markers, and poses are stamped when solved (ours).",
+    "Two quartzes of slightly different rate, set alike at the start: the offset grows with session time.",
     set_aside=True,
-    sizes=(0.002, 1.2),
     shared=True,
+    sizes=(0.002, 1.2),
 )
-def slow_for_closed_hand(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """The time difference follows, a little smoothed, how far the hand is closed."""
-    keep = np.exp(-1 / (draws.one("smooth_s", 1.5, 3.0) * scene.rate_hz))
-    closed = scene.closing - scene.closing[:, :1]
-    smooth = np.asarray(lfilter([1 - keep], [1.0, -keep], closed, axis=1)) + scene.closing[:, :1]
-    return _shifted(signal, scene, draws.sign() * size[0] * (0.2 + 1.6 * smooth))
+def quartz_rates_differ(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Size is the offset in seconds after half an hour; the first setting leaves a small rest."""
+    rest = draws.one("rest", -0.1, 0.1)
+    offset = draws.sign() * size[0] * (rest + scene.session_s / 1800.0)
+    return _seen(signal, scene, np.clip(offset, -2.9, 2.9))
 
 
-def _shifted(signal: np.ndarray, scene: Scene, offset_s: np.ndarray) -> np.ndarray:
-    """The signal at its times plus an offset for every take and time."""
-    moved = zip(signal, scene.time_s + offset_s, strict=True)
-    return np.stack([at_times(scene.time_s, take, times) for take, times in moved])
+@form(
+    Stage.CLOCK,
+    "Each take is started on two computers by a command or a clap: the offset is new for each take (ours).",
+    set_aside=True,
+    shared=True,
+    sizes=(0.002, 1.2),
+)
+def takes_started_apart(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Size is the spread of the offset over takes in seconds, about a mean that may be off as well."""
+    mean = draws.one("mean", -0.5, 0.5)
+    apart = [mean + draws.stream("start", start.key).uniform(-1.7, 1.7) for start in scene.starts]
+    return _seen(signal, scene, size[0] * np.array(apart)[:, None])
 
 
-FORMS = (tuning_fork_crystal, stepped_once, slow_for_closed_hand)
+FORMS = (clocks_set_apart, quartz_rates_differ, takes_started_apart)

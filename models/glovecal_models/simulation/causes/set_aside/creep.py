@@ -1,71 +1,70 @@
-"""Creep: a bend that is held changes the reading over seconds to a minute.
-
-Only large strains creep, two layers creep against each other, or the give comes in jerks.
-"""
+"""Creep: the material relaxes over seconds to a minute after it is bent."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.signal import lfilter
 
 from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 
-@form(
-    Stage.MECHANICAL,
-    "Creep grows far more than in proportion with the strain (stress-dependent compliance; Schapery 1969).",
-    set_aside=True,
-)
-def deep_bends_creep(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """A relaxation of a high power of the bend: little after small bends, much after deep ones."""
-    seconds, power = draws.each("seconds", 6.0, 25.0), draws.each("power", 2.5, 4.0)
-    bend = np.maximum(_bend(signal, scene), 0.0)
-    return signal + size * 6 * draws.sign() * _follow(bend**power, seconds, scene.rate_hz)
+def _slow(values: np.ndarray, time_s: float | np.ndarray, rate_hz: float) -> np.ndarray:
+    """``values`` (T, N, S) followed with a time constant for each sensor, at rest before the first frame."""
+    keep = np.exp(-1.0 / (np.broadcast_to(time_s, values.shape[2:]) * rate_hz))
+    followed = np.empty_like(values)
+    for sensor, kept in enumerate(keep):
+        first = values[:, :1, sensor]
+        part = lfilter([1 - kept], [1.0, -kept], values[:, :, sensor] - first, axis=1)
+        followed[:, :, sensor] = first + part
+    return followed
 
 
 @form(
     Stage.MECHANICAL,
-    "A step rises for seconds and vanishes within a minute, as two layers give unequally fast (Kovacs 1963).",
+    "A spring beside a spring with a damper: it relaxes with one time constant (standard linear solid).",
     set_aside=True,
 )
-def two_layers_cancel(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """A quick layer's relaxation less a slow one's, so that a held bend is right at once and at last."""
-    quick, slow = draws.each("quick_s", 1.5, 4.0), draws.each("slow_s", 12.0, 30.0)
-    bend = _bend(signal, scene)
-    hump = _follow(bend, quick, scene.rate_hz) - _follow(bend, slow, scene.rate_hz)
-    return signal + size * 6 * draws.signs() * hump
+def single_relaxation(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """After a bend the reading droops, and after straightening it comes back from below."""
+    share = (signal - scene.low) / scene.span
+    return signal - size * _slow(share, draws.each("time_s", 4.0, 20.0), scene.rate_hz)
 
 
 @form(
     Stage.MECHANICAL,
-    "Fibres slip past each other in small jerks while they relax (crackling of crumpled sheets).",
+    "Polymer that relaxes evenly in the logarithm of time, 1 to 50 s (Prony series of a power law, Findley).",
     set_aside=True,
 )
-def gives_in_jerks(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """A relaxation that rests until its pent-up part lets go, which it then does at once."""
-    seconds, jerk = draws.each("seconds", 6.0, 20.0), draws.each("jerk", 0.06, 0.15)
-    smooth = _follow(_bend(signal, scene), seconds, scene.rate_hz)
-    out = np.empty_like(signal)
-    state = smooth[:, 0]
-    for frame in range(signal.shape[1]):
-        state = np.where(np.abs(smooth[:, frame] - state) > jerk, smooth[:, frame], state)
-        out[:, frame] = state
-    return signal + size * 6 * draws.sign() * out
+def logarithmic_relaxation(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Four time constants, three or four times apart, of about equal weight."""
+    share = (signal - scene.low) / scene.span
+    shortest, exponent = draws.one("shortest_s", 0.8, 1.5), draws.each("exponent", -0.1, 0.25)
+    relaxed, total = np.zeros_like(share), np.zeros_like(exponent)
+    for step in range(4):
+        weight = np.exp(exponent * step)
+        relaxed += weight * _slow(share, shortest * 3.3**step, scene.rate_hz)
+        total += weight
+    return signal - size * relaxed / total
 
 
-def _bend(signal: np.ndarray, scene: Scene) -> np.ndarray:
-    return np.clip((signal - scene.low) / scene.span, -0.2, 1.2)
+@form(
+    Stage.MECHANICAL,
+    "Textile lengthens while the joint is bent far, and recovers more slowly than it gave way (ours).",
+    set_aside=True,
+)
+def slowly_recovering_textile(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Lengthening goes to the square of the bend, quickly upwards and slowly downwards."""
+    load = np.clip((signal - scene.low) / scene.span, 0.0, 1.2) ** 2
+    giving = draws.each("giving_s", 3.0, 10.0)
+    returning = giving * draws.each("times_slower", 2.0, 4.0)
+    quick, slow = (1 - np.exp(-1.0 / (time_s * scene.rate_hz)) for time_s in (giving, returning))
+    longer, now = np.empty_like(load), load[:, 0]
+    for frame in range(load.shape[1]):
+        gap = load[:, frame] - now
+        now = now + np.where(gap > 0, quick, slow) * gap
+        longer[:, frame] = now
+    return signal - size * longer
 
 
-def _follow(drive: np.ndarray, seconds: np.ndarray, rate_hz: float) -> np.ndarray:
-    """A state that closes in on the drive with one time per sensor."""
-    share = 1 - np.exp(-1 / (seconds * rate_hz))
-    out = np.empty_like(drive)
-    state = drive[:, 0]
-    for frame in range(drive.shape[1]):
-        state = state + share * (drive[:, frame] - state)
-        out[:, frame] = state
-    return out
-
-
-FORMS = (deep_bends_creep, two_layers_cancel, gives_in_jerks)
+FORMS = (single_relaxation, logarithmic_relaxation, slowly_recovering_textile)

@@ -1,7 +1,4 @@
-"""Cross coupling: other joints of the hand show in a sensor's reading.
-
-Through a return wire that all share, through a magnet that comes alongside, and through a web with slack.
-"""
+"""Cross-coupling: neighbouring joints also stretch or bend the sensor, at once and always alike."""
 
 from __future__ import annotations
 
@@ -11,61 +8,60 @@ from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 
-@form(
-    Stage.ELECTRICAL,
-    "Currents of all other sensors lift the ground of a shared return wire (common-impedance coupling; Ott).",
-    set_aside=True,
-    touches="two",
-)
-def shared_return_wire(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Each sensor is lifted by the others' currents, which fall as they bend, less so when bent itself."""
-    growth = draws.each("growth", 1.0, 3.0)
-    bend = _bend(scene.own, scene)
-    current = 1 / (1 + growth * bend)
-    others = current.sum(axis=2, keepdims=True) - current
-    lift = others - (bend.shape[2] - 1) / (1 + 0.4 * growth)
-    return signal + size * 4 * lift * (1 - draws.one("own_share", 0.3, 0.7) * bend)
-
-
-@form(
-    Stage.ELECTRICAL,
-    "A neighbour's magnet adds its field while both fingers are side by side (dipole: inverse cube).",
-    set_aside=True,
-    touches="two",
-)
-def magnet_alongside(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Each sensor is disturbed while it and its neighbour are about equally bent, not when they part."""
-    reach = draws.each("reach", 0.12, 0.3)
-    apart = _bend(scene.own, scene) - _neighbour(_bend(scene.own, scene))
-    return signal + size * 4 * draws.signs() * (1 + (apart / reach) ** 2) ** -1.5
+def _neighbour_shares(scene: Scene, draws: Draws) -> tuple[np.ndarray, np.ndarray]:
+    """Two other sensors' angles for each sensor as shares of their ranges, each of shape (T, N, S)."""
+    count = len(scene.sensors)
+    random = draws.stream("neighbours")
+    picked = []
+    for sensor in range(count):
+        others = [other for other in range(count) if other != sensor]
+        first, second = random.choice(others, 2, replace=len(others) < 2)
+        picked.append((int(first), int(second)))
+    firsts, seconds = [pair[0] for pair in picked], [pair[1] for pair in picked]
+    draws.values["first_neighbour"] = [float(place) for place in firsts]
+    draws.values["second_neighbour"] = [float(place) for place in seconds]
+    share = (scene.own - scene.low) / scene.span
+    return share[:, :, firsts], share[:, :, seconds]
 
 
 @form(
     Stage.MECHANICAL,
-    "A web of cloth follows the neighbour with slack, so it rests until that is taken up (backlash; ours).",
+    "Fabric between the fingers hands on a fixed share of two neighbours' bending (linear; ours).",
     set_aside=True,
     touches="two",
 )
-def slack_web(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Each sensor is pulled by a web that its neighbour drags along behind a slack in both directions."""
-    slack = draws.each("slack", 0.1, 0.25)
-    bend = _neighbour(_bend(scene.own, scene))
-    dragged = np.empty_like(bend)
-    place = bend[:, 0]
-    for frame in range(bend.shape[1]):
-        place = np.clip(place, bend[:, frame] - slack, bend[:, frame] + slack)
-        dragged[:, frame] = place
-    return signal + size * 4 * draws.signs() * dragged
+def shared_fabric_pull(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The nearer neighbour counts fully, the other one less."""
+    near, far = _neighbour_shares(scene, draws)
+    return signal + size * draws.signs() * (near + draws.each("far_share", 0.2, 0.6) * far)
 
 
-def _bend(angle: np.ndarray, scene: Scene) -> np.ndarray:
-    return np.clip((angle - scene.low) / scene.span, 0.0, 1.1)
+@form(
+    Stage.MECHANICAL,
+    "Slack between fingers: a neighbour pulls only once it is bent enough to tighten the cloth (ours).",
+    set_aside=True,
+    touches="two",
+)
+def pull_after_slack(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Nothing up to the slack, then in proportion to what goes beyond it, with a rounded corner."""
+    near, _ = _neighbour_shares(scene, draws)
+    slack, width = draws.each("slack", 0.2, 0.45), 0.04
+    pull = width * np.logaddexp(0.0, (near - slack) / width)
+    return signal + size * draws.signs() * pull
 
 
-def _neighbour(values: np.ndarray) -> np.ndarray:
-    """The next sensor's values for each sensor; the last one takes those before it."""
-    place = np.arange(values.shape[2])
-    return values[:, :, np.where(place + 1 < len(place), place + 1, place - 1)]
+@form(
+    Stage.MECHANICAL,
+    "A neighbour's pull reaches the sensor better the more its own joint has tightened the glove (ours).",
+    set_aside=True,
+    touches="two",
+)
+def pull_on_tight_glove(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The neighbour's bend times a transfer that grows with the own bend."""
+    near, _ = _neighbour_shares(scene, draws)
+    own = np.clip((scene.own - scene.low) / scene.span, 0.0, 1.0)
+    loose = draws.each("transfer_when_loose", 0.1, 0.3)
+    return signal + size * draws.signs() * near * (loose + (1 - loose) * own)
 
 
-FORMS = (shared_return_wire, magnet_alongside, slack_web)
+FORMS = (shared_fabric_pull, pull_after_slack, pull_on_tight_glove)

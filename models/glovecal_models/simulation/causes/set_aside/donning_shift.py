@@ -1,7 +1,4 @@
-"""Donning shift: the glove sits otherwise in every wearing, and stays so until it is taken off.
-
-A strap with holes, cloth that stretches with each donning, or loops that guide the strip.
-"""
+"""Donning shift: each wearing sits differently and stays as it is until the glove is taken off."""
 
 from __future__ import annotations
 
@@ -11,50 +8,48 @@ from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 
-@form(
-    Stage.WEARING,
-    "A strap with five holes is closed in another one each time, and takes all sensors along (ours).",
-    set_aside=True,
-)
-def holes_of_strap(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """All sensors are shifted by the same number of notches per wearing, each by a notch of its own."""
-    holes = draws.stream("holes").permutation(np.linspace(-1.0, 1.0, 5))
-    used = np.array([holes[start.wearing % 5] for start in scene.starts])
-    notch = draws.each("notch", 0.7, 1.4) * draws.signs()
-    return signal + size * 1.5 * used[:, None, None] * notch
+def _per_wearing(scene: Scene, draws: Draws, name: str, count: int) -> np.ndarray:
+    """``count`` normal numbers for each wearing, shape (T, 1, count)."""
+    drawn = [draws.stream(name, start.wearing).standard_normal(count) for start in scene.starts]
+    return np.array(drawn)[:, None, :]
 
 
 @form(
     Stage.WEARING,
-    "Cloth gives a little with each donning and never takes it back: bends count ever less (ours).",
+    "Every sensor lies a little differently over its joint: an offset of its own per wearing (ours).",
     set_aside=True,
 )
-def wider_each_time(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Each sensor falls short by a part that grows from wearing to wearing and levels off."""
-    wearings = draws.one("wearings", 1.0, 3.0)
-    own, gain = draws.each("own", 0.7, 1.3), draws.each("gain", 0.3, 0.9)
-    donned = np.array([start.wearing for start in scene.starts])
-    wide = 1 - np.exp(-donned / wearings)
-    bend = _bend(signal, scene)
-    return signal - size * 4 * own * wide[:, None, None] * (1 - gain + gain * bend)
+def seat_offsets(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Independent from sensor to sensor and from wearing to wearing."""
+    return signal + size * _per_wearing(scene, draws, "seat", signal.shape[2])
 
 
 @form(
     Stage.WEARING,
-    "The strip runs through loops of thread that sit elsewhere along it in every wearing (ours).",
+    "The sensors lie higher or lower over the joints: another lever, so another gain and zero (ours).",
     set_aside=True,
 )
-def loops_of_thread(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """A ripple over the bend, the place of which is another in every wearing."""
-    loops = draws.each("loops", 1.0, 2.2)
-    phase = [draws.stream("place", start.wearing).uniform(0, 1, signal.shape[2]) for start in scene.starts]
-    bend = _bend(signal, scene)
-    return signal + size * 1.5 * np.sin(2 * np.pi * (loops * bend + np.stack(phase)[:, None]))
+def seat_levers(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Mostly a gain about the lowest angle, with a smaller offset."""
+    share = (signal - scene.low) / scene.span
+    zero = draws.one("zero_share", 0.15, 0.4)
+    gains = _per_wearing(scene, draws, "lever", signal.shape[2])
+    return signal + size * (gains * share + zero * _per_wearing(scene, draws, "zero", signal.shape[2]))
 
 
-def _bend(signal: np.ndarray, scene: Scene) -> np.ndarray:
-    """Each sensor's bend as a share of its range."""
-    return (signal - scene.low) / scene.span
+@form(
+    Stage.WEARING,
+    "How far the hand went in and how the glove is turned: two numbers per wearing move all sensors (ours).",
+    set_aside=True,
+)
+def pulled_on_and_turned(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """All fingers go with the first; each has its part in the second; a bent finger draws the cloth taut."""
+    depth = draws.each("depth_part", 0.7, 1.3)
+    turn = draws.each("turn_part", -1.0, 1.0)
+    fading = draws.one("fading", 0.2, 0.6)
+    share = np.clip((signal - scene.low) / scene.span, 0.0, 1.0)
+    seat = _per_wearing(scene, draws, "seat", 2)
+    return signal + size * (seat[:, :, :1] * depth + seat[:, :, 1:] * turn) * (1 - fading * share)
 
 
-FORMS = (holes_of_strap, wider_each_time, loops_of_thread)
+FORMS = (seat_offsets, seat_levers, pulled_on_and_turned)

@@ -1,7 +1,4 @@
-"""Garment slip: the glove moves on the hand while it is worn, and stays so until the next donning.
-
-A seam that ravels, cloth that sags from straight fingers, or a sheath that turns round its finger.
-"""
+"""Garment slip: the glove moves on the hand during a wearing, at random, and stays there."""
 
 from __future__ import annotations
 
@@ -10,58 +7,76 @@ import numpy as np
 from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
-
-@form(
-    Stage.WEARING,
-    "A seam ravels stitch by stitch, quicker and quicker, as each one lost loads the next more (ours).",
-    set_aside=True,
-)
-def seam_ravels(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """All sensors move on by a step with each stitch, and stitches follow each other ever sooner."""
-    quickens = _per_wearing(scene, draws, "quickens_s", 150.0, 350.0)[:, None]
-    stitches = draws.one("stitches", 4.0, 9.0)
-    own = draws.each("own", 0.6, 1.4) * draws.signs()
-    gone = np.expm1(_worn(scene) / quickens) / np.expm1(600.0 / quickens)
-    return signal + size * 3 * own * (np.floor(stitches * gone + 0.5) / stitches)[:, :, None]
+LONGEST_S = 7200
 
 
-@form(
-    Stage.WEARING,
-    "Cloth grown slack sags from straight fingers, with the root of the time worn (diffusive give; ours).",
-    set_aside=True,
-)
-def sags_when_straight(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Below a certain bend each sensor falls off, by more and more since donning."""
-    below = draws.each("below_bend", 0.35, 0.6)
-    pace = _per_wearing(scene, draws, "pace", 0.6, 1.4)[:, None]
-    slack = pace * np.sqrt(_worn(scene) / 600.0)
-    bend = (signal - scene.low) / scene.span
-    return signal + size * 8 * draws.signs() * slack[:, :, None] * np.maximum(below - bend, 0.0)
+def _worn(scene: Scene, slipped: dict[int, np.ndarray]) -> np.ndarray:
+    """Each wearing's course (seconds since donning, S) at the times of its takes, shape (T, N, S)."""
+    seconds = np.arange(LONGEST_S)
+    return np.stack(
+        [
+            np.stack([np.interp(donned, seconds, part) for part in slipped[start.wearing].T], axis=1)
+            for start, donned in zip(scene.starts, scene.since_donned_s, strict=True)
+        ]
+    )
+
+
+def _wearings(scene: Scene) -> list[int]:
+    return sorted({start.wearing for start in scene.starts})
 
 
 @form(
     Stage.WEARING,
-    "A finger's sheath turns slowly round it, so that the strip sees the bend by the cosine (geometry; ours).",
+    "Now and then a strong grip shifts the glove: a few sudden steps that last (compound Poisson; ours).",
     set_aside=True,
 )
-def sheath_turns(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Each sheath turns from where it was put on, one way or the other, and swings a little on its way."""
-    swing_s, own = draws.one("swing_s", 90.0, 200.0), draws.each("own", 0.5, 1.0)
-    rate = _per_wearing(scene, draws, "turn", 0.7, 1.5)[:, None]
-    worn = _worn(scene)
-    turned = rate * (worn / 600.0 + 0.25 * np.sin(2 * np.pi * worn / swing_s))
-    seen = np.cos(np.clip(turned[:, :, None] * own, -1.5, 1.5)) - 1
-    return signal + size * 8 * (signal - scene.low) / scene.span * seen
+def shifted_by_grips(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A step every one to three minutes, of a size and direction of its own for each sensor."""
+    every_s = draws.one("every_s", 60.0, 180.0)
+    slipped = {}
+    for wearing in _wearings(scene):
+        random = draws.stream("steps", wearing)
+        happens = random.random((LONGEST_S, 1)) < 1.0 / every_s
+        steps = random.standard_normal((LONGEST_S, signal.shape[2]))
+        slipped[wearing] = np.cumsum(happens * steps, axis=0)
+    return signal + size * _worn(scene, slipped)
 
 
-def _worn(scene: Scene) -> np.ndarray:
-    """Seconds since donning, between putting on and half an hour."""
-    return np.clip(scene.since_donned_s, 0.0, 1800.0)
+@form(
+    Stage.WEARING,
+    "Every move shifts the cloth by a little: each sensor's zero wanders slowly (random walk; ours).",
+    set_aside=True,
+)
+def wandering_cloth(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Many tiny steps, partly common to all sensors."""
+    common = draws.one("common", 0.2, 0.6)
+    slipped = {}
+    for wearing in _wearings(scene):
+        random = draws.stream("walk", wearing)
+        steps = (1 - common) * random.standard_normal((LONGEST_S, signal.shape[2]))
+        steps += common * random.standard_normal((LONGEST_S, 1))
+        slipped[wearing] = np.cumsum(steps, axis=0) / 20.0
+    return signal + size * _worn(scene, slipped)
 
 
-def _per_wearing(scene: Scene, draws: Draws, name: str, low: float, high: float) -> np.ndarray:
-    """One number for every take, the same within a wearing."""
-    return np.array([draws.stream(name, start.wearing).uniform(low, high) for start in scene.starts])
+@form(
+    Stage.WEARING,
+    "The glove works itself off the hand by many small slips in one direction, fewer as it settles (ours).",
+    set_aside=True,
+)
+def working_itself_off(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Exponential slips, all sensors at once; each takes its part, less when bent (taut cloth)."""
+    every_s, settles_s = draws.one("every_s", 15.0, 40.0), draws.one("settles_s", 600.0, 1800.0)
+    part = draws.each("part", 0.5, 1.5) * draws.sign()
+    fading = draws.one("fading", 0.1, 0.4)
+    slipped = {}
+    for wearing in _wearings(scene):
+        random = draws.stream("slips", wearing)
+        rate = np.exp(-np.arange(LONGEST_S) / settles_s) / every_s
+        slips = (random.random(LONGEST_S) < rate) * random.exponential(1.0, LONGEST_S)
+        slipped[wearing] = np.cumsum(slips)[:, None] * part / 10.0
+    share = np.clip((signal - scene.low) / scene.span, 0.0, 1.0)
+    return signal + size * _worn(scene, slipped) * (1 - fading * share)
 
 
-FORMS = (seam_ravels, sags_when_straight, sheath_turns)
+FORMS = (shifted_by_grips, wandering_cloth, working_itself_off)

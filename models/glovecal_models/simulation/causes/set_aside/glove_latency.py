@@ -1,11 +1,9 @@
-"""Glove latency: all readings come late by the same time, without being smoothed.
-
-The time is settled at pairing, grows as a queue fills, or changes with the way the packets take.
-"""
+"""Glove latency: all sensors come late by the same delay."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
@@ -14,54 +12,51 @@ from glovecal_models.simulation.signals import at_times
 
 @form(
     Stage.COUNTS,
-    "Glove and receiver agree on a buffer each time they pair, so every wearing is late by its own time (ours).",
+    "Radio link and driver deliver every frame after the same time (pure delay; ours).",
     set_aside=True,
-    sizes=(0.002, 0.4),
     shared=True,
+    sizes=(0.002, 0.4),
 )
-def agreed_at_pairing(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """One delay within each wearing, another one in the next."""
-    share = [draws.stream("share", start.wearing).uniform(0.6, 1.5) for start in scene.starts]
-    return _late(signal, scene, size[0] * np.array(share)[:, None])
+def steady_link_delay(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Size is the delay in seconds."""
+    return np.stack([at_times(scene.time_s, take, scene.time_s - size[0]) for take in signal])
 
 
 @form(
     Stage.COUNTS,
-    "Each hiccup of the reader leaves more in its queue, which is emptied only at the next start (bufferbloat).",
+    "The firmware smooths all sensors with a running mean: late by half its window (linear-phase filter).",
     set_aside=True,
-    sizes=(0.002, 0.4),
     shared=True,
+    sizes=(0.002, 0.4),
 )
-def queue_fills(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """The delay begins alike in all takes and grows by a notch at random moments."""
-    every, notch = draws.one("every_s", 7.0, 14.0), draws.one("notch", 0.12, 0.25)
-    moments = [draws.stream("moments", start.key).exponential(every, 8).cumsum() for start in scene.starts]
-    hiccups = np.stack([np.searchsorted(take, scene.time_s) for take in moments])
-    return _late(signal, scene, size[0] * (0.7 + notch * hiccups))
+def firmware_running_mean(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Size is the delay in seconds, half the window."""
+    window = 2 * size[0]
+    early = scene.time_s[0]
+    means = []
+    for take in signal:
+        sums = CubicSpline(scene.time_s, take, axis=0).antiderivative()
+        ends = np.maximum(scene.time_s, early + window)
+        means.append((sums(ends) - sums(ends - window)) / window)
+    return np.stack(means)
 
 
 @form(
     Stage.COUNTS,
-    "At times packets reach the receiver only by way of a second node and take longer (mesh network).",
+    "A queue of frames between glove and program fills and drains slowly: late by a wandering delay (ours).",
     set_aside=True,
-    sizes=(0.002, 0.4),
     shared=True,
+    sizes=(0.002, 0.4),
 )
-def by_way_of_second_node(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """The delay changes between two values, each of which lasts for seconds."""
-    longer, lasts = draws.one("longer", 1.4, 2.2), draws.one("lasts_s", 4.0, 10.0)
-    delay = np.empty((signal.shape[0], signal.shape[1]))
-    for take, start in enumerate(scene.starts):
-        changes = scene.time_s[0] + draws.stream("changes", start.key).exponential(lasts, 80).cumsum()
-        indirect = np.searchsorted(changes, scene.time_s) % 2 == 1
-        delay[take] = np.where(indirect, longer, 0.7)
-    return _late(signal, scene, size[0] * delay)
+def filling_queue(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Size is the usual delay in seconds; it wanders over tens of seconds by some part of itself."""
+    wander, period = draws.one("wander", 0.2, 0.45), draws.one("period_s", 20.0, 60.0)
+    late = []
+    for start, take in zip(scene.starts, signal, strict=True):
+        phase = draws.stream("phase", start.key).uniform(0, 2 * np.pi)
+        delay = size[0] * (1 + wander * np.sin(2 * np.pi * scene.time_s / period + phase))
+        late.append(at_times(scene.time_s, take, scene.time_s - delay))
+    return np.stack(late)
 
 
-def _late(signal: np.ndarray, scene: Scene, delay_s: np.ndarray) -> np.ndarray:
-    """All sensors as they were a delay ago, given for every take and time."""
-    moved = zip(signal, scene.time_s - delay_s, strict=True)
-    return np.stack([at_times(scene.time_s, take, times) for take, times in moved])
-
-
-FORMS = (agreed_at_pairing, queue_fills, by_way_of_second_node)
+FORMS = (steady_link_delay, firmware_running_mean, filling_queue)

@@ -1,7 +1,4 @@
-"""Palm arch: cupping the palm pulls on sensors near it, beside their own joints.
-
-The cloth folds bit by bit, sticks to the palm, or is slackened by the finger's own bend.
-"""
+"""Palm arch: cupping the palm stretches or bends the finger sensors too."""
 
 from __future__ import annotations
 
@@ -11,50 +8,46 @@ from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 
-@form(
-    Stage.MECHANICAL,
-    "Folds spring up across the palm one by one, each of which lets go what the arch has pulled (ours).",
-    set_aside=True,
-    touches="palm",
-)
-def folds_one_by_one(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """The pull rises with the arch and falls back at once whenever another fold springs up."""
-    folds = draws.each("folds", 1.8, 3.5)
-    first = draws.each("taken_before", 0.1, 0.6)
-    taken = first + folds * scene.bent("PALM_ARCH")[:, :, None]
-    return signal + size * 4 * draws.signs() * (taken % 1.0)
+def _arch(scene: Scene) -> np.ndarray:
+    """How far the palm is cupped, as a share of its range, shape (T, N, 1)."""
+    return scene.bent("PALM_ARCH")[:, :, None]
 
 
 @form(
     Stage.MECHANICAL,
-    "Damp cloth sticks to the palm and is taken along only once the arch has moved some way (Coulomb; ours).",
+    "The back of the glove is stretched across the hand in proportion to the palm's arch (linear; ours).",
     set_aside=True,
     touches="palm",
 )
-def sticks_to_palm(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """The pull follows the arch behind a slack, whichever way the arch moves."""
-    slack = draws.each("slack", 0.08, 0.2)
-    arch = scene.bent("PALM_ARCH")[:, :, None]
-    out = np.empty_like(signal)
-    place = np.repeat(arch[:, 0], signal.shape[2], axis=1)
-    for frame in range(signal.shape[1]):
-        place = np.clip(place, arch[:, frame] - slack, arch[:, frame] + slack)
-        out[:, frame] = place
-    return signal + size * 4 * draws.signs() * out
+def stretched_glove_back(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A shift in proportion to the arch in degrees."""
+    return signal + size * draws.signs() * scene.rotation("PALM_ARCH")[:, :, None] / 10.0
 
 
 @form(
     Stage.MECHANICAL,
-    "A bent finger gives cloth to the palm, so only the arch beyond what it gave can pull (ours).",
+    "A slightly arched palm only takes up slack; the pull grows with the square of the arch (sagitta; ours).",
     set_aside=True,
     touches="palm",
 )
-def finger_gives_cloth(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """The arch pulls only as far as it exceeds a share of the sensor's own bend."""
-    given = draws.each("given", 0.3, 0.8)
-    bend = np.clip((scene.own - scene.low) / scene.span, 0.0, 1.0)
-    beyond = np.maximum(scene.bent("PALM_ARCH")[:, :, None] - given * bend, 0.0)
-    return signal + size * 4 * draws.signs() * beyond
+def pull_grows_with_cupping(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The length of an arc over its chord grows with the square of its height; a little grows linearly."""
+    linear = draws.each("linear_share", 0.0, 0.2)
+    arch = _arch(scene)
+    return signal + size * draws.signs() * (linear * arch + (1 - linear) * arch**2)
 
 
-FORMS = (folds_one_by_one, sticks_to_palm, finger_gives_cloth)
+@form(
+    Stage.MECHANICAL,
+    "Cupping turns the knuckles, so that a sensor's lever changes: an error that grows with bend (ours).",
+    set_aside=True,
+    touches="palm",
+)
+def turned_knuckle_lever(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The arch changes the gain about the flat hand and shifts the straight finger a little."""
+    base = draws.each("straight_share", 0.1, 0.35)
+    own = np.clip((scene.own - scene.low) / scene.span, 0.0, 1.0)
+    return signal + size * draws.signs() * _arch(scene) * (base + (1 - base) * own)
+
+
+FORMS = (stretched_glove_back, pull_grows_with_cupping, turned_knuckle_lever)

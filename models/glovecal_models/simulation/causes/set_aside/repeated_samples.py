@@ -1,11 +1,9 @@
-"""Repeated samples: old readings come again in place of new ones.
-
-While the radio signal fades, while a buffer is played in a loop, or when packets arrive out of order.
-"""
+"""Repeated samples: frames repeat older readings."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import ndtr
 
 from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
@@ -14,70 +12,63 @@ from glovecal_models.simulation.signals import lasting_noise
 
 @form(
     Stage.TRANSPORT,
-    "Echoes cancel the radio signal now and then, and the last frame is shown on (fading; Rayleigh, Clarke 1968).",
+    "The glove reads its sensors more slowly than the link sends frames: each reading is sent again (ours).",
     set_aside=True,
-    sizes=(0.005, 0.97),
     shared=True,
+    sizes=(0.017, 1.0),
 )
-def signal_fades(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Frames are lost while the strength of two noisy parts of the signal together is below a level."""
-    lasts = draws.one("lasts_s", 0.15, 0.5)
-    frames = signal.shape[1]
-    lost = np.empty(signal.shape[:2], dtype=bool)
+def glove_slower_than_link(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Size is the time between new readings in seconds."""
+    frames = np.arange(signal.shape[1])
+    hold = max(size[0] * scene.rate_hz, 1.0)
+    held = np.empty_like(signal)
     for take, start in enumerate(scene.starts):
-        parts = lasting_noise(draws.stream("echoes", start.key), frames, 2, lasts, scene.rate_hz)
-        lost[take] = (parts**2).sum(axis=1) / 2 < -np.log1p(-size[0])
-    return _shown(signal, np.maximum.accumulate(np.where(lost, 0, np.arange(frames)), axis=1))
+        phase = draws.stream("phase", start.key).uniform(0.0, hold)
+        newest = np.ceil(np.floor((frames + phase) / hold) * hold - phase - 1e-6).astype(int)
+        held[take] = signal[take, np.clip(newest, 0, frames)]
+    return held
 
 
 @form(
     Stage.TRANSPORT,
-    "When no data come, the driver plays its ring buffer again and again (as stuttering sound does).",
+    "Packets are lost on the radio link, often several in a row, and the last good one is repeated (ours).",
     set_aside=True,
-    sizes=(0.02, 3.0),
     shared=True,
+    sizes=(0.003, 0.97),
 )
-def ring_buffer_again(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """In each pause of the link, up to some tenths of a second before it come again in a loop."""
-    apart, pause = draws.one("apart_s", 1.5, 3.5), max(round(size[0] * scene.rate_hz), 1)
-    ring = min(max(round(draws.one("ring_s", 0.1, 0.4) * scene.rate_hz), 2), pause)
-    frames = signal.shape[1]
-    shown = np.tile(np.arange(frames), (len(signal), 1))
+def lost_packets(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Size is the share of frames that are lost."""
+    frames = np.arange(signal.shape[1])
+    lasts_s = draws.one("fade_s", 0.05, 0.15)
+    held = np.empty_like(signal)
     for take, start in enumerate(scene.starts):
-        gaps = draws.stream("gaps", start.key).exponential(apart, frames) * scene.rate_hz
-        first = ring
-        for gap in gaps:
-            first += int(gap)
-            if first >= frames:
-                break
-            many = np.arange(min(pause, frames - first))
-            shown[take, first + many] = first - ring + many % ring
-            first += pause
-    return _shown(signal, shown)
+        random = draws.stream("fading", start.key)
+        fading = lasting_noise(random, len(frames), 1, lasts_s, scene.rate_hz)[:, 0]
+        good = ndtr(fading) >= size[0]
+        newest = np.maximum.accumulate(np.where(good, frames, 0))
+        held[take] = signal[take, newest]
+    return held
 
 
 @form(
     Stage.TRANSPORT,
-    "Some packets take a longer way and overwrite newer ones on arrival (UDP does not keep order; RFC 768).",
+    "A multiplexer reads a sensor at a time, a frame holds older readings of the rest (round robin; ours).",
     set_aside=True,
-    sizes=(0.02, 3.0),
     shared=True,
+    sizes=(0.017, 1.0),
 )
-def out_of_order(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Single frames among new ones are older by a time that differs from one to the next."""
-    share = draws.one("share", 0.12, 0.3)
-    frames = signal.shape[1]
-    shown = np.empty(signal.shape[:2], dtype=int)
-    for take, start in enumerate(scene.starts):
-        random = draws.stream("packets", start.key)
-        age = np.ceil(size[0] * scene.rate_hz * random.uniform(0.4, 1.0, frames))
-        late = random.random(frames) < share
-        shown[take] = np.maximum(np.arange(frames) - np.where(late, age, 0.0), 0).astype(int)
-    return _shown(signal, shown)
+def sensors_read_in_turn(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Size is the time of a whole round in seconds; the sensors' turns are spread evenly over it."""
+    frames = np.arange(signal.shape[1])
+    sensors = signal.shape[2]
+    turns = draws.stream("turns").permutation(sensors) / sensors
+    draws.values["turns"] = [round(float(turn), 6) for turn in turns]
+    hold = max(size[0] * scene.rate_hz, 1.0)
+    held = np.empty_like(signal)
+    for sensor, turn in enumerate(turns):
+        newest = np.ceil((np.floor(frames / hold + turn) - turn) * hold - 1e-6).astype(int)
+        held[:, :, sensor] = signal[:, np.clip(newest, 0, frames), sensor]
+    return held
 
 
-def _shown(signal: np.ndarray, frame: np.ndarray) -> np.ndarray:
-    return np.take_along_axis(signal, frame[:, :, None], axis=1)
-
-
-FORMS = (signal_fades, ring_buffer_again, out_of_order)
+FORMS = (glove_slower_than_link, lost_packets, sensors_read_in_turn)

@@ -1,7 +1,4 @@
-"""Saturation: in part of the range, readings no longer tell angles apart.
-
-Steps may grow with the signal, the window may follow the mean, or the current may be shared.
-"""
+"""Saturation: at an end of its range the reading hardly changes any more."""
 
 from __future__ import annotations
 
@@ -13,59 +10,46 @@ from glovecal_models.simulation.scene import Scene
 
 @form(
     Stage.CONVERTER,
-    "Codes of companded samples lie ever further apart towards the high end (mu-law; ITU-T G.711).",
+    "The amplified signal exceeds the converter's full scale: every larger bend gives the highest count.",
     set_aside=True,
     touches="two",
-    sizes=(0.02, 1.6),
     judged_by="lost_angle",
+    sizes=(0.02, 1.6),
 )
-def companded_codes(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Readings stop at a few levels, which lie close together when straight and far apart when bent."""
-    ratio = draws.each("ratio", 4.0, 15.0)
-    bend = np.clip((signal - scene.low) / scene.span, -0.05, 1.2)
-    level = np.log1p(ratio * np.maximum(bend, 0.0)) / np.log1p(ratio)
-    step = np.maximum(0.4 * size, 1e-6)
-    coarse = np.expm1(np.log1p(ratio) * step * np.round(level / step)) / ratio
-    stepped = signal + scene.span * (coarse - bend)
-    return np.where((size > 0) & (bend > 0), stepped, signal)
+def converter_full_scale(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A hard stop; size is the share of the range above it."""
+    return np.minimum(signal, scene.high - size * scene.span)
 
 
 @form(
     Stage.COUNTS,
-    "A coupling capacitor sets the middle of the input window to the signal's mean of late (AC coupling).",
+    "An amplifier nears its rail, or a stretched sensor its limit: the reading levels off (ours).",
     set_aside=True,
     touches="two",
-    sizes=(0.02, 1.6),
     judged_by="lost_angle",
+    sizes=(0.02, 1.6),
 )
-def window_follows_mean(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Readings stop on both sides of a mean that follows the signal over seconds."""
-    seconds = draws.each("seconds", 5.0, 20.0)
-    share = 1 - np.exp(-1 / (seconds * scene.rate_hz))
-    half = scene.span * np.exp(-1.3 * size)
-    out = np.empty_like(signal)
-    mean = signal[:, 0]
-    for frame in range(signal.shape[1]):
-        mean = mean + share * (signal[:, frame] - mean)
-        out[:, frame] = np.clip(signal[:, frame], mean - half, mean + half)
-    return np.where(size > 0, out, signal)
+def levelling_off_bent(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A rounded knee with hardly any slope left above it; size is the share of the range above the knee."""
+    width = draws.each("rounding", 0.02, 0.05) * scene.span
+    over = width * np.logaddexp(0.0, (signal - (scene.high - size * scene.span)) / width)
+    return signal - over
 
 
 @form(
     Stage.COUNTS,
-    "Sensors share a supply with a current limit, so that others leave less for a bent one (ours).",
+    "A loose sensor buckles when the finger is nearly straight: it starts only once it is taut (ours).",
     set_aside=True,
     touches="two",
-    sizes=(0.02, 1.6),
     judged_by="lost_angle",
+    sizes=(0.02, 1.6),
 )
-def shared_current_limit(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Readings stop at a ceiling that comes down as the other joints bend."""
-    taken = draws.each("taken", 0.5, 0.8)
-    bend = np.clip((scene.own - scene.low) / scene.span, 0.0, 1.0)
-    others = (bend.sum(axis=2, keepdims=True) - bend) / max(bend.shape[2] - 1, 1)
-    ceiling = scene.low + scene.span * (1.05 - size * (1 - taken + taken * others))
-    return np.where(size > 0, np.minimum(signal, ceiling), signal)
+def slack_when_straight(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The lowest share of the range gives hardly any change; size is that share."""
+    left = draws.each("slope_left", 0.0, 0.01)
+    width = 0.015 * scene.span
+    under = width * np.logaddexp(0.0, (scene.low + size * scene.span - signal) / width)
+    return signal + (1 - left) * under
 
 
-FORMS = (companded_codes, window_follows_mean, shared_current_limit)
+FORMS = (converter_full_scale, levelling_off_bent, slack_when_straight)

@@ -1,7 +1,4 @@
-"""Supply sag: readings change as the battery's voltage falls.
-
-An input stage may change over elsewhere, ripple may grow, or the cell's own resistance may show.
-"""
+"""Supply sag: readings depend on the recorded supply voltage."""
 
 from __future__ import annotations
 
@@ -10,52 +7,44 @@ import numpy as np
 from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
-
-@form(
-    Stage.ELECTRICAL,
-    "A rail-to-rail input changes from one pair of transistors to the other a volt below the supply (data sheets).",
-    set_aside=True,
-)
-def input_pair_changes(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Each reading has a small step at a bend that falls with the supply voltage."""
-    moves, width = draws.each("ranges_per_volt", 1.2, 3.0), draws.each("width", 0.02, 0.08)
-    at = draws.each("at", 0.25, 0.6) + moves * (scene.supply_v[:, :, None] - 3.95)
-    bend = _bend(signal, scene)
-    return signal + size * 2 * draws.signs() * np.tanh((bend - at) / width)
+USUAL_V = 3.8
 
 
 @form(
-    Stage.ELECTRICAL,
-    "A converter's ripple grows as its input falls, and sampling folds it down to a slow beat (aliasing).",
+    Stage.COUNTS,
+    "Sensor dividers hang on the battery, the converter has a fixed reference: counts go with the volts.",
     set_aside=True,
+    shared=True,
+    sizes=(0.003, 20.0),
 )
-def ripple_grows(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """All readings swing together at a few hertz, the more the lower the voltage."""
-    beat, drift = draws.one("beat_hz", 0.4, 3.0), draws.one("drift_hz", 0.05, 0.3)
-    full, own = draws.one("full_v", 4.0, 4.15), draws.each("own", 0.6, 1.4)
-    turns = beat * scene.session_s + drift / 0.3 * np.sin(0.3 * scene.session_s)
-    height = np.maximum(full - scene.supply_v, 0.0) / 0.15
-    return signal + size * 1.5 * own * (height * np.sin(2 * np.pi * turns))[:, :, None]
+def dividers_on_battery(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Size 1: the voltage behind a reading is in proportion to the supply."""
+    gain = size * (scene.supply_v[:, :, None] / USUAL_V - 1)
+    return signal + gain * (signal + scene.counts_zero_deg)
 
 
 @form(
     Stage.ELECTRICAL,
-    "The cell's own resistance rises as it empties and shows all sensors' current (internal resistance).",
+    "Finite supply rejection of amplifiers: each zero moves in proportion to supply (data sheets, PSRR).",
     set_aside=True,
 )
-def cell_resistance(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Each reading drops by the current of all sensors, straight ones drawing most, once the cell is low."""
-    knee, width = draws.one("knee_v", 3.86, 4.0), draws.one("width_v", 0.03, 0.08)
-    growth, part = draws.each("growth", 0.8, 2.5), draws.each("part", 0.2, 0.6)
-    bend = np.clip(_bend(scene.own, scene), 0.0, 1.1)
-    current = (1 / (1 + growth * bend)).mean(axis=2, keepdims=True)
-    low_cell = 1 / (1 + np.exp((scene.supply_v[:, :, None] - knee) / width))
-    return signal - size * 6 * low_cell * current * (part + (1 - part) * bend)
+def poor_supply_rejection(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """So many degrees per volt, in a direction of its own for each sensor."""
+    return signal + size * draws.signs() * (scene.supply_v[:, :, None] - USUAL_V) * 5.0
 
 
-def _bend(angle: np.ndarray, scene: Scene) -> np.ndarray:
-    """Each sensor's bend as a share of its range."""
-    return (angle - scene.low) / scene.span
+@form(
+    Stage.COUNTS,
+    "The regulator drops out when the battery is low: below a knee excitation falls with it (LDO).",
+    set_aside=True,
+    shared=True,
+    sizes=(0.003, 20.0),
+)
+def regulator_drops_out(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Size 1: below the knee the excitation falls as the supply does; the knee is rounded."""
+    knee_v, rounding_v = draws.one("knee_v", 3.9, 4.05), 0.06
+    missing_v = rounding_v * np.logaddexp(0.0, (knee_v - scene.supply_v[:, :, None]) / rounding_v)
+    return signal - size * missing_v / knee_v * (signal + scene.counts_zero_deg)
 
 
-FORMS = (input_pair_changes, ripple_grows, cell_resistance)
+FORMS = (dividers_on_battery, poor_supply_rejection, regulator_drops_out)

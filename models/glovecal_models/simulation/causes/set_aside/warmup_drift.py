@@ -1,8 +1,4 @@
-"""Warm-up drift: readings settle in the minutes after power-on.
-
-The amplifier may set itself to zero now and then, wander less and less, or warm a strip that is stiff when
-cold.
-"""
+"""Warm-up drift: readings drift with the time since power-on and settle."""
 
 from __future__ import annotations
 
@@ -12,52 +8,45 @@ from glovecal_models.simulation.causes.form import Draws, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 
-@form(
-    Stage.ELECTRICAL,
-    "An amplifier sets itself to zero every few minutes and drifts off between (periodic auto-zero).",
-    set_aside=True,
-)
-def auto_zero(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Zero points show how far the amplifier has settled since it last set itself to zero."""
-    every, settles = draws.one("every_s", 90.0, 240.0), draws.each("settles_s", 200.0, 500.0)
-    now = _powered_s(scene)
-    zeroed = np.floor(now / every) * every
-    return signal + size * 5 * draws.signs() * (np.exp(-zeroed / settles) - np.exp(-now / settles))
+def _left(scene: Scene, time_s: np.ndarray) -> np.ndarray:
+    """The share of warming that is still to come, shape (T, N, S)."""
+    return np.exp(-np.maximum(scene.power_on_s, 0.0)[:, :, None] / time_s)
 
 
 @form(
     Stage.ELECTRICAL,
-    "Zero points wander after power-on, ever less and ever slower (burn-in of contacts and films; ours).",
+    "The amplifier's zero settles exponentially as the electronics reach their temperature (Newton's law).",
     set_aside=True,
 )
-def wanders_ever_less(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Each zero point follows waves of the logarithm of the time since power-on that die down."""
-    fades = draws.each("fades_s", 150.0, 500.0)
-    now = _powered_s(scene)
-    age = np.log1p(now / 15.0)
-    waves = np.zeros_like(signal)
-    for number in (1, 2, 3):
-        turns, phase = draws.each(f"turns_{number}", 0.15, 0.6), draws.each(f"phase_{number}", 0.0, 1.0)
-        waves = waves + np.sin(2 * np.pi * (turns * age + phase))
-    return signal + size * 2 * waves / (1 + now / fades)
+def settling_zero(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """One time constant for the board, a direction and a size for each sensor."""
+    time_s = np.full(signal.shape[2], draws.one("time_s", 120.0, 500.0))
+    return signal + size * draws.signs() * _left(scene, time_s)
 
 
 @form(
     Stage.ELECTRICAL,
-    "A strip is stiff until its own current has warmed it, and falls short of deep bends till then (ours).",
+    "The amplification, or the sensors' excitation, settles exponentially: bent joints are off most (ours).",
     set_aside=True,
 )
-def stiff_until_warm(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """From a certain bend on each sensor falls short, by less and less after power-on."""
-    warms, from_bend = draws.each("warms_s", 80.0, 300.0), draws.each("from_bend", 0.15, 0.4)
-    bend = np.clip((signal - scene.low) / scene.span, 0.0, 1.2)
-    cold = np.exp(-_powered_s(scene) / warms)
-    return signal - size * 6 * cold * np.maximum(bend - from_bend, 0.0)
+def settling_gain(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A gain about the lowest angle that is off at power-on, mostly in one direction for all."""
+    share = (signal - scene.low) / scene.span
+    time_s = np.full(signal.shape[2], draws.one("time_s", 120.0, 500.0))
+    return signal + size * draws.sign() * _left(scene, time_s) * share
 
 
-def _powered_s(scene: Scene) -> np.ndarray:
-    """Seconds since power-on, 0 before it, shape (T, N, 1)."""
-    return np.maximum(scene.power_on_s, 0.0)[:, :, None]
+@form(
+    Stage.ELECTRICAL,
+    "The chip warms within a minute, its housing within a quarter of an hour: two time constants (ours).",
+    set_aside=True,
+)
+def chip_then_housing(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Quick and slow drift of the zero, in the same direction for each sensor."""
+    quick = draws.each("quick_share", 0.35, 0.65)
+    chip = _left(scene, draws.each("chip_s", 20.0, 60.0))
+    housing = _left(scene, draws.each("housing_s", 400.0, 1000.0))
+    return signal + size * draws.signs() * (quick * chip + (1 - quick) * housing)
 
 
-FORMS = (auto_zero, wanders_ever_less, stiff_until_warm)
+FORMS = (settling_zero, settling_gain, chip_then_housing)
