@@ -17,7 +17,7 @@ from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.hold_drift import hold_drift
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
-from glovecal_models.diagnosis.naming import Naming, beside_known, beside_last, is_beside_known, named
+from glovecal_models.diagnosis.naming import Naming, beside_known, beside_wholes, is_beside_known, named
 from glovecal_models.diagnosis.next_take import NextTake, hold_next_take, next_take
 from glovecal_models.diagnosis.not_identifiable import (
     ONLY_POSE_NAMES,
@@ -89,8 +89,8 @@ def diagnose(
     found, impossible = assessed(design, judged, np.random.default_rng(seed), has, progress)
     saved = problem.saved_by_known(design)
     seen = camera_errors(problem, takes) if problem.has_camera else None
-    last = [item.effect for item in known if item.effect.stage == "last"]
-    found = beside_last(beside_known(found, saved), last)
+    wholes = [item.effect for item in known if item.effect.also_explained_by]
+    found = beside_wholes(beside_known(found, saved), wholes)
     if seen is not None:
         found = beside_camera(found, seen, problem, design)
     naming, beside, screened = named(found, limits), problem, design
@@ -101,7 +101,7 @@ def diagnose(
         others = [item for item in judged if item.name not in {each.effect for each in impossible}]
         screened = beside.design()
         found, _ = assessed(screened, others, np.random.default_rng(seed), has, progress)
-        found = beside_last(beside_known(found, saved), last)
+        found = beside_wholes(beside_known(found, saved), wholes)
         if seen is not None:
             found = beside_camera(found, seen, beside, screened)
         naming = named(found, limits)

@@ -91,8 +91,10 @@ class Diagnosis:
             if name not in self.naming.confidence_set and not is_outweighed(found, self.naming):
                 return found
         if self.naming.ranked:
-            last = [item for item in self.findings if self.effects[item.effect].stage == "last"]
-            by_effect = {item.effect: [each for each in last if each.effect == item.effect] for item in last}
+            wholes = [item for item in self.findings if self.effects[item.effect].also_explained_by]
+            by_effect = {
+                item.effect: [each for each in wholes if each.effect == item.effect] for item in wholes
+            }
             return tuple(
                 finding
                 for name, found in by_effect.items()

@@ -51,9 +51,9 @@ def beside_known(found: Sequence[Assessment], saved: Mapping[str, float]) -> lis
     return [replace(item, known_saved_square=tuple(saved[name] for name in item.joints)) for item in found]
 
 
-def beside_last(found: Sequence[Assessment], known: Sequence[Effect]) -> list[Assessment]:
-    """The same, where the model has an effect that is asked for last, such as a slip: what seems to explain a
-    part of it has to explain more than that."""
+def beside_wholes(found: Sequence[Assessment], known: Sequence[Effect]) -> list[Assessment]:
+    """The same, where the model has an effect that others seem to explain a part of, such as a slip: they
+    have to explain more than that."""
     wholes = {name: item for item in known for name in item.also_explained_by}
     result = []
     for item in found:

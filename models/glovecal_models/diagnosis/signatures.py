@@ -50,7 +50,11 @@ def may_explain(
 
 def _size_square(found: Sequence[Finding]) -> float:
     """Degrees squared, summed over where something was found; nothing for what has no size."""
-    return sum(item.size_deg**2 for item in found if item.size_deg is not None)
+    return sum(
+        item.size_deg**2 if item.error_square is None else item.error_square
+        for item in found
+        if item.size_deg is not None
+    )
 
 
 def _is_asked(effect: Effect, naming: Naming, effects: Mapping[str, Effect]) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glovecal_models.diagnosis.naming import Naming, beside_last, saved_share_of
+from glovecal_models.diagnosis.naming import Naming, beside_wholes, saved_share_of
 from glovecal_models.diagnosis.signatures import is_outweighed, may_explain
 from glovecal_models.diagnosis.text import part_sentence
 from glovecal_models.effects.base.assessment import Assessment, JointErrors
@@ -62,12 +62,12 @@ def test_slips_that_are_larger_than_the_wearings_come_first():
 
 def test_beside_a_known_slip_a_column_has_to_explain_more_than_a_part():
     found = [ranked("temperature", 0.4), ranked("temperature", 0.7), ranked("hysteresis", 0.4)]
-    kept = [bool(item.significant_joints) for item in beside_last(found, [effect("garment_slip")])]
+    kept = [bool(item.significant_joints) for item in beside_wholes(found, [effect("garment_slip")])]
     assert kept == [False, True, True]
-    refused = beside_last(found, [effect("garment_slip")])[0]
+    refused = beside_wholes(found, [effect("garment_slip")])[0]
     assert not refused.within_known
     assert "more than a part of garment_slip" in part_sentence(refused)
-    assert all(item.significant_joints for item in beside_last(found, []))
+    assert all(item.significant_joints for item in beside_wholes(found, []))
 
 
 def test_the_share_is_that_of_all_significant_joints_together():

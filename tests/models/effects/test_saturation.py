@@ -38,7 +38,7 @@ def test_a_sensor_that_is_cut_off_is_found(glove, end):
     assert "sensor stops responding here" in finding.sentence
     assert (finding.size_deg or 0.0) > 4
     assert finding.evidence["density_over_next_bands_1"] > 3
-    assert finding.evidence["reference_spread_over_next_band_1"] > 2
+    assert finding.evidence["reference_spread_over_usual_1"] > 2
 
 
 def test_before_anything_is_learned_the_band_counts_as_unsure_as_the_reference_spreads(glove):

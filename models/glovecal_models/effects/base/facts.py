@@ -125,7 +125,7 @@ class EffectFacts:
     is_physical: ClassVar[bool] = True
     """Whether its name says what happens; not where only a recorded column is named."""
     also_explained_by: ClassVar[tuple[str, ...]] = ()
-    """Of an effect asked for last: effects that seem to explain a part of it."""
+    """Of an effect known by its signature: effects that seem to explain a part of it."""
     also_explained_share: ClassVar[float] = 0.0
     """Share of the squared error up to which they do; who explains more is no such effect."""
     caveat: ClassVar[str] = ""

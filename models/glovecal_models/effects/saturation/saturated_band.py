@@ -36,13 +36,15 @@ class SaturatedBand:
     towards: int
     """+1 when the true angle may be larger than predicted, -1 when smaller, 0 in a dead band in mid-range."""
     extra_sd_deg: float
-    """What the reference spreads in the band beyond what it does in the next one."""
+    """What the reference spreads at the end, or in a dead band, beyond what it does elsewhere."""
     piled_up: float
-    """Density of readings in the band over that of the next two."""
+    """Density of readings in the band over that beside it."""
     spread_ratio: float
     frames: int
     step_sd_deg: tuple[float, ...] = ()
     """Learned: standard deviation beside the claimed one, from the open end inwards; empty before."""
+    lost_deg: float = 0.0
+    """RMS over all frames of what is lost in the band."""
 
     @property
     def width(self) -> float:

@@ -2,7 +2,7 @@
 
 Seven signatures: *stuck* (one value while the reference moves), *spikes* (gone after a frame or two),
 *dropouts* (jumps to a constant and back), a *jump* of gain or offset in the middle of a take, a gain that
-has *changed* from one take to another, *switching* to and fro between levels, and the *hum* of a tone. What a
+has *changed* from one take to another, *switching* (jumps again and again), and the *hum* of a tone. What a
 sensor answered before a change says nothing of what it answers now: that is left out. Switching and hum go on
 in use, and no single frame shows them: they are told and stay in training, so that the claimed standard
 deviation has them.
@@ -242,9 +242,10 @@ def _finding_hum(sensor: str, hum: Hum) -> Finding:
 
 
 def _finding_switches(sensor: str, found: LevelSwitches) -> Finding:
+    does = "switches {} times to and fro between levels" if found.take_turns else "jumps {} times"
     sentence = (
-        f"{sensor} switches {found.count} times to and fro between levels, by {found.size_deg:.1f} deg in the"
-        " mean, which its joint does not do; look at its solder joints and plug."
+        f"{sensor} {does.format(found.count)}, by {found.size_deg:.1f} deg in the mean, which its joint does"
+        " not do; look at its solder joints and plug."
     )
     evidence = {"switches_count": float(found.count)}
     return Finding(
