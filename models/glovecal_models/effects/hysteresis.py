@@ -45,7 +45,11 @@ class Hysteresis(ArrayStateEffect):
     shown_by: ClassVar = RAMPS
     shows_in: ClassVar = ("direction", "speed")
     shown_over: ClassVar = "angle both ways"
-    rivals: ClassVar = (Rival("creep", RAMPS),)
+    rivals: ClassVar = tuple(
+        # Slow turns show all of it and nothing of a delay.
+        Rival(name, RAMPS)
+        for name in ("creep", "lag", "clock_offset", "glove_latency")
+    )
     parameters: ClassVar = (Parameter("widest_play", "deg", 0.2, 30.0, "1 to 7 deg in bend sensors"),)
 
     def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:

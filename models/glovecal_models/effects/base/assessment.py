@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -123,22 +124,23 @@ class Assessment:
     def _beyond_control(self) -> tuple[int, ...]:
         if self.p_value is not None:
             return self._significant_in_session(self.p_value)
-        limits = self.limits
-        fewest, least = limits.fewest_blocks, limits.least_share
-        some = {
-            i
-            for i, item in enumerate(self.errors)
-            if item.contrast >= least
-            and signed_rank(item.beyond_control, fewest)
-            <= limits.joint_p_value / max(1, len(self.errors) / 5)
-        }
-        together = [i for i, item in enumerate(self.errors) if item.contrast >= 0.5 * least]
-        if len(together) > 1:
-            pooled = pooled_errors(self.errors)
-            p_value = signed_rank(pooled.beyond_control, fewest)
-            if pooled.contrast >= least and p_value <= limits.pooled_p_value:
-                some.update(together)
+        joint_p_value = self.limits.joint_p_value / max(1, len(self.errors) / 5)
+        some = {i for i, item in enumerate(self.errors) if self._is_beyond_chance(item, joint_p_value)}
+        together = [i for i, item in enumerate(self.errors) if item.contrast >= 0.5 * self.limits.least_share]
+        if len(together) > 1 and self._is_beyond_chance(
+            pooled_errors(self.errors), self.limits.pooled_p_value
+        ):
+            some.update(together)
         return tuple(sorted(some))
+
+    def _is_beyond_chance(self, errors: JointErrors, p_value: float) -> bool:
+        limits = self.limits
+        if errors.contrast < limits.least_share:
+            return False
+        if signed_rank(errors.beyond_control, limits.fewest_blocks) <= p_value:
+            return True
+        is_large = errors.contrast >= limits.rare_share
+        return is_large and random_signs(errors.beyond_control, limits.fewest_blocks) <= limits.rare_p_value
 
     def _significant_in_session(self, p_value: float) -> tuple[int, ...]:
         largest = max((item.contrast for item in self.errors), default=0.0)
@@ -200,6 +202,15 @@ def signed_rank(values: np.ndarray, fewest: int = SIGNIFICANCE_LIMITS.fewest_blo
 
     found: Any = wilcoxon(values, alternative="greater", method="exact" if len(values) <= 25 else "approx")
     return float(found.pvalue)
+
+
+def random_signs(values: np.ndarray, fewest: int = SIGNIFICANCE_LIMITS.fewest_blocks) -> float:
+    """The p value of the sum of ``values`` (B,) if each could as well have the other sign (normal
+    approximation); 1 for fewer than ``fewest``."""
+    scale = float(np.sqrt(np.sum(values**2)))
+    if len(values) < fewest or scale == 0:
+        return 1.0
+    return 0.5 * math.erfc(float(values.sum()) / scale / math.sqrt(2.0))
 
 
 def over_joints(

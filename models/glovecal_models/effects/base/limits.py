@@ -39,6 +39,21 @@ class SignificanceLimits:
         "The same test of all joints together.",
         "Not tuned; chosen with the first version of the diagnosis (2026-11-21).",
     )
+    rare_share: float = limit(
+        0.08,
+        "share of the squared error",
+        "Or an effect may act only now and then, where the rank of a block says little: then it must save so"
+        " much beyond its control.",
+        "Slew rates of three simulated gloves (2026-11-24), which cost a little in calm blocks and save 10 to"
+        " 15 % of all in those with the fastest motion.",
+    )
+    rare_p_value: float = limit(
+        0.0005,
+        "p value",
+        "And what its blocks save must be unlikely under random signs (normal tail of sum over root of the"
+        " sum of squares), of one joint or of all together.",
+        "The same three gloves: two had 5e-5 and less, one 0.007.",
+    )
     beside_known_share: float = limit(
         0.2,
         "share of the squared error that the model's effects save",

@@ -38,8 +38,8 @@ repeated frames."""
 TURNS = 0.65
 """Share of the switches that go the other way than the one before; half would be chance."""
 FEWEST_SHARP, SHARP_SHARE, SHARP_READING_SHARE, SHARP_APART_SE = 25, 0.85, 0.8, 2.5
-"""The same for those that do not take turns. Of 576 simulated gloves with one effect of 1.3 or 2.6 noise floors
-only faults had such jumps in one sensor."""
+"""The same for those that do not take turns. Of 576 simulated gloves with one effect of 1.3 or 2.6 noise
+floors only faults had such jumps in one sensor."""
 LARGEST_SHARE = 1.25
 """Of the difference of means: a step that is larger is made up for on its two sides."""
 OTHERS_SWITCHES, OTHERS_SHARE = 0.25, 0.25
