@@ -86,6 +86,18 @@ def test_a_falling_sensor_opens_to_the_other_side(glove):
     assert {(band.end, band.towards) for band in bands} == {("low", 1)}
 
 
+def test_a_sensor_that_is_used_up_slowly_is_found(glove):
+    """Each degree takes a share of the light that is left: no readings pile up at a rail."""
+
+    def used_up(counts, generator):
+        return np.column_stack([counts[:, 0], 40 + 190 * -np.expm1(-(counts[:, 1] - 40) / 60), counts[:, 2]])
+
+    [band] = saturated_bands(glove.takes(shape_counts=used_up, noise_deg=0.6), glove.sensor_of)
+    assert (band.rotation, band.end, band.towards) == ("M_PIP", "high", 1)
+    assert band.high - band.low > 190 * 0.06, "several steps wide"
+    assert 0.5 < band.lost_deg < band.extra_sd_deg
+
+
 def test_a_posture_at_the_end_is_no_saturation(glove):
     """The hand rests fully bent for a quarter of the time: readings pile up, but so does the reference."""
     takes = []

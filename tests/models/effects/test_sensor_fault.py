@@ -256,6 +256,36 @@ def test_a_contact_that_goes_to_and_fro_switches(glove, contact):
     assert all(mended is take for mended, take in zip(FAULT.repaired(takes), takes, strict=True))
 
 
+def recharges(time_s, angles, generator):
+    """Sinks away within seconds and is charged anew at random: all jumps go one way."""
+    charged = np.maximum.accumulate(np.where(generator.random(len(time_s)) < 1 / 150, time_s, 0.0))
+    return 4.0 * np.exp(-(time_s - charged) / 2.0)
+
+
+def sparks(time_s, angles, generator):
+    """Kicked to either side at random, and back within a second."""
+    kicks = (generator.random(len(time_s)) < 1 / 150) * generator.choice([-4.0, 4.0], len(time_s))
+    return np.convolve(kicks, np.exp(-np.arange(120) / 30.0))[: len(time_s)]
+
+
+@pytest.mark.parametrize("fault", [recharges, sparks])
+def test_a_sensor_that_jumps_without_taking_turns_is_faulty(glove, fault):
+    takes = with_sensor(glove, fault, count=8)
+    [finding] = FAULT.find(takes, glove.sensor_of)
+    assert (finding.where, finding.kind) == (("I_PIP",), "switching")
+    assert "jumps" in finding.sentence
+
+
+def unequal_steps(time_s, angles, generator):
+    """The heaviest bits of a converter weigh too much, so that a step is made up for between two of them."""
+    return 3.0 * (np.mod(angles, 20.0) / 20.0 - 0.5)
+
+
+def test_unequal_steps_of_a_converter_are_no_fault(glove):
+    kinds = [item.kind for item in FAULT.find(with_sensor(glove, unequal_steps, count=8), glove.sensor_of)]
+    assert "switching" not in kinds
+
+
 def vibrates(time_s, angles, generator):
     return 0.8 * np.sin(2 * np.pi * 9.3 * time_s)
 
