@@ -112,14 +112,15 @@ class BaseProducts:
     def __init__(self, units: Sequence[Rows], prior_sd: np.ndarray | None = None) -> None:
         """``prior_sd`` (P,) of the coefficients, infinite (default) for those that are free."""
         self.units = units
+        self.prior_sd = np.full(units[0].base.shape[1], np.inf) if prior_sd is None else prior_sd
         self.gram = np.array([rows.weighted(rows.base).T @ rows.base for rows in units])
         self.right = np.array([rows.base.T @ rows.weighted(rows.target) for rows in units])
         self.square = np.array([rows.target @ rows.weighted(rows.target) for rows in units])
         self.count = np.array([len(rows.target) for rows in units])
         total, ridge = self.gram.sum(axis=0), BASE_RIDGE * np.trace(self.gram.sum(axis=0))
         self.ridge = ridge / len(total) * np.eye(len(total))
-        if prior_sd is not None and np.isfinite(prior_sd).any():
-            self.ridge += np.diag(self._held_by(prior_sd))
+        if np.isfinite(self.prior_sd).any():
+            self.ridge += np.diag(self._held_by(self.prior_sd))
         left = total - self.gram + self.ridge
         self.coefficients = np.linalg.solve(left, (self.right.sum(axis=0) - self.right)[:, :, None])[:, :, 0]
         self.residual = tuple(

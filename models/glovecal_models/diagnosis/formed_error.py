@@ -109,7 +109,7 @@ def _squared(design: ForwardDesign, joint: int, inputs: FormInputs | None) -> fl
 def _squared_on(
     design: ForwardDesign, joint: int, inputs: FormInputs | None, kept: Sequence[int], held: Sequence[int]
 ) -> float:
-    rows, sd = design.products[joint].units, None
+    rows, sd = design.products[joint].units, design.products[joint].prior_sd
     if inputs is not None:
         extra, prior = inputs.plain, inputs.prior_sd
         terms = inputs.terms(design, joint, kept)
@@ -118,7 +118,7 @@ def _squared_on(
             learned = [form.columns(values)[:, 0, :] for values in inputs.values]
             extra = [np.column_stack(pair) for pair in zip(extra, learned, strict=True)]
             prior = np.concatenate([prior, np.ones(form.count)])
-        sd = np.concatenate([np.full(rows[0].base.shape[1], np.inf), prior])
+        sd = np.concatenate([sd, prior])
         pairs = zip(rows, extra, strict=True)
         rows = [Rows(np.column_stack([unit.base, part]), unit.target) for unit, part in pairs]
     fitted = BaseProducts([rows[unit] for unit in kept], sd)
