@@ -4,7 +4,7 @@ With the effects' part taken from the reference the regressors are trained as ev
 prediction as each joint's own signal the effects' shapes and weights are fitted, beside a static map of the
 same inputs, so that what the regressor can explain is not claimed by an effect. Two turns suffice for most:
 on three simulated gloves (hysteresis, creep, donning) a third changed the error by less than 1 %. Slow creep
-moves the regressors themselves, and needs more.
+moves the regressors themselves, and needs more; so may a form, once it is learned.
 """
 
 from __future__ import annotations
@@ -33,6 +33,9 @@ from glovecal_models.regression.lmc_search import LmcOptimum
 from glovecal_models.regression.regressor import Regressor
 
 MOST_TURNS = 5
+MOST_LAST_TURNS = 3
+"""With forms. A form may move the regressors as well: a structure that is lost while bent, on top of which
+weights of the turn before doubled the error."""
 SETTLED_SHARE = 0.1
 """Of the effects' part, by which it may still change when the regressors have been trained anew."""
 
@@ -111,8 +114,12 @@ def fit_with_effects(
             own = own_signals()
             if _has_settled(corrected, _explained(takes, own, effects)):
                 break
-        fit_effects(own, is_last=True)
-        trained()
+        for _ in range(MOST_LAST_TURNS):
+            fit_effects(own, is_last=True)
+            trained()
+            own = own_signals()
+            if _has_settled(corrected, _explained(takes, own, effects)):
+                break
     return EffectFit(results, effects, tuple(found))
 
 

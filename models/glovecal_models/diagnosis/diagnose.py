@@ -89,8 +89,9 @@ def diagnose(
     found, impossible = assessed(design, judged, np.random.default_rng(seed), has, progress)
     saved = problem.saved_by_known(design)
     seen = camera_errors(problem, takes) if problem.has_camera else None
-    wholes = [item.effect for item in known if item.effect.also_explained_by]
-    found = beside_wholes(beside_known(found, saved), wholes)
+    has_effects = [item.effect for item in known]
+    wholes = [item for item in has_effects if item.also_explained_by]
+    found = beside_wholes(beside_known(found, saved, has_effects, limits), wholes)
     if seen is not None:
         found = beside_camera(found, seen, problem, design)
     naming, beside, screened = named(found, limits), problem, design
@@ -101,7 +102,7 @@ def diagnose(
         others = [item for item in judged if item.name not in {each.effect for each in impossible}]
         screened = beside.design()
         found, _ = assessed(screened, others, np.random.default_rng(seed), has, progress)
-        found = beside_wholes(beside_known(found, saved), wholes)
+        found = beside_wholes(beside_known(found, saved, has_effects, limits), wholes)
         if seen is not None:
             found = beside_camera(found, seen, beside, screened)
         naming = named(found, limits)

@@ -40,7 +40,12 @@ def named(assessments: Sequence[Assessment], limits: DiagnosisLimits = DIAGNOSIS
     return Naming(tuple(passing), (best.effect, *rivals))
 
 
-def beside_known(found: Sequence[Assessment], saved: Mapping[str, float]) -> list[Assessment]:
+def beside_known(
+    found: Sequence[Assessment],
+    saved: Mapping[str, float],
+    known: Sequence[Effect],
+    limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
+) -> list[Assessment]:
     """The same, held against what the effects of the model save on each joint, degrees squared per row.
 
     A named effect is right in its inputs and only nearly right in its form. What the form misses goes along
@@ -48,7 +53,16 @@ def beside_known(found: Sequence[Assessment], saved: Mapping[str, float]) -> lis
     """
     if not saved:
         return list(found)
-    return [replace(item, known_saved_square=tuple(saved[name] for name in item.joints)) for item in found]
+    alike = {name for item in known for name in item.rest_like}
+    strict = replace(limits, beside_known_share=limits.beside_alike_share)
+    return [
+        replace(
+            item,
+            known_saved_square=tuple(saved[name] for name in item.joints),
+            limits=strict if item.effect in alike else item.limits,
+        )
+        for item in found
+    ]
 
 
 def beside_wholes(found: Sequence[Assessment], known: Sequence[Effect]) -> list[Assessment]:

@@ -39,6 +39,7 @@ class Creep(ArrayStateEffect):
     shows_in: ClassVar = ("direction", "time in take")
     shown_over: ClassVar = "hold"
     drift_in_holds: ClassVar = "begins anew with each hold"
+    rest_like: ClassVar = ("hysteresis",)
     parameters: ClassVar = (
         Parameter("fast_tau", "s", 0.4, 60.0, "1 to 60 s"),
         Parameter("middle_tau", "s", 0.5, 60.0, "1 to 60 s"),

@@ -50,6 +50,7 @@ class Hysteresis(ArrayStateEffect):
         Rival(name, RAMPS)
         for name in ("creep", "lag", "clock_offset", "glove_latency")
     )
+    rest_like: ClassVar = ("creep",)
     parameters: ClassVar = (Parameter("widest_play", "deg", 0.2, 30.0, "1 to 7 deg in bend sensors"),)
 
     def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:

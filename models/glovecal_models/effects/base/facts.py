@@ -128,6 +128,8 @@ class EffectFacts:
     """Of an effect known by its signature: effects that seem to explain a part of it."""
     also_explained_share: ClassVar[float] = 0.0
     """Share of the squared error up to which they do; who explains more is no such effect."""
+    rest_like: ClassVar[tuple[str, ...]] = ()
+    """Effects that what the form of this one misses may look like: beside it they have to save more."""
     caveat: ClassVar[str] = ""
     """What the same evidence may also mean, as the end of a sentence that names the effect."""
     drift_in_holds: ClassVar[HoldDrift | None] = None

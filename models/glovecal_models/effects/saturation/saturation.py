@@ -64,6 +64,8 @@ class Saturation(IntervalEffect):
         return tuple(_finding(band) for band in bands)
 
     def proposed(self, recorded: Recorded) -> Proposal | None:
+        if recorded.only_held_levels:
+            return None  # between two angles that are held, every step is as wide as their distance
         bands = saturated_bands(recorded.takes, recorded.sensor_of)
         where = tuple(dict.fromkeys(band.rotation for band in bands))
         return Proposal({"bands": [band.to_settings() for band in bands]}, where) if bands else None
