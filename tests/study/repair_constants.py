@@ -12,7 +12,7 @@ from glovecal_models.diagnosis.signatures import own_sensors
 from glovecal_models.effects.base.signature_effect import SignatureEffect
 from glovecal_models.effects.catalogue import effect
 from glovecal_models.effects.delay.clock_offset import ClockOffsetEffect
-from glovecal_models.effects.saturation.saturation import saturated_bands
+from glovecal_models.effects.saturation.band_search import saturated_bands
 from glovecal_models.takes.take import Take
 
 

@@ -14,7 +14,7 @@ from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.comparison.compare import compare
 from glovecal_models.comparison.residuals import residuals
-from glovecal_models.effects.saturation.saturation import saturated_bands
+from glovecal_models.effects.saturation.band_search import saturated_bands
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.improvement.improve import improve

@@ -54,6 +54,13 @@ def test_a_second_cause_as_strong_as_the_first_is_named():
     assert set(added(found)) == {"creep", "supply_sag"}
 
 
+def test_a_form_that_moves_the_regressor_is_learned_until_both_agree():
+    sensors = ("I_MCP", "I_PIP", "M_MCP", "M_PIP", "R_MCP")
+    found = improved(12, sensors, Cause("creep", "lost_structure", 2.0))
+    assert added(found) == ["creep"]
+    assert found.steps[-1].rmse_deg < 0.8 * found.steps[0].rmse_deg
+
+
 def test_a_rotation_where_an_effect_cannot_be_learned_does_not_keep_it_from_the_others():
     sensors = ("T_MCP", "T_IP", "I_MCP", "I_DIP", "R_MCP", "RP_ABD")
     found = improved(1001, sensors, Cause("creep", "squeezed_fluid", 2.0))
