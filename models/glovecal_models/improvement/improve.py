@@ -280,8 +280,10 @@ class _Loop:
         return bool(names - self._tried)
 
     def _add_widenings(self) -> bool:
-        without = self._tried | self._has
-        steps = widenings(self.steps[-1].model, self._repaired(), self.diagnosis, without, self.found_before)
+        without, takes = self._tried | self._has, self._repaired()
+        if len(takes) < self.limits.claim_fewest_takes:
+            return False  # the diagnosis names them; no claim can be checked
+        steps = widenings(self.steps[-1].model, takes, self.diagnosis, without, self.found_before)
         return self._add_first(steps)
 
     def _add_first(self, steps: Sequence[Proposed]) -> bool:

@@ -109,6 +109,15 @@ def test_a_claim_that_becomes_no_truer_is_undone_and_few_takes_are_refused():
         add_effect(model, session.takes[:2], "garment_slip", rotations=["I_PIP"], settings=SETTINGS)
 
 
+def test_with_too_few_takes_to_check_a_claim_saturation_is_only_named():
+    session = recorded(3, Cause("saturation", "hard_clip", 3.0))
+    found = improve(session.takes[:2], LAYOUT, "anna", SETTINGS)
+    assert found.diagnosis is not None
+    assert found.diagnosis.named is not None
+    assert found.diagnosis.named.effect == "saturation"
+    assert not any(step.added for step in found.steps)
+
+
 def test_a_fault_is_left_out_told_and_served_live():
     session = recorded(7, Cause("sensor_fault", "spikes", 2.0, ("I_PIP",)), takes=2, take_s=20.0)
     found = improve(session.takes, LAYOUT, "anna", SETTINGS, max_steps=1)
