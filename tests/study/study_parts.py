@@ -69,7 +69,7 @@ class StudyChoices:
     """Gloves that are repaired, per effect."""
     pairs: int = 60
     """Gloves with two effects per size."""
-    second_names: int = 270
+    second_names: int = 288
     """Gloves with one effect that is added, in all."""
     ceilings: int = 200
     """Gloves that are asked for their ceiling, in all; every second one is clean."""

@@ -56,5 +56,7 @@ def test_other_limits_reach_the_diagnosis():
     assert glove is not None
     glove = replace(glove, rate_hz=30.0, takes_per_wearing=3, take_s=20.0)
     assert diagnosis_answer(glove)["first"] == "hysteresis"
-    strict = limits_from({"diagnosis": {"joint_p_value": 0.0, "pooled_p_value": 0.0, "clear_share": 2.0}})
+    strict = limits_from(
+        {"diagnosis": {"joint_p_value": 0.0, "pooled_p_value": 0.0, "rare_p_value": 0.0, "clear_share": 2.0}}
+    )
     assert diagnosis_answer(glove, strict)["first"] == NOTHING

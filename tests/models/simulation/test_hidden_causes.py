@@ -21,7 +21,9 @@ from glovecal_models.takes.take_check import check_take
 
 PLAN = SessionPlan(seed=5, takes_per_wearing=2, take_s=20.0, bits=12)
 STRENGTH_DEG = 1.5
-ROUGHLY = ("changes_mode", "narrow_window", "wrong_channel", "signal_fades", "ring_buffer_again")
+ROUGHLY = (
+    "changes_mode", "narrow_window", "wrong_channel", "signal_fades", "ring_buffer_again", "lost_packets",
+)  # fmt: skip
 """Forms whose strength does not follow their size on this short motion; within a factor of two."""
 HASHES = Path(__file__).parents[2] / "study" / "set_aside_forms.sha256"
 ALL_FORMS = [
