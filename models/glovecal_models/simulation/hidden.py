@@ -71,7 +71,7 @@ def hide(cause: Cause, place: int, glove: SessionGlove, scene: Scene) -> Hidden:
                 reached = np.sqrt(np.mean(reached**2))
             size = np.where(reached > LEAST_REACHED_DEG, size * targets / np.maximum(reached, 1e-12), 0.0)
     reached = measure(size)
-    everywhere = np.full(len(affected), size[0] if form.shared else 0.0)
+    everywhere = np.full(len(affected), size[0])  # of no other sensor is anything kept, but a size is no zero
     everywhere[affected] = size
     channels = tuple(np.array(glove.plan.sensors)[affected].tolist())
     record = HiddenCause(
