@@ -90,7 +90,7 @@ def _end_band(
     inside = angles[end] - mean[step[end]]
     if extra < LEAST_EXTRA_DEG or _moves_within(visits, inside) < MOVES_SHARE * float(inside.std()):
         return None
-    towards = 1 if np.median(angles[end]) >= np.median(angles[beside]) else -1
+    towards = 1 if np.median(angles[end]) >= np.median(angles[~end]) else -1
     edges = sorted((sign * (top - many * width), sign * max(float(value.max()), float(top))))
     return SaturatedBand(
         sensor, rotation, float(edges[0]), float(edges[1]), "high" if sign > 0 else "low", towards, extra,
