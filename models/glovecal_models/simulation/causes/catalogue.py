@@ -157,7 +157,14 @@ def forms(name: str) -> tuple[Form, ...]:
         own = import_module(f"{PACKAGE}.{name}").FORMS
     else:
         raise BadInput(f"no cause {name!r}; there are {', '.join(KNOWN_CAUSES + UNKNOWN_CAUSES)}")
-    return (*own, *_further("retired", name), *_further("set_aside", name))
+    return (
+        *own, *_further("retired", name), *_further("set_aside", name), *_further("set_aside.unlike", name),
+    )  # fmt: skip
+
+
+def unlike_open_forms(name: str) -> frozenset[str]:
+    """Names of the forms set aside whose author knew the laws of all others and had to find other ones."""
+    return frozenset(form.name for form in _further("set_aside.unlike", name))
 
 
 def _further(folder: str, name: str) -> tuple[Form, ...]:
