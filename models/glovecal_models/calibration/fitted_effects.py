@@ -17,6 +17,7 @@ from glovecal_models.calibration.effect_shape import REFINEMENTS, EffectGroup, b
 from glovecal_models.calibration.form_choice import FormRows, chosen_columns, chosen_form
 from glovecal_models.calibration.held_out import (
     BaseFeatures,
+    BaseProducts,
     Rows,
     WeightPosterior,
     weight_posterior,
@@ -24,6 +25,8 @@ from glovecal_models.calibration.held_out import (
 )
 from glovecal_models.calibration.own_signal import OwnSignal
 from glovecal_models.calibration.prepared_takes import PreparedTakes
+from glovecal_models.effects.base.column_steps import IN_STEPS, learned_steps
+from glovecal_models.effects.base.context_effect import ContextEffect
 from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.form_curve import LaneCurves
 from glovecal_models.effects.base.learned_form import LearnedForm
@@ -61,6 +64,7 @@ def fitted_effects(
         effect = group.wanted.effect
         if is_last:
             group = groups[place] = _with_curves(group, shape, rows, bases, extra, priors)
+            group = groups[place] = _with_steps(group, shape, rows, bases, extra)
         found = effect.columns_of_takes(group.signals, group.settings, shape)
         own_prior = effect.prior_sd(group.settings)
         for lane, name in enumerate(group.lanes):
@@ -139,6 +143,33 @@ def _with_curves(
     return replace(group, settings=choices[chosen_columns(map(lanes, choices))])
 
 
+def _with_steps(
+    group: EffectGroup,
+    shape: np.ndarray,
+    rows: Mapping[str, Sequence[np.ndarray]],
+    bases: Mapping[str, list[Rows]],
+    extra: Mapping[str, list[list[np.ndarray]]],
+) -> EffectGroup:
+    """With the steps in which a slow cause acts, where none are known and these takes show them; ``extra`` as
+    above."""
+    effect = group.wanted.effect
+    if not isinstance(effect, ContextEffect) or not effect.may_act_in_steps or IN_STEPS in group.settings:
+        return group
+    found = effect.columns_of_takes(group.signals, group.settings, shape)
+    left = []
+    for lane, name in enumerate(group.lanes):
+        mine = [part[index, lane] for part, index in zip(found, rows[name], strict=True)]
+        units = [
+            replace(unit, base=np.column_stack([unit.base, *columns]))
+            for unit, *columns in zip(bases[name], *extra[name], mine, strict=True)
+        ]
+        fit = BaseProducts(units)
+        left.append([unit.target - fit.fitted(unit.base) for unit in units])
+    values = [effect.clipped(take, group.settings) for take in group.signals]
+    steps = learned_steps(values, [rows[name] for name in group.lanes], left)
+    return group if steps is None else replace(group, settings=group.settings | steps.to_settings())
+
+
 def _learned_form(
     group: EffectGroup,
     values: Sequence[Mapping[str, np.ndarray]],
@@ -206,7 +237,9 @@ def _groups(
         values = [np.column_stack(parts) for parts in zip(*(own[name].takes for name in lanes), strict=True)]
         without = frozenset(columns[lanes[0]].sensors) if item.effect.one_joint_at_a_time else frozenset()
         signals = takes.signals(values, np.array([own[name].zero_deg for name in lanes]), without)
-        groups.append(EffectGroup(item, lanes, signals, item.effect.fit_repair_constants(signals)))
+        settings = item.effect.fit_repair_constants(signals)
+        settings = item.effect.settings_with_found(settings, item.settings)
+        groups.append(EffectGroup(item, lanes, signals, settings))
     return groups
 
 

@@ -25,7 +25,9 @@ def requested_effects(model: CalibrationModel) -> tuple[EffectRequest, ...]:
             continue  # training takes tell nothing of a wearing that only a quick check saw
         before = merged.get(item.name)
         rotations = item.active if before is None else (*before.rotations, *item.active)
-        settings = item.settings if not item.weights.shape[1] else {}
+        settings = item.settings
+        if item.weights.shape[1]:
+            settings = item.effect.settings_with_found({}, item.settings)
         merged[item.name] = EffectRequest(item.name, tuple(dict.fromkeys(rotations)), settings)
     return tuple(merged.values())
 

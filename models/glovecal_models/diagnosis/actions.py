@@ -6,8 +6,9 @@ with the same form, freedom and choice, both on takes held out whole.
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from glovecal_models.layout import Layout
 
 TRAIN_OTHERWISE = "lmc_gpr"
 """The method that learns curves and products of all the sensors that the layout gives a rotation."""
+NOTHING_SAVED: Mapping[str, float] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,9 @@ class Action:
     """To be trained with rather, where the base could read the column and a straight line does not use it."""
     rmse_deg: HeldOutRmse | None = None
     """Of the rotation's sensor, on takes held out whole: without the effect, with it, with its control."""
+    least_saved_square: float = 0.0
+    """Degrees squared: a physical effect that saves less may only grasp what the form of the model's own
+    effects leaves on the rotation."""
 
     @property
     def rotation(self) -> str:
@@ -51,6 +56,16 @@ class Action:
         """Whether the effect beats nothing and its control on held-out takes."""
         found = self.rmse_deg
         return found is not None and found.after < min(found.before, found.control)
+
+    @property
+    def is_within_known(self) -> bool:
+        """Whether what the model's effects leave there may explain as much: no cause is claimed."""
+        found = self.rmse_deg
+        return (
+            self.is_physical
+            and found is not None
+            and found.before**2 - found.after**2 < self.least_saved_square
+        )
 
     @property
     def saved_share(self) -> float | None:
@@ -79,13 +94,17 @@ def actions_for(
     *,
     linear: bool,
     seed: int = 0,
+    saved_by_known: Mapping[str, float] = NOTHING_SAVED,
 ) -> tuple[Action, ...]:
     """One for each rotation and effect, those that save most first. ``has``: effects that are on a rotation
-    already, as pairs; ``linear``: whether the base is a straight line of the measuring sensor."""
+    already, as pairs; ``linear``: whether the base is a straight line of the measuring sensor;
+    ``saved_by_known``: degrees squared that the model's effects save on each rotation."""
     found: list[Action] = []
     done: set[tuple[str, str]] = set()
     for item in associations:
         action = _action(item, design, layout, has, linear, seed)
+        least = design.limits.beside_known_share * saved_by_known.get(item.rotation, 0.0)
+        action = replace(action, least_saved_square=least)
         key = (item.rotation, action.effect or action.method or item.column)
         if key not in done:
             done.add(key)

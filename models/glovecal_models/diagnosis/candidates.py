@@ -12,6 +12,7 @@ from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.not_identifiable import NotIdentifiable, undecidable
 from glovecal_models.diagnosis.permutation_test import session_p_value
 from glovecal_models.diagnosis.smooth_column import smooth_assessment
+from glovecal_models.diagnosis.stepped_column import stepped_assessment
 from glovecal_models.effects.base.assessment import (
     Assessment,
     JointErrors,
@@ -92,11 +93,15 @@ def _assessed(
 def _in_any_form(
     design: ForwardDesign, effect: Effect, usual: Assessment, generator: np.random.Generator
 ) -> Assessment:
-    """Where its usual form is not significant, a smooth one may be."""
-    if usual.significant_joints or not isinstance(effect, ContextEffect) or not effect.has_any_form:
+    """Where its usual form is not significant, a smooth one may be, or one in steps."""
+    if usual.significant_joints or not isinstance(effect, ContextEffect):
         return usual
-    smooth = smooth_assessment(design, effect, usual, generator)
-    return smooth if smooth is not None and smooth.significant_joints else usual
+    forms = [(effect.has_any_form, smooth_assessment), (effect.may_act_in_steps, stepped_assessment)]
+    for is_possible, assess in forms:
+        found = assess(design, effect, usual, generator) if is_possible else None
+        if found is not None and found.significant_joints:
+            return found
+    return usual
 
 
 def _screened(design: ForwardDesign, effect: Effect, generator: np.random.Generator) -> tuple[Evidence, ...]:

@@ -132,7 +132,9 @@ def diagnose(
             stated_deg={} if seen is None else seen.stated_deg,
         )  # fmt: skip
         there = {(item.effect.name, joint) for item in after.known for joint in item.joints}
-        actions = actions_for(residual.associations, rest, layout, there, linear=linear, seed=seed)
+        actions = actions_for(
+            residual.associations, rest, layout, there, linear=linear, seed=seed, saved_by_known=saved
+        )
     progress("done", 1.0)
     return Diagnosis(
         joints=problem.joints,

@@ -75,6 +75,7 @@ def beside_wholes(found: Sequence[Assessment], known: Sequence[Effect]) -> list[
         if (
             whole is not None
             and item.significant_joints
+            and item.steps is None
             and saved_share_of(item) < whole.also_explained_share
         ):
             item = replace(item, part_of=whole.name)

@@ -123,7 +123,9 @@ class DiagnosisProblem:
             return replace(self, even=tuple(moved), bases={})
         where = tuple(first.joints[i] for i in first.significant_joints)
         shapes = tuple(first.shapes[i] for i in first.significant_joints)
-        return self.beside(_with_learned_terms(KnownEffect(effects[first.effect], where, shapes), design))
+        stored = {} if first.steps is None else first.steps.to_settings()
+        known = KnownEffect(effects[first.effect], where, shapes, stored=stored)
+        return self.beside(_with_learned_terms(known, design))
 
 
 def _with_joints(take: ResampledTake, kept: np.ndarray) -> ResampledTake:

@@ -32,14 +32,15 @@ def may_explain(
     effect: Effect, naming: Naming, found: Sequence[Finding], effects: Mapping[str, Effect]
 ) -> bool:
     """Whether what an effect that is asked for last found is behind a ranking: nothing is ranked, or only
-    effects that seem to explain a part of it. These explain no more than that, or they are not needed beside
-    what was found where that is larger. ``effects``: those that were ranked, by name."""
+    effects that seem to explain a part of it, and not in equal steps of a column. These explain no more than
+    that, or they are not needed beside what was found where that is larger. ``effects``: those that were
+    ranked, by name."""
     if not _is_asked(effect, naming, effects):
         return False
     if not naming.ranked:
         return True
     first = naming.ranked[0]
-    if saved_share_of(first) < effect.also_explained_share:
+    if first.steps is None and saved_share_of(first) < effect.also_explained_share:
         return _size_square(found) >= LEAST_SIZE * first.saved_square
     needless = [set(item.accounts_for) for item in found]
     if all(item.effect in set.intersection(*needless) for item in naming.ranked):

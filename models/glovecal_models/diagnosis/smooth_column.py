@@ -55,6 +55,9 @@ class Pieces:
     """(T, P), evenly spread and scaled to 0..1."""
     piece: tuple[np.ndarray, ...]
     """For each unit (N,): the piece of each of its rows, counted through all takes."""
+    low: float = 0.0
+    span: float = 1.0
+    """Of the column as it was recorded."""
 
 
 def smooth_assessment(
@@ -69,7 +72,7 @@ def smooth_assessment(
         return None
     settings = effect.fit_constants(design.signals)
     columns = [effect.evenly(effect.clipped(take, settings), settings) for take in design.signals]
-    pieces = [_pieces(design, joint, columns, count) for joint in range(len(usual.errors))]
+    pieces = [pieces_of(design, joint, columns, count) for joint in range(len(usual.errors))]
     known = [item for item in pieces if item is not None]
     if len(known) < len(pieces):
         return None
@@ -87,7 +90,10 @@ def smooth_assessment(
         if np.mean(found.explained >= found.explained[0]) > JOINT_P_VALUE:
             errors.append(replace(before, added=before.base, control=before.base))
         else:
-            errors.append(_errors(design, joint, known[joint], before, found))
+            said = (
+                [each.ravel()[at] for at in known[joint].piece] for each in (found.predicted, found.control)
+            )
+            errors.append(errors_beside(design, joint, before, *said))
     return replace(usual, errors=tuple(errors), p_value=p_value)
 
 
@@ -113,7 +119,9 @@ class _Left:
         return cls(explained, predicted, control)
 
 
-def _pieces(design: ForwardDesign, joint: int, columns: Sequence[np.ndarray], pieces: int) -> Pieces | None:
+def pieces_of(design: ForwardDesign, joint: int, columns: Sequence[np.ndarray], pieces: int) -> Pieces | None:
+    """So many of each take; ``columns`` (N,) of each. None where a take has no error of the joint, or the
+    column never changes."""
     takes = len(design.signals)
     rows_of: list[list[np.ndarray]] = [[] for _ in range(takes)]
     for take, rows in design.units(joint):
@@ -136,7 +144,8 @@ def _pieces(design: ForwardDesign, joint: int, columns: Sequence[np.ndarray], pi
     span = float(np.ptp(column))
     if span <= 0 or not np.isfinite(span):
         return None
-    return Pieces(error / np.maximum(count, 1.0), (column - column.min()) / span, tuple(piece))
+    low = float(column.min())
+    return Pieces(error / np.maximum(count, 1.0), (column - low) / span, tuple(piece), low, span)
 
 
 def left_out(pieces: Pieces, orders: np.ndarray) -> np.ndarray:
@@ -158,19 +167,19 @@ def left_out(pieces: Pieces, orders: np.ndarray) -> np.ndarray:
     return np.stack(found)
 
 
-def _errors(
+def errors_beside(
     design: ForwardDesign,
     joint: int,
-    pieces: Pieces,
     before: JointErrors,
-    left: _Left,
+    predicted: Sequence[np.ndarray],
+    control: Sequence[np.ndarray],
 ) -> JointErrors:
+    """``before`` with what is left of the joint beside predictions (N,) of each unit's rows, degrees, and
+    beside those of a control."""
     residual = design.products[joint].residual
     starts = block_starts([len(part) for part in residual])
     added, mirrored = (
-        squared_in_blocks(
-            [part - each.ravel()[at] for part, at in zip(residual, pieces.piece, strict=True)], starts
-        )
-        for each in (left.predicted, left.control)
+        squared_in_blocks([part - said for part, said in zip(residual, each, strict=True)], starts)
+        for each in (predicted, control)
     )
     return replace(before, added=added, control=mirrored)

@@ -127,8 +127,12 @@ def candidate_sentence(item: Assessment) -> str:
     rmse = item.rmse_deg
     return (
         f"{item.effect}: {rmse.before:.2f} to {rmse.after:.2f} degrees (control: {rmse.control:.2f}); largest"
-        f" on {item.largest_contrast_joint}."
+        f" on {item.largest_contrast_joint}.{_in_steps(item)}"
     )
+
+
+def _in_steps(item: Assessment) -> str:
+    return "" if item.steps is None else f" It acts in equal steps of {item.steps.width:.3g} of its column."
 
 
 def next_take_sentence(take: NextTake) -> str:
@@ -209,10 +213,11 @@ def action_sentence(action: Action) -> str:
         )
     rmse = action.rmse_deg
     unnamed = "" if action.is_physical else " (no cause is claimed)"
+    within = " That is no more than the model's own effects may have left there." * action.is_within_known
     return (
         f"{item.rotation}: the residual is associated with {item.phrase}; {action.effect}{unnamed} reduces"
         f" the held-out error from {rmse.before:.2f} to {rmse.after:.2f} degrees (control:"
-        f" {rmse.control:.2f})."
+        f" {rmse.control:.2f}).{within}"
     )
 
 

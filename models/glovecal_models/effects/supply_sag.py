@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from glovecal_models.effects.base.column_steps import step_columns, step_names, step_prior_sd
 from glovecal_models.effects.base.context_effect import ContextEffect
 from glovecal_models.effects.base.facts import Parameter, Settings
 from glovecal_models.effects.base.joint_units import in_joint_units
@@ -19,7 +20,10 @@ OWN_PRIOR_DEG = 1.0
 
 
 class SupplySag(ContextEffect):
-    """Columns: the common scaling, then each joint's own departure from it in offset and gain."""
+    """Columns: the common scaling, then each joint's own departure from it in offset and gain.
+
+    Two more where it acts in steps.
+    """
 
     name = "supply_sag"
     explanation = "All readings shrink together as the supply voltage falls."
@@ -28,6 +32,7 @@ class SupplySag(ContextEffect):
     parameters: ClassVar = (Parameter("exponent", "1", 0.3, 3.0, "about 1"),)
     context: ClassVar = ("supply_v",)
     has_any_form: ClassVar[bool] = True
+    may_act_in_steps: ClassVar[bool] = True
 
     def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
         return np.repeat(np.array(EXPONENTS)[:, None, None], takes[0].own.shape[1], axis=1)
@@ -40,10 +45,11 @@ class SupplySag(ContextEffect):
         own = (volts / max(settings["high"] - settings["low"], 1e-9))[:, None] * np.ones_like(take.own)
         own = own - settings["usual"] / max(settings["high"] - settings["low"], 1e-9)
         joint = in_joint_units(take.own, settings)
-        return np.stack([common, own, own * joint, own * joint**2], axis=2)
+        smooth = np.stack([common, own, own * joint, own * joint**2], axis=2)
+        return np.concatenate([smooth, step_columns(volts, take.own, settings)], axis=2)
 
     def prior_sd(self, settings: Settings) -> np.ndarray:
-        return np.array([1.0, OWN_PRIOR_DEG, OWN_PRIOR_DEG, OWN_PRIOR_DEG])
+        return np.append([1.0, OWN_PRIOR_DEG, OWN_PRIOR_DEG, OWN_PRIOR_DEG], step_prior_sd(settings))
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         return (
@@ -51,4 +57,5 @@ class SupplySag(ContextEffect):
             "own_offset_deg",
             "own_gain_deg_per_sd",
             "own_bend_deg_per_sd2",
+            *step_names(settings, self.column),
         )

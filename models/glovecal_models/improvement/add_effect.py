@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.child_model import child_model, columnless_effects, kept_lanes
 from glovecal_models.calibration.effect_fit import fit_with_effects
 from glovecal_models.calibration.effect_request import EffectRequest
@@ -90,6 +91,7 @@ def add_effect(
     if report:
         report(f"learning {name} from all takes", 0.4)
     fit = fit_with_effects(prepared, chosen, wanted, settings, cancelled=cancelled)
+    wanted = tuple(_with_found(item, fit.effects) for item in wanted)
     with_it = part(report, 0.5, 0.9, f"with {name}")
     after = held_out_errors(
         prepared, chosen, wanted, settings, optima=fit.optima, cancelled=cancelled,
@@ -195,6 +197,14 @@ def _joined(has: Sequence[EffectRequest], fresh: EffectRequest) -> EffectRequest
         tuple(dict.fromkeys((*before.rotations, *fresh.rotations))),
         fresh.settings or before.settings,
     )
+
+
+def _with_found(request: EffectRequest, learned: Sequence[AddedEffect]) -> EffectRequest:
+    """With what was searched in all takes: folds have too few to search it again."""
+    mine = next((item for item in learned if item.name == request.name), None)
+    if mine is None:
+        return request
+    return replace(request, settings=mine.effect.settings_with_found(request.settings, mine.settings))
 
 
 def _require_judgeable(takes: PreparedTakes, why: str | None, name: str) -> None:

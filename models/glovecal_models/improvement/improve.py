@@ -157,7 +157,7 @@ class _Loop:
                 continue
             where = [item.joints[i] for i in item.significant_joints]
             tried_effect = self.diagnosis.effects[item.effect]
-            constants = None
+            constants = None if item.steps is None else item.steps.to_settings()
             if isinstance(tried_effect, SignatureEffect):
                 constants = tried_effect.constants_of(item, [take.name for take in self.takes])
             if self._add(item.effect, where, constants, self.diagnosis):
@@ -260,10 +260,11 @@ class _Loop:
         return self._add(asked[0].effect, where, None, diagnosis, tuple(map(action_sentence, asked)))
 
     def _add_associated(self, diagnosis: Diagnosis) -> bool:
-        """The first effect of a column that the residual goes along with, if it stays."""
+        """The first effect of a column that the residual goes along with, if it stays; none that may only
+        grasp what the form of an earlier one left."""
         for action in diagnosis.actions:
             pair = (action.effect or "", action.rotation)
-            if action.effect is None or not action.saves or pair in self.followed:
+            if action.effect is None or not action.saves or action.is_within_known or pair in self.followed:
                 continue
             self.followed.add(pair)
             if self._add(

@@ -185,6 +185,9 @@ class ActionView(View):
     rmse_after_deg: float | None = Field(description="With the effect, in the form that the takes ask for.")
     rmse_control_deg: float | None = Field(description="With its control, of the same form and freedom.")
     saves: bool = Field(description="Whether the effect beats its control.")
+    is_within_known: bool = Field(
+        description="Whether the model's own effects may have left as much; improve does not add it then."
+    )
     sentence: str
 
     @classmethod
@@ -201,6 +204,7 @@ class ActionView(View):
             rmse_after_deg=None if found is None else found.after,
             rmse_control_deg=None if found is None else found.control,
             saves=item.saves,
+            is_within_known=item.is_within_known,
             sentence=action_sentence(item),
         )
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from glovecal_models.effects.base.column_steps import ColumnSteps
 from glovecal_models.effects.base.facts import BETWEEN_TAKES, Certainty
 from glovecal_models.effects.base.limits import SIGNIFICANCE_LIMITS, SignificanceLimits
 
@@ -92,6 +93,8 @@ class Assessment:
     """Joints on which what it saves may as well be an error of the camera that measured the angles."""
     part_of: str = ""
     """An effect of the model that it seems to explain a part of; empty: none."""
+    steps: ColumnSteps | None = None
+    """In which it acts; None: smoothly."""
 
     def shape_described(self, joint: int) -> dict[str, float]:
         """The shape of one joint by its numbers' names."""

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from glovecal_models.effects.base.column_steps import IN_STEPS, ColumnSteps
 from glovecal_models.effects.base.effect import InstantEffect
 from glovecal_models.effects.base.facts import Control, Settings, ShownOver
 from glovecal_models.effects.base.joint_units import fit_joint_units, in_joint_units
@@ -27,6 +28,8 @@ class ContextEffect(InstantEffect):
     control: ClassVar[Control] = "context of other takes"
     has_any_form: ClassVar[bool] = False
     """Whether the error may follow the column, which changes between takes, in any smooth form."""
+    may_act_in_steps: ClassVar[bool] = False
+    """Whether firmware may correct it by a table of the column (``column_steps``)."""
     shown_over: ClassVar[ShownOver] = "context"
 
     @property
@@ -42,6 +45,13 @@ class ContextEffect(InstantEffect):
             "usual": float(np.median(values)),
             **fit_joint_units(takes),
         }
+
+    def settings_with_found(self, settings: Settings, stored: Settings) -> Settings:
+        steps = ColumnSteps.of_settings(stored)
+        return settings if steps is None else {**settings, **steps.to_settings()}
+
+    def settings_as_stored(self, takes: Sequence[Signals], settings: Settings, stored: Settings) -> Settings:
+        return self.settings_with_found(settings, stored)
 
     def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
         return np.zeros((1, takes[0].own.shape[1], 0))
@@ -64,6 +74,8 @@ class ContextEffect(InstantEffect):
         return value
 
     def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
+        if IN_STEPS in settings:
+            return {}  # what a smooth curve would find between steps is chance
         value = self.clipped(take, settings)
         return {self.column: np.repeat(value[:, None], take.own.shape[1], axis=1)}
 

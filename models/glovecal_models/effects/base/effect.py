@@ -145,6 +145,11 @@ class Effect(EffectFacts, ABC):
         ask for, or none."""
         return ()
 
+    def settings_with_found(self, settings: Settings, stored: Settings) -> Settings:
+        """``settings`` of other takes with those of ``stored`` that were searched in all takes; not to be
+        searched again in fewer."""
+        return settings
+
     def settings_as_stored(self, takes: Sequence[Signals], settings: Settings, stored: Settings) -> Settings:
         """``settings`` of other lanes with the further columns that a model with ``stored`` took."""
         return settings

@@ -11,6 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from glovecal_models.effects.base.column_steps import step_columns, step_names, step_prior_sd
 from glovecal_models.effects.base.context_effect import PRIOR_DEG, ContextEffect
 from glovecal_models.effects.base.effect import Stream
 from glovecal_models.effects.base.facts import Settings
@@ -29,10 +30,14 @@ START = "start"
 
 
 class SlowContextEffect(ContextEffect):
-    """Columns of the context column and its square, and one more: its mean slope over the past minutes."""
+    """Columns of the context column and its square, and one more: its mean slope over the past minutes.
+
+    Two more where it acts in steps.
+    """
 
     has_memory: ClassVar[bool] = True
     has_any_form: ClassVar[bool] = True
+    may_act_in_steps: ClassVar[bool] = True
     take_sd_deg: ClassVar[float] = 0.5  # what came before the first frame is known by its slope only
 
     def transient_s(self, shape: np.ndarray) -> float:
@@ -57,21 +62,27 @@ class SlowContextEffect(ContextEffect):
         """Columns (N, L, C) with the column's mean slope (N,), per second, given."""
         steepness = (slope - settings[START]["slope"]) / settings["steepest_per_s"]
         each = np.repeat(np.clip(steepness, -SLOPE_REACH, SLOPE_REACH)[:, None, None], len(shape), axis=1)
-        return np.concatenate([super().columns(take, settings, shape), each], axis=2)
+        steps = step_columns(self.clipped(take, settings), take.own, settings)
+        return np.concatenate([super().columns(take, settings, shape), each, steps], axis=2)
 
     def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
         """The column and how steeply it changes: together they tell how far the sensor is behind."""
-        return {**super().form_inputs(take, columns, settings), f"slope of {self.column}": columns[:, :, -1]}
+        found = super().form_inputs(take, columns, settings)
+        return found and {**found, f"slope of {self.column}": columns[:, :, -1]}
 
     def stream(self, settings: Settings, shape: np.ndarray) -> Stream:
         return _SlowContextStream(self, settings, shape)
 
     def prior_sd(self, settings: Settings) -> np.ndarray:
-        return np.append(super().prior_sd(settings), PRIOR_DEG)
+        return np.concatenate([super().prior_sd(settings), [PRIOR_DEG], step_prior_sd(settings)])
 
     def weight_names(self, settings: Settings) -> tuple[str, ...]:
         steepest = 60.0 * settings["steepest_per_s"]
-        return (*super().weight_names(settings), f"offset_deg_per_{steepest:.3g}[c.{self.column}]_per_min")
+        return (
+            *super().weight_names(settings),
+            f"offset_deg_per_{steepest:.3g}[c.{self.column}]_per_min",
+            *step_names(settings, self.column),
+        )
 
 
 class _SlowContextStream(Stream):
