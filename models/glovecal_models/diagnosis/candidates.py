@@ -98,7 +98,8 @@ def _in_any_form(
         return usual
     forms = [(effect.has_any_form, smooth_assessment), (effect.may_act_in_steps, stepped_assessment)]
     for is_possible, assess in forms:
-        found = assess(design, effect, usual, generator) if is_possible else None
+        # Draws of their own: whether one form is tried changes no other effect's permutations.
+        found = assess(design, effect, usual, generator.spawn(1)[0]) if is_possible else None
         if found is not None and found.significant_joints:
             return found
     return usual

@@ -78,6 +78,9 @@ def _within_without(
     for take in range(takes):
         kept = np.arange(takes) != take
         others = StepSearch(search.column[kept])
+        if not others.tried:
+            found.append([np.zeros(len(column)) for column in columns])
+            continue
         at, _ = others.best(errors[:, kept], np.arange(takes - 1)[None, :])
         steps = others.refined(errors[:, kept], int(at[0]))
         found.append([steps.within(column) for column in columns])

@@ -9,6 +9,7 @@ it missed, and then moves more slowly; a hand that rested starts slowly. How oft
 told by the frames that follow one another without a repeat.
 
 Sensors that are read in turn repeat each by itself: most frames in a movement of theirs hold an old reading.
+A buffer that is played again repeats runs of frames (``replayed_frames``).
 """
 
 from __future__ import annotations
@@ -28,11 +29,15 @@ from glovecal_models.effects.base.signature_effect import (
     named,
 )
 from glovecal_models.takes.reading_faults import smallest_step
+from glovecal_models.takes.replayed_frames import replayed
 from glovecal_models.takes.take import Take
 
 LEAST_REPEATED_SHARE = 0.02
 """Of the moments inside a movement."""
 LEAST_COUNT = 10
+RARELY_REPEATED_SHARE, RARE_BY_CHANCE, BRIEF_FRAMES = 0.005, 0.001, 10
+"""And of those moments by repeats no longer than so, where columns so seldom repeat together by chance: fine
+steps of several sensors."""
 BEYOND_CHANCE = 1.5
 """Columns must repeat together so many times more often than each for itself makes likely."""
 FINE_SHARE = 0.5
@@ -78,6 +83,8 @@ class Repeats:
     """Steps without a halt, for comparison."""
     plain_leaps: int = 0
     """Those of them that are leaps."""
+    brief: int = 0
+    """Repeats in the middle of a movement that last for a few frames only: no rest of a hand."""
 
     @property
     def share(self) -> float:
@@ -103,6 +110,7 @@ class RepeatedSamples(SignatureEffect):
         by_frames = _finding("frames", takes, frames)
         found = [by_frames, _finding("reference rows", takes, rows)]
         if by_frames is None:
+            found.append(_finding_replayed(takes, replayed([take.readings for take in takes])))
             found.append(_finding_in_turn(takes, list(dict.fromkeys(sensor_of.values()))))
         return tuple(item for item in found if item is not None)
 
@@ -112,7 +120,10 @@ class RepeatedSamples(SignatureEffect):
         drop_frames = _is_found([repeats(take.readings) for take in takes])
         drop_rows = _is_found([repeats(take.reference) for take in takes])
         old = {} if drop_frames or not takes else _read_in_turn(takes, takes[0].sensors)
-        return tuple(_renewed(_without(take, drop_frames, drop_rows), old) for take in takes)
+        readings = [take.readings for take in takes]
+        again = [repeats(part).rows for part in readings] if drop_frames else replayed(readings)
+        pairs = zip(takes, again, strict=True)
+        return tuple(_renewed(_without(take, frames, drop_rows), old) for take, frames in pairs)
 
 
 def repeats(values: np.ndarray) -> Repeats:
@@ -143,10 +154,11 @@ def repeats(values: np.ndarray) -> Repeats:
     missed = np.zeros(len(values), dtype=bool)
     for start, end in zip(fresh[1:-2][leaping & halting], fresh[2:-1][leaping & halting], strict=True):
         missed[start + 1 : end] = True
+    brief = goes_on & padded & (np.diff(fresh)[1:] <= BRIEF_FRAMES)
     return Repeats(
         same & (near | missed), interrupted, going, together, _by_chance(values, steps, near, together),
         int(halting.sum()), int((leaping & halting).sum()), int((lasts == 1).sum()),
-        int((leaping & (lasts == 1)).sum()),
+        int((leaping & (lasts == 1)).sum()), int(brief.sum()),
     )  # fmt: skip
 
 
@@ -184,11 +196,14 @@ def _leap_beyond_chance(found: Sequence[Repeats]) -> bool:
 
 def _are_many(found: Sequence[Repeats]) -> bool:
     interrupted, moving = sum(item.interrupted for item in found), sum(item.moving for item in found)
-    if interrupted < LEAST_COUNT or interrupted < LEAST_REPEATED_SHARE * (interrupted + moving):
-        return False
     together, by_chance = (
         float(np.mean([getattr(r, name) for r in found])) for name in ("together", "by_chance")
     )
+    brief, moments = sum(item.brief for item in found), interrupted + moving
+    if by_chance <= RARE_BY_CHANCE and brief >= max(LEAST_COUNT, RARELY_REPEATED_SHARE * moments):
+        return True
+    if interrupted < LEAST_COUNT or interrupted < LEAST_REPEATED_SHARE * moments:
+        return False
     return together >= LEAST_REPEATED_SHARE + BEYOND_CHANCE * by_chance
 
 
@@ -213,6 +228,19 @@ def _finding(kind: str, takes: Sequence[Take], found: Sequence[Repeats]) -> Find
         "leaps_after_halts_count": sum(item.leaps for item in found),
     }
     return Finding(RepeatedSamples.name, names, sentence, kind=kind, count=count, evidence=evidence)
+
+
+def _finding_replayed(takes: Sequence[Take], again: Sequence[np.ndarray]) -> Finding | None:
+    count, total = (sum(int(method(part)) for part in again) for method in (np.sum, np.size))
+    if not count:
+        return None
+    names = tuple(take.name for take, part in zip(takes, again, strict=True) if part.any())
+    sentence = (
+        f"{count} of {total} frames come a second time, in runs ({named(names)}): a buffer was played again;"
+        " they should be dropped."
+    )
+    evidence = {"replayed_share_of_frames_pct": 100.0 * count / total}
+    return Finding(RepeatedSamples.name, names, sentence, kind="runs", count=count, evidence=evidence)
 
 
 def _read_in_turn(takes: Sequence[Take], sensors: Sequence[str]) -> dict[str, float]:
@@ -265,12 +293,13 @@ def _renewed(take: Take, sensors: Collection[str]) -> Take:
     return replace(take, readings=readings)
 
 
-def _without(take: Take, drop_frames: bool, drop_rows: bool) -> Take:
+def _without(take: Take, frames: np.ndarray, drop_rows: bool) -> Take:
+    """Without those of the frames (N,), and the repeated rows of the reference."""
     if drop_rows and len(take.reference):
         unknown = repeats(take.reference).rows[:, None]
         take = replace(take, reference=np.where(unknown, np.nan, take.reference))
-    if drop_frames:
-        keep = ~repeats(take.readings).rows
+    if frames.any():
+        keep = ~frames
         poses = take.poses
         take = replace(
             take,

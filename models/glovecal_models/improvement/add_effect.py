@@ -97,7 +97,12 @@ def add_effect(
         prepared, chosen, wanted, settings, optima=fit.optima, cancelled=cancelled,
         report=with_it,
     )  # fmt: skip
-    kept = _not_worse(before, after, chosen, limits)
+    undone = Addition(
+        name, chosen, False, before, after, model, has, judged=tuple(judged or chosen), least_gain=least_gain
+    )
+    # Where it does not pay on all of them, one where it cannot be learned must not keep it from the others.
+    worse_times = limits.worse_times if undone.gain >= least_gain else 1.0
+    kept = _not_worse(before, after, chosen, worse_times)
     if fresh.has_columns and least_gain >= 0 and 0 < len(kept) < len(chosen):
         judged = [item for item in judged or kept if item in kept] or None
         found = add_effect(
@@ -106,8 +111,6 @@ def add_effect(
             limits=limits, cancelled=cancelled, report=report,
         )  # fmt: skip
         return replace(found, left_out=tuple(item for item in chosen if item not in kept))
-    judged = tuple(judged or chosen)
-    undone = Addition(name, chosen, False, before, after, model, has, judged=judged, least_gain=least_gain)
     if undone.gain < least_gain:
         return undone
     has_form = any(item.name == name and item.curves for item in fit.effects)
@@ -138,14 +141,13 @@ def add_effect(
 
 
 def _not_worse(
-    before: HeldOutErrors, after: HeldOutErrors, rotations: Sequence[str], limits: ImprovementLimits
+    before: HeldOutErrors, after: HeldOutErrors, rotations: Sequence[str], worse_times: float
 ) -> tuple[str, ...]:
-    """Rotations whose held-out error does not rise with the effect: one where it cannot be learned must not
-    keep it from the others."""
+    """Rotations whose held-out error rises by no more than to ``worse_times`` with the effect."""
     return tuple(
         name
         for name in rotations
-        if total_rmse_deg(after, [name]) <= limits.worse_times * total_rmse_deg(before, [name])
+        if total_rmse_deg(after, [name]) <= worse_times * total_rmse_deg(before, [name])
     )
 
 

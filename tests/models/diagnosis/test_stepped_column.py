@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from glovecal_models.calibration.artifact import dump, load
@@ -55,3 +58,22 @@ def test_they_are_repaired_and_a_stored_model_keeps_them():
     assert again.effects[0].settings == added.settings
     assert requested_effects(again)[0].settings == {IN_STEPS: added.settings[IN_STEPS]}
     assert added.form is None
+
+
+def test_a_column_that_differs_in_one_take_only_is_judged_without_an_error():
+    takes = [
+        replace(
+            take, context={**take.context, "temperature_c": np.full(len(take.time_s), 20.0 + 3.0 * (at == 4))}
+        )
+        for at, take in enumerate(recorded("temperature", "corrected_in_steps", 11))
+    ]
+    found = diagnose(takes, LAYOUT, judge_residual=False)
+    assert all(item.steps is None for item in found.assessments if item.effect == "temperature")
+
+
+def test_wearings_that_sit_otherwise_are_no_steps_of_a_column():
+    for seed in (2, 3):
+        found = diagnose(recorded("donning_shift", "offset_and_gain", seed), LAYOUT, judge_residual=False)
+        assert found.named is not None
+        assert found.named.effect == "donning_shift"
+        assert not any(item.steps and item.significant_joints for item in found.assessments)

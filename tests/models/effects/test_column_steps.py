@@ -121,3 +121,7 @@ def test_frame_by_frame_gives_the_columns_of_the_whole_take(name):
     frames = [stream.columns(take.at(slice(at, at + 1))) for at in range(300)]
     assert np.concatenate(frames) == pytest.approx(whole, abs=1e-9)
     assert whole.shape[2] == len(effect.prior_sd(settings)) == len(effect.weight_names(settings))
+
+
+def test_a_column_that_never_changes_has_no_steps():
+    assert StepSearch(np.full((TAKES, PIECES_OF_STEPS), 20.0)).tried == ()

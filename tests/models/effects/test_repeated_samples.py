@@ -107,3 +107,38 @@ def test_sensors_that_are_read_in_turn_are_found_and_follow_straight_lines(glove
     ]
     assert errors[1] < 0.4 * errors[0]
     assert REPEATED.find(mended, glove.sensor_of) == ()
+
+
+def test_a_buffer_that_is_played_again_is_found_and_taken_out(glove):
+    takes, again = [], np.zeros(1800, dtype=bool)
+    shown = np.arange(1800)
+    for start in range(100, 1700, 200):
+        shown[start : start + 27] = start - 9 + np.arange(27) % 9
+        again[start : start + 27] = True
+    for take in glove.takes():
+        takes.append(replace(take, readings=take.readings[shown]))
+    [finding] = REPEATED.find(takes, glove.sensor_of)
+    assert finding.kind == "runs"
+    assert "a buffer was played again" in finding.sentence
+    mended = REPEATED.repaired(takes)
+    for old, new in zip(takes, mended, strict=True):
+        dropped = ~np.isin(old.time_s, new.time_s)
+        assert not dropped[~again].any()
+        assert dropped[again].mean() > 0.6
+    assert REPEATED.find(mended, glove.sensor_of) == ()
+
+
+def test_few_repeats_of_many_fine_columns_are_found(glove):
+    """Of 12-bit readings of several sensors in a movement not one frame equals the one before by chance."""
+    random, takes = np.random.default_rng(2), []
+    time = np.arange(1800) / 60.0
+    for take in glove.takes():
+        fine = [np.round(2000 + 1500 * np.sin(time * rate)) for rate in (1.3, 2.1, 0.7)]
+        shown = np.arange(1800)
+        for start in random.choice(np.arange(20, 1780, 12), 20, replace=False).tolist():
+            shown[start : start + 3] = start - 1
+        readings = np.column_stack(fine)[shown]
+        takes.append(replace(take, sensors=("A", "B", "C"), readings=readings))
+    [finding] = REPEATED.find(takes, {})
+    assert finding.kind == "frames"
+    assert finding.evidence["repeated_share_of_moving_pct"] < 2.0

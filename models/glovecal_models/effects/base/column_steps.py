@@ -102,6 +102,8 @@ class StepSearch:
         """So many steps over the range, each with its first edge at each share of a step; those that these
         takes pass."""
         low, span, values = float(self.column.min()), float(np.ptp(self.column)), self.column.ravel()
+        if span <= 0:
+            return ()
         every = [
             ColumnSteps(span / count, low + span / count * edge)
             for count in counts.tolist()
@@ -176,7 +178,7 @@ def learned_steps(
             known = np.bincount(piece, minlength=count)
             if known.all():
                 errors[joint, take] = np.bincount(piece, part, count) / known
-    if not np.isfinite(errors).all() or np.ptp(search.column) <= 0 or not search.tried:
+    if not np.isfinite(errors).all() or not search.tried:
         return None
     generator = np.random.default_rng(seed)
     orders = np.array([np.arange(takes), *(generator.permutation(takes) for _ in range(ALL_DRAWS))])
