@@ -22,14 +22,15 @@ posture, or a reference that wanders slowly. A cause is hidden in it in one of s
 gets the takes and the layout. Every second glove has five bends of fingers, the others five joints drawn \
 from the whole hand. Sizes are multiples of the noise floor.
 
-Open forms were there while the diagnosis was made. Set-aside forms were written by somebody who saw \
-neither diagnosis nor limits; their hashes were committed first, and they are asked once. The present ones \
-are what their author expects to meet most often in a real glove, without having seen any other form: by \
-the judgement of a third reader 39 of 57 have the law of an open form in another hand, and 18 are near \
-relatives. Authors before had to avoid every law that was there: of theirs 76 to 80 % were named first at \
-1.3 noise floors. The clean twin is the same glove without the cause: a sensor that lost the angle cannot \
-be brought back to it. So the ceiling is asked of each repaired glove that stays above 1.1 times its twin: \
-"none" means that boosted trees on all that was recorded find nothing more.
+Open forms were there while the diagnosis was made. Set-aside forms were written by two authors who saw \
+neither diagnosis nor limits; hashes were committed first. One, who saw no other form, wrote what is to be \
+met most often in a real glove: by the judgement of a third reader 39 of those 57 have the law of an open \
+form in another hand, and 18 are near relatives; they were asked once before, on earlier programs. The \
+other was told the laws of all forms there are and had to find other ones that one may really meet; these \
+were asked once. The parts below tell both apart. The clean twin is the same glove without the cause: a \
+sensor that lost the angle cannot be brought back to it. So the ceiling is asked of each repaired glove \
+that stays above 1.1 times its twin: "none" means that boosted trees on all that was recorded find nothing \
+more.
 """
 FOLDER = "pictures"
 FORMS = ("open forms", "set-aside forms")
