@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from glovecal_models.calibration.artifact import dump, load
 from glovecal_models.calibration.model_recipe import requested_effects
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.diagnosis import stepped_column
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.text import candidate_sentence
-from glovecal_models.effects.base.column_steps import IN_STEPS, ColumnSteps
+from glovecal_models.effects.base.column_steps import IN_STEPS, ColumnSteps, StepSearch
 from glovecal_models.improvement.improve import improve
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
@@ -60,15 +59,13 @@ def test_they_are_repaired_and_a_stored_model_keeps_them():
     assert added.form is None
 
 
-def test_a_column_that_differs_in_one_take_only_is_judged_without_an_error():
-    takes = [
-        replace(
-            take, context={**take.context, "temperature_c": np.full(len(take.time_s), 20.0 + 3.0 * (at == 4))}
-        )
-        for at, take in enumerate(recorded("temperature", "corrected_in_steps", 11))
-    ]
-    found = diagnose(takes, LAYOUT, judge_residual=False)
-    assert all(item.steps is None for item in found.assessments if item.effect == "temperature")
+def test_a_take_without_which_the_column_never_changes_is_predicted_by_no_steps():
+    column = np.full((12, 8), 20.0)
+    column[4] = np.linspace(20.0, 24.0, 8)
+    errors, columns = np.random.default_rng(0).standard_normal((2, 12, 8)), list(column)
+    found = stepped_column._within_without(StepSearch(column), errors, columns)
+    assert not np.concatenate(found[4]).any()
+    assert np.concatenate(found[3]).any()
 
 
 def test_wearings_that_sit_otherwise_are_no_steps_of_a_column():

@@ -7,6 +7,7 @@ import pytest
 
 from glovecal_models.effects.base.column_steps import (
     FEWEST_TAKES_OF_STEPS,
+    IN_STEPS,
     PIECES_OF_STEPS,
     ColumnSteps,
     StepSearch,
@@ -17,6 +18,7 @@ from glovecal_models.effects.base.column_steps import (
 )
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.catalogue import effect as catalogue_effect
+from glovecal_models.errors import BadInput
 
 TAKES, FRAMES, JOINTS = 12, 400, 3
 TRUTH = ColumnSteps(0.8, 20.3)
@@ -125,3 +127,9 @@ def test_frame_by_frame_gives_the_columns_of_the_whole_take(name):
 
 def test_a_column_that_never_changes_has_no_steps():
     assert StepSearch(np.full((TAKES, PIECES_OF_STEPS), 20.0)).tried == ()
+
+
+@pytest.mark.parametrize("stored", [{"width": 0.0, "edge": 1.0}, {"width": np.nan, "edge": 1.0}, {"a": 1}, 3])
+def test_stored_steps_that_cannot_be_are_refused(stored):
+    with pytest.raises(BadInput, match="steps of a column"):
+        ColumnSteps.of_settings({IN_STEPS: stored})

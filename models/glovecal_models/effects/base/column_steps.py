@@ -15,6 +15,7 @@ import numpy as np
 
 from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.joint_units import in_joint_units
+from glovecal_models.errors import BadInput
 
 IN_STEPS = "in_steps"
 """Where settings keep the width and the edge; without them the effect is smooth."""
@@ -39,14 +40,26 @@ ALL_DRAWS = 99
 
 @dataclass(frozen=True)
 class ColumnSteps:
-    """Where a table's entries lie, in units of the column."""
+    """Where a table's entries lie, in units of the column. Raises BadInput for what cannot be steps."""
 
     width: float
     edge: float
 
+    def __post_init__(self) -> None:
+        if not (0 < self.width < np.inf and np.isfinite(self.edge)):
+            raise BadInput(
+                f"steps of a column need a width above 0 and an edge, not {self.width} and {self.edge}"
+            )
+
     @classmethod
     def of_settings(cls, settings: Settings) -> ColumnSteps | None:
-        return cls(**settings[IN_STEPS]) if IN_STEPS in settings else None
+        """None for a smooth effect. Raises BadInput."""
+        if IN_STEPS not in settings:
+            return None
+        try:
+            return cls(**{name: float(value) for name, value in settings[IN_STEPS].items()})
+        except (AttributeError, TypeError, ValueError) as error:
+            raise BadInput(f"not the steps of a column: {error}") from error
 
     def to_settings(self) -> dict[str, Any]:
         return {IN_STEPS: asdict(self)}
