@@ -37,7 +37,8 @@ LEAST_REPEATED_SHARE = 0.02
 LEAST_COUNT = 10
 RARELY_REPEATED_SHARE, RARE_BY_CHANCE, BRIEF_FRAMES = 0.005, 0.001, 10
 """And of those moments by repeats no longer than so, where columns so seldom repeat together by chance: fine
-steps of several sensors. Chosen on one simulated glove of 12 bits (1 percent); of 80 healthy gloves none is named."""
+steps of several sensors. Chosen on one simulated glove of 12 bits (1 percent); of 80 healthy gloves none is
+named."""
 BEYOND_CHANCE = 1.5
 """Columns must repeat together so many times more often than each for itself makes likely."""
 FINE_SHARE = 0.5
