@@ -163,7 +163,7 @@ def _with_steps(
             replace(unit, base=np.column_stack([unit.base, *columns]))
             for unit, *columns in zip(bases[name], *extra[name], mine, strict=True)
         ]
-        fit = BaseProducts(units)
+        fit = BaseProducts(units, own=bases[name][0].base.shape[1])
         left.append([unit.target - fit.fitted(unit.base) for unit in units])
     values = [effect.clipped(take, group.settings) for take in group.signals]
     steps = learned_steps(values, [rows[name] for name in group.lanes], left)

@@ -109,16 +109,24 @@ def with_precision(units: Sequence[Rows], variance: Sequence[np.ndarray | None])
 class BaseProducts:
     """The part that all candidates share."""
 
-    def __init__(self, units: Sequence[Rows], prior_sd: np.ndarray | None = None) -> None:
-        """``prior_sd`` (P,) of the coefficients, infinite (default) for those that are free."""
+    def __init__(
+        self, units: Sequence[Rows], prior_sd: np.ndarray | None = None, own: int | None = None
+    ) -> None:
+        """``prior_sd`` (P,) of the coefficients, infinite (default) for those that are free; ``own``: so many
+        columns are the base's own (None: all), further ones an effect's."""
         self.units = units
         self.prior_sd = np.full(units[0].base.shape[1], np.inf) if prior_sd is None else prior_sd
         self.gram = np.array([rows.weighted(rows.base).T @ rows.base for rows in units])
         self.right = np.array([rows.base.T @ rows.weighted(rows.target) for rows in units])
         self.square = np.array([rows.target @ rows.weighted(rows.target) for rows in units])
         self.count = np.array([len(rows.target) for rows in units])
-        total, ridge = self.gram.sum(axis=0), BASE_RIDGE * np.trace(self.gram.sum(axis=0))
-        self.ridge = ridge / len(total) * np.eye(len(total))
+        total = self.gram.sum(axis=0)
+        self.own = len(total) if own is None else own
+        size = np.diagonal(total)
+        # An effect's columns may be a thousand times larger: they must not change how the base is held.
+        held = LEAST_RIDGE * size
+        held[: self.own] = BASE_RIDGE * size[: self.own].mean()
+        self.ridge = np.diag(held)
         if np.isfinite(self.prior_sd).any():
             self.ridge += np.diag(self._held_by(self.prior_sd))
         left = total - self.gram + self.ridge

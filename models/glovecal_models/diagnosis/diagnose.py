@@ -12,6 +12,7 @@ from glovecal_models.comparison.noise_floor import takes_noise
 from glovecal_models.diagnosis.actions import Action, actions_for
 from glovecal_models.diagnosis.camera_errors import beside_camera, camera_errors
 from glovecal_models.diagnosis.candidates import assessed
+from glovecal_models.diagnosis.confidence_set import beside_findings, beside_hidden, beside_levels
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.hold_drift import hold_drift
@@ -31,7 +32,7 @@ from glovecal_models.diagnosis.posed_holds import are_pose_labels
 from glovecal_models.diagnosis.problem import DiagnosisProblem
 from glovecal_models.diagnosis.reference_problems import reference_problems
 from glovecal_models.diagnosis.resampled import SMOOTHING
-from glovecal_models.diagnosis.signatures import are_held_levels, beside_levels, signature_findings
+from glovecal_models.diagnosis.signatures import are_held_levels, signature_findings
 from glovecal_models.diagnosis.unexplained_residual import UnexplainedResidual, unexplained_residual
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Motion
@@ -117,6 +118,9 @@ def diagnose(
         if by_name[item.effect].stage != "last" or is_beside_known(item, saved, limits.beside_known_share)
     )
     naming = beside_levels(naming, takes, findings, by_name)
+    if signatures and not are_held_levels(takes):
+        naming = beside_findings(naming, findings, layout)
+        naming = beside_hidden(naming, takes, layout, lacking, by_name, known)
     progress("testing the residual", 0.95)
     actions: tuple[Action, ...] = ()
     if not judge_residual:

@@ -154,7 +154,7 @@ class Diagnosis:
             first.effect,
             tuple(sorted({name for item in self.signature for name in item.where})),
             "finding" if is_only_told else self.effects[first.effect].kind,
-            rivals if first.effect in rivals else (first.effect,),
+            tuple(dict.fromkeys((first.effect, *rivals))) if first.effect in rivals else (first.effect,),
             dict(first.evidence),
         )
 

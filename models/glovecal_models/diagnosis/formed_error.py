@@ -5,25 +5,77 @@ The control has the same basis, the same choice of a form inside each fold, and 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from glovecal_models.calibration.added_effect import form_values
 from glovecal_models.calibration.folds import folds_over_takes
+from glovecal_models.calibration.form_choice import FormRows, chosen_form
 from glovecal_models.calibration.held_out import BaseProducts, Rows
-from glovecal_models.diagnosis.form_inputs import FormInputs
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.effects.base.assessment import HeldOutRmse
 from glovecal_models.effects.base.control import control_signals
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Settings
-from glovecal_models.effects.base.learned_form import LearnedForm
+from glovecal_models.effects.base.learned_form import FormTerm, LearnedForm
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.errors import BadInput
 
 FOLDS = 4
 FROM_OTHER_TAKES = ("context of other takes", "permuted wearings")
 CONTROLS_TRIED = 5
+
+
+@dataclass(frozen=True)
+class FormInputs:
+    """An effect's own columns on one joint, and the signals that its form may be a function of."""
+
+    plain: list[np.ndarray]
+    """For each unit (N, C)."""
+    values: list[Mapping[str, np.ndarray]]
+    """For each unit, each (N, 1); empty for an effect without a form."""
+    prior_sd: np.ndarray
+    """(C,) of the own columns' weights."""
+    take_sd_deg: float
+
+    @classmethod
+    def of(
+        cls,
+        design: ForwardDesign,
+        joint: int,
+        effect: Effect,
+        takes: Sequence[Signals],
+        settings: Settings,
+        shape: np.ndarray,
+        step: int = 1,
+    ) -> FormInputs:
+        """``takes`` of the joint alone, ``shape`` (1, P); ``step`` -1: their rows are in reverse."""
+        plain = effect.columns_of_takes(takes, settings, shape)
+        values = [form_values(effect, take, part, settings) for take, part in zip(takes, plain, strict=True)]
+        units = list(design.units(joint))
+        return cls(
+            [plain[take][::step][index, 0] for take, index in units],
+            [{name: each[::step][index] for name, each in values[take].items()} for take, index in units],
+            effect.prior_sd(settings),
+            effect.take_sd_deg,
+        )
+
+    def terms(self, design: ForwardDesign, joint: int, units: Sequence[int]) -> tuple[FormTerm, ...]:
+        """Those that ``units`` of the design ask for; none where there is nothing to choose from."""
+        if not self.values[0]:
+            return ()
+        base = design.products[joint].units
+        rows = FormRows.of(
+            [base[unit] for unit in units],
+            [self.plain[unit] for unit in units],
+            self.prior_sd,
+            [design.unit_take[unit] for unit in units],
+            self.take_sd_deg,
+            [self.values[unit] for unit in units],
+        )
+        return chosen_form([rows])
 
 
 def formed_rmse(design: ForwardDesign, effect: Effect, joint: int, seed: int = 0) -> HeldOutRmse | None:
@@ -109,7 +161,8 @@ def _squared(design: ForwardDesign, joint: int, inputs: FormInputs | None) -> fl
 def _squared_on(
     design: ForwardDesign, joint: int, inputs: FormInputs | None, kept: Sequence[int], held: Sequence[int]
 ) -> float:
-    rows, sd = design.products[joint].units, design.products[joint].prior_sd
+    products = design.products[joint]
+    rows, sd = products.units, products.prior_sd
     if inputs is not None:
         extra, prior = inputs.plain, inputs.prior_sd
         terms = inputs.terms(design, joint, kept)
@@ -121,6 +174,6 @@ def _squared_on(
         sd = np.concatenate([sd, prior])
         pairs = zip(rows, extra, strict=True)
         rows = [Rows(np.column_stack([unit.base, part]), unit.target) for unit, part in pairs]
-    fitted = BaseProducts([rows[unit] for unit in kept], sd)
+    fitted = BaseProducts([rows[unit] for unit in kept], sd, products.own)
     left = [rows[unit].target - fitted.fitted(rows[unit].base) for unit in held]
     return float(sum(part @ part for part in left))

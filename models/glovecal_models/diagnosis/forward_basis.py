@@ -52,7 +52,7 @@ class JointBasis:
         ]
         free = np.full(self.units[0].base.shape[1], np.inf)
         prior_sd = np.concatenate([free, *(found.prior_sd for found in extra)])
-        result = BaseProducts(with_precision(units, self.variance), prior_sd)
+        result = BaseProducts(with_precision(units, self.variance), prior_sd, len(free))
         if not known:
             self.without_effects.append(result)
         return result

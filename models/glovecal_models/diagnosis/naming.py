@@ -50,9 +50,11 @@ def beside_known(
 
     A named effect is right in its inputs and only nearly right in its form. What the form misses goes along
     with the same movements, so that another effect can grasp a part of it; a cause of its own saves more.
+    What no known effect leaves is not held against them.
     """
     if not saved:
         return list(found)
+    unlike = set.intersection(*(set(item.rest_unlike) for item in known)) if known else set()
     alike = {name for item in known for name in item.rest_like}
     strict = replace(limits, beside_known_share=limits.beside_alike_share)
     return [
@@ -61,6 +63,8 @@ def beside_known(
             known_saved_square=tuple(saved[name] for name in item.joints),
             limits=strict if item.effect in alike else item.limits,
         )
+        if item.effect not in unlike
+        else item
         for item in found
     ]
 

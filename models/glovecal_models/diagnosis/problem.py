@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from glovecal_models.diagnosis.camera_columns import CameraPart
-from glovecal_models.diagnosis.form_inputs import FormInputs
+from glovecal_models.diagnosis.formed_error import FormInputs
 from glovecal_models.diagnosis.forward_basis import EVERY, ForwardBasis
 from glovecal_models.diagnosis.forward_design import ForwardDesign, forward
 from glovecal_models.diagnosis.known_effect import KnownEffect

@@ -35,7 +35,7 @@ def may_explain(
     effects that seem to explain a part of it, and not in equal steps of a column. These explain no more than
     that, or they are not needed beside what was found where that is larger. ``effects``: those that were
     ranked, by name."""
-    if not _is_asked(effect, naming, effects):
+    if not is_asked_beside(effect, naming, effects):
         return False
     if not naming.ranked:
         return True
@@ -58,8 +58,9 @@ def _size_square(found: Sequence[Finding]) -> float:
     )
 
 
-def _is_asked(effect: Effect, naming: Naming, effects: Mapping[str, Effect]) -> bool:
-    """A column that goes along is no cause by itself, whatever its name."""
+def is_asked_beside(effect: Effect, naming: Naming, effects: Mapping[str, Effect]) -> bool:
+    """Whether an effect that is asked for last may be behind a ranking: all of it seems to explain a part of
+    the effect. A column that goes along is no cause by itself, whatever its name."""
     return all(
         item.effect in effect.also_explained_by or not effects[item.effect].is_physical
         for item in naming.ranked
@@ -122,7 +123,7 @@ def signature_findings(
             found = _with_error_squares(found, takes, sensor_of, static_errors(takes, sensor_of, known))
         yield from found
     for item in by_signature(effects, "last"):
-        if _is_asked(item, naming, by_name):
+        if is_asked_beside(item, naming, by_name):
             found = item.find(takes, sensor_of, static_errors(takes, sensor_of, known))
             if found and may_explain(item, naming, found, by_name):
                 yield from found
@@ -131,20 +132,6 @@ def signature_findings(
 def are_held_levels(takes: Sequence[Take]) -> bool:
     """Whether all takes only hold one angle after another: there nothing moves, and repeats mean nothing."""
     return bool(takes) and all(held_levels(take.reference) is not None for take in takes)
-
-
-def beside_levels(
-    naming: Naming, takes: Sequence[Take], findings: Sequence[Finding], effects: Mapping[str, Effect]
-) -> Naming:
-    """One pass over known angles cannot tell what is found between them from some effects: both are named."""
-    if not findings or not are_held_levels(takes):
-        return naming
-    found = effects[findings[0].effect]
-    if not naming.ranked:
-        return replace(naming, confidence_set=(found.name, *found.alike_between_levels))
-    if naming.ranked[0].effect not in found.alike_between_levels:
-        return naming
-    return replace(naming, confidence_set=(*naming.confidence_set, found.name))
 
 
 def _with_error_squares(
@@ -203,7 +190,8 @@ def static_errors(
                 for number, part in enumerate(curves)
             ]
             free = np.full(curves[0].shape[1], np.inf)
-            fitted = _fitted(columns, y, rows, np.concatenate([free, *(found.prior_sd for found in extra)]))
+            prior_sd = np.concatenate([free, *(found.prior_sd for found in extra)])
+            fitted = _fitted(columns, y, rows, prior_sd, len(free))
         for part, found, angle in zip(result, columns, y, strict=True):
             part[:, column] = found @ fitted.whole - angle
     return result
@@ -223,6 +211,7 @@ def _fitted(
     target: Sequence[np.ndarray],
     rows: Sequence[np.ndarray],
     prior_sd: np.ndarray | None = None,
+    own: int | None = None,
 ) -> BaseProducts:
     units = zip(columns, target, rows, strict=True)
-    return BaseProducts([Rows(part[index], angle[index]) for part, angle, index in units], prior_sd)
+    return BaseProducts([Rows(part[index], angle[index]) for part, angle, index in units], prior_sd, own)

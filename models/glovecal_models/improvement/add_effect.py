@@ -100,8 +100,8 @@ def add_effect(
     undone = Addition(
         name, chosen, False, before, after, model, has, judged=tuple(judged or chosen), least_gain=least_gain
     )
-    # Where it does not pay on all of them, one where it cannot be learned must not keep it from the others.
-    worse_times = limits.worse_times if undone.gain >= least_gain else 1.0
+    # Where it does not pay on all of them together, it may on some: there alone it is kept.
+    worse_times = limits.worse_times if undone.gain >= least_gain else 1.0 - least_gain
     kept = _not_worse(before, after, chosen, worse_times)
     if fresh.has_columns and least_gain >= 0 and 0 < len(kept) < len(chosen):
         judged = [item for item in judged or kept if item in kept] or None

@@ -75,3 +75,20 @@ def test_columns_at_fitted_rows_are_those_of_all_rows():
         for (take, index), whole, part in zip(of_lane, every.units(lane), some.units(lane), strict=True):
             np.testing.assert_array_equal(whole, columns[take][index][:, lane::2])
             np.testing.assert_array_equal(part, whole)
+
+
+def test_large_columns_of_an_effect_do_not_loosen_or_tighten_the_base():
+    generator = np.random.default_rng(3)
+    base = [generator.normal(size=(80, 3)) for _ in range(4)]
+    effect = [generator.normal(size=(80, 1)) for _ in range(4)]
+    target = [part @ [1.0, -2.0, 0.5] + 0.3 * extra[:, 0] for part, extra in zip(base, effect, strict=True)]
+
+    def coefficients(times):
+        units = [
+            Rows(np.column_stack([part, times * extra]), angle)
+            for part, extra, angle in zip(base, effect, target, strict=True)
+        ]
+        return BaseProducts(units, own=3).whole * [1.0, 1.0, 1.0, times]
+
+    assert coefficients(1e4) == pytest.approx(coefficients(1.0), rel=1e-9)
+    assert coefficients(1e4) == pytest.approx([1.0, -2.0, 0.5, 0.3], rel=1e-5)

@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from glovecal_models.diagnosis.confidence_set import beside_findings
 from glovecal_models.diagnosis.naming import Naming, beside_wholes, saved_share_of
 from glovecal_models.diagnosis.signatures import is_outweighed, may_explain
 from glovecal_models.diagnosis.text import part_sentence
 from glovecal_models.effects.base.assessment import Assessment, JointErrors
 from glovecal_models.effects.base.signature_effect import Finding
 from glovecal_models.effects.catalogue import catalogue, effect
+from glovecal_models.layout import Layout
 
 BLOCKS = 12
 
@@ -85,3 +87,19 @@ def test_what_saves_half_of_what_is_left_is_no_rest_of_a_form():
     items = [ranked("supply_sag", share) for share in (0.3, 0.8)]
     known = [replace(item, known_saved_square=(50.0, 50.0)) for item in items]
     assert [bool(item.significant_joints) for item in known] == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("where", "expected"), [("J0", ("hysteresis", "sensor_fault")), ("J5", ("hysteresis",))]
+)
+def test_a_sensor_that_jumps_where_hysteresis_saves_error_may_be_either(where, expected):
+    layout = Layout.from_columns("glove", ["J0", "J1"], ["J0", "J1"])
+    fault = Finding("sensor_fault", (where,), "it jumps", rivals=("hysteresis",))
+    assert beside_findings(naming(ranked("hysteresis", 0.3)), [fault], layout).confidence_set == expected
+
+
+def test_a_ranked_effect_that_is_no_rival_of_a_finding_stays_alone():
+    layout = Layout.from_columns("glove", ["J0", "J1"], ["J0", "J1"])
+    found = naming(ranked("lag", 0.3))
+    fault = Finding("sensor_fault", ("J0",), "it jumps", rivals=("hysteresis",))
+    assert beside_findings(found, [fault], layout) == found

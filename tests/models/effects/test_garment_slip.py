@@ -9,6 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from glovecal_models.effects.base.interval_effect import ClaimedErrors
+from glovecal_models.effects.catalogue import effect
 from glovecal_models.effects.garment_slip.garment_slip import (
     GROWS_S,
     GarmentSlip,
@@ -118,6 +119,24 @@ def test_what_all_sensors_do_together_is_no_slip(glove):
 
     takes = glove.takes(count=8, shape_counts=together)
     assert SLIP.find(takes, glove.sensor_of, glove.errors(takes)) == ()
+
+
+def test_a_slip_may_be_behind_a_column_that_goes_along_by_chance(glove):
+    takes = glove.takes(count=8, shape_counts=between_takes(1.5))
+    errors = glove.errors(takes)
+    means = np.array([error[:, 1].mean() for error in errors])
+    chance = np.random.default_rng(5).normal(size=len(takes))
+
+    def warmed(per_take):
+        return [
+            replace(take, context={"temperature_c": np.full(len(take.time_s), 30 + 2 * value)})
+            for take, value in zip(takes, per_take, strict=True)
+        ]
+
+    temperature, creep = effect("temperature"), effect("creep")
+    assert SLIP.may_be_instead(temperature, warmed(chance), glove.sensor_of, errors)
+    assert not SLIP.may_be_instead(temperature, warmed(means), glove.sensor_of, errors)
+    assert not SLIP.may_be_instead(creep, warmed(chance), glove.sensor_of, errors)
 
 
 def test_the_claimed_variance_grows_in_proportion_to_the_time():

@@ -130,6 +130,8 @@ class EffectFacts:
     """Share of the squared error up to which they do; who explains more is no such effect."""
     rest_like: ClassVar[tuple[str, ...]] = ()
     """Effects that what the form of this one misses may look like: beside it they have to save more."""
+    rest_unlike: ClassVar[tuple[str, ...]] = ()
+    """Effects that it does not: these only have to beat their control beside it."""
     caveat: ClassVar[str] = ""
     """What the same evidence may also mean, as the end of a sentence that names the effect."""
     drift_in_holds: ClassVar[HoldDrift | None] = None

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from glovecal_models.effects.base.assessment import Assessment
-from glovecal_models.effects.base.effect import ColumnlessEffect
+from glovecal_models.effects.base.effect import ColumnlessEffect, Effect
 from glovecal_models.effects.base.facts import Kind, Settings, Stage
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.errors import BadInput
@@ -55,6 +55,8 @@ class Finding:
     """How much of the squared error is where it was found, degrees squared per frame; None: not known."""
     accounts_for: tuple[str, ...] = ()
     """Effects that would seem to explain it, and are not needed beside it."""
+    rivals: tuple[str, ...] = ()
+    """Effects that it may be instead, where these save error on the same rotation."""
 
 
 class FoundBefore:
@@ -166,6 +168,15 @@ class SignatureEffect(ColumnlessEffect):
         error (N, len(sensor_of)) at the frames, degrees, NaN where there is no reference. Raises BadInput
         for sensors that a take does not have and for errors of another shape.
         """
+
+    def may_be_instead(
+        self, first: Effect, takes: Sequence[Take], sensor_of: Mapping[str, str], errors: Sequence[np.ndarray]
+    ) -> bool:
+        """Whether takes may hold it, though it is not found in them, where another effect is ranked first.
+
+        ``sensor_of``: the rotations on which that saves error; ``errors`` as for ``find``.
+        """
+        return False
 
     def find_between_levels(self, takes: Sequence[Take], sensor_of: Mapping[str, str]) -> tuple[Finding, ...]:
         """The same in takes that only hold one known angle after another; by default nothing."""

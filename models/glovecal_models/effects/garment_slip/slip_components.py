@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-from glovecal_models.effects.garment_slip.slip_rate import MEAN_S
+from glovecal_models.effects.garment_slip.slip_pieces import SlipPieces, slip_pieces
 from glovecal_models.regression.lapack_routines import potrf, potri
 from glovecal_models.takes.take import Take
 
@@ -29,18 +29,12 @@ LIKELIER, FEW_JOINTS = 4.0, 5
 4; a clean session of six minutes reached 3.5."""
 LEAST_SLOW_DEG = 0.35
 """Means that scatter by less hold no slip that is worth a name."""
-FEWEST_SLOW_PIECES, MOST_PIECES = 12, 160
+FEWEST_SLOW_PIECES = 12
 HEALTHY_LASTS_S = 25.0
 ALIKE_SD = 0.5
 """Bends within so many standard deviations have about one error of posture."""
 CURVE_SD = 0.7
 """The same of a context column's curve."""
-FIRST_WORN_S = 30.0
-"""A glove is recorded about so long after it was put on."""
-PAUSE_S = 20.0
-"""Between takes, where nothing tells the time."""
-MEASURED_SHARE, COMPLETE_SHARE = 0.5, 0.9
-"""A piece counts where so much of it was measured, and it has about as many frames as the longest."""
 NUGGET = 1e-2
 """Of the variance: keeps the covariance positive."""
 LEAST_LOG, START_LOG, MOST_LOG = -7.0, -1.6, 3.0
@@ -48,7 +42,6 @@ LIKELIHOOD_ROUNDS = 60
 SINCE_DONNING, SAME_WAY, INSIDE, BETWEEN = "since donning", "same way", "inside takes", "between takes"
 SLIPS = (SINCE_DONNING, SAME_WAY, INSIDE, BETWEEN)
 WORN = "wearing"
-POWER_ON = "power_on_s"
 
 
 @dataclass(frozen=True)
@@ -70,27 +63,12 @@ class SlipComponents:
         return self.likelier > LIKELIER + 2 * np.log(max(joints / FEW_JOINTS, 1.0))
 
 
-@dataclass(frozen=True)
-class _Pieces:
-    """Means over pieces of takes; each array (P,)."""
-
-    error: np.ndarray
-    bend: np.ndarray
-    worn_s: np.ndarray
-    """Since donning."""
-    inside_s: np.ndarray
-    """Since the take's first frame."""
-    take: np.ndarray
-    wearing: np.ndarray
-    context: tuple[np.ndarray, ...]
-
-
 def slip_components(
     takes: Sequence[Take], errors: Sequence[np.ndarray], angles: Sequence[np.ndarray]
 ) -> SlipComponents | None:
     """``errors`` (N,) of each take less what goes with posture, ``angles`` (N,) measured, degrees; NaN where
     there is no reference. None where there is too little to say, or no slow error worth a name."""
-    pieces = _pieces(takes, errors, angles)
+    pieces = slip_pieces(takes, errors, angles)
     if len(pieces.error) < FEWEST_SLOW_PIECES or pieces.error.std() < LEAST_SLOW_DEG:
         return None
     spread = float(pieces.error.std())
@@ -110,6 +88,28 @@ def slip_components(
         float(np.sqrt(sum(sizes.values()))), 2 * (free - held), max(sizes, key=lambda kind: sizes[kind]),
         2 * (free - worn_alike), len(pieces.error),
     )  # fmt: skip
+
+
+def likelier_with_cause(
+    takes: Sequence[Take],
+    errors: Sequence[np.ndarray],
+    angles: Sequence[np.ndarray],
+    context: Sequence[str],
+) -> float:
+    """Twice the log likelihood ratio of what follows recorded columns (of no name: the wearings) beside a
+    slip of any size; 0 where there is too little to say. Errors and angles as for ``slip_components``."""
+    pieces = slip_pieces(takes, errors, angles)
+    spread = float(pieces.error.std())
+    if len(pieces.error) < FEWEST_SLOW_PIECES or spread == 0:
+        return 0.0
+    parts = _covariances(pieces)
+    cause = {f"context {name}" for name in context} if context else {WORN}
+    likelihood = _Likelihood(parts, pieces.error / spread)
+    most = {name: LEAST_LOG if name[0] in cause else MOST_LOG for name in parts}
+    without, logs = likelihood.highest(most)
+    begin = {name: START_LOG if name[0] in cause else log for name, log in logs.items()}
+    free, _ = likelihood.highest(dict.fromkeys(parts, MOST_LOG), begin)
+    return 2 * (free - without)
 
 
 Name = tuple[str, str]
@@ -157,7 +157,7 @@ class _Likelihood:
         return float(value), -0.5 * variances * (self._parts @ (np.outer(solved, solved) - inverse).ravel())
 
 
-def _covariances(pieces: _Pieces) -> dict[Name, np.ndarray]:
+def _covariances(pieces: SlipPieces) -> dict[Name, np.ndarray]:
     """(P, P) of every component; the scale of each is free."""
     count = len(pieces.error)
     worn = (pieces.wearing[:, None] == pieces.wearing[None, :]).astype(float)
@@ -174,10 +174,10 @@ def _covariances(pieces: _Pieces) -> dict[Name, np.ndarray]:
         (WORN, ""): worn,
         (WORN, "bend"): worn * bent,
     }
-    for number, column in enumerate(pieces.context):
+    for name, column in pieces.context.items():
         value = _standard(column)
-        found[f"context {number}", "line"] = np.outer(value, value) * (1 + bent)
-        found[f"context {number}", "curve"] = _alike(value, CURVE_SD) * (1 + bent)
+        found[f"context {name}", "line"] = np.outer(value, value) * (1 + bent)
+        found[f"context {name}", "curve"] = _alike(value, CURVE_SD) * (1 + bent)
     found |= {
         (SINCE_DONNING, ""): since_donned * worn,
         (SINCE_DONNING, "bend"): since_donned * worn * bent,
@@ -196,48 +196,3 @@ def _alike(values: np.ndarray, within: float) -> np.ndarray:
 
 def _standard(values: np.ndarray) -> np.ndarray:
     return (values - values.mean()) / max(float(values.std()), 1e-9)
-
-
-def _pieces(takes: Sequence[Take], errors: Sequence[np.ndarray], angles: Sequence[np.ndarray]) -> _Pieces:
-    """Of about ``MEAN_S``, longer in long sessions."""
-    lasts_s = MEAN_S * max(1.0, sum(take.duration_s for take in takes) / (MEAN_S * MOST_PIECES))
-    names = _context_names(takes)
-    rows: list[np.ndarray] = []
-    for number, (take, begins_s) in enumerate(zip(takes, _worn_s(takes), strict=True)):
-        piece = np.floor((take.time_s - take.time_s[0]) / lasts_s).astype(int)
-        known = np.isfinite(errors[number]) & np.isfinite(angles[number])
-        every, count = np.bincount(piece), np.bincount(piece, known)
-        good = (count >= MEASURED_SHARE * every) & (every >= COMPLETE_SHARE * every.max()) & (count > 0)
-        columns = (errors[number], angles[number], *(take.context[name] for name in names))
-        total = [np.bincount(piece, np.where(known, column, 0.0))[good] / count[good] for column in columns]
-        middle = lasts_s * (np.flatnonzero(good) + 0.5)
-        rows.append(np.column_stack([np.full(len(middle), number), begins_s + middle, middle, *total]))
-    take_of, worn_s, inside_s, error, bend, *context = np.concatenate(rows).T
-    wearings = list(dict.fromkeys(take.wearing for take in takes))
-    wearing = np.array([wearings.index(takes[int(number)].wearing) for number in take_of])
-    varied = tuple(column for column in context if column.size and np.ptp(column) > 1e-9)
-    return _Pieces(error, bend, worn_s, inside_s, take_of, wearing, varied)
-
-
-def _context_names(takes: Sequence[Take]) -> list[str]:
-    """Columns that every take knows throughout."""
-    names = takes[0].context if takes else {}
-    return [n for n in names if all(n in t.context and np.isfinite(t.context[n]).all() for t in takes)]
-
-
-def _worn_s(takes: Sequence[Take]) -> list[float]:
-    """How long the glove was worn when each take began, by the time since power-on where it was recorded."""
-    found, last = [], {}
-    for take in takes:
-        on = take.context.get(POWER_ON)
-        now = float(on[0]) if on is not None and np.isfinite(on[0]) else None
-        begins_s = FIRST_WORN_S
-        if take.wearing in last:
-            began_s, power_s, lasted_s = last[take.wearing]
-            begins_s = began_s + lasted_s + PAUSE_S
-            if now is not None and power_s is not None:
-                went_on = now - power_s >= lasted_s
-                begins_s = began_s + now - power_s if went_on else began_s + lasted_s + now
-        found.append(begins_s)
-        last[take.wearing] = (begins_s, now, take.duration_s)
-    return found

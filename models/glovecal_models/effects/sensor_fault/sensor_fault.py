@@ -55,6 +55,8 @@ EXPLAINED_BY = {"switching": ("spikes", "dropouts", "jump"), "hum": ("spikes",)}
 TIMES_PER_FAULT = 4
 """A dropout has two switches; with more than so many switches, or seconds of a tone, for each other fault,
 those that are no larger are explained by them."""
+STICKS = ("hysteresis",)
+"""What sticks and lets go jumps too, and where it jumps goes along with the joint's turns."""
 LARGEST = {"switching": 2.0, "hum": 3.0}
 """Times the mean height of the switches, or the tone's RMS, that a fault so explained reaches at most."""
 
@@ -250,7 +252,7 @@ def _finding_switches(sensor: str, found: LevelSwitches) -> Finding:
     evidence = {"switches_count": float(found.count)}
     return Finding(
         SensorFault.name, (sensor,), sentence, kind="switching", size_deg=found.size_deg, count=found.count,
-        evidence=evidence, is_only_told=True,
+        evidence=evidence, is_only_told=True, rivals=STICKS,
     )  # fmt: skip
 
 
