@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from glovecal_models.calibration.effect_request import EffectRequest
-from glovecal_models.calibration.held_out import BaseProducts, FittedColumns, Rows, held_out
+from glovecal_models.calibration.held_out import BaseProducts, FittedColumns, FittedRows, Rows, held_out
 from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.signals import Signals
 
@@ -50,12 +50,13 @@ def best_shape(
     }
     prior = effect.prior_sd(settings)
     units = [list(enumerate(rows[name])) for name in group.lanes]
+    fitted = FittedRows.of([len(take) for take in group.signals], units)
     best = np.zeros((len(group.lanes), grid.shape[2]))
     for _ in range(1 + refinements):
         shapes, lanes, numbers = grid.shape
         flat = grid.reshape(shapes * lanes, numbers)
         tiled = [_tiled(take, shapes) for take in group.signals]
-        found = FittedColumns.of(effect.columns_of_takes(tiled, settings, flat), units)
+        found = FittedColumns.of(effect.columns_of_takes(tiled, settings, flat), fitted)
         for lane, name in enumerate(group.lanes):
             best[lane] = grid[held_out(products[name], found.units(lane), prior).shape, lane]
         grid = _finer(grid, best)

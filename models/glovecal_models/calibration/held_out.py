@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations_with_replacement
 from math import comb
 
@@ -137,6 +138,16 @@ class BaseProducts:
         self.error = np.array([rows.weighted(r) @ r for rows, r in zip(units, self.residual, strict=True)])
         self.whole = np.linalg.solve(total + self.ridge, self.right.sum(axis=0))
 
+    @cached_property
+    def beside(self) -> tuple[np.ndarray, ...]:
+        """For each unit (N, P + 1): its base and its target."""
+        return tuple(np.column_stack([rows.base, rows.target]) for rows in self.units)
+
+    @cached_property
+    def rooted_residual(self) -> tuple[np.ndarray, ...]:
+        """For each unit (N,): held-out error, degrees, as ``Rows.rooted``."""
+        return tuple(rows.rooted(part) for rows, part in zip(self.units, self.residual, strict=True))
+
     def _held_by(self, prior_sd: np.ndarray) -> np.ndarray:
         """(P,) of the ridge, as for the columns of an effect; the noise is what all columns leave."""
         total, right = self.gram.sum(axis=0), self.right.sum(axis=0)
@@ -150,46 +161,52 @@ class BaseProducts:
 
 
 @dataclass(frozen=True)
+class FittedRows:
+    """Where several joints, the lanes of an effect, are fitted."""
+
+    rows: tuple[np.ndarray | slice, ...]
+    """For each take the M rows that some of the joints are fitted on."""
+    places: tuple[tuple[tuple[int, slice | np.ndarray], ...], ...]
+    """For each lane and unit its take, and the unit's rows among those."""
+
+    @classmethod
+    def of(cls, lengths: Sequence[int], units: Sequence[Sequence[tuple[int, np.ndarray]]]) -> FittedRows:
+        """Of takes with so many rows; ``units``: for each lane the take and the rows of each of its units."""
+        is_fitted = [np.zeros(length, dtype=bool) for length in lengths]
+        for take, index in (unit for of_lane in units for unit in of_lane):
+            is_fitted[take][index] = True
+        place = [np.cumsum(mask) - 1 for mask in is_fitted]
+        return cls(
+            tuple(_as_slice(np.flatnonzero(mask)) for mask in is_fitted),
+            tuple(
+                tuple((take, _as_slice(place[take][index])) for take, index in of_lane) for of_lane in units
+            ),
+        )
+
+
+@dataclass(frozen=True)
 class FittedColumns:
     """Columns of an effect on several joints, its lanes: put in the order of fits in memory once, and only
     where some joint is fitted."""
 
     columns: tuple[np.ndarray, ...]
-    """For each take (L, M, G, C), at the M rows that some of the joints are fitted on."""
-    places: tuple[tuple[tuple[int, slice | np.ndarray], ...], ...]
-    """For each lane and unit its take, and the unit's rows among those."""
+    """For each take (L, M, G, C)."""
+    fitted: FittedRows
 
     @classmethod
     def of(
-        cls,
-        columns: Sequence[np.ndarray],
-        units: Sequence[Sequence[tuple[int, np.ndarray]]],
-        fitted: Sequence[np.ndarray] | None = None,
+        cls, columns: Sequence[np.ndarray], fitted: FittedRows, *, are_fitted: bool = False
     ) -> FittedColumns:
-        """``columns``: for each take (N, G L, C), lane by lane within each of the G shapes; ``units``: for
-        each lane the take and the rows of each of its units. ``fitted``: the columns are at these
-        ``fitted_rows`` only."""
-        rows = fitted_rows([len(part) for part in columns], units) if fitted is None else fitted
+        """``columns``: for each take (N, G L, C), lane by lane within each of the G shapes; or at the fitted
+        rows only where they ``are_fitted``."""
+        lanes = len(fitted.places)
         # One take after the other: all at once would be too much for the processor's cache.
-        some = (part[at] for part, at in zip(columns, rows, strict=True)) if fitted is None else columns
-        return cls(
-            tuple(_by_lane(part, len(units)) for part in some),
-            tuple(tuple((take, _place(index, rows[take])) for take, index in of_lane) for of_lane in units),
-        )
+        some = columns if are_fitted else (part[at] for part, at in zip(columns, fitted.rows, strict=True))
+        return cls(tuple(_by_lane(part, lanes) for part in some), fitted)
 
     def units(self, lane: int) -> list[np.ndarray]:
         """(N, G, C) of each unit of one lane."""
-        return [self.columns[take][lane, rows] for take, rows in self.places[lane]]
-
-
-def fitted_rows(
-    lengths: Sequence[int], units: Sequence[Sequence[tuple[int, np.ndarray]]]
-) -> list[np.ndarray]:
-    """For each take (M,), of so many rows, those that some unit of some lane is fitted on."""
-    is_fitted = [np.zeros(length, dtype=bool) for length in lengths]
-    for take, index in (unit for of_lane in units for unit in of_lane):
-        is_fitted[take][index] = True
-    return [np.flatnonzero(mask) for mask in is_fitted]
+        return [self.columns[take][lane, rows] for take, rows in self.fitted.places[lane]]
 
 
 def _by_lane(columns: np.ndarray, lanes: int) -> np.ndarray:
@@ -198,10 +215,11 @@ def _by_lane(columns: np.ndarray, lanes: int) -> np.ndarray:
     return np.ascontiguousarray(apart.transpose(2, 0, 1, 3))
 
 
-def _place(index: np.ndarray, fitted: np.ndarray) -> slice | np.ndarray:
-    """Where rows ``index`` stand among ``fitted``: as a slice where they follow one another there."""
-    at = np.searchsorted(fitted, index)
-    return slice(int(at[0]), int(at[-1]) + 1) if len(at) and at[-1] - at[0] + 1 == len(at) else at
+def _as_slice(rows: np.ndarray) -> np.ndarray | slice:
+    """Evenly rising rows (M,) as a slice, which copies nothing."""
+    step = int(rows[1] - rows[0]) if len(rows) > 1 else 0
+    is_even = step > 0 and bool((np.diff(rows) == step).all())
+    return slice(int(rows[0]), int(rows[-1]) + 1, step) if is_even else rows
 
 
 def held_out(
@@ -216,19 +234,22 @@ def held_out(
     """
     size = products.gram.shape[1]
     shapes, added = columns[0].shape[1:]
-    joint = np.zeros((len(columns), shapes, size + added, size + added))
-    right = np.zeros((len(columns), shapes, size + added))
+    # With the base and with the target at once.
+    crossed = np.empty((len(columns), shapes * added, size + 1))
+    inner = np.empty((len(columns), shapes, added, added))
     for unit, (rows, extra) in enumerate(zip(products.units, columns, strict=True)):
-        joint[unit, :, :size, :size] = products.gram[unit]
-        right[unit, :, :size] = products.right[unit]
-        flat = extra.reshape(len(extra), shapes * added)
-        counted = rows.weighted(flat)
-        joint[unit, :, size:, :size] = (counted.T @ rows.base).reshape(shapes, added, size)
-        joint[unit, :, :size, size:] = joint[unit, :, size:, :size].swapaxes(1, 2)
-        right[unit, :, size:] = (counted.T @ rows.target).reshape(shapes, added)
-        for g in range(shapes):
-            own = slice(g * added, (g + 1) * added)
-            joint[unit, g, size:, size:] = counted[:, own].T @ flat[:, own]
+        counted = rows.weighted(extra)
+        np.matmul(counted.reshape(len(extra), shapes * added).T, products.beside[unit], out=crossed[unit])
+        np.matmul(counted.transpose(1, 2, 0), extra.transpose(1, 0, 2), out=inner[unit])
+    by_shape = crossed.reshape(len(columns), shapes, added, size + 1)
+    joint = np.empty((len(columns), shapes, size + added, size + added))
+    joint[:, :, :size, :size] = products.gram[:, None]
+    joint[:, :, size:, :size] = by_shape[..., :size]
+    joint[:, :, :size, size:] = by_shape[..., :size].swapaxes(2, 3)
+    joint[:, :, size:, size:] = inner
+    right = np.empty((len(columns), shapes, size + added))
+    right[:, :, :size] = products.right[:, None]
+    right[:, :, size:] = by_shape[..., size]
     total, total_right = joint.sum(axis=0), right.sum(axis=0)
     ridge = np.zeros((shapes, size + added))
     ridge[:, :size] = np.diagonal(products.ridge)
@@ -242,9 +263,12 @@ def held_out(
     )
     best = np.argmin(training, axis=1)
     chosen = beta[np.arange(len(columns)), best]
+    of_base = np.column_stack([-chosen[:, :size], np.ones(len(columns))])
     residual = tuple(
-        rows.rooted(rows.target - rows.base @ b[:size] - extra[:, g, :] @ b[size:])
-        for rows, extra, g, b in zip(products.units, columns, best, chosen, strict=True)
+        rows.rooted(beside @ own - extra[:, g, :] @ b)
+        for rows, beside, own, extra, g, b in zip(
+            products.units, products.beside, of_base, columns, best.tolist(), chosen[:, size:], strict=True
+        )
     )
     whole = _solved(total, total_right, ridge)  # the last use of ``total``
     fit = products.square.sum() + _quadratic(total_right, whole, ridge)
@@ -256,9 +280,7 @@ def held_out(
         shape=shape,
         weights=whole[shape, size:],
         fitted=float(fit[shape]),
-        residual=tuple(
-            rows.rooted(part) for rows, part in zip(products.units, products.residual, strict=True)
-        ),
+        residual=products.rooted_residual,
         residual_added=residual,
     )
 

@@ -164,27 +164,53 @@ def dependence(
     )
 
 
-def explained_when_shifted(
-    errors: tuple[np.ndarray, ...], covariate: Covariate, shares: np.ndarray, steps_at_most: int
-) -> np.ndarray | None:
-    """What the covariate explains as it is, then with the errors shifted in time; (1 + S,), degrees.
+@dataclass(frozen=True)
+class ShiftedErrors:
+    """What a covariate explains of errors as they are, and shifted in time."""
 
-    ``shares`` (S, takes), 0 to 1, say how far each take is shifted, so that several columns can be held
-    against the same shifts. Takes longer than ``steps_at_most`` are averaged to that. None when the covariate
-    takes fewer than two values or no take is long enough.
-    """
-    pairs = _known_pairs(errors, covariate)
-    edges = _edges(pairs)
-    if len(edges) < 2:
-        return None
-    centre = float(np.concatenate([e for e, _ in pairs]).mean())
-    series = [_thinned(e - centre, _bin(v, edges), steps_at_most) for e, v in pairs]
-    tested = [(number, item) for number, item in enumerate(series) if len(item[0]) >= FEWEST_STEPS_TO_SHIFT]
-    if not tested:
-        return None
-    shifts = [_least_shift(len(e)) + (shares[:, n] * _shift_span(len(e))).astype(int) for n, (e, _) in tested]
-    sums, counts = _sums_when_shifted([item for _, item in tested], len(edges) - 1, shifts)
-    return np.sqrt(np.sum(sums**2 / np.maximum(counts, 1), axis=1) / counts.sum())
+    series: list[tuple[int, np.ndarray, np.ndarray]]
+    """Number, errors (N,) without the mean of all, and bins (N,) of each take that is long enough."""
+    bins: int
+
+    @classmethod
+    def of(
+        cls, errors: tuple[np.ndarray, ...], covariate: Covariate, steps_at_most: int
+    ) -> ShiftedErrors | None:
+        """Takes longer than ``steps_at_most`` are averaged to that. None when the covariate takes fewer than
+        two values or no take is long enough."""
+        pairs = _known_pairs(errors, covariate)
+        edges = _edges(pairs)
+        if len(edges) < 2:
+            return None
+        centre = float(np.concatenate([e for e, _ in pairs]).mean())
+        series = [_thinned(e - centre, _bin(v, edges), steps_at_most) for e, v in pairs]
+        long = [
+            (number, *item) for number, item in enumerate(series) if len(item[0]) >= FEWEST_STEPS_TO_SHIFT
+        ]
+        return cls(long, len(edges) - 1) if long else None
+
+    @property
+    def explained_deg(self) -> float:
+        """As they are."""
+        sums, counts = (
+            sum(np.bincount(where, weight, self.bins) for where, weight in each)
+            for each in (
+                [(where, error) for _, error, where in self.series],
+                [(where, None) for _, _, where in self.series],
+            )
+        )
+        return float(np.sqrt(np.sum(sums**2 / np.maximum(counts, 1)) / np.sum(counts)))
+
+    def explained_when_shifted(self, shares: np.ndarray) -> np.ndarray:
+        """(1 + S,), degrees: as they are, then shifted. ``shares`` (S, takes), 0 to 1, say how far each take
+        is shifted, so that several columns can be held against the same shifts."""
+        shifts = [
+            _least_shift(len(error)) + (shares[:, number] * _shift_span(len(error))).astype(int)
+            for number, error, _ in self.series
+        ]
+        series = [(error, where) for _, error, where in self.series]
+        sums, counts = _sums_when_shifted(series, self.bins, shifts)
+        return np.sqrt(np.sum(sums**2 / np.maximum(counts, 1), axis=1) / counts.sum())
 
 
 def _known_pairs(errors: tuple[np.ndarray, ...], covariate: Covariate) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -43,16 +44,22 @@ class Hold:
     def freedom(self) -> int:
         return len(self.error) - 2
 
+    @cached_property
+    def _time(self) -> tuple[np.ndarray, float]:
+        """Seconds from the middle, (N,), and the sum of their squares."""
+        time = self.time_s - self.time_s.mean()
+        return time, float(time @ time)
+
     def square(self, values: np.ndarray) -> float:
         """Sum of squares of ``values`` around their straight line: drift and creep are no noise."""
-        time, values = self.time_s - self.time_s.mean(), values - values.mean()
-        slope = float(time @ values) / float(time @ time)
-        return float(np.sum((values - slope * time) ** 2))
+        (time, square), values = self._time, values - values.mean()
+        left = values - float(time @ values) / square * time
+        return float(np.add.reduce(left * left))
 
     def drift_deg(self, values: np.ndarray) -> float:
         """How far the straight line of ``values`` goes over the hold."""
-        time = self.time_s - self.time_s.mean()
-        return float(time @ values) / float(time @ time) * float(np.ptp(time))
+        time, square = self._time
+        return float(time @ values) / square * float(time[-1] - time[0])
 
 
 def holds(item: TakeResiduals, column: int, limits: ComparisonLimits = COMPARISON_LIMITS) -> list[Hold]:

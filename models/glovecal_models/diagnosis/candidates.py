@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.calibration.held_out import FittedColumns, HeldOut, fitted_rows, held_out
+from glovecal_models.calibration.held_out import FittedColumns, FittedRows, HeldOut, held_out
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.not_identifiable import NotIdentifiable, undecidable
 from glovecal_models.diagnosis.permutation_test import session_p_value
@@ -20,9 +20,10 @@ from glovecal_models.effects.base.assessment import (
     squared_in_blocks,
 )
 from glovecal_models.effects.base.context_effect import ContextEffect
-from glovecal_models.effects.base.control import control_columns
+from glovecal_models.effects.base.control import control_columns, control_signals
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Settings
+from glovecal_models.effects.base.history_effect import ArrayStateEffect
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.progress import Report
 
@@ -155,31 +156,24 @@ def _screen(
     controls: int,
 ) -> tuple[Evidence, ...]:
     """One for each of ``joints``, the lanes of ``signals``; of so many controls the one in the middle."""
-    settings = effect.fit_constants(signals)
+    settings = design.constants(effect) if signals is design.signals else effect.fit_constants(signals)
     grid = effect.grid(signals, settings)
     shapes, lanes, numbers = grid.shape
     tiled = tuple(replace(take, own=np.tile(take.own, (1, shapes))) for take in signals)
     flat = grid.reshape(shapes * lanes, numbers)
     prior = effect.prior_sd(settings)
-    units = [list(design.units(joint)) for joint in joints]
+    fitted = design.once(f"fitted rows of {list(joints)}", lambda: _fitted_rows(design, joints))
 
-    fitted = fitted_rows([len(take) for take in signals], units)
-    # What does not remember is worked out on the rows that are fitted, which are every second one.
-    is_instant = not effect.needs_time and effect.control != "time-reversed"
-    rows = [_as_slice(part) for part in fitted] if is_instant else None
-    right = tiled if rows is None else [take.at(some) for take, some in zip(tiled, rows, strict=True)]
-
-    def held_out_of(columns: Sequence[np.ndarray]) -> list[HeldOut]:
-        """Of each joint; ``columns`` (N, G L, C) of each take, or of its fitted rows."""
-        by_lane = FittedColumns.of(columns, units, fitted if is_instant else None)
+    def held_out_of(columns: FittedColumns) -> list[HeldOut]:
+        """Of each joint."""
         return [
-            held_out(design.products[joint], by_lane.units(lane), prior) for lane, joint in enumerate(joints)
+            held_out(design.products[joint], columns.units(lane), prior) for lane, joint in enumerate(joints)
         ]
 
-    true = held_out_of(effect.columns_of_takes(right, settings, flat))
-    tried = [
-        held_out_of(control_columns(effect, tiled, settings, flat, generator, rows)) for _ in range(controls)
-    ]
+    true, *tried = (
+        held_out_of(columns)
+        for columns in _columns(effect, tiled, settings, flat, fitted, generator, controls)
+    )
     middle = [sorted(items, key=lambda item: item.saved)[controls // 2] for items in zip(*tried, strict=True)]
     return tuple(
         Evidence(right, wrong, grid[right.shape, lane], settings)
@@ -187,8 +181,36 @@ def _screen(
     )
 
 
-def _as_slice(rows: np.ndarray) -> np.ndarray | slice:
-    """Evenly spaced rows (M,) as a slice, which copies nothing."""
-    steps = np.diff(rows)
-    is_even = len(rows) > 1 and bool((steps == steps[0]).all())
-    return slice(int(rows[0]), int(rows[-1]) + 1, int(steps[0])) if is_even else rows
+def _columns(
+    effect: Effect,
+    takes: Sequence[Signals],
+    settings: Settings,
+    shape: np.ndarray,
+    fitted: FittedRows,
+    generator: np.random.Generator,
+    controls: int,
+) -> Iterator[FittedColumns]:
+    """Those of the effect, then those of so many controls, only on the rows that are fitted, which are every
+    second one; what remembers is run through all of them."""
+    is_reversed, lanes = effect.control == "time-reversed", len(fitted.places)
+    if isinstance(effect, ArrayStateEffect) and is_reversed:
+        yield FittedColumns(tuple(effect.columns_by_lane(takes, settings, shape, fitted.rows, lanes)), fitted)
+        for _ in range(controls):
+            wrong = control_signals(effect, takes, generator)
+            columns = effect.columns_by_lane(wrong, settings, shape, fitted.rows, lanes, are_backwards=True)
+            yield FittedColumns(tuple(columns), fitted)
+        return
+    is_instant = not effect.needs_time and not is_reversed
+    rows = fitted.rows if is_instant else None
+    right = takes if rows is None else [take.at(some) for take, some in zip(takes, rows, strict=True)]
+    columns = effect.columns_of_takes(right, settings, shape)
+    yield FittedColumns.of(columns, fitted, are_fitted=is_instant)
+    for _ in range(controls):
+        columns = control_columns(effect, takes, settings, shape, generator, rows)
+        yield FittedColumns.of(columns, fitted, are_fitted=is_instant)
+
+
+def _fitted_rows(design: ForwardDesign, joints: Sequence[int]) -> FittedRows:
+    return FittedRows.of(
+        [len(take) for take in design.signals], [list(design.units(joint)) for joint in joints]
+    )

@@ -50,9 +50,11 @@ class FormInputs:
         settings: Settings,
         shape: np.ndarray,
         step: int = 1,
+        plain: Sequence[np.ndarray] | None = None,
     ) -> FormInputs:
-        """``takes`` of the joint alone, ``shape`` (1, P); ``step`` -1: their rows are in reverse."""
-        plain = effect.columns_of_takes(takes, settings, shape)
+        """``takes`` of the joint alone, ``shape`` (1, P); ``step`` -1: their rows are in reverse; ``plain``:
+        the own columns (N, 1, C) of each take, where they are known."""
+        plain = plain or effect.columns_of_takes(takes, settings, shape)
         values = [form_values(effect, take, part, settings) for take, part in zip(takes, plain, strict=True)]
         units = list(design.units(joint))
         return cls(

@@ -16,6 +16,8 @@ from glovecal_models.calibration.held_out import BaseProducts
 from glovecal_models.diagnosis.forward_basis import ForwardBasis
 from glovecal_models.diagnosis.known_effect import KnownEffect, one_lane
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
+from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.facts import Settings
 from glovecal_models.effects.base.signals import Signals
 
 
@@ -44,6 +46,10 @@ class ForwardDesign:
         if what not in self.kept:
             self.kept[what] = work()
         return self.kept[what]
+
+    def constants(self, effect: Effect) -> Settings:
+        """Those of ``effect`` on all joints; not to be changed."""
+        return self.once(f"constants of {effect.name}", lambda: effect.fit_constants(self.signals))
 
     def rows(self, joint: int, columns: Sequence[np.ndarray]) -> list[np.ndarray]:
         """``columns``: for each take (N, ...); the fitted rows of those."""
@@ -76,10 +82,13 @@ def forward(
 
     Where deviations of the reference are stated, rows count by them.
     """
-    products = []
+    products, together = [], [each.side_by_side(basis.signals, rotations) for each in known]
     for column, (rotation, joint) in enumerate(zip(rotations, basis.joints, strict=True)):
         without = [_without(take, joint.beside) for take in basis.signals] if known else []
-        found = [each.columns(without, column, rotation) for each in known]
+        found = [
+            each.columns(without, column, rotation, columns)
+            for each, columns in zip(known, together, strict=True)
+        ]
         products.append(joint.products(basis.unit_take, [item for item in found if item is not None]))
     return ForwardDesign(
         tuple(rotations),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -12,6 +12,7 @@ from glovecal_models.calibration.added_effect import form_values
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Settings
+from glovecal_models.effects.base.history_effect import ArrayStateEffect
 from glovecal_models.effects.base.learned_form import FormTerm, LearnedForm
 from glovecal_models.effects.base.signals import Signals
 
@@ -23,6 +24,9 @@ class KnownColumns(NamedTuple):
     """For each take (N, C)."""
     prior_sd: np.ndarray
     """(C,) of their weights; infinite for those that the effect always has."""
+
+
+NOTHING: Mapping[str, list[np.ndarray]] = {}
 
 
 @dataclass(frozen=True)
@@ -37,9 +41,42 @@ class KnownEffect:
     """For each joint those of its learned form; none given: none was learned."""
     stored: Settings = field(default_factory=dict)
     """Its settings in the model."""
+    kept: list[tuple[Sequence[Signals], dict[str, list[np.ndarray]]]] = field(
+        default_factory=list, compare=False, repr=False
+    )
+    """Takes that it was run through, and what came of it."""
 
-    def columns(self, takes: Sequence[Signals], lane: int, joint: str) -> KnownColumns | None:
-        """Of one joint, a lane of ``takes``; None when it is not concerned."""
+    def __getstate__(self) -> dict[str, object]:
+        """Workers are sent the effect alone."""
+        return {**self.__dict__, "kept": []}
+
+    def side_by_side(self, takes: Sequence[Signals], rotations: Sequence[str]) -> dict[str, list[np.ndarray]]:
+        """Its own columns (N, 1, C) of ``takes``, own (N, R), for each of its joints; empty for an effect
+        that has no memory of the joint's own signal alone. All joints are run together: a frame costs mostly
+        the call, whatever it holds."""
+        if not isinstance(self.effect, ArrayStateEffect) or not self.joints:
+            return {}
+        for known, columns in self.kept:
+            if known is takes:
+                return columns
+        lanes = [rotations.index(name) for name in self.joints]
+        some = [replace(take, own=take.own[:, lanes], zero_deg=None) for take in takes]
+        settings = self.effect.fit_repair_constants(some)
+        settings = self.effect.settings_as_stored(some, settings, self.stored)
+        found = self.effect.columns_of_takes(some, settings, np.array(self.shapes))
+        columns = {name: [part[:, [at]] for part in found] for at, name in enumerate(self.joints)}
+        self.kept.append((takes, columns))
+        return columns
+
+    def columns(
+        self,
+        takes: Sequence[Signals],
+        lane: int,
+        joint: str,
+        together: Mapping[str, list[np.ndarray]] = NOTHING,
+    ) -> KnownColumns | None:
+        """Of one joint, a lane of ``takes``; None when it is not concerned. ``together``: as
+        ``side_by_side`` has it."""
         if joint not in self.joints:
             return None
         place = self.joints.index(joint)
@@ -48,7 +85,7 @@ class KnownEffect:
         own_count = len(self.effect.prior_sd(settings))
         settings = self.effect.settings_as_stored(single, settings, self.stored)
         shape = self.shapes[place][None, :]
-        plain = self.effect.columns_of_takes(single, settings, shape)
+        plain = together.get(joint) or self.effect.columns_of_takes(single, settings, shape)
         free = np.full(plain[0].shape[2], np.inf)
         free[own_count:] = self.effect.prior_sd(settings)[own_count:]
         terms = self.terms[place] if self.terms else ()

@@ -33,10 +33,8 @@ def session_p_value(design: ForwardDesign, effect: Effect, generator: np.random.
     permutations = _permutations(design, effect, generator)
     rows = [_thinned(take.time_s) for take in design.signals]
     thin = [take.at(some) for take, some in zip(design.signals, rows, strict=True)]
-    settings, left = (
-        effect.fit_constants(design.signals),
-        [_projected(design, joint, rows) for joint in joints],
-    )
+    settings = design.constants(effect)
+    left = [_projected(design, joint, rows) for joint in joints]
     given = _Given(effect, settings, effect.grid(design.signals, settings), thin, left)
     own = _own_givers(thin, effect)
     every = np.array([given.explained(order) for order in (own, *permutations)])

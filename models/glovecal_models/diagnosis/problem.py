@@ -135,12 +135,13 @@ def _with_joints(take: ResampledTake, kept: np.ndarray) -> ResampledTake:
 
 def _with_learned_terms(known: KnownEffect, design: ForwardDesign) -> KnownEffect:
     """The same in the form that the takes of ``design``, whose base does not have it, ask for."""
-    terms = []
+    terms, together = [], known.side_by_side(design.signals, design.rotations)
     for joint, shape in zip(known.joints, known.shapes, strict=True):
         lane = design.rotations.index(joint)
         takes = design.of_joint(lane)
         settings = known.effect.fit_repair_constants(takes)
-        inputs = FormInputs.of(design, lane, known.effect, takes, settings, shape[None, :])
+        plain = together.get(joint)
+        inputs = FormInputs.of(design, lane, known.effect, takes, settings, shape[None, :], plain=plain)
         terms.append(inputs.terms(design, lane, range(len(inputs.plain))))
     return replace(known, terms=tuple(terms))
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glovecal_models.comparison.dependence import Covariate, covariates, explained_when_shifted
+from glovecal_models.comparison.dependence import Covariate, ShiftedErrors, covariates
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.limits import DiagnosisLimits
@@ -27,6 +27,8 @@ DRAWS = 999
 STEPS_AT_MOST = 1000
 """Of a take; what lasts for seconds needs no more."""
 MOST = 5
+ROUNDING = 1e-6
+COLUMNS_AT_ONCE = 16
 MOSTLY_WITHIN = 0.5
 """Share of a column's variance inside takes above which it is tested by shifts within takes."""
 TAKES_PER_BIN = 3
@@ -62,18 +64,20 @@ def residual_associations(
     shares = generator.random((DRAWS, len(even)))
     permutations = np.array([generator.permutation(len(even)) for _ in range(DRAWS)])
     tried: list[_Tried] = []
+    shifted: list[_Shiftable] = []
     for joint in joints:
-        errors = _errors(design, joint, means[joint])
+        rotation, errors = design.rotations[joint], _errors(design, joint, means[joint])
         square = float(np.nanmean(np.concatenate(errors) ** 2))
         for column in _columns(design, even, layout, joint):
-            is_permuted = column.name == "wearing" or not _changes_within_takes(column)
-            found = (
-                _explained_when_permuted(errors, column, permutations)
-                if is_permuted
-                else explained_when_shifted(errors, column, shares, STEPS_AT_MOST)
-            )
-            if found is not None:
-                tried.append(_Tried(design.rotations[joint], column, square, is_permuted, found))
+            if column.name == "wearing" or not _changes_within_takes(column):
+                found = _explained_when_permuted(errors, column, permutations)
+                if found is not None:
+                    tried.append(_Tried(rotation, column, square, True, found))
+            else:
+                whole = ShiftedErrors.of(errors, column, STEPS_AT_MOST)
+                if whole is not None:
+                    shifted.append(_Shiftable(rotation, column, square, whole))
+    tried += _tried_with_shifts(shifted, shares, design.limits)
     listed = [
         *_listed([each for each in tried if each.is_permuted], design.limits),
         *_listed([each for each in tried if not each.is_permuted], design.limits),
@@ -97,6 +101,43 @@ class _Tried:
     def size_deg(self) -> float:
         """What it explains beyond the mean of the draws."""
         return float(np.sqrt(max(self.explained[0] ** 2 - np.mean(self.explained[1:] ** 2), 0.0)))
+
+
+@dataclass(frozen=True)
+class _Shiftable:
+    """One column before it is tested."""
+
+    rotation: str
+    column: Covariate
+    square: float
+    errors: ShiftedErrors
+
+    def tried(self, shares: np.ndarray) -> _Tried:
+        found = self.errors.explained_when_shifted(shares)
+        return _Tried(self.rotation, self.column, self.square, False, found)
+
+
+def _tried_with_shifts(
+    columns: Sequence[_Shiftable], shares: np.ndarray, limits: DiagnosisLimits
+) -> list[_Tried]:
+    """All ``columns``; none where it is clear before that none of them would be listed.
+
+    A column that explains too little as it is, is not; and the more columns are tested, the more often the
+    largest of all is as large: a p value of some columns is at most that of all.
+    """
+    least = limits.association_share * (1.0 - ROUNDING)
+    matters = [item.errors.explained_deg**2 >= least * item.square for item in columns]
+    order = [*np.flatnonzero(matters).tolist(), *np.flatnonzero(np.logical_not(matters)).tolist()]
+    tried: dict[int, _Tried] = {}
+    for end in (
+        sum(matters),
+        *range(sum(matters) + COLUMNS_AT_ONCE, len(order), COLUMNS_AT_ONCE),
+        len(order),
+    ):
+        tried |= {at: columns[at].tried(shares) for at in order[len(tried) : end]}
+        if not any(_listed(list(tried.values()), limits)):
+            return []
+    return [tried[at] for at in range(len(columns))]
 
 
 def _listed(tried: Sequence[_Tried], limits: DiagnosisLimits) -> Iterator[ResidualAssociation]:

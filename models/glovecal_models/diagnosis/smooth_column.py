@@ -15,6 +15,7 @@ import numpy as np
 
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.permutation_test import share_as_large
+from glovecal_models.diagnosis.pieces_of_takes import Pieces, pieces_of
 from glovecal_models.effects.base.assessment import (
     Assessment,
     JointErrors,
@@ -45,21 +46,6 @@ or other. Of 96 simulated gloves that slip or sit otherwise after donning nine h
 six with a cause that the usual forms miss 0.002, the least of so many draws (2026-11-24)."""
 
 
-@dataclass(frozen=True)
-class Pieces:
-    """Mean errors of one joint."""
-
-    error: np.ndarray
-    """(T, P), degrees; of rows that count by their weights as ``Rows.rooted``."""
-    column: np.ndarray
-    """(T, P), evenly spread and scaled to 0..1."""
-    piece: tuple[np.ndarray, ...]
-    """For each unit (N,): the piece of each of its rows, counted through all takes."""
-    low: float = 0.0
-    span: float = 1.0
-    """Of the column as it was recorded."""
-
-
 def smooth_assessment(
     design: ForwardDesign, effect: ContextEffect, usual: Assessment, generator: np.random.Generator
 ) -> Assessment | None:
@@ -70,17 +56,19 @@ def smooth_assessment(
     count = min(PIECES_OF_A_TAKE, MOST_PIECES_OF_ALL // max(takes, 1))
     if takes < FEWEST_TAKES_OF_A_CURVE or count < 1:
         return None
-    settings = effect.fit_constants(design.signals)
+    settings = design.constants(effect)
     columns = [effect.evenly(effect.clipped(take, settings), settings) for take in design.signals]
-    pieces = [pieces_of(design, joint, columns, count) for joint in range(len(usual.errors))]
-    known = [item for item in pieces if item is not None]
-    if len(known) < len(pieces):
+    known = pieces_of(design, columns, count)
+    if known is None:
         return None
+    # Joints that were measured at the same times, mostly all, have the same column.
+    different = {item.column.tobytes(): item.column for item in known}
+    without = {key: leaving_out(column) for key, column in different.items()}
     orders, left, p_value = np.arange(takes)[None, :], [], 1.0
     for draws in (FEW_DRAWS, DRAWS):
         more = [generator.permutation(takes) for _ in range(draws + 1 - len(orders))]
         orders = np.concatenate([orders, more])
-        left = [_Left.of(item, orders) for item in known]
+        left = [_Left.of(item, orders, without[item.column.tobytes()]) for item in known]
         p_value = min(1.0, STRICTER * share_as_large(np.column_stack([item.explained for item in left])))
         if draws < DRAWS and p_value > HOPELESS_P_VALUE:
             return None
@@ -109,8 +97,8 @@ class _Left:
     """The same in a draw that explains neither much nor little."""
 
     @classmethod
-    def of(cls, pieces: Pieces, orders: np.ndarray) -> _Left:
-        left = left_out(pieces, orders)
+    def of(cls, pieces: Pieces, orders: np.ndarray, without: np.ndarray) -> _Left:
+        left = left_out(pieces.error, orders, without)
         square = np.mean(left**2, axis=(2, 3))
         best, every = square.argmin(axis=0), np.arange(len(orders))
         explained = 1.0 - square[best, every] / max(float(np.mean(pieces.error**2)), 1e-12)
@@ -119,52 +107,27 @@ class _Left:
         return cls(explained, predicted, control)
 
 
-def pieces_of(design: ForwardDesign, joint: int, columns: Sequence[np.ndarray], pieces: int) -> Pieces | None:
-    """So many of each take; ``columns`` (N,) of each. None where a take has no error of the joint, or the
-    column never changes."""
-    takes = len(design.signals)
-    rows_of: list[list[np.ndarray]] = [[] for _ in range(takes)]
-    for take, rows in design.units(joint):
-        rows_of[take].append(rows)
-    error, column = np.zeros((takes, pieces)), np.zeros((takes, pieces))
-    count = np.zeros((takes, pieces))
-    edges, piece = [], []
-    for take, parts in enumerate(rows_of):
-        rows = np.sort(np.concatenate(parts)) if parts else np.empty(0, dtype=int)
-        if len(rows) < pieces:
-            return None
-        cut = np.array_split(rows, pieces)
-        edges.append(np.array([part[0] for part in cut[1:]]))
-        column[take] = [float(np.mean(columns[take][part])) for part in cut]
-    for (take, rows), residual in zip(design.units(joint), design.products[joint].residual, strict=True):
-        at = np.searchsorted(edges[take], rows, side="right")
-        np.add.at(error[take], at, residual)
-        np.add.at(count[take], at, 1.0)
-        piece.append(take * pieces + at)
-    span = float(np.ptp(column))
-    if span <= 0 or not np.isfinite(span):
-        return None
-    low = float(column.min())
-    return Pieces(error / np.maximum(count, 1.0), (column - low) / span, tuple(piece), low, span)
+def left_out(error: np.ndarray, orders: np.ndarray, without: np.ndarray) -> np.ndarray:
+    """(K, D, T, P), degrees: errors (T, P) with takes in each of ``orders`` (D, T), less what the other takes
+    and the column predict of them. ``without``: as ``leaving_out`` has it."""
+    target = error[orders].reshape(len(orders), -1).T
+    return (without @ target).swapaxes(1, 2).reshape(len(without), len(orders), *error.shape)
 
 
-def left_out(pieces: Pieces, orders: np.ndarray) -> np.ndarray:
-    """(K, D, T, P), degrees: for K choices of lengthscale and noise, errors with takes in each of ``orders``
-    (D, T), less what the other takes and the column predict of them."""
-    takes, each = pieces.error.shape
-    x, take = pieces.column.ravel(), np.repeat(np.arange(takes), each)
-    target = pieces.error[orders].reshape(len(orders), -1).T
-    variance = max(float(np.mean(pieces.error**2)), 1e-12)
+def leaving_out(column: np.ndarray) -> np.ndarray:
+    """(K, T P, T P): for K choices of lengthscale and noise, what makes of errors beside ``column`` (T, P)
+    those less what the other takes and the column predict of them."""
+    takes, each = column.shape
+    x, take = column.ravel(), np.repeat(np.arange(takes), each)
     same = take[:, None] == take[None, :]
     found = []
     for length, share in product(LENGTHS, NOISE_SHARES):
         cover = np.exp(-0.5 * ((x[:, None] - x[None, :]) / length) ** 2) + LEVEL_SHARE
-        precision = np.linalg.inv(variance * (cover + share * (same + np.eye(len(x)))))
+        precision = np.linalg.inv(cover + share * (same + np.eye(len(x))))
         of_take = precision.reshape(takes, each, -1)
         blocks = of_take.reshape(takes, each, takes, each)[np.arange(takes), :, np.arange(takes), :]
-        leave = np.linalg.solve(blocks, of_take).reshape(precision.shape)
-        found.append((leave @ target).T.reshape(len(orders), takes, each))
-    return np.stack(found)
+        found.append(np.linalg.solve(blocks, of_take).reshape(precision.shape))
+    return np.array(found)
 
 
 def errors_beside(

@@ -13,7 +13,8 @@ import numpy as np
 
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.permutation_test import share_as_large
-from glovecal_models.diagnosis.smooth_column import JOINT_P_VALUE, STRICTER, errors_beside, pieces_of
+from glovecal_models.diagnosis.pieces_of_takes import pieces_of
+from glovecal_models.diagnosis.smooth_column import JOINT_P_VALUE, STRICTER, errors_beside
 from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.column_steps import ColumnSteps, StepSearch
 from glovecal_models.effects.base.context_effect import ContextEffect
@@ -32,11 +33,10 @@ def stepped_assessment(
     count = StepSearch.pieces(takes)
     if count < 1:
         return None
-    settings = effect.fit_constants(design.signals)
+    settings = design.constants(effect)
     columns = [effect.clipped(take, settings) for take in design.signals]
-    pieces = [pieces_of(design, joint, columns, count) for joint in range(len(usual.errors))]
-    known = [item for item in pieces if item is not None]
-    if len(known) < len(pieces):
+    known = pieces_of(design, columns, count)
+    if known is None:
         return None
     search, errors = StepSearch(known[0].column), np.array([item.error for item in known])
     if not search.tried:

@@ -51,12 +51,12 @@ class CrossCoupling(InstantEffect):
     def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
         lanes = take.own.shape[1]
         joint = in_joint_units(take.own, settings)[:, :, None]
-        rest = np.zeros(len(take))
-        if not settings["neighbours"]:
-            return np.zeros((len(take), take.own.shape[1], 0))
-        others = np.column_stack([take.others.get(name, rest) for name in settings["neighbours"]])[:, None, :]
-        others = np.repeat(others, lanes, axis=1)
-        return np.concatenate([others, others * joint], axis=2)
+        names = settings["neighbours"]
+        result = np.empty((len(take), lanes, 2 * len(names)))
+        for at, name in enumerate(names):
+            result[:, :, at] = take.others[name][:, None] if name in take.others else 0.0
+        np.multiply(result[:, :, : len(names)], joint, out=result[:, :, len(names) :])
+        return result
 
     def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
         return {name: columns[:, :, at] for at, name in enumerate(settings["neighbours"])}

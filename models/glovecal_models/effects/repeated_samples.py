@@ -138,9 +138,8 @@ def repeats(values: np.ndarray) -> Repeats:
     same &= np.isfinite(values).any(axis=1)
     fresh = np.flatnonzero(~same)
     quantum = np.array([smallest_step(column) for column in values.T])
-    limit = np.where(quantum > 0, CLEAR_STEP * quantum, np.inf)
     between = np.nan_to_num(np.diff(values[fresh], axis=0))
-    clear = np.where(np.abs(between) >= limit, np.sign(between), 0.0)
+    clear = _clear(between, quantum)
     # Of each fresh row but first and last: some column steps clearly the same way before and after it.
     goes_on = ((clear[1:] * clear[:-1]) > 0).any(axis=1)
     padded = np.diff(fresh)[1:] > 1
@@ -160,6 +159,25 @@ def repeats(values: np.ndarray) -> Repeats:
         int(halting.sum()), int((leaping & halting).sum()), int((lasts == 1).sum()),
         int((leaping & (lasts == 1)).sum()), int(brief.sum()),
     )  # fmt: skip
+
+
+def _clear(between: np.ndarray, quantum: np.ndarray) -> np.ndarray:
+    """The signs of steps (S, K) between fresh rows, 0 where they may be noise."""
+    limit = np.where(quantum > 0, CLEAR_STEP * quantum, np.inf)
+    return np.where(np.abs(between) >= limit, np.sign(between), 0.0)
+
+
+def _moments(readings: np.ndarray) -> tuple[int, int]:
+    """``interrupted`` and ``moving`` of the ``repeats`` of one sensor's readings (N,) alone."""
+    if len(readings) <= 2 * NEAR_FRAMES:
+        return 0, 0
+    steps = np.diff(readings)
+    same = (steps == 0) | np.isnan(steps)
+    fresh = np.flatnonzero(np.concatenate([[True], ~(same & np.isfinite(readings[1:]))]))
+    clear = _clear(np.nan_to_num(np.diff(readings[fresh])), np.array(smallest_step(readings)))
+    lasts = np.diff(fresh)[1:][clear[1:] * clear[:-1] > 0]
+    interrupted = int((lasts > 1).sum())
+    return interrupted, len(lasts) - interrupted
 
 
 def _leaps(between: np.ndarray, quantum: np.ndarray) -> np.ndarray:
@@ -250,10 +268,8 @@ def _read_in_turn(takes: Sequence[Take], sensors: Sequence[str]) -> dict[str, fl
     for sensor in sensors:
         if not all(sensor in take.sensors for take in takes):
             continue
-        found = [repeats(take.readings[:, [take.sensors.index(sensor)]]) for take in takes]
-        interrupted, moving = (
-            sum(getattr(item, name) for item in found) for name in ("interrupted", "moving")
-        )
+        found = [_moments(take.readings[:, take.sensors.index(sensor)]) for take in takes]
+        interrupted, moving = (sum(counts) for counts in zip(*found, strict=True))
         if interrupted + moving >= FEWEST_MOMENTS:
             shares[sensor] = interrupted / (interrupted + moving)
     old = {sensor: share for sensor, share in shares.items() if share >= OLD_SHARE}

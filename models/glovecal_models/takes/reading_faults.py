@@ -34,14 +34,28 @@ def spikes(readings: np.ndarray, span: float) -> np.ndarray:
     """Excursions of one or two frames that come back; ``span`` is the sensor's range in readings."""
     if len(readings) < 5 or span <= 0:
         return np.zeros(len(readings), dtype=bool)
-    from scipy.ndimage import median_filter  # slow to load, and every model with effects loads this file
-
-    away = np.abs(readings - median_filter(readings, 5, mode="nearest"))
+    # A frame is no farther from a median over five than two steps take it: mostly that is too little already.
+    least = SPIKE_SHARE * span
+    if 2.0 * float(np.abs(np.diff(readings)).max()) <= least:
+        return np.zeros(len(readings), dtype=bool)
+    away = np.abs(readings - median_of_five(np.pad(readings, 2, mode="edge")))
+    if float(away.max()) <= least:
+        return np.zeros(len(readings), dtype=bool)
     spread = 1.4826 * float(np.median(away))
-    limit = max(SPIKE_SPREADS * spread, 3.0 * smallest_step(readings), SPIKE_SHARE * span)
+    limit = max(SPIKE_SPREADS * spread, 3.0 * smallest_step(readings), least)
     found = away > limit
     # Where a level changes for good, the frames beside the step are no spikes.
     return found & ~_longer_than(found, 2)
+
+
+def median_of_five(padded: np.ndarray) -> np.ndarray:
+    """(N,): of ``padded`` (N + 4,) values each with the two before it and the two after it."""
+    one, two, middle, four, five = (padded[at : len(padded) - 4 + at] for at in range(5))
+    low, high = np.minimum(one, two), np.maximum(one, two)
+    other_low, other_high = np.minimum(four, five), np.maximum(four, five)
+    # The least and the largest of four are out; it is the median of the two between them and the fifth.
+    low, high = np.maximum(low, other_low), np.minimum(high, other_high)
+    return np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), middle))
 
 
 def dropouts(readings: np.ndarray, span: float) -> np.ndarray:

@@ -7,8 +7,8 @@ from glovecal_models.calibration.held_out import (
     ALIKE_ROWS,
     BaseProducts,
     FittedColumns,
+    FittedRows,
     Rows,
-    fitted_rows,
     held_out,
 )
 
@@ -68,9 +68,10 @@ def test_columns_at_fitted_rows_are_those_of_all_rows():
         [(0, np.arange(0, 20, 2)), (1, np.arange(1, 9))],
         [(0, np.arange(4, 20, 2)), (1, np.array([3, 15]))],
     ]
-    fitted = fitted_rows([20, 20], units)
-    every = FittedColumns.of(columns, units)
-    some = FittedColumns.of([part[at] for part, at in zip(columns, fitted, strict=True)], units, fitted)
+    fitted = FittedRows.of([20, 20], units)
+    every = FittedColumns.of(columns, fitted)
+    some = [part[at] for part, at in zip(columns, fitted.rows, strict=True)]
+    some = FittedColumns.of(some, fitted, are_fitted=True)
     for lane, of_lane in enumerate(units):
         for (take, index), whole, part in zip(of_lane, every.units(lane), some.units(lane), strict=True):
             np.testing.assert_array_equal(whole, columns[take][index][:, lane::2])

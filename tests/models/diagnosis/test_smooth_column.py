@@ -13,7 +13,7 @@ from glovecal_models.diagnosis.smooth_column import (
     LEVEL_SHARE,
     NOISE_SHARES,
     PIECES_OF_A_TAKE,
-    Pieces,
+    leaving_out,
     left_out,
 )
 from glovecal_models.diagnosis.text import diagnosis_sentences, named_sentence
@@ -32,14 +32,14 @@ PLAN = SessionPlan(seed=5, bits=12, nuisance="white")
 
 def test_what_takes_left_out_leave_is_that_of_the_process_without_them():
     random = np.random.default_rng(2)
-    pieces = Pieces(random.standard_normal((6, PIECES_OF_A_TAKE)), random.random((6, PIECES_OF_A_TAKE)), ())
+    error, column = random.standard_normal((6, PIECES_OF_A_TAKE)), random.random((6, PIECES_OF_A_TAKE))
     orders = np.array([np.arange(6), random.permutation(6)])
-    found = left_out(pieces, orders)
-    x, variance = pieces.column.ravel(), float(np.mean(pieces.error**2))
+    found = left_out(error, orders, leaving_out(column))
+    x, variance = column.ravel(), float(np.mean(error**2))
     take = np.repeat(np.arange(6), PIECES_OF_A_TAKE)
     length, share = LENGTHS[1], NOISE_SHARES[0]
     for draw, order in enumerate(orders):
-        target = pieces.error[order].ravel()
+        target = error[order].ravel()
         for out in range(6):
             rest, here = take != out, take == out
             cover = np.exp(-0.5 * ((x[:, None] - x) / length) ** 2) + LEVEL_SHARE

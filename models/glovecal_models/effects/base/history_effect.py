@@ -104,23 +104,60 @@ class ArrayStateEffect(HistoryEffect):
         """Takes are run side by side, a few at a time where a frame of one has many values already."""
         lanes, added = shape.shape[0], len(self.weight_names(settings))
         found = [np.empty((len(take), lanes, added)) for take in takes]
-        strips = [
-            _Strip(take.own[part], elapsed[part], columns[part])
-            for take, columns in zip(takes, found, strict=True)
-            for elapsed in [elapsed_s(take.time_s)]
-            for part in unbroken(take.time_s)
-            if part.stop > part.start
-        ]
+        every = [np.arange(len(take)) for take in takes]
+        self._run(takes, settings, shape, every, [part[:, None] for part in found])
+        return found
+
+    def columns_by_lane(
+        self,
+        takes: Sequence[Signals],
+        settings: Settings,
+        shape: np.ndarray,
+        rows: Sequence[np.ndarray | slice],
+        lanes: int,
+        *,
+        are_backwards: bool = False,
+    ) -> list[np.ndarray]:
+        """The same at some rows of each take, (L, M, G, C): ``shape`` (G L, P) are shapes of ``lanes``.
+
+        ``are_backwards``: the takes are played backwards, ``rows`` are those of the takes as they were.
+        """
+        added, step = len(self.weight_names(settings)), -1 if are_backwards else 1
+        found, kept, written = [], [], []
+        for take, some in zip(takes, rows, strict=True):
+            at = np.arange(len(take))[::step][some]
+            found.append(np.empty((lanes, len(at), len(shape) // lanes, added)))
+            kept.append(at[::step])
+            written.append(found[-1].transpose(1, 2, 0, 3)[::step])
+        self._run(takes, settings, shape, kept, written)
+        return found
+
+    def _run(
+        self,
+        takes: Sequence[Signals],
+        settings: Settings,
+        shape: np.ndarray,
+        kept: Sequence[np.ndarray],
+        written: Sequence[np.ndarray],
+    ) -> None:
+        """Write the columns at rising rows ``kept`` (M,) of each take to ``written`` (M, G, L, C)."""
+        strips = []
+        for take, rows, columns in zip(takes, kept, written, strict=True):
+            elapsed = elapsed_s(take.time_s)
+            for part in unbroken(take.time_s):
+                some = slice(*np.searchsorted(rows, [part.start, part.stop]).tolist())
+                if part.stop > part.start and some.stop > some.start:
+                    mine = rows[some] - part.start
+                    strips.append(_Strip(take.own[part], elapsed[part], mine, columns[some]))
         strips.sort(key=lambda strip: -len(strip.own))
-        most = max(FRAME_VALUES // max(lanes * added, 1), 1)
+        most = max(FRAME_VALUES // max(len(shape) * written[0].shape[-1], 1), 1) if strips else 1
         for first in range(0, len(strips), most):
             self._run_strips(strips[first : first + most], settings, shape)
-        return found
 
     def _run_strips(self, strips: Sequence[_Strip], settings: Settings, shape: np.ndarray) -> None:
         """Write the columns of ``strips``, the longest first."""
         states = np.array([self.start(strip.own[0], settings, shape) for strip in strips])
-        values = len(strips) * strips[0].columns[0].size
+        values = len(strips) * strips[0].columns[:1].size
         block = min(max(BLOCK_VALUES // max(values, 1), 1), BLOCK_FRAMES)
         for first in range(0, len(strips[0].own), block):
             going = [strip for strip in strips if len(strip.own) > first]
@@ -134,20 +171,30 @@ class ArrayStateEffect(HistoryEffect):
                 elapsed[: len(here), number] = strip.elapsed_s[rows]
             columns = self.run_takes(states[: len(going)], elapsed, own, settings, shape)
             for number, strip in enumerate(going):
-                mine = strip.columns[rows]
-                mine[:] = columns[: len(mine), number]
+                some = slice(*np.searchsorted(strip.kept, [rows.start, rows.stop]).tolist())
+                mine, at = strip.columns[some], _as_slice(strip.kept[some] - rows.start)
+                mine[:] = columns[at, number].reshape(mine.shape)
 
 
 @dataclass(frozen=True)
 class _Strip:
-    """Frames without a gap, and where their columns are to be written."""
+    """Frames without a gap, and where the columns of some are to be written."""
 
     own: np.ndarray
     """(N, L)."""
     elapsed_s: np.ndarray
     """(N,)."""
+    kept: np.ndarray
+    """(M,) rising: those frames."""
     columns: np.ndarray
-    """(N, L, C)."""
+    """(M, G, L, C)."""
+
+
+def _as_slice(rows: np.ndarray) -> np.ndarray | slice:
+    """Evenly rising rows (M,) as a slice, which copies nothing."""
+    step = int(rows[1] - rows[0]) if len(rows) > 1 else 0
+    is_even = step > 0 and bool((np.diff(rows) == step).all())
+    return slice(int(rows[0]), int(rows[-1]) + 1, step) if is_even else rows
 
 
 def elapsed_s(time_s: np.ndarray) -> np.ndarray:

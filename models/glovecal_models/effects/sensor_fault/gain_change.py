@@ -127,9 +127,12 @@ class _Slopes:
         usual = straight_line(every, counts)[0]
         if usual == 0.0:
             return None
-        powers = np.vander((every - centre) / (2.0 * spread), CURVE_DEGREE + 1)
-        curve = np.linalg.lstsq(powers.T @ powers, powers.T @ counts, rcond=None)[0]
-        left = np.split(counts - powers @ curve, np.cumsum([len(angle) for angle in angles])[:-1])
+        powers = np.ones((CURVE_DEGREE + 1, len(every)))
+        place = (every - centre) / (2.0 * spread)
+        for number in range(1, len(powers)):
+            np.multiply(powers[number - 1], place, out=powers[number])
+        curve = np.linalg.lstsq(powers @ powers.T, powers @ counts, rcond=None)[0]
+        left = np.split(counts - curve @ powers, np.cumsum([len(angle) for angle in angles])[:-1])
         values = [straight_line(*pair)[0] / usual for pair in zip(angles, left, strict=True)]
         return cls(np.array(values), np.array([angle.std() for angle in angles]), spread)
 

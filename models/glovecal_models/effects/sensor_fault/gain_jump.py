@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glovecal_models.effects.sensor_fault.short_faults import straight_line
 from glovecal_models.takes.take_check import GAP_INTERVALS
 
 SHORTEST_SIDE_S = 4.0
@@ -56,13 +57,13 @@ def gain_jump(
         return None
     spread = float(angle.std())
     x = (angle - angle.mean()) / spread
-    base = np.column_stack([np.ones_like(x), x])
-    line = np.linalg.lstsq(base, y, rcond=None)[0]
-    one = float(np.sum((y - base @ line) ** 2))
-    slope = abs(float(line[1])) / spread
-    cut, two = _best_cut(time, base, y)
+    answer, rest = straight_line(x, y)
+    one = float(np.sum((y - answer * x - rest) ** 2))
+    slope = abs(answer) / spread
+    cut, two = _best_cut(time, x, y)
     if cut is None or slope <= 0 or two > BETTER_THAN_ONE * one:
         return None
+    base = np.column_stack([np.ones_like(x), x])
     place = (2 * (time - time[0]) / (time[-1] - time[0]) - 1)[:, None]
     if two > BETTER_THAN_DRIFT * _left(np.column_stack([base, base * place]), y):
         return None
@@ -91,9 +92,8 @@ def _left(columns: np.ndarray, y: np.ndarray) -> float:
     return float(np.sum((y - columns @ weights) ** 2))
 
 
-def _best_cut(time: np.ndarray, base: np.ndarray, y: np.ndarray) -> tuple[int | None, float]:
+def _best_cut(time: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[int | None, float]:
     """The frame that starts the second line, and the squared error of both; from running sums."""
-    x = base[:, 1]
     centred = y - y.mean()
     terms = np.stack([np.ones_like(x), x, x * x, centred, x * centred, centred * centred])
     before = np.cumsum(terms, axis=1)

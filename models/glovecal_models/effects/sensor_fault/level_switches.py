@@ -132,6 +132,8 @@ def level_switches(sensors: Sequence[ReadingErrors | None]) -> list[LevelSwitche
 
 
 def _candidates(sensor: ReadingErrors) -> _Candidates | None:
+    from scipy.ndimage import maximum_filter1d  # slow to load, and every model with effects loads this file
+
     side = max(SIDE_FRAMES, round(SIDE_S * sensor.rate_hz))
     place = np.arange(2 * side) - (side - 0.5)
     means = np.where(place > 0, 1.0, -1.0) / side
@@ -148,11 +150,8 @@ def _candidates(sensor: ReadingErrors) -> _Candidates | None:
     heights, angles, steps, reading_steps = [], [], [], []
     for take, height in zip(long, differences, strict=True):
         size = np.where(np.isfinite(height), np.abs(height), 0.0)
-        peaks = [
-            at
-            for at in np.flatnonzero(size > limit)
-            if size[at] >= size[max(at - side, 0) : at + side + 1].max()
-        ]
+        around = maximum_filter1d(size, 2 * side + 1, mode="constant")
+        peaks = np.flatnonzero((size > limit) & (size >= around))
         heights.append(height[peaks])
         for at in peaks:
             way, inside = np.sign(height[at]), slice(at, at + 2 * side)

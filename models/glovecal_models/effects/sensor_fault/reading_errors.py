@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glovecal_models.effects.sensor_fault.short_faults import straight_line
+
 PIECES = 30
 FEWEST_READINGS = 300
 LEAST_ANGLES_DEG = 3.0
@@ -37,7 +39,7 @@ def reading_errors(
     if known.sum() < FEWEST_READINGS or np.ptp(y[known]) < LEAST_ANGLES_DEG:
         return None
     intervals = np.concatenate([np.diff(time) for time in times])
-    gain, _ = np.polyfit(y[known], x[known], 1)
+    gain, _ = straight_line(y[known], x[known])
     if gain == 0 or not len(intervals):
         return None
     edges = np.unique(np.quantile(y[known], np.linspace(0.0, 1.0, PIECES + 1)))

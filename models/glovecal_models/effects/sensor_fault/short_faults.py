@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.takes.reading_faults import GRADUAL_SHARE, constant_runs, smallest_step
+from glovecal_models.takes.reading_faults import GRADUAL_SHARE, constant_runs, median_of_five, smallest_step
 
 FEWEST = 3
 """Of either kind, in all takes together."""
@@ -68,15 +68,18 @@ def shortly_stuck(
     from scipy.ndimage import uniform_filter1d  # slow to load, and every model with effects loads this file
 
     found = np.zeros(len(readings), dtype=bool)
-    smooth = uniform_filter1d(expected, SMOOTHED)
     margin = GRADUAL_SHARE * (high - low)
-    least = max(STUCK_STEPS * smallest_step(readings), STUCK_DEG * gain)
     start, end = constant_runs(readings)
     start, end = start[end < len(readings)], end[end < len(readings)]
-    asked = smooth[end] - smooth[start]
     long = (end - start >= SHORT_STUCK_FRAMES) & (time_s[end] - time_s[start] >= SHORT_STUCK_S)
     within = (low + margin < readings[start]) & (readings[start] < high - margin)
-    possible = np.flatnonzero(long & within & (np.abs(asked) > least))
+    start, end = start[long & within], end[long & within]
+    if not len(start):
+        return found
+    smooth = uniform_filter1d(expected, SMOOTHED)
+    least = max(STUCK_STEPS * smallest_step(readings), STUCK_DEG * gain)
+    asked = smooth[end] - smooth[start]
+    possible = np.flatnonzero(np.abs(asked) > least)
     for first, after, missing in zip(start[possible], end[possible], asked[possible], strict=True):
         released = readings[after] - readings[after - 1]
         found[first:after] = (
@@ -92,17 +95,18 @@ def small_dropouts(
 
     ``span`` is the sensor's range in readings; ``others_move`` (N,): no repeated frame.
     """
-    from scipy.ndimage import median_filter
-
     found = np.zeros(len(readings), dtype=bool)
-    fresh = others_move | (np.diff(readings, prepend=np.nan) != 0)
     change = np.diff(readings - expected, prepend=np.nan)
     known = np.isfinite(change)
     if span <= 0 or known.sum() < 100:
         return found
     change[~known] = 0.0
+    # No change stands out from a median of its neighbours by more than all of them span.
+    if float(np.ptp(change)) <= DROPOUT_SHARE * span:
+        return found
+    fresh = others_move | (np.diff(readings, prepend=np.nan) != 0)
     # A movement that the line does not explain lasts; only what stands out from its neighbours is a jump.
-    jump = change - median_filter(change, 5)
+    jump = change - median_of_five(np.pad(change, 2, mode="symmetric"))
     spread = 1.4826 * float(np.median(np.abs(jump[known])))
     limit = max(DROPOUT_SPREADS * spread, 4.0 * smallest_step(readings), DROPOUT_SHARE * span)
     places = 1 + np.flatnonzero(np.abs(jump[1:]) > limit)
