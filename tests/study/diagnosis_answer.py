@@ -25,7 +25,7 @@ def diagnosis_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_
         signatures = ranked
     return {
         "first": ranked[0] if ranked else NOTHING,
-        "confidence_set": signatures[:1] or list(found.naming.confidence_set),
+        "confidence_set": [] if found.named is None else list(found.named.confidence_set),
         "ranked": ranked,
         "right": names_of(glove),
         **glove.told(),
