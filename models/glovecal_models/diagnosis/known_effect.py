@@ -54,17 +54,19 @@ class KnownEffect:
         """Its own columns (N, 1, C) of ``takes``, own (N, R), for each of its joints; empty for an effect
         that has no memory of the joint's own signal alone. All joints are run together: a frame costs mostly
         the call, whatever it holds."""
-        if not isinstance(self.effect, ArrayStateEffect) or not self.joints:
+        names = [name for name in self.joints if name in rotations]
+        if not isinstance(self.effect, ArrayStateEffect) or not names:
             return {}
         for known, columns in self.kept:
             if known is takes:
                 return columns
-        lanes = [rotations.index(name) for name in self.joints]
+        lanes = [rotations.index(name) for name in names]
         some = [replace(take, own=take.own[:, lanes], zero_deg=None) for take in takes]
         settings = self.effect.fit_repair_constants(some)
         settings = self.effect.settings_as_stored(some, settings, self.stored)
-        found = self.effect.columns_of_takes(some, settings, np.array(self.shapes))
-        columns = {name: [part[:, [at]] for part in found] for at, name in enumerate(self.joints)}
+        shapes = np.array([self.shapes[self.joints.index(name)] for name in names])
+        found = self.effect.columns_of_takes(some, settings, shapes)
+        columns = {name: [part[:, [at]] for part in found] for at, name in enumerate(names)}
         self.kept.append((takes, columns))
         return columns
 

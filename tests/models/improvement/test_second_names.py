@@ -5,12 +5,15 @@ Simulated gloves of six joints drawn from the whole hand; the limits were chosen
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.diagnosis.naming import is_beside_known
+from glovecal_models.diagnosis.naming import beside_known, is_beside_known
 from glovecal_models.diagnosis.text import within_known_sentence
+from glovecal_models.effects.base.assessment import Assessment, JointErrors
 from glovecal_models.effects.base.signature_effect import Finding
+from glovecal_models.effects.catalogue import effect
 from glovecal_models.improvement.improve import improve
 from glovecal_models.improvement.improvement import Improvement
 from glovecal_models.improvement.text import improvement_sentences
@@ -44,6 +47,28 @@ def test_what_a_form_leaves_is_not_named(sticky):
     refused = {item.effect: item for item in sticky.diagnosis.assessments if item.within_known}
     assert "creep" in refused
     assert "the model's effects save" in within_known_sentence(refused["creep"])
+
+
+def delay(square: float) -> Assessment:
+    """That saves 15 % of a joint's error of so many degrees squared, in 12 blocks of 5 s."""
+    base = np.full(12, 100 * square)
+    errors = JointErrors(base, 0.85 * base, 1.1 * base, 1200, np.repeat(np.arange(4), 3))
+    return Assessment("lag", ("I_PIP",), (errors,), (np.empty(0),), (np.empty(0),))
+
+
+@pytest.mark.parametrize(
+    ("known", "is_named"),
+    [
+        (("creep",), True),
+        (("hysteresis",), True),
+        (("cross_coupling",), False),
+        (("creep", "cross_coupling"), False),
+    ],
+)
+def test_a_delay_is_named_beside_what_leaves_nothing_like_it(known, is_named):
+    found = beside_known([delay(1.0)], {"I_PIP": 5.0}, [effect(name) for name in known])
+    assert bool(found[0].significant_joints) is is_named
+    assert bool(found[0].within_known) is not is_named
 
 
 def test_a_second_cause_as_strong_as_the_first_is_named():
