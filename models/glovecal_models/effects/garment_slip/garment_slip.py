@@ -194,7 +194,7 @@ def _finding(rotation: str, slip: SlipComponents, rate_deg_per_sqrt_min: float |
     )
     sentence = (
         f"{rotation}: the error {HOW[slip.kind]}, by {slip.size_deg:.1f} deg in all{rate}; {advice}. "
-        f"No recorded column goes along with it."
+        f"No recorded column explains all of it."
     )
     evidence = {"likelihood_ratio_2ln": slip.likelier, "pieces_count": float(slip.pieces)}
     if rate_deg_per_sqrt_min is not None:
