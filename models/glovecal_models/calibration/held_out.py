@@ -21,6 +21,7 @@ import numpy as np
 
 from glovecal_models.calibration.sample_weight import effective_sample_ratio
 from glovecal_models.effects.base.assessment import saved_share
+from glovecal_models.effects.base.signals import as_slice
 from glovecal_models.regression.sample_noise import sample_noise
 
 BASE_RIDGE = 1e-6
@@ -177,9 +178,9 @@ class FittedRows:
             is_fitted[take][index] = True
         place = [np.cumsum(mask) - 1 for mask in is_fitted]
         return cls(
-            tuple(_as_slice(np.flatnonzero(mask)) for mask in is_fitted),
+            tuple(as_slice(np.flatnonzero(mask)) for mask in is_fitted),
             tuple(
-                tuple((take, _as_slice(place[take][index])) for take, index in of_lane) for of_lane in units
+                tuple((take, as_slice(place[take][index])) for take, index in of_lane) for of_lane in units
             ),
         )
 
@@ -213,13 +214,6 @@ def _by_lane(columns: np.ndarray, lanes: int) -> np.ndarray:
     """(L, M, G, C) of (M, G L, C)."""
     apart = columns.reshape(len(columns), columns.shape[1] // lanes, lanes, columns.shape[2])
     return np.ascontiguousarray(apart.transpose(2, 0, 1, 3))
-
-
-def _as_slice(rows: np.ndarray) -> np.ndarray | slice:
-    """Evenly rising rows (M,) as a slice, which copies nothing."""
-    step = int(rows[1] - rows[0]) if len(rows) > 1 else 0
-    is_even = step > 0 and bool((np.diff(rows) == step).all())
-    return slice(int(rows[0]), int(rows[-1]) + 1, step) if is_even else rows
 
 
 def held_out(

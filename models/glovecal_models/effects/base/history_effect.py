@@ -12,7 +12,7 @@ import numpy as np
 
 from glovecal_models.effects.base.effect import Effect, Stream
 from glovecal_models.effects.base.facts import Settings
-from glovecal_models.effects.base.signals import GloveFrames, Signals
+from glovecal_models.effects.base.signals import GloveFrames, Signals, as_slice
 
 LONGEST_GAP_S = 1.0
 """After a longer pause the state is forgotten: the hand may have done anything meanwhile."""
@@ -172,7 +172,7 @@ class ArrayStateEffect(HistoryEffect):
             columns = self.run_takes(states[: len(going)], elapsed, own, settings, shape)
             for number, strip in enumerate(going):
                 some = slice(*np.searchsorted(strip.kept, [rows.start, rows.stop]).tolist())
-                mine, at = strip.columns[some], _as_slice(strip.kept[some] - rows.start)
+                mine, at = strip.columns[some], as_slice(strip.kept[some] - rows.start)
                 mine[:] = columns[at, number].reshape(mine.shape)
 
 
@@ -188,13 +188,6 @@ class _Strip:
     """(M,) rising: those frames."""
     columns: np.ndarray
     """(M, G, L, C)."""
-
-
-def _as_slice(rows: np.ndarray) -> np.ndarray | slice:
-    """Evenly rising rows (M,) as a slice, which copies nothing."""
-    step = int(rows[1] - rows[0]) if len(rows) > 1 else 0
-    is_even = step > 0 and bool((np.diff(rows) == step).all())
-    return slice(int(rows[0]), int(rows[-1]) + 1, step) if is_even else rows
 
 
 def elapsed_s(time_s: np.ndarray) -> np.ndarray:

@@ -85,3 +85,12 @@ class GloveFrames(Sequence[Signals]):
             return None
         context = {name: np.array([of_glove[name] for of_glove in self._context]) for name in names}
         return Signals(self.time_s, self.own, self._others(), context, wearing, zero_deg=self._zero_deg)
+
+
+def as_slice(rows: np.ndarray) -> np.ndarray | slice:
+    """Evenly rising or falling rows (N,) as a slice, which copies nothing."""
+    step = int(rows[1] - rows[0]) if len(rows) > 1 else 0
+    if step == 0 or not (np.diff(rows) == step).all():
+        return rows
+    end = int(rows[-1]) + (1 if step > 0 else -1)
+    return slice(int(rows[0]), end if end >= 0 else None, step)

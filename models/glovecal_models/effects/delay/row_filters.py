@@ -11,6 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from glovecal_models.effects.base.signals import as_slice
+
 NONE = np.empty((2, 0))
 WHOLE = 1e-9
 """Of a sample: times so near to one lie on it."""
@@ -44,16 +46,7 @@ def low_passed(
     each, count = passed.reshape(len(blocks), len(signals), len(h)), len(tau) + len(first)
     if len(first):
         each[:, :, len(tau) : count] += each[:, :, count:]
-    return [each[_as_slice(place), number, :count] for number, place in enumerate(places)]
-
-
-def _as_slice(places: np.ndarray) -> np.ndarray | slice:
-    """Evenly rising or falling places (N,) as a slice, which copies nothing."""
-    step = int(places[1] - places[0]) if len(places) > 1 else 0
-    if step == 0 or not (np.diff(places) == step).all():
-        return places
-    end = int(places[-1]) + (1 if step > 0 else -1)
-    return slice(int(places[0]), end if end >= 0 else None, step)
+    return [each[as_slice(place), number, :count] for number, place in enumerate(places)]
 
 
 def _blocks(

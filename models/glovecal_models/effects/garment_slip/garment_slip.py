@@ -47,8 +47,8 @@ NEEDED_LIKELIER = 4.0
 """Twice the log likelihood ratio from which on the wearings differ by more than their slips."""
 CAUSE_LIKELIER = 6.0
 """Twice the log likelihood ratio, summed over rotations, from which on a recorded cause is needed beside a
-slip: 95 % of chi squared with two degrees of freedom. Of 53 simulated gloves with such a cause that saves
-less than ``also_explained_share`` 36 have more; of 9 that slip 8 have less (2026-11-24)."""
+slip: 95 % of chi squared with two degrees of freedom. Of 48 simulated gloves with such a cause that saves
+less than ``also_explained_share`` 32 have more; of 9 that slip 8 have less (2026-11-24)."""
 
 
 @dataclass(frozen=True)
