@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -27,6 +28,8 @@ LEAST_START_FRAMES, LEAST_S, BLOCK_S = 20, 2.0, 1.0
 EXPECTED_STEADY_TAKES = 2.0
 """Takes without any slope that are counted beside those of training: the mean of few is held near zero."""
 LEAST = 1e-12
+MOST_KEPT = 64
+"""Takes whose slopes are remembered."""
 
 
 @dataclass(frozen=True)
@@ -129,10 +132,19 @@ class FollowedColumn:
 
 
 def mean_slopes(time_s: np.ndarray, value: np.ndarray, start: ColumnStart) -> np.ndarray:
-    """(N,) per second; a gap in the frames begins anew."""
+    """(N,) per second, not to be changed; a gap in the frames begins anew."""
+    times, values = (np.asarray(part, dtype=float).tobytes() for part in (time_s, value))
+    return _mean_slopes(times, values, start)
+
+
+@lru_cache(maxsize=MOST_KEPT)
+def _mean_slopes(times: bytes, values: bytes, start: ColumnStart) -> np.ndarray:
+    """Of a take's column as bytes: all joints of a glove, one after the other, ask for the same."""
+    time_s, value = np.frombuffer(times), np.frombuffer(values)
     elapsed = elapsed_s(time_s)
     result = np.zeros(len(time_s))
     for part in unbroken(time_s):
         if part.stop > part.start:
             result[part] = FollowedColumn(start).run(elapsed[part], value[part])
+    result.flags.writeable = False
     return result
