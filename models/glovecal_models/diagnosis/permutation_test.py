@@ -75,8 +75,8 @@ class _Given:
         joints: Sequence[_Projected],
     ) -> None:
         self._effect, self._settings, self._grid = effect, settings, grid
-        self._takes, self._joints = takes, joints
-        self._size = max(joint.base.shape[1] for joint in joints)
+        self._takes = takes
+        self._parts = [_TakePart.of(joints, take) for take in range(len(takes))]
         self._square = np.array([float(joint.target @ joint.target) for joint in joints])
         count = np.array([len(joint.target) for joint in joints])
         self._held = (self._square / count)[:, None] / effect.prior_sd(settings) ** 2 * 4.0
@@ -105,16 +105,13 @@ class _Given:
     def _products(self, number: int, take: Signals) -> _Products:
         found = [self._effect.columns(take, self._settings, shape) for shape in self._grid]
         every = np.stack(found, axis=1)
-        joints, (_, shapes, lanes, added) = self._joints, every.shape
-        columns = np.zeros((lanes, shapes, added, added))
-        base = np.zeros((lanes, shapes, self._size, added))
-        target = np.zeros((lanes, shapes, added))
-        for lane, joint in enumerate(joints):
-            rows, part = joint.rows_of(number)
-            mine = every[rows, :, lane].transpose(1, 0, 2)
-            columns[lane] = mine.swapaxes(-1, -2) @ mine
-            base[lane, :, : joint.base.shape[1]] = joint.base[part].T @ mine
-            target[lane] = joint.target[part] @ mine
+        part, (_, shapes, lanes, added) = self._parts[number], every.shape
+        # All joints at once: (J, M, G, C).
+        mine = np.where(part.is_measured[..., None, None], every[part.row, :, np.arange(lanes)[:, None]], 0.0)
+        beside = part.beside @ mine.reshape(lanes, -1, shapes * added)
+        beside = np.moveaxis(beside.reshape(lanes, -1, shapes, added), 1, 2)
+        base, target = np.ascontiguousarray(beside[:, :, :-1]), beside[:, :, -1].copy()
+        columns = mine.transpose(0, 2, 3, 1) @ mine.transpose(0, 2, 1, 3)
         return _Products(columns, base, target)
 
 
@@ -211,6 +208,30 @@ class _Projected:
         """Of a take: which of its thinned rows, and where they stand here."""
         part = np.flatnonzero(self.take == take)
         return self.row[part], part
+
+
+@dataclass(frozen=True)
+class _TakePart:
+    """One take's thinned rows of all joints side by side, filled up where a joint has fewer."""
+
+    row: np.ndarray
+    """(J, M), among the take's thinned rows."""
+    is_measured: np.ndarray
+    """(J, M), False where filled up."""
+    beside: np.ndarray
+    """(J, P + 1, M): the bases, with zeros up to the largest, and the targets; 0 where filled up."""
+
+    @classmethod
+    def of(cls, joints: Sequence[_Projected], take: int) -> _TakePart:
+        size, parts = max(joint.base.shape[1] for joint in joints), [joint.rows_of(take) for joint in joints]
+        most = max(len(row) for row, _ in parts)
+        rows, beside = np.zeros((len(joints), most), dtype=int), np.zeros((len(joints), size + 1, most))
+        is_measured = np.zeros(rows.shape, dtype=bool)
+        for lane, (joint, (row, part)) in enumerate(zip(joints, parts, strict=True)):
+            rows[lane, : len(row)], is_measured[lane, : len(row)] = row, True
+            beside[lane, : joint.base.shape[1], : len(row)] = joint.base[part].T
+            beside[lane, -1, : len(row)] = joint.target[part]
+        return cls(rows, is_measured, beside)
 
 
 def _projected(design: ForwardDesign, joint: int, rows: Sequence[np.ndarray]) -> _Projected:
