@@ -17,7 +17,9 @@ from glovecal_models.effects.garment_slip.garment_slip import (
     SlipInterval,
     slip_growth,
 )
+from glovecal_models.effects.garment_slip.slip_pieces import slip_pieces
 from glovecal_models.effects.garment_slip.slip_rate import slip_rate
+from glovecal_models.takes.take import Take
 
 SLIP = GarmentSlip()
 
@@ -162,3 +164,13 @@ def test_the_rate_of_the_growth_is_that_of_the_walk(glove):
     settings = SLIP.learned(left_out, {})
     assert "in the first minute" in SLIP.sentence(settings, ["M_PIP"])
     assert SLIP.described_on(settings, "M_PIP")["rate_deg_per_sqrt_min"] == growth.rate_deg_per_sqrt_min
+
+
+def test_a_piece_of_which_frames_were_dropped_counts_and_one_that_ends_early_does_not():
+    """Few frames are left in stretches of 3 s. 45 s are four pieces of 10 s and a rest."""
+    time_s = np.arange(0.0, 45.0, 1 / 60)
+    is_slow, number = (time_s // 3) % 3 == 1, np.arange(len(time_s))
+    time_s = time_s[~is_slow | (number % 30 == 0)]
+    take = Take("a", "w1", ("I_PIP",), time_s, np.zeros((len(time_s), 1)))
+    found = slip_pieces([take], [np.sin(time_s)], [np.cos(time_s)])
+    assert found.inside_s.tolist() == [5.0, 15.0, 25.0, 35.0]

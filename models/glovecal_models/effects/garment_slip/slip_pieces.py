@@ -16,7 +16,9 @@ FIRST_WORN_S = 30.0
 PAUSE_S = 20.0
 """Between takes, where nothing tells the time."""
 MEASURED_SHARE, COMPLETE_SHARE = 0.5, 0.9
-"""A piece counts where so much of it was measured, and it has about as many frames as the longest."""
+"""A piece counts where so many of its frames were measured, and frames came in about as many of its seconds
+as in those of the fullest. Not as many frames: where repeated ones were dropped, that would leave the few
+pieces in which none were."""
 POWER_ON = "power_on_s"
 
 
@@ -47,7 +49,10 @@ def slip_pieces(
         piece = np.floor((take.time_s - take.time_s[0]) / lasts_s).astype(int)
         known = np.isfinite(errors[number]) & np.isfinite(angles[number])
         every, count = np.bincount(piece), np.bincount(piece, known)
-        good = (count >= MEASURED_SHARE * every) & (every >= COMPLETE_SHARE * every.max()) & (count > 0)
+        begins_second = np.diff(np.floor(take.time_s - take.time_s[0]), prepend=-1.0) > 0
+        seconds = np.bincount(piece, begins_second)
+        is_complete = seconds >= COMPLETE_SHARE * seconds.max()
+        good = (count >= MEASURED_SHARE * every) & is_complete & (count > 0)
         columns = (errors[number], angles[number], *(take.context[name] for name in names))
         total = [np.bincount(piece, np.where(known, column, 0.0))[good] / count[good] for column in columns]
         middle = lasts_s * (np.flatnonzero(good) + 0.5)
