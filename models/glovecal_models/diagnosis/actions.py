@@ -12,11 +12,13 @@ from types import MappingProxyType
 
 import numpy as np
 
+from glovecal_models.diagnosis.candidates import is_memory_of_known
 from glovecal_models.diagnosis.formed_error import formed_rmse
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.residual_association import ResidualAssociation
 from glovecal_models.effects.base.assessment import HeldOutRmse
-from glovecal_models.effects.catalogue import explaining
+from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.catalogue import effect, explaining
 from glovecal_models.layout import Layout
 
 TRAIN_OTHERWISE = "lmc_gpr"
@@ -40,6 +42,9 @@ class Action:
     least_saved_square: float = 0.0
     """Degrees squared: a physical effect that saves less may only grasp what the form of the model's own
     effects leaves on the rotation."""
+    is_of_known: bool = False
+    """Whether the model's effects explain it as well by what they are: a memory of what they add, or a part
+    of what one of them does."""
 
     @property
     def rotation(self) -> str:
@@ -61,11 +66,9 @@ class Action:
     def is_within_known(self) -> bool:
         """Whether what the model's effects leave there may explain as much: no cause is claimed."""
         found = self.rmse_deg
-        return (
-            self.is_physical
-            and found is not None
-            and found.before**2 - found.after**2 < self.least_saved_square
-        )
+        if not self.is_physical or found is None:
+            return False
+        return self.is_of_known or found.before**2 - found.after**2 < self.least_saved_square
 
     @property
     def saved_share(self) -> float | None:
@@ -95,16 +98,19 @@ def actions_for(
     linear: bool,
     seed: int = 0,
     saved_by_known: Mapping[str, float] = NOTHING_SAVED,
+    wholes: Sequence[Effect] = (),
 ) -> tuple[Action, ...]:
     """One for each rotation and effect, those that save most first. ``has``: effects that are on a rotation
     already, as pairs; ``linear``: whether the base is a straight line of the measuring sensor;
-    ``saved_by_known``: degrees squared that the model's effects save on each rotation."""
+    ``saved_by_known``: degrees squared that the model's effects save on each rotation; ``wholes``: those of
+    its effects that others seem to explain a part of."""
     found: list[Action] = []
     done: set[tuple[str, str]] = set()
     for item in associations:
         action = _action(item, design, layout, has, linear, seed)
         least = design.limits.beside_known_share * saved_by_known.get(item.rotation, 0.0)
-        action = replace(action, least_saved_square=least)
+        is_of_known = _is_of_known(action, design, wholes)
+        action = replace(action, least_saved_square=least, is_of_known=is_of_known)
         key = (item.rotation, action.effect or action.method or item.column)
         if key not in done:
             done.add(key)
@@ -124,18 +130,27 @@ def _action(
     if linear and sensor is not None and sensor in layout.correspondence(item.rotation).sensors:
         return Action(item, None, method=TRAIN_OTHERWISE)
     best = Action(item, None)
-    for effect in explaining(item.column, sensor):
-        if (effect.name, item.rotation) in has:
+    for each in explaining(item.column, sensor):
+        if (each.name, item.rotation) in has:
             continue
-        rmse = formed_rmse(design, effect, design.rotations.index(item.rotation), seed)
+        rmse = formed_rmse(design, each, design.rotations.index(item.rotation), seed)
         if rmse is None:
             continue
-        method = effect.learned_by if linear else None
-        tried = Action(item, effect.name, effect.is_physical, method, rmse)
+        method = each.learned_by if linear else None
+        tried = Action(item, each.name, each.is_physical, method, rmse)
         # A column that only has a name comes last: it is taken where no physical effect saves anything.
-        if tried.saves and (not best.saves or (effect.is_physical and _saved(tried) > _saved(best))):
+        if tried.saves and (not best.saves or (each.is_physical and _saved(tried) > _saved(best))):
             best = tried
     return best
+
+
+def _is_of_known(action: Action, design: ForwardDesign, wholes: Sequence[Effect]) -> bool:
+    if action.effect is None or not action.saves:
+        return False
+    share = action.saved_share or 0.0
+    if any(action.effect in each.also_explained_by and share < each.also_explained_share for each in wholes):
+        return True
+    return is_memory_of_known(design, effect(action.effect), design.rotations.index(action.rotation))
 
 
 def _saved(action: Action) -> float:

@@ -82,13 +82,40 @@ def _assessed(
         design.limits,
     )
     if not effect.changes_between_takes:
-        return found
+        of_known = (i for i in found.significant_joints if is_memory_of_known(design, effect, i))
+        return replace(found, of_known=tuple(of_known))
     few = undecidable(design.signals, effect, design.limits)
     if few is not None:
         return NotIdentifiable(effect.name, few.why, few.record, found)
     some = any(item.contrast >= design.limits.least_session_share for item in errors)
     found = replace(found, p_value=session_p_value(design, effect, generator) if some else 1.0)
     return _in_any_form(design, effect, found, generator)
+
+
+def is_memory_of_known(design: ForwardDesign, effect: Effect, joint: int) -> bool:
+    """Whether a memory follows what the known effects add at a joint, neither the joint's own motion nor both
+    together, which is what the sensor feels: with that as its input it leaves the least held-out error.
+
+    What a known effect adds may lag or stick by itself, as where cloth pulls behind a slack; the joint moves
+    along, so that a memory of its own motion seems to be there.
+    """
+    if not isinstance(effect, ArrayStateEffect) or not design.known_deg or not design.known_deg[joint]:
+        return False
+    takes = design.of_joint(joint)
+    pairs = list(zip(takes, design.known_deg[joint], strict=True))
+    added = [replace(take, own=values[:, None]) for take, values in pairs]
+    both = [replace(take, own=take.own + values[:, None]) for take, values in pairs]
+    by_known, *others = (_left_by(design, effect, joint, each) for each in (added, takes, both))
+    return by_known <= min(others)
+
+
+def _left_by(design: ForwardDesign, effect: Effect, joint: int, takes: Sequence[Signals]) -> float:
+    """Held-out error with the effect's own columns, degrees squared; ``takes`` have one lane."""
+    settings = effect.fit_constants(takes)
+    shapes = effect.grid(takes, settings)[:, 0]
+    tiled = [replace(take, own=np.repeat(take.own, len(shapes), axis=1)) for take in takes]
+    columns = design.rows(joint, effect.columns_of_takes(tiled, settings, shapes))
+    return float(held_out(design.products[joint], columns, effect.prior_sd(settings)).added.sum())
 
 
 def _in_any_form(

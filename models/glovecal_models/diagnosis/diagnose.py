@@ -137,8 +137,9 @@ def diagnose(
         )  # fmt: skip
         there = {(item.effect.name, joint) for item in after.known for joint in item.joints}
         actions = actions_for(
-            residual.associations, rest, layout, there, linear=linear, seed=seed, saved_by_known=saved
-        )
+            residual.associations, rest, layout, there, linear=linear, seed=seed, saved_by_known=saved,
+            wholes=wholes,
+        )  # fmt: skip
     progress("done", 1.0)
     return Diagnosis(
         joints=problem.joints,

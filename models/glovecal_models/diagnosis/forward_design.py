@@ -14,7 +14,7 @@ import numpy as np
 
 from glovecal_models.calibration.held_out import BaseProducts
 from glovecal_models.diagnosis.forward_basis import ForwardBasis
-from glovecal_models.diagnosis.known_effect import KnownEffect, one_lane
+from glovecal_models.diagnosis.known_effect import KnownColumns, KnownEffect, one_lane
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Settings
@@ -36,6 +36,8 @@ class ForwardDesign:
     """For each joint and unit: indices of its take's rows that are fitted."""
     products: tuple[BaseProducts, ...]
     """For each joint."""
+    known_deg: tuple[tuple[np.ndarray, ...], ...] = ()
+    """For each joint and take (N,): what the known effects without a memory add; no take where none does."""
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS
 
     kept: dict[str, Any] = field(default_factory=dict, compare=False)
@@ -82,14 +84,17 @@ def forward(
 
     Where deviations of the reference are stated, rows count by them.
     """
-    products, together = [], [each.side_by_side(basis.signals, rotations) for each in known]
+    products, known_deg = [], []
+    together = [each.side_by_side(basis.signals, rotations) for each in known]
     for column, (rotation, joint) in enumerate(zip(rotations, basis.joints, strict=True)):
         without = [_without(take, joint.beside) for take in basis.signals] if known else []
         found = [
             each.columns(without, column, rotation, columns)
             for each, columns in zip(known, together, strict=True)
         ]
-        products.append(joint.products(basis.unit_take, [item for item in found if item is not None]))
+        there = [(each, item) for each, item in zip(known, found, strict=True) if item is not None]
+        products.append(joint.products(basis.unit_take, [item for _, item in there]))
+        known_deg.append(_without_memory(there, products[-1]))
     return ForwardDesign(
         tuple(rotations),
         basis.signals,
@@ -97,8 +102,23 @@ def forward(
         basis.unit_take,
         tuple(joint.used for joint in basis.joints),
         tuple(products),
+        tuple(known_deg),
         limits,
     )
+
+
+def _without_memory(
+    known: Sequence[tuple[KnownEffect, KnownColumns]], products: BaseProducts
+) -> tuple[np.ndarray, ...]:
+    """For each take (N,) degrees: what those of ``known`` that have no memory add to one joint."""
+    parts: list[list[np.ndarray]] = []
+    first = products.own
+    for each, columns in known:
+        stop = first + len(columns.prior_sd)
+        if not each.effect.has_memory:
+            parts.append([part @ products.whole[first:stop] for part in columns.parts])
+        first = stop
+    return tuple(np.sum(of_take, axis=0) for of_take in zip(*parts, strict=True))
 
 
 def _without(take: Signals, known: frozenset[str]) -> Signals:

@@ -110,6 +110,11 @@ def nothing_named_sentence(diagnosis: Diagnosis) -> str:
 def within_known_sentence(item: Assessment) -> str:
     """Of an effect that is not named because the effects of the model may have left as much."""
     where = ", ".join(item.joints[i] for i in item.within_known)
+    if set(item.within_known) <= set(item.of_known):
+        return (
+            f"{item.effect} on {where} is not named: a memory of what the model's effects add there leaves no"
+            " more error than one of the joint's own motion."
+        )
     return (
         f"{item.effect} on {where} is not named: it would save less than"
         f" {100 * item.limits.beside_known_share:.0f} % of the squared error that the model's effects save"

@@ -91,6 +91,8 @@ class Assessment:
     """Squared degrees per row that the effects of the model save on each joint; empty where it has none."""
     within_camera: tuple[int, ...] = ()
     """Joints on which what it saves may as well be an error of the camera that measured the angles."""
+    of_known: tuple[int, ...] = ()
+    """Joints on which the memory is of what the model's effects add there, not of the joint's own motion."""
     part_of: str = ""
     """An effect of the model that it seems to explain a part of; empty: none."""
     steps: ColumnSteps | None = None
@@ -115,6 +117,8 @@ class Assessment:
         return () if self.part_of else tuple(i for i in self._beyond_control if self._is_within_known(i))
 
     def _is_within_known(self, joint: int) -> bool:
+        if joint in self.of_known:
+            return True
         if not self.known_saved_square:
             return False
         item = self.errors[joint]
