@@ -116,6 +116,20 @@ class AddedEffect:
         each, first = list(numbers.items()), len(self.effect.parameters)
         return {**dict(each[:first]), **self.curves[rotation].described(), **dict(each[first:])}
 
+    def columns_of_takes(self, takes: Sequence[Signals]) -> list[np.ndarray]:
+        """(N, L, C) of each take whose lanes are this effect's: what the weights are multiplied with."""
+        found = self.effect.columns_of_takes(takes, self.settings, self.shape)
+        if self.form is None:
+            return found
+        inputs = [
+            form_values(self.effect, take, part, self.settings)
+            for take, part in zip(takes, found, strict=True)
+        ]
+        return [
+            np.concatenate([part, self.form.columns(values)], axis=2)
+            for part, values in zip(found, inputs, strict=True)
+        ]
+
     def corrections(self, takes: Sequence[Signals]) -> list[np.ndarray]:
         """(N, L), degrees, of each take whose lanes are this effect's."""
         found = self.effect.columns_of_takes(takes, self.settings, self.shape)

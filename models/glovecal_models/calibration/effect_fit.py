@@ -4,7 +4,7 @@ With the effects' part taken from the reference the regressors are trained as ev
 prediction as each joint's own signal the effects' shapes and weights are fitted, beside a static map of the
 same inputs, so that what the regressor can explain is not claimed by an effect. Two turns suffice for most:
 on three simulated gloves (hysteresis, creep, donning) a third changed the error by less than 1 %. Slow creep
-moves the regressors themselves, and needs more; so may a form, once it is learned.
+moves the regressors themselves, and needs more. Then forms are learned, and weights until both have settled.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from glovecal_models.calibration.fit_memory import KNOWN_FITS
 from glovecal_models.calibration.fit_task import FitResult
 from glovecal_models.calibration.fitted_effects import fitted_effects
 from glovecal_models.calibration.model import CalibrationModel, restore_regressor
+from glovecal_models.calibration.new_weights import with_new_weights
 from glovecal_models.calibration.own_signal import OwnSignal
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.samples import Samples, joined_variances, sampled_rows
@@ -32,12 +33,15 @@ from glovecal_models.progress import Cancel, stop_if
 from glovecal_models.regression.lmc_search import LmcOptimum
 from glovecal_models.regression.regressor import Regressor
 
-MOST_TURNS = 5
-MOST_LAST_TURNS = 3
-"""With forms. A form may move the regressors as well: a structure that is lost while bent, on top of which
-weights of the turn before doubled the error."""
+MOST_TURNS = 4
+MOST_WEIGHT_TURNS = 5
+"""Once forms are learned, with shapes and forms as they are. A form may move the regressors as well: a
+structure that is lost while bent, on top of which weights of the turn before doubled the error."""
 SETTLED_SHARE = 0.1
-"""Of the effects' part, by which it may still change when the regressors have been trained anew."""
+"""Of the effects' part, by which it may still change when forms are learned."""
+NOISE_SHARE = 0.15
+"""Of a rotation's error, by which the effects' part may change in the end: what is left of a change stands in
+every prediction, and ten percent of a large effect were 0.6 degrees beside a noise of 0.7."""
 
 
 Optima = tuple[Mapping[str, LmcOptimum], ...]
@@ -97,29 +101,34 @@ def fit_with_effects(
             if any(name in each.rotations for each in wanted)
         }
 
+    is_linear = settings.method in LINEAR_METHODS
+
     def fit_effects(own: Mapping[str, OwnSignal], *, is_last: bool) -> None:
         nonlocal effects, corrected
         effects = fitted_effects(
-            takes, columns, own, wanted, is_linear=settings.method in LINEAR_METHODS, is_last=is_last,
-            cancelled=cancelled,
-        )  # fmt: skip
+            takes, columns, own, wanted, is_linear=is_linear, is_last=is_last, cancelled=cancelled
+        )
         corrected = _explained(takes, own, effects)
 
     trained()
     if wanted:
         own = own_signals()
-        for _ in range(MOST_TURNS - 1):
+        for _ in range(MOST_TURNS):
             fit_effects(own, is_last=False)
             trained()
             own = own_signals()
             if _has_settled(corrected, _explained(takes, own, effects)):
                 break
-        for _ in range(MOST_LAST_TURNS):
-            fit_effects(own, is_last=True)
+        fit_effects(own, is_last=True)
+        trained()
+        own = own_signals()
+        for _ in range(MOST_WEIGHT_TURNS):
+            if _is_within_noise(takes, own, corrected, _explained(takes, own, effects)):
+                break
+            effects = with_new_weights(effects, takes, columns, own, is_linear=is_linear)
+            corrected = _explained(takes, own, effects)
             trained()
             own = own_signals()
-            if _has_settled(corrected, _explained(takes, own, effects)):
-                break
     return EffectFit(results, effects, tuple(found))
 
 
@@ -127,6 +136,23 @@ def _has_settled(before: Mapping[str, list[np.ndarray]], after: Mapping[str, lis
     """Whether the effects' part, read from the regressors now, is what these were trained for."""
     then, now = (np.concatenate([part for name in after for part in each[name]]) for each in (before, after))
     return float(np.linalg.norm(now - then)) <= SETTLED_SHARE * float(np.linalg.norm(then))
+
+
+def _is_within_noise(
+    takes: PreparedTakes,
+    own: Mapping[str, OwnSignal],
+    before: Mapping[str, list[np.ndarray]],
+    after: Mapping[str, list[np.ndarray]],
+) -> bool:
+    """Whether the effects' part has settled within what each rotation's fit leaves of the reference."""
+    for name, parts in after.items():
+        now = np.concatenate(parts)
+        left = takes.target(name), own[name].takes
+        error = np.concatenate([target - mean for target, mean in zip(*left, strict=True)]) - now
+        rms = float(np.sqrt(np.nanmean(error**2)))
+        if float(np.sqrt(np.mean((now - np.concatenate(before[name])) ** 2))) > NOISE_SHARE * rms:
+            return False
+    return True
 
 
 def found_optima(settings: Mapping[str, Mapping[str, Any]]) -> dict[str, LmcOptimum]:

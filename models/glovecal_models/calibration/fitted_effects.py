@@ -5,7 +5,6 @@ Shapes and forms are found one effect after another, then all weights of a joint
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -16,13 +15,10 @@ from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.effect_shape import REFINEMENTS, EffectGroup, best_shape
 from glovecal_models.calibration.form_choice import FormRows, chosen_columns, chosen_form
 from glovecal_models.calibration.held_out import (
-    BaseFeatures,
     BaseProducts,
     Rows,
-    WeightPosterior,
-    weight_posterior,
-    with_precision,
 )
+from glovecal_models.calibration.joint_rows import base_rows, joint_weights, signals_of_lanes
 from glovecal_models.calibration.own_signal import OwnSignal
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.effects.base.column_steps import IN_STEPS, learned_steps
@@ -51,11 +47,11 @@ def fitted_effects(
     touched = list(own)
     groups = [group for item in wanted for group in _groups(takes, item, columns, own)]
     rows = {name: takes.rows(name) for name in touched}
-    bases = {name: _base(takes, columns[name], rows[name], is_linear) for name in touched}
+    bases = {name: base_rows(takes, columns[name], rows[name], is_linear) for name in touched}
     extra: dict[str, list[list[np.ndarray]]] = {name: [] for name in touched}
     priors: dict[str, list[np.ndarray]] = {name: [] for name in touched}
     shapes: list[np.ndarray] = []
-    inputs: dict[int, dict[str, dict[str, np.ndarray]]] = {}
+    inputs: dict[int, list[dict[str, np.ndarray]]] = {}
     for place, group in enumerate(groups):
         stop_if(cancelled, "adding an effect")
         # The first turn's shapes only tell the base what to leave out: the grid is fine enough for that.
@@ -78,26 +74,23 @@ def fitted_effects(
             form = _learned_form(group, values, rows, bases, extra, priors)
             if form is not None:
                 groups[place] = replace(group, settings=group.settings | {FORM: form.to_document()})
-                inputs[place] = _form_inputs(group, form, values, rows)
-    weights = {name: _weights(bases[name], extra[name], priors[name]) for name in touched}
+                inputs[place] = values
+    weights = {name: joint_weights(bases[name], extra[name], priors[name]) for name in touched}
     used = dict.fromkeys(touched, 0)
     added = []
     for place, (group, shape) in enumerate(zip(groups, shapes, strict=True)):
-        mine, curves = [], {}
+        mine, degrees = [], {}
         for name in group.lanes:
             mine.append(weights[name][used[name]])
-            if place in inputs and any(map(len, rows[name])):
-                degrees = np.concatenate(extra[name][used[name]]) @ mine[-1].mean
-                drawn = LaneCurves.over(inputs[place][name], group.wanted.effect.form_unit, degrees)
-                curves[name] = drawn.to_document()
+            degrees[name] = [part @ mine[-1].mean for part in extra[name][used[name]]]
             used[name] += 1
+        settled = group.settings
+        if place in inputs:
+            settled = with_curves(settled, group.wanted.effect.form_unit, inputs[place], rows, degrees)
         zero = np.array([own[name].zero_deg for name in group.lanes])
         mean = np.array([each.mean for each in mine])
         is_told = group.wanted.effect.tells_own_uncertainty
         covariance = None if is_told else np.array([each.covariance for each in mine])
-        settled = group.settings
-        if curves:
-            settled = settled | {FORM: settled[FORM] | {CURVES: curves}}
         added.append(
             AddedEffect(group.wanted.name, group.lanes, settled, shape, mean, zero, covariance=covariance)
         )
@@ -205,23 +198,29 @@ def _learned_form(
     return form
 
 
-def _form_inputs(
-    group: EffectGroup,
-    form: LearnedForm,
+def with_curves(
+    settings: Settings,
+    unit: str,
     values: Sequence[Mapping[str, np.ndarray]],
     rows: Mapping[str, Sequence[np.ndarray]],
-) -> dict[str, dict[str, np.ndarray]]:
-    """For each lane the fitted rows (N,) of each input that the form uses."""
+    degrees: Mapping[str, Sequence[np.ndarray]],
+) -> Settings:
+    """``settings`` with a learned form and, for each lane of ``degrees``, its picture: what the effect adds
+    at the fitted rows over each input that the form uses. ``values``: for each take the inputs (N, L)."""
+    form = LearnedForm.from_document(settings[FORM])
     used = dict.fromkeys(key for term in form.terms for key in term.inputs)
-    return {
-        name: {
+    curves = {}
+    for lane, (name, parts) in enumerate(degrees.items()):
+        if not any(map(len, parts)):
+            continue
+        inputs = {
             key: np.concatenate(
                 [take[key][index, lane] for take, index in zip(values, rows[name], strict=True)]
             )
             for key in used
         }
-        for lane, name in enumerate(group.lanes)
-    }
+        curves[name] = LaneCurves.over(inputs, unit, np.concatenate(parts)).to_document()
+    return settings | {FORM: settings[FORM] | {CURVES: curves}} if curves else settings
 
 
 def _groups(
@@ -234,37 +233,8 @@ def _groups(
     sets = [(name,) for name in names] if item.effect.one_joint_at_a_time else [tuple(names)]
     groups = []
     for lanes in sets:
-        values = [np.column_stack(parts) for parts in zip(*(own[name].takes for name in lanes), strict=True)]
-        without = frozenset(columns[lanes[0]].sensors) if item.effect.one_joint_at_a_time else frozenset()
-        signals = takes.signals(values, np.array([own[name].zero_deg for name in lanes]), without)
+        signals = signals_of_lanes(takes, item.effect, lanes, columns, own)
         settings = item.effect.fit_repair_constants(signals)
         settings = item.effect.settings_with_found(settings, item.settings)
         groups.append(EffectGroup(item, lanes, signals, settings))
     return groups
-
-
-def _base(
-    takes: PreparedTakes, correspondence: Correspondence, rows: Sequence[np.ndarray], linear: bool
-) -> list[Rows]:
-    inputs = takes.inputs(correspondence)
-    features = BaseFeatures.fit_constants(inputs, linear=linear)
-    units = [
-        Rows(features.columns(part[index]), target[index])
-        for part, target, index in zip(inputs, takes.target(correspondence.rotation), rows, strict=True)
-    ]
-    stated = [take.reference_sd_at_frames([correspondence.rotation]) for take in takes.takes]
-    variance = [
-        None if part is None or not np.isfinite(part[index, 0]).all() else part[index, 0] ** 2
-        for part, index in zip(stated, rows, strict=True)
-    ]
-    return with_precision(units, variance)
-
-
-def _weights(
-    base: list[Rows], extra: list[list[np.ndarray]], priors: list[np.ndarray]
-) -> list[WeightPosterior]:
-    """For each effect of one joint, all fitted together."""
-    together = [np.column_stack(parts) for parts in zip(*extra, strict=True)]
-    whole = weight_posterior(base, together, np.concatenate(priors))
-    ends = np.cumsum([0, *(len(part) for part in priors)])
-    return [whole.part(slice(start, end)) for start, end in itertools.pairwise(ends)]

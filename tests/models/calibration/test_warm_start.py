@@ -41,7 +41,7 @@ def test_turns_end_when_one_more_changes_little(
 ) -> None:
     wanted = [EffectRequest("creep", SENSORS, {})]
     usual = fit_with_effects(takes, SENSORS, wanted, SETTINGS)
-    assert len(usual.optima) <= effect_fit.MOST_TURNS + 1
+    assert len(usual.optima) <= effect_fit.MOST_TURNS + 2 + effect_fit.MOST_WEIGHT_TURNS
     monkeypatch.setattr(effect_fit, "SETTLED_SHARE", 0.0)
     monkeypatch.setattr(effect_fit, "MOST_TURNS", len(usual.optima) + 1)
     longer = fit_with_effects(takes, SENSORS, wanted, SETTINGS)
