@@ -8,8 +8,8 @@ import pytest
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.ceiling.black_box import left_by_box
 from glovecal_models.ceiling.black_box_ceiling import black_box_ceiling
-from glovecal_models.ceiling.boosted_trees import left_by_box
 from glovecal_models.ceiling.ceiling import Gain, sign_flip_p_value, verdict_of
 from glovecal_models.ceiling.limits import CEILING_LIMITS
 from glovecal_models.ceiling.text import ceiling_sentence, not_left_to_gain
@@ -73,6 +73,22 @@ def test_a_column_of_which_nothing_is_known_changes_nothing() -> None:
     unknown = np.column_stack([columns, np.full(800, np.nan)])
     assert left_by_box(unknown, target, take, 1).square.sum() == pytest.approx(
         left_by_box(columns, target, take, 1).square.sum(), rel=0.1
+    )
+
+
+def test_products_find_a_memory_that_depends_on_the_bend_and_nothing_in_noise() -> None:
+    random = np.random.default_rng(5)
+    take = np.repeat(np.arange(8), 200)
+    reading, average = random.standard_normal((2, len(take)))
+    noise = random.standard_normal(len(take))
+    columns = np.column_stack([reading, average, random.standard_normal((len(take), 12))])
+    products = [(0, 0), (0, 1), (0, 0, 1)]
+    memory = average * (1 + reading) + noise
+    by_trees = left_by_box(columns, memory, take, 1).square.sum()
+    with_products = left_by_box(columns, memory, take, 1, products=products).square.sum()
+    assert with_products < 1.1 * (noise @ noise) < 0.95 * by_trees
+    assert left_by_box(columns, noise, take, 1, products=products).square.sum() == pytest.approx(
+        noise @ noise, rel=0.01
     )
 
 

@@ -29,7 +29,7 @@ form in another hand, and 18 are near relatives; they were asked once before, on
 other was told the laws of all forms there are and had to find other ones that one may really meet; these \
 were asked once. The parts below tell both apart. The clean twin is the same glove without the cause: a \
 sensor that lost the angle cannot be brought back to it. So the ceiling is asked of each repaired glove \
-that stays above 1.1 times its twin: "none" means that boosted trees on all that was recorded find nothing \
+that stays above 1.1 times its twin: "none" means that a black box on all that was recorded finds nothing \
 more.
 """
 FOLDER = "pictures"

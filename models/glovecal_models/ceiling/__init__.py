@@ -1,1 +1,1 @@
-"""Whether anything is left to gain from what was recorded: boosted trees on a model's held-out errors."""
+"""Whether anything is left to gain from what was recorded: a black box on a model's held-out errors."""

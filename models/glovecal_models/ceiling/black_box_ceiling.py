@@ -23,20 +23,17 @@ from glovecal_models.calibration.model_recipe import (
 )
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.ceiling.boosted_trees import left_by_box
+from glovecal_models.ceiling.black_box import left_by_box
 from glovecal_models.ceiling.ceiling import Ceiling, Gain, is_gain, verdict_of
 from glovecal_models.ceiling.held_out_take_errors import held_out_take_errors
 from glovecal_models.ceiling.limits import CEILING_LIMITS, CeilingLimits
 from glovecal_models.ceiling.recorded_columns import (
     GROUPS,
-    MOST_ROWS,
-    ROW_EVERY,
     TakeColumns,
     exchange_order,
-    exchanged,
     recorded_columns,
-    smoothed_error,
 )
+from glovecal_models.ceiling.rotation_rows import RotationRows, joined, products_of
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.progress import Cancel, Report, part, stop_if
 from glovecal_models.takes.take import Take
@@ -107,57 +104,12 @@ def _of_errors(
             scale = np.concatenate(prepared.readings).std(axis=0)
             scale = np.where(scale > 0, scale, 1.0)
             columns[own] = recorded_columns(prepared.takes, prepared.readings, own, scale)
-        rows = _Rows.of(columns[own], prepared, [error[:, number] for error in errors], order, own)
+        rows = RotationRows.of(columns[own], prepared, [error[:, number] for error in errors], order, own)
         if rows is not None:
             boxes[name] = _boxes(rows, seed)
     if not boxes:
         return _undecided(f"no rotation was measured in {limits.fewest_takes} takes", len(errors), limits)
     return _summed_up(boxes, prepared, seed, limits)
-
-
-@dataclass(frozen=True)
-class _Rows:
-    """Of one rotation, all takes after one another; only rows where it was measured."""
-
-    groups: dict[str, np.ndarray]
-    others: dict[str, np.ndarray]
-    """The same columns with the rows of other takes."""
-    symmetric: np.ndarray
-    target: np.ndarray
-    take: np.ndarray
-    mean_square: float
-    """Of the error at the frames, not smoothed."""
-    own: tuple[int, ...]
-
-    @classmethod
-    def of(
-        cls, columns: Sequence[TakeColumns], prepared: PreparedTakes, errors: Sequence[np.ndarray],
-        order: Sequence[int], own: tuple[int, ...],
-    ) -> _Rows | None:  # fmt: skip
-        smooth = [
-            smoothed_error(item.time_s, take, error)
-            for item, take, error in zip(columns, prepared.takes, errors, strict=True)
-        ]
-        measured = sum(int(np.isfinite(values).sum()) for values in smooth)
-        step = max(ROW_EVERY, -(-measured // MOST_ROWS))
-        index = [np.flatnonzero(np.isfinite(values))[::step] for values in smooth]
-        if min(len(rows) for rows in index) == 0:
-            return None
-        swapped = {name: exchanged([item.groups[name] for item in columns], order) for name in GROUPS}
-
-        def stacked(parts: Sequence[np.ndarray]) -> np.ndarray:
-            return np.concatenate([values[rows] for values, rows in zip(parts, index, strict=True)])
-
-        every = np.concatenate(errors)
-        return cls(
-            {name: stacked([item.groups[name] for item in columns]) for name in GROUPS},
-            {name: stacked(swapped[name]) for name in GROUPS},
-            stacked([item.symmetric_history for item in columns]),
-            stacked(smooth),
-            np.concatenate([np.full(len(rows), number) for number, rows in enumerate(index)]),
-            float(np.nanmean(every**2)),
-            own,
-        )
 
 
 @dataclass(frozen=True)
@@ -173,7 +125,7 @@ class _Boxes:
     """Of the mean square, that changes from take to take."""
 
 
-def _boxes(rows: _Rows, seed: int) -> _Boxes:
+def _boxes(rows: RotationRows, seed: int) -> _Boxes:
     count, total = int(rows.take.max()) + 1, len(rows.target)
     alone = np.bincount(rows.take, rows.target**2, count)
     places, at = {}, 0
@@ -181,15 +133,20 @@ def _boxes(rows: _Rows, seed: int) -> _Boxes:
         width = rows.groups[name].shape[1]
         places[name] = (slice(at, at + width), rows.others[name])
         at += width
-    box = left_by_box(_joined(rows.groups), rows.target, rows.take, seed, places)
+    powers, products = products_of(rows)
+    box = left_by_box(joined(rows.groups), rows.target, rows.take, seed, places, products)
     saved = alone - box.square
     if saved.sum() > WORTH_CONTROLS * rows.mean_square * total:
         without = {name: values for name, values in rows.groups.items() if name != "history"}
-        flexible = left_by_box(_joined(rows.others), rows.target, rows.take, seed).square
-        now = left_by_box(_joined(without), rows.target, rows.take, seed).square
-        averaged = left_by_box(
-            _joined(without | {"history": rows.symmetric}), rows.target, rows.take, seed
-        ).square
+        directionless = joined(rows.groups | {"history": rows.symmetric})
+        flexible, now, averaged = (
+            left_by_box(columns, rows.target, rows.take, seed, products=of).square
+            for columns, of in (
+                (joined(rows.others), products),
+                (joined(without), powers),
+                (directionless, powers),
+            )
+        )
         for less, more in ((alone, flexible), (now, averaged)):
             if less.sum() > more.sum():
                 saved = saved - (less - more)
@@ -198,7 +155,7 @@ def _boxes(rows: _Rows, seed: int) -> _Boxes:
     return _Boxes(saved * count / total, rows.mean_square, rise, share)
 
 
-def _by_take(rows: _Rows) -> float:
+def _by_take(rows: RotationRows) -> float:
     """Mean square that a line in the readings of its own explains of each take, beyond one line for all.
 
     A column that stands still in a take can explain no more than this, and there are as many values of it as
@@ -212,10 +169,6 @@ def _by_take(rows: _Rows) -> float:
         fitted = x[of] @ np.linalg.lstsq(x[of], left[of], rcond=None)[0]
         explained += float(fitted @ fitted)
     return explained / len(left)
-
-
-def _joined(groups: dict[str, np.ndarray]) -> np.ndarray:
-    return np.column_stack(list(groups.values()))
 
 
 def _summed_up(

@@ -12,7 +12,7 @@ from scipy.special import stdtrit
 from glovecal_models.ceiling.limits import CEILING_LIMITS, CeilingLimits
 
 Verdict = Literal["gain", "none", "undecided"]
-RECIPE = 1
+RECIPE = 2
 """Rises when the same model and takes get another answer: results kept of an earlier one are not used."""
 EXACT_FLIPS = 14
 RANDOM_FLIPS = 20000

@@ -24,7 +24,7 @@ MOST_ROWS = 6000
 KERNEL_S = 0.1
 """Standard deviation."""
 LAGS_S = (0.1, 0.2, 0.4, 0.8, 1.4, 2.0)
-AVERAGES_S = (1.0, 3.0, 10.0, 30.0, 60.0)
+AVERAGES_S = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 60.0)
 EXTREMES_S = (2.0, 10.0, 60.0)
 OTHERS_LAGS_S = (0.2, 0.8)
 OTHERS_AVERAGES_S = (5.0,)
@@ -72,6 +72,18 @@ def recorded_columns(
             "wearing and time": np.column_stack(session),
         }
         found.append(TakeColumns(time, groups, (past + mirrored) / 2))
+    return found
+
+
+def own_averages(own: Sequence[int], sensors: int) -> dict[int, list[int]]:
+    """For each own sensor the places of its running averages in the history."""
+    found, at = {}, 0
+    for sensor in range(sensors):
+        if sensor in own:
+            found[sensor] = list(range(at + len(LAGS_S), at + len(LAGS_S) + len(AVERAGES_S)))
+            at += len(LAGS_S) + len(AVERAGES_S) + 2 * len(EXTREMES_S)
+        else:
+            at += len(OTHERS_LAGS_S) + len(OTHERS_AVERAGES_S)
     return found
 
 

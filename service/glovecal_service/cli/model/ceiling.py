@@ -43,7 +43,7 @@ def ceiling(
 ) -> None:
     """Find whether a model leaves anything to gain, or the recorded sensors do not know more.
 
-    The model is trained again without each quarter of the takes, and boosted trees predict its error from all
+    The model is trained again without each quarter of the takes, and a black box predicts its error from all
     readings and their history, context, wearing and time. compare, where and diagnose show the answer then.
     """
     with connect() as service:
