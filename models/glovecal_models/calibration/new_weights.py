@@ -31,8 +31,8 @@ def with_new_weights(
     signals = [signals_of_lanes(takes, each.effect, each.rotations, columns, own) for each in effects]
     extra: dict[str, list[list[np.ndarray]]] = {name: [] for name in own}
     priors: dict[str, list[np.ndarray]] = {name: [] for name in own}
-    for added, of_takes in zip(effects, signals, strict=True):
-        found = added.columns_of_takes(of_takes)
+    every = [added.columns_of_takes(part) for added, part in zip(effects, signals, strict=True)]
+    for added, found in zip(effects, every, strict=True):
         prior = added.effect.prior_sd(added.settings)
         prior = np.concatenate([prior, np.ones(added.weights.shape[1] - len(prior))])
         for lane, name in enumerate(added.rotations):
@@ -41,14 +41,14 @@ def with_new_weights(
     bases = {name: base_rows(takes, columns[name], rows[name], is_linear) for name in own}
     weights = {name: iter(joint_weights(bases[name], extra[name], priors[name])) for name in own}
     result = []
-    for added, of_takes in zip(effects, signals, strict=True):
+    for added, of_takes, found in zip(effects, signals, every, strict=True):
         mine = {name: next(weights[name]) for name in added.rotations}
         degrees = {name: [part @ item.mean for part in extra[name].pop(0)] for name, item in mine.items()}
         settings = added.settings
         if added.form is not None:
             values = [
-                form_values(added.effect, take, added.effect.columns(take, settings, added.shape), settings)
-                for take in of_takes
+                form_values(added.effect, take, part[:, :, : added.own_count], settings)
+                for take, part in zip(of_takes, found, strict=True)
             ]
             settings = with_curves(settings, added.effect.form_unit, values, rows, degrees)
         result.append(
