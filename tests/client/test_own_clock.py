@@ -1,6 +1,7 @@
 """Own clocks of two gloves: drift and offset from their stamps, aligned within 5 ms for an hour."""
 
 import random
+import time
 from pathlib import Path
 
 import numpy as np
@@ -109,8 +110,6 @@ def test_answers_of_whole_frames_bound_the_clock_far_below_one(tmp_path: Path) -
     with Emulation(glove, port, faults):
         link = SerialLink(port.name, 115200)
         reading = read_clock(link, 30.0)
-        import time
-
         true_s = nearest_s(glove.clock_s(time.monotonic()) - wall_of_day_s())
         assert reading.is_consistent
         assert reading.half_width_s < FRAME_S / 4
@@ -118,4 +117,32 @@ def test_answers_of_whole_frames_bound_the_clock_far_below_one(tmp_path: Path) -
         after, times = set_clock(link, 30.0)
         assert abs(after.ahead_s) <= FRAME_S
         assert 1 <= times <= 3
+        link.close()
+
+
+class DropsQuestions(SerialLink):
+    """Every other question about the time is lost on its way."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name, 115200)
+        self.asked = 0
+
+    def write(self, data: bytes) -> None:
+        self.asked += data == b"1tg"
+        if data != b"1tg" or self.asked % 2 == 0:
+            super().write(data)
+
+
+def test_a_question_that_is_lost_is_asked_again(tmp_path: Path) -> None:
+    faults = Faults()
+    faults.offset_s = 0.1234
+    glove = EmulatedCyberGlove3(StillHand(), faults)  # type: ignore[arg-type]
+    port = PseudoTerminal(tmp_path / "emulated-cyberglove3")
+    with Emulation(glove, port, faults):
+        link = DropsQuestions(port.name)
+        reading = read_clock(link, 30.0, wanted_s=FRAME_S)
+        true_s = nearest_s(glove.clock_s(time.monotonic()) - wall_of_day_s())
+        assert reading.is_consistent
+        assert link.asked == 2 * reading.polls
+        assert abs(reading.ahead_s - true_s) <= reading.half_width_s + 0.002
         link.close()

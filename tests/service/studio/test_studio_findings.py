@@ -90,7 +90,7 @@ def test_every_effect_has_the_picture_of_rest_and_an_expression_is_tried(
     expression = page.get_by_role("textbox", name="Expression")
     problem, verdict = page.locator(".expression-problem"), page.locator(".own-effect > .effect-sentence")
     expect(verdict).to_contain_text("On left-out takes", timeout=PATIENCE_MS)
-    assert page.locator(".own-effect .candidate-table tbody tr").count() == 1
+    expect(page.locator(".own-effect .candidate-table tbody tr")).to_have_count(1)
     expression.fill(f"name = mine; columns = {HOSTILE}")
     expect(problem).to_contain_text("img src", timeout=PATIENCE_MS)
     assert page.locator("img").count() == 0
@@ -115,7 +115,7 @@ def test_a_hand_is_measured_where_its_picture_says(opened: Open, address: str) -
     form = page.get_by_role("region", name="Hand dimensions")
     subject = httpx.get(f"{address}/v1/subjects").json()[0]["name"]
     sizes = httpx.get(f"{address}/v1/subjects/{subject}/skeleton").json()["dimensions"]["sizes"]
-    assert form.locator(".hand-number-text").count() == len(sizes)
+    expect(form.locator(".hand-number-text")).to_have_count(len(sizes), timeout=PATIENCE_MS)
     form.get_by_label("1 hand_length, mm").fill("187.5")
     form.get_by_role("button", name="Save").click()
     expect(form.get_by_text("Saved.")).to_be_visible(timeout=PATIENCE_MS)

@@ -40,11 +40,11 @@ def test_a_model_is_taken_apart_by_keyboard(opened: Open, address: str, remember
     expect(version.get_by_role("heading", name="Effect 1: creep")).to_be_visible(timeout=PATIENCE_MS)
     [effect] = found["effect_details"]
     learned = version.get_by_role("region", name="What creep learned").locator("tbody tr")
-    assert learned.locator("th").all_inner_texts() == list(effect["parameters"])
+    expect(learned.locator("th")).to_have_text(list(effect["parameters"]))
     numbers = next(iter(effect["parameters"].values()))
     assert learned.first.locator("td").first.inner_text() == f"{next(iter(numbers.values())):.4g}"
     rotations = version.get_by_role("region", name="Rotations of the model").locator("tbody th")
-    assert rotations.all_inner_texts() == [one["rotation"] for one in found["rotations"]]
+    expect(rotations).to_have_text([one["rotation"] for one in found["rotations"]])
     seen.page.wait_for_timeout(300)
     assert serious(seen.page) == []
     assert version.get_by_role("button", name="Take creep out").is_enabled()

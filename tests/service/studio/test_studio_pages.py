@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import httpx
 import pytest
+from playwright.sync_api import expect
 from studio_support import Open, serious
 
 pytestmark = pytest.mark.needs_chromium
@@ -26,7 +27,7 @@ LEAST_TARGET_PX = 44
 def test_everybody_can_use_it(opened: Open, address: str, name: str) -> None:
     seen = opened(name)
     page = seen.page
-    assert page.locator("h1").all_inner_texts() == [PAGES[name]]
+    expect(page.locator("h1")).to_have_text([PAGES[name]])
     assert page.locator("html").get_attribute("lang") == "en-US"
     assert page.locator(f'nav a[href="/studio/{name}"]').get_attribute("aria-current") == "page"
     page.locator(LAST_THERE.get(name, "h1")).first.wait_for()

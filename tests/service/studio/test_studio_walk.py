@@ -68,7 +68,7 @@ def test_a_diagnosis_of_before_is_shown_with_what_to_do(opened: Open, address: s
 def test_every_effect_of_the_catalogue_is_explained(opened: Open, address: str) -> None:
     page = opened("effects").page
     told = {each["name"]: each["explanation"] for each in httpx.get(f"{address}/v1/effects").json()}
-    assert page.locator(".cards h2").all_inner_texts() == list(told)
+    expect(page.locator(".cards h2")).to_have_text(list(told))
     for sentence in told.values():
         assert sentence in page.locator("#main").inner_text()
 

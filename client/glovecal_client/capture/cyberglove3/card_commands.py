@@ -10,7 +10,7 @@ import re
 from typing import Any
 
 from glovecal_client.capture.cyberglove3.clock_poll import ClockReading, read_clock, set_clock
-from glovecal_client.capture.cyberglove3.conversation import ask, battery_volts, command, quiet
+from glovecal_client.capture.cyberglove3.conversation import ask, battery_volts, command, question, quiet
 from glovecal_client.capture.stream.links import Link
 from glovecal_client.errors import BadOption, DeviceLost
 
@@ -53,7 +53,7 @@ def status(link: Link, frame_rate: float) -> dict[str, Any]:
     """Battery in V, the clock against the computer's, active file, files, free space in MB."""
     volts = battery_volts(link)
     files = [line.strip() for line in _text(link, b"?l").splitlines() if line.strip()]
-    free = _FREE.search(ask(link, b"?I", _TEXT_END))
+    free = _FREE.search(question(link, b"?I", _TEXT_END))
     return {
         "battery_v": volts,
         "active_file": _text(link, b"?A").strip() or None,
@@ -89,5 +89,5 @@ def _open_file(link: Link, name: str) -> None:
 
 def _text(link: Link, query: bytes) -> str:
     """What a query answers, without its echo and the NUL."""
-    heard = ask(link, query, _TEXT_END)
+    heard = question(link, query, _TEXT_END)
     return heard.replace(query, b"", 1).rstrip(b"\0").decode("latin-1")

@@ -12,7 +12,7 @@ import time
 from dataclasses import dataclass
 from datetime import datetime
 
-from glovecal_client.capture.cyberglove3.conversation import ask, command
+from glovecal_client.capture.cyberglove3.conversation import command, question
 from glovecal_client.capture.stream.links import Link
 from glovecal_client.errors import DeviceLost
 
@@ -49,8 +49,8 @@ def read_clock(link: Link, frame_rate: float, wanted_s: float = WANTED_S) -> Clo
     second_low, second_high, consistent = -DAY_S, DAY_S, True
     begun = time.monotonic()
     while True:
-        sent_s = wall_of_day_s()
-        heard = ask(link, b"1tg", _SAID)
+        sent_s = wall_of_day_s()  # of an answer to a repeated question the bound is wider, never wrong
+        heard = question(link, b"1tg", _SAID)
         got_s = wall_of_day_s()
         found = _SAID.search(heard)
         if found is None:

@@ -52,9 +52,22 @@ def quiet(link: Link) -> None:
 
 def battery_volts(link: Link) -> float | None:
     """The battery's voltage; None if the glove does not tell. Its answer says Volts and means millivolts."""
-    found = _VOLTAGE.search(ask(link, b"V", _LINE_FEED))
+    found = _VOLTAGE.search(question(link, b"V", _LINE_FEED))
     link.read(_QUIET_S)  # a NUL may follow, in one source it does not
     return None if found is None else int(found[1]) / 1000
+
+
+def question(link: Link, sent: bytes, end: re.Pattern[bytes]) -> bytes:
+    """The answer to what changes nothing in the glove: asked up to three times until it comes.
+
+    What a late answer left on the way is read away first: it would be taken for that of the next question.
+    """
+    for _ in range(_TRIES):
+        heard = ask(link, sent, end)
+        if end.search(heard):
+            break
+        quiet(link)
+    return heard
 
 
 def ask(link: Link, sent: bytes, end: re.Pattern[bytes]) -> bytes:
