@@ -22,6 +22,10 @@ MOST_WEARING_GROUPS = 4
 """Each is one more fit of every rotation."""
 
 
+ALONE_SHARE = 0.1
+"""Of the range of all units: an angle so far beyond those of all others is reached by one unit alone."""
+
+
 @dataclass(frozen=True)
 class Fold:
     """Which samples are left out, as a boolean mask of shape (N,), and what they are in words."""
@@ -98,3 +102,20 @@ def pieces(time_s: np.ndarray, reference: np.ndarray) -> list[slice]:
     if found is not None:
         edges = [start, *(start + part.stop for part in found)]
     return [slice(a, b) for a, b in itertools.pairwise([0, *edges[1:]])]
+
+
+def reached_by_others(angles: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """For each unit a mask (N,) of the ``angles`` (N,) that its held-out error can be asked at.
+
+    Where one unit alone goes far beyond all others, nothing is known of its sensor once it is left out: the
+    base leaves many times its usual error, and whatever bends the curve seems to save it. Not where it would
+    be most of the unit.
+    """
+    with_rows = [part for part in angles if len(part)]
+    if len(with_rows) < 3:
+        return [np.full(len(part), True) for part in angles]
+    least = np.sort([part.min() for part in with_rows])
+    most = np.sort([part.max() for part in with_rows])
+    margin = ALONE_SHARE * (most[-1] - least[0])
+    masks = [(part >= least[1] - margin) & (part <= most[-2] + margin) for part in angles]
+    return [mask if 2 * mask.sum() > len(mask) else np.full(len(mask), True) for mask in masks]

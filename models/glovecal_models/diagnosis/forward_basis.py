@@ -5,16 +5,19 @@ A diagnosis makes a design with the effects that a model has, one without them a
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from glovecal_models.calibration.folds import are_short, first_measured, pieces
+from glovecal_models.calibration.folds import are_short, first_measured, pieces, reached_by_others
 from glovecal_models.calibration.held_out import BaseFeatures, BaseProducts, Rows, with_precision
 from glovecal_models.diagnosis.camera_columns import CameraPart, camera_columns, without_visibility
 from glovecal_models.diagnosis.known_effect import KnownColumns
 from glovecal_models.diagnosis.resampled import ResampledTake
+from glovecal_models.diagnosis.tied_angles import tied_angles
+from glovecal_models.effects.base.control import motion_words
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.layout import Correspondence, Layout
 
@@ -27,7 +30,7 @@ class JointBasis:
     """One joint: its rows and its base without effects."""
 
     read: frozenset[str]
-    """Names among ``others`` that the base reads already, and joints that bend as it does."""
+    """Names among ``others`` that the base reads already, and joints whose angles tell its own."""
     beside: frozenset[str]
     """Names that an effect in the base does not read for this joint."""
     used: tuple[np.ndarray, ...]
@@ -82,7 +85,7 @@ class ForwardBasis:
     ) -> ForwardBasis:
         """Own sensor, scaled to degrees, from the measured angles; one measured row in ``every`` is fitted.
 
-        ``same_angle_share``: of its deviation, within which another joint bends as one does.
+        ``same_angle_share``: of its deviation, within which an angle follows from one or two others.
         """
         names, is_seen = list(rotations), any(take.reference_sd is not None for take in takes)
         sensor = [_own_sensor(takes, layout, rotation, column) for column, rotation in enumerate(rotations)]
@@ -95,7 +98,7 @@ class ForwardBasis:
             for number, take in enumerate(takes)
         ]
         everything = np.concatenate(filled)
-        alike = _bending_alike(everything, same_angle_share)
+        tied = tied_angles(everything, same_angle_share)
         cut = _cut(takes)
         unit_take = tuple(number for number, parts in enumerate(cut) for _ in parts)
         joints = []
@@ -104,12 +107,15 @@ class ForwardBasis:
             neighbours = [] if linear else _read_beside(item, names, layout)
             columns = [column, *(names.index(name) for name in neighbours)]
             features = BaseFeatures.fit_constants([part[:, columns] for part in filled], linear=linear)
-            used = tuple(
+            measured = [
                 rows[(rows >= piece.start) & (rows < piece.stop)]
                 for take, parts in zip(takes, cut, strict=True)
                 for rows in [np.flatnonzero(np.isfinite(take.reference[:, column]))[::every]]
                 for piece in parts
-            )
+            ]
+            own = [filled[take][rows, column] for take, rows in zip(unit_take, measured, strict=True)]
+            reached = reached_by_others(own)
+            used = tuple(rows[mask] for rows, mask in zip(measured, reached, strict=True))
             units = tuple(
                 Rows(features.columns(filled[take][rows][:, columns]), sensor[column].values[take][rows])
                 for take, rows in zip(unit_take, used, strict=True)
@@ -118,7 +124,7 @@ class ForwardBasis:
             beside = frozenset({rotation, *neighbours, *item.sensors})
             joints.append(
                 JointBasis(
-                    beside | {names[other] for other in alike[column]},
+                    beside | {names[other] for other in tied[column]},
                     beside,
                     used,
                     units,
@@ -164,9 +170,18 @@ def _signals(
 
 
 def _cut(takes: Sequence[ResampledTake]) -> list[list[slice]]:
-    """The units of each take: itself, or quarters where takes are short."""
+    """The units of each take: itself, or quarters where takes are short or where it is the only one of its
+    motion beside many of another: left out whole, nothing would show what the others then are asked for."""
     short = len(takes) == 1 or are_short([take.time_s[first_measured(take.reference) :] for take in takes])
-    return [pieces(take.time_s, take.reference) if short else [slice(0, len(take.time_s))] for take in takes]
+    motions = [motion_words(take.name, take.wearing) for take in takes]
+    [(_, most)] = Counter(motions).most_common(1)
+    is_usual = 2 * most > len(takes)
+    return [
+        pieces(take.time_s, take.reference)
+        if short or (is_usual and motions.count(motion) == 1)
+        else [slice(0, len(take.time_s))]
+        for take, motion in zip(takes, motions, strict=True)
+    ]
 
 
 def _variance(take: ResampledTake, rows: np.ndarray, column: int) -> np.ndarray | None:
@@ -176,19 +191,6 @@ def _variance(take: ResampledTake, rows: np.ndarray, column: int) -> np.ndarray 
     stated = take.reference_sd[rows, column]
     # Smoothing reaches past the last accepted sample by less than half its width.
     return np.where(np.isfinite(stated), stated, np.nanmax(take.reference_sd[:, column])) ** 2
-
-
-def _bending_alike(angles: np.ndarray, share: float) -> list[list[int]]:
-    """For each column of ``angles`` (N, R) the others that are a cubic of it, but for ``share`` of their
-    deviation."""
-    centred = angles - angles.mean(axis=0)
-    squares, found = np.einsum("nr,nr->r", centred, centred), []
-    for column, scale in enumerate(np.maximum(angles.std(axis=0), 1e-9)):
-        cubic = np.linalg.qr(np.vander(centred[:, column] / scale, 4))[0]
-        left = squares - np.square(cubic.T @ centred).sum(axis=0)
-        alike = left < share**2 * squares
-        found.append([int(other) for other in np.flatnonzero(alike) if other != column])
-    return found
 
 
 def _read_beside(item: Correspondence, names: Sequence[str], layout: Layout) -> list[str]:

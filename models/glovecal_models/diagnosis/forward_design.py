@@ -29,7 +29,7 @@ class ForwardDesign:
     signals: tuple[Signals, ...]
     """One for each take, own (N, R)."""
     known: tuple[frozenset[str], ...]
-    """Names among ``others`` that the base of each joint reads already, and joints that bend as it does."""
+    """Names among ``others`` that the base of each joint reads already, and joints that tell its angle."""
     unit_take: tuple[int, ...]
     """The take of each unit that is left out: a whole take, or a quarter of a short one."""
     used: tuple[tuple[np.ndarray, ...], ...]

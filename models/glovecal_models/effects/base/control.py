@@ -145,10 +145,12 @@ def _partition(wearings: Sequence[str]) -> frozenset[frozenset[int]]:
 
 
 def motions_of(takes: Sequence[Signals]) -> list[str]:
-    """The words of each take's name that are neither numbered nor part of its wearing's name."""
-    motions = []
-    for take in takes:
-        wearing = set(re.split(r"[^A-Za-z0-9]+", take.wearing.lower()))
-        words = [word for word in re.split(r"[^A-Za-z0-9]+", take.take.lower()) if word not in wearing]
-        motions.append(" ".join(word for word in words if not re.search(r"\d", word)))
-    return motions
+    """What each take's name says of its motion; see ``motion_words``."""
+    return [motion_words(take.take, take.wearing) for take in takes]
+
+
+def motion_words(take: str, wearing: str) -> str:
+    """The words of a take's name that are neither numbered nor part of its wearing's name."""
+    known = set(re.split(r"[^A-Za-z0-9]+", wearing.lower()))
+    words = [word for word in re.split(r"[^A-Za-z0-9]+", take.lower()) if word not in known]
+    return " ".join(word for word in words if not re.search(r"\d", word))
