@@ -72,7 +72,8 @@ class CameraCard:
         self._sentence.set_text(as_sentence(camera["sentence"]))
         self._source.set_text(camera["source"])
         self._stop.set_visibility(camera["state"] != "stopped")
-        self._view.follow(health is not None and camera["state"] in ("streaming", "lost"))
+        looked_at = health is not None and health["tracked"] + health["without_hand"] > 0
+        self._view.follow(looked_at and camera["state"] in ("streaming", "lost"))
         self._show_findings(health)
         if health is None:
             return
