@@ -28,7 +28,7 @@ def improved(seed: int, sensors: tuple[str, ...], *causes: Cause) -> Improvement
     layout = Layout.from_document(
         {"name": "six", "sensors": list(sensors), "rotations": {name: [name] for name in sensors}}
     )
-    return improve(list(takes), layout, "anna", TrainingSettings(samples=400, folds=3))
+    return improve(list(takes), layout, "anna", TrainingSettings(samples=150, folds=2))
 
 
 def added(found: Improvement) -> list[str]:
