@@ -6,10 +6,13 @@ Neighbouring frames are alike, so a model scored on random frames is scored on f
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+from glovecal_models.effects.base.control import motion_words
 
 STRETCHES = 8
 QUARTERS = 4
@@ -68,6 +71,16 @@ def wearing_groups(wearings: Sequence[str]) -> list[tuple[str, ...]]:
 def are_short(times: Sequence[np.ndarray]) -> bool:
     """Whether takes measured at these times are left out in pieces instead of whole."""
     return float(np.median([part[-1] - part[0] if len(part) else 0.0 for part in times])) < SHORT_S
+
+
+def alone_in_their_motion(names: Sequence[str], wearings: Sequence[str]) -> list[bool]:
+    """Which takes are the only ones of their motion, told by their names, beside many of one other motion.
+
+    Slow ramps among takes of free motion: left out whole, nothing would show what a model is then asked for.
+    """
+    motions = [motion_words(name, wearing) for name, wearing in zip(names, wearings, strict=True)]
+    is_usual = 2 * max(Counter(motions).values(), default=0) > len(motions) > 1
+    return [is_usual and motions.count(motion) == 1 for motion in motions]
 
 
 def first_measured(reference: np.ndarray) -> int:

@@ -15,7 +15,13 @@ from glovecal_models.calibration.effect_fit import (
     fit_with_effects,
 )
 from glovecal_models.calibration.effect_request import EffectRequest
-from glovecal_models.calibration.folds import are_short, first_measured, folds_over_takes, pieces
+from glovecal_models.calibration.folds import (
+    alone_in_their_motion,
+    are_short,
+    first_measured,
+    folds_over_takes,
+    pieces,
+)
 from glovecal_models.calibration.own_signal import OwnSignal
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training_settings import TrainingSettings
@@ -66,7 +72,8 @@ def held_out_errors(
     ``optima`` of the fit on all takes, where it is known (``fit_with_effects``). Once squared errors exceed
     ``most_square``, degrees squared over all rotations, the other folds are not fitted.
 
-    A single take, and short takes of one motion each, are left out in pieces (``left_out``).
+    A single take, and short takes of one motion each, are left out in pieces; so is a take that is alone in
+    its motion, each piece with what came before it as its pre-roll.
     """
     square, count = dict.fromkeys(rotations, 0.0), dict.fromkeys(rotations, 0)
     short = len(takes.takes) == 1 or are_short(
@@ -77,9 +84,16 @@ def held_out_errors(
     )
     number = np.arange(len(takes.takes))
     parts, folds = takes, [fold.held_out for fold in folds_over_takes(number, max(settings.folds, 2))]
+    alone = alone_in_their_motion([take.name for take in takes.takes], [take.wearing for take in takes.takes])
     if short:
-        parts, place = _cut(takes)
+        parts, _, place = _cut(takes, [True] * len(number))
         folds = [place == at for at in np.unique(place)]
+    elif any(alone):
+        parts, take, place = _cut(takes, alone, with_history=True)
+        folds = [
+            np.where(np.array(alone)[take], place % len(folds) == at, held[take])
+            for at, held in enumerate(folds)
+        ]
     for at, held in enumerate(folds):
         if report:
             so_far = np.sqrt(sum(square.values()) / max(sum(count.values()), 1))
@@ -126,27 +140,38 @@ def frame_errors_of(
     return found
 
 
-def _cut(takes: PreparedTakes) -> tuple[PreparedTakes, np.ndarray]:
-    """Each take in pieces, as takes of their own; and each piece's number within its take."""
-    found, reference, place = [], [], []
-    for take, measured in zip(takes.takes, takes.reference, strict=True):
+def _cut(
+    takes: PreparedTakes, in_pieces: Sequence[bool], *, with_history: bool = False
+) -> tuple[PreparedTakes, np.ndarray, np.ndarray]:
+    """Takes in pieces as takes of their own, others whole; each one's take and its number within that.
+
+    ``with_history``: before what is measured of a piece stand the readings of the take up to there, so that
+    effects with a memory are where they were.
+    """
+    found, reference, owner, place = [], [], [], []
+    for index, (take, measured) in enumerate(zip(takes.takes, takes.reference, strict=True)):
+        parts = pieces(take.time_s, measured) if in_pieces[index] else [slice(0, len(take.time_s))]
         deviations = take.reference_sd_at_frames(takes.layout.rotations)
-        for number, rows in enumerate(pieces(take.time_s, measured)):
+        for number, known in enumerate(parts):
+            rows = slice(0, known.stop) if with_history else known
+            owner.append(index)
             place.append(number)
-            reference.append(measured[rows])
+            before = np.full((known.start - rows.start, measured.shape[1]), np.nan)
+            reference.append(np.concatenate([before, measured[known]]))
             found.append(
                 replace(
                     take,
-                    name=f"{take.name}, part {number + 1}",
+                    name=f"{take.name}, part {number + 1}" if len(parts) > 1 else take.name,
                     time_s=take.time_s[rows],
                     readings=take.readings[rows],
                     rotations=takes.layout.rotations,
-                    reference_time_s=take.time_s[rows],
-                    reference=measured[rows],
-                    reference_sd=None if deviations is None else deviations[rows],
+                    reference_time_s=take.time_s[known],
+                    reference=measured[known],
+                    reference_sd=None if deviations is None else deviations[known],
                     context={name: values[rows] for name, values in take.context.items()},
                     poses=None if take.poses is None else take.poses[rows],
                 )
             )
     prepared = PreparedTakes.of(found, takes.layout)
-    return replace(prepared, reference=tuple(reference), scale=takes.scale), np.array(place)
+    parts = replace(prepared, reference=tuple(reference), scale=takes.scale)
+    return parts, np.array(owner), np.array(place)

@@ -5,19 +5,23 @@ A diagnosis makes a design with the effects that a model has, one without them a
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from glovecal_models.calibration.folds import are_short, first_measured, pieces, reached_by_others
+from glovecal_models.calibration.folds import (
+    alone_in_their_motion,
+    are_short,
+    first_measured,
+    pieces,
+    reached_by_others,
+)
 from glovecal_models.calibration.held_out import BaseFeatures, BaseProducts, Rows, with_precision
 from glovecal_models.diagnosis.camera_columns import CameraPart, camera_columns, without_visibility
 from glovecal_models.diagnosis.known_effect import KnownColumns
 from glovecal_models.diagnosis.resampled import ResampledTake
 from glovecal_models.diagnosis.tied_angles import tied_angles
-from glovecal_models.effects.base.control import motion_words
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.layout import Correspondence, Layout
 
@@ -170,17 +174,12 @@ def _signals(
 
 
 def _cut(takes: Sequence[ResampledTake]) -> list[list[slice]]:
-    """The units of each take: itself, or quarters where takes are short or where it is the only one of its
-    motion beside many of another: left out whole, nothing would show what the others then are asked for."""
+    """The units of each take: itself, or quarters where takes are short or it is alone in its motion."""
     short = len(takes) == 1 or are_short([take.time_s[first_measured(take.reference) :] for take in takes])
-    motions = [motion_words(take.name, take.wearing) for take in takes]
-    [(_, most)] = Counter(motions).most_common(1)
-    is_usual = 2 * most > len(takes)
+    alone = alone_in_their_motion([take.name for take in takes], [take.wearing for take in takes])
     return [
-        pieces(take.time_s, take.reference)
-        if short or (is_usual and motions.count(motion) == 1)
-        else [slice(0, len(take.time_s))]
-        for take, motion in zip(takes, motions, strict=True)
+        pieces(take.time_s, take.reference) if short or is_alone else [slice(0, len(take.time_s))]
+        for take, is_alone in zip(takes, alone, strict=True)
     ]
 
 
