@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from glovecal_models.effects.base.motions import TAPS
+from glovecal_service.views.next_take import FREE_MOTION
 from glovecal_service.views.renamed_keys import current
 
 SHORT = 12
@@ -26,7 +28,7 @@ def next_command(model: str, stored: Mapping[str, Any], subject: str = "") -> st
         where = "".join(f" --rotation {name}" for name in named.get("where") or ())
         return f"glovecal add-effect {short} {named['effect']}" + where * _is_on_rotations(found)
     if following:
-        return f"glovecal record GLOVE deciding --seconds {following['seconds']}"
+        return recording_command(following)
     if named:
         return f"glovecal add-effect {short} {named['effect']}"
     for action in found.get("actions") or ():
@@ -37,8 +39,16 @@ def next_command(model: str, stored: Mapping[str, Any], subject: str = "") -> st
     if residual.get("is_significant"):
         return f"glovecal where {short} --report where.html"
     if residual.get("not_identifiable"):
-        return f"glovecal record GLOVE free-motion --seconds {LONG_ENOUGH_S}"
+        return f"glovecal record GLOVE {FREE_MOTION} --seconds {LONG_ENOUGH_S}"
     return f"glovecal model activate {short}"
+
+
+def recording_command(following: Mapping[str, Any]) -> str:
+    """Of the recording that decides; documents of an earlier service name none."""
+    if following.get("motion") == TAPS.name:
+        return "glovecal take latency GLOVE"
+    name = following.get("take_name", "deciding")
+    return f"glovecal record GLOVE {name} --seconds {following['seconds']}"
 
 
 def action_command(model: str, action: Mapping[str, Any], subject: str = "") -> str | None:

@@ -7,6 +7,7 @@ from typing import Any
 
 from markupsafe import Markup
 
+from glovecal_service.next_command import recording_command
 from glovecal_service.report.caption import Caption
 from glovecal_service.report.diagnosis_page import hold_table, next_take_note
 from glovecal_service.report.effects import effect_card
@@ -86,7 +87,7 @@ def _next(found: Mapping[str, Any]) -> str:
     model = str(found["steps"][-1].get("model") or "MODEL")[:12]
     following = found.get("next_take")
     if following:
-        return f"glovecal record GLOVE deciding --seconds {following['seconds']}"
+        return recording_command(following)
     if found["stopped"] == "noise_floor":
         return f"glovecal model activate {model}"
     return f"glovecal where {model} --report where.html"

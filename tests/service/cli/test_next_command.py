@@ -1,6 +1,10 @@
 """The one command after a diagnosis: activating comes last, and not where nothing could be judged."""
 
+import pytest
+
+from glovecal_models.diagnosis.next_take import NextTake
 from glovecal_service.next_command import next_command
+from glovecal_service.views.next_take import NextTakeView
 
 MODEL = "0123456789abcdef"
 
@@ -43,3 +47,24 @@ def test_an_association_has_its_command():
     assert next_command(MODEL, found, "pia") == "glovecal train --subject pia --method lmc_gpr"
     found["actions"] = [{**action, "saves": False}]
     assert next_command(MODEL, found, "pia") == "glovecal where 0123456789ab --report where.html"
+
+
+@pytest.mark.parametrize(
+    ("motion", "command"),
+    [
+        ("ramps", "glovecal record GLOVE ramps --seconds 40"),
+        ("one_finger", "glovecal record GLOVE one-finger --seconds 40"),
+        ("more_wearings", "glovecal record GLOVE free-motion --seconds 40"),
+        ("taps", "glovecal take latency GLOVE"),
+    ],
+)
+def test_what_decides_is_recorded_under_the_name_of_its_motion(motion, command):
+    view = NextTakeView.of(NextTake(motion, "Move.", 40, ("creep", "hysteresis")))
+    assert view is not None
+    assert next_command(MODEL, {"named": None, "next_take": view.model_dump()}) == command
+
+
+def test_a_recording_asked_for_by_an_earlier_service_has_its_command():
+    following = {"what": "Move.", "seconds": 25, "separates": ["creep", "hysteresis"]}
+    found = {"named": None, "next_take": following}
+    assert next_command(MODEL, found) == "glovecal record GLOVE deciding --seconds 25"

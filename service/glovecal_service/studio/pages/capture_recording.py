@@ -59,9 +59,8 @@ class RecordingPage:
                 heading(2, "Record a take")
             await self._worn.build((proposed or {}).get("subject"))
             with ui.element("div").classes("capture-fields"):
-                self._name = ui.input(
-                    "Name of the take", value="deciding" if proposed else _free_name()
-                ).classes("choice")
+                wanted = proposed.get("take_name", "deciding") if proposed else _free_name()
+                self._name = ui.input("Name of the take", value=wanted).classes("choice")
                 self._seconds = ui.number(
                     "Stop after, s (empty: by key)", value=self._proposed.get("seconds"), min=1, max=LONGEST_S
                 ).classes("capture-number")
