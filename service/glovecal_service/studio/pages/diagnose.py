@@ -132,7 +132,8 @@ class DiagnosePage:
             with ui.element("section").classes("finding"):
                 heading(2, "What to record next")
                 _next_take(found["next_take"])
-                ui.link("Record it", f"/capture?proposal={job['id']}").classes("studio-link")
+                if found["next_take"].get("motion") != "taps":  # no take: its text names the command
+                    ui.link("Record it", f"/capture?proposal={job['id']}").classes("studio-link")
         _unjudged(found)
         ui.link("Report with pictures", f"../v1/jobs/{job['id']}/report", new_tab=True).classes("studio-link")
         if view is not None and named is not None:
