@@ -15,12 +15,16 @@ from wandering_reference import WANDER_DEG, with_wander
 
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
-from glovecal_models.simulation.session import RecordedSession, record_session
+from glovecal_models.simulation.session import RecordedSession, _record, record_session
+from glovecal_models.simulation.session_glove import SessionGlove
 from glovecal_models.simulation.session_plan import FIVE_SENSORS, SessionPlan, TakeMotion
+from glovecal_models.simulation.session_schedule import FULL_BATTERY_V, one_more
 from glovecal_models.takes.take import Take
 
 PALM_SENSORS = ("I_MCP", "M_MCP", "R_MCP", "P_MCP", "P_PIP", "T_TMC", "PALM_ARCH")
 """Six joints, and the sensor without which no palm arch can be seen; the thumb, as its opposition enters."""
+BETWEEN_S = 60.0
+"""From the end of a take to the next, while one thing is changed."""
 BYSTANDER_DEG = 1e-3
 """A recorded column whose cause is this small explains nothing."""
 
@@ -106,8 +110,38 @@ class BlindGlove:
 
     def also(self, motion: TakeMotion, take_s: float, wearing: int, *, repeat: int = 0) -> Take:
         """One more take after the session, as ``RecordedSession.also``, of the same glove and reference."""
-        take = self.session.also(motion, take_s, wearing, repeat=repeat).take
-        return with_wander(take, self.seed) if self.nuisance == "reference" else take
+        return self._wandering(self.session.also(motion, take_s, wearing, repeat=repeat).take)
+
+    def crossed(self, take_s: float, repeat: int) -> list[Take]:
+        """Free motion after each of three changes, one at a time: a fresh battery without switching off, the
+        glove off and on without switching off, switched off and on without taking it off."""
+        plan, last, new = self.session.plan, self.wearings - 1, self.wearings + repeat
+        random = np.random.default_rng([self.seed, 43, repeat])
+        fresh_v, powered_s = random.uniform(*FULL_BATTERY_V), random.uniform(4.0, 70.0)
+        [battery] = one_more(plan, "natural", take_s, last, 2 * repeat)
+        [donned] = one_more(plan, "natural", take_s, new, 0)
+        [switched] = one_more(plan, "natural", take_s, new, 1)
+        later_s = take_s + BETWEEN_S
+        starts = (
+            replace(battery, supply_v=fresh_v),
+            replace(
+                donned,
+                supply_v=fresh_v,
+                session_s=battery.session_s + later_s,
+                power_on_s=battery.power_on_s + later_s,
+            ),
+            replace(
+                switched,
+                supply_v=fresh_v,
+                session_s=battery.session_s + 2 * later_s,
+                power_on_s=powered_s,
+                since_donned_s=donned.since_donned_s + later_s,
+            ),
+        )
+        glove = SessionGlove(plan)
+        return [
+            self._wandering(_record(plan, glove, (start,), self.session._hidden)[0].take) for start in starts
+        ]
 
     @property
     def duration_s(self) -> float:
@@ -136,7 +170,9 @@ class BlindGlove:
         }
 
     def _measured(self, take: Take) -> Take:
-        take = _reference_from(take, self.lead_s)
+        return self._wandering(_reference_from(take, self.lead_s))
+
+    def _wandering(self, take: Take) -> Take:
         return with_wander(take, self.seed) if self.nuisance == "reference" else take
 
 

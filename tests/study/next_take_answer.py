@@ -11,7 +11,7 @@ from blind_glove import BlindGlove
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.next_take import NextTake
-from glovecal_models.effects.base.motions import TAPS
+from glovecal_models.effects.base.motions import CROSSED, TAPS
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 from glovecal_models.simulation.session_plan import TakeMotion
 from glovecal_models.simulation.signals import at_times
@@ -39,7 +39,7 @@ def next_take_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_
             tapped = _tapped(glove, random)
             takes = [replace(take, glove_latency=tapped) for take in takes]
         else:
-            takes.append(_recorded(glove, found.next_take, len(motions) - 1))
+            takes.extend(_recorded(glove, found.next_take, len(motions) - 1))
         found: Diagnosis = diagnose(takes, glove.layout, linear=glove.linear, limits=limits.diagnosis)
         sets.append(list(found.naming.confidence_set))
     return {"confidence_sets": sets, "motions": motions}
@@ -52,24 +52,15 @@ def _decides(found: Diagnosis) -> bool:
 
 
 def _tapped(glove: BlindGlove, random: np.random.Generator) -> KnownLatency:
-    """What taps on some key measure: how late the whole glove is, its sensors' lag and the age of frames that
-    come again included."""
-    hidden = zip(glove.causes, glove.session.causes, strict=False)
-    late = [(mine, item) for mine, item in hidden if item.name in ("glove_latency", "lag")]
-    true_s = sum(
-        float(np.mean(list(item.sizes.values()))) * (0.5 if mine.form == "moving_average" else 1.0)
-        for mine, item in late
-    )
-    if any(item.name == "repeated_samples" for item in glove.causes):
-        true_s += _late_s(glove)
+    """What taps on some key measure: how late the whole glove is, whatever makes it so."""
     usual_s, key_sd_s = usual_key()
     wrong_s = usual_s - random.uniform(*USUAL_KEY_S) + random.normal(0.0, TAPS_SD_S)
-    return KnownLatency(true_s + wrong_s, float(np.hypot(TAPS_SD_S, key_sd_s)))
+    return KnownLatency(_late_s(glove) + wrong_s, float(np.hypot(TAPS_SD_S, key_sd_s)))
 
 
 def _late_s(glove: BlindGlove) -> float:
-    """By which delay the clean twin's readings come nearest to those of a glove that sends old ones again:
-    they are the same readings, noise included."""
+    """By which delay the clean twin's readings, noise included, come nearest to the glove's: of a glove whose
+    forms of delay have other parameters than seconds, and of one that sends old readings again."""
     pairs = list(zip(glove.takes, glove.clean_takes, strict=True))
     left = [
         sum(
@@ -81,9 +72,11 @@ def _late_s(glove: BlindGlove) -> float:
     return float(DELAYS_S[int(np.argmin(left))])
 
 
-def _recorded(glove: BlindGlove, asked: NextTake, repeat: int) -> Take:
-    """The wearer does as told, in the last wearing; whatever is no motion is a new wearing in free motion."""
+def _recorded(glove: BlindGlove, asked: NextTake, repeat: int) -> list[Take]:
+    """The wearer does as told; whatever is no motion is a new wearing in free motion."""
     if asked.motion in get_args(TakeMotion):
         motion = cast(TakeMotion, asked.motion)
-        return glove.also(motion, float(asked.seconds), glove.wearings - 1, repeat=repeat)
-    return glove.also("natural", NEW_WEARING_S, glove.wearings + repeat)
+        return [glove.also(motion, float(asked.seconds), glove.wearings - 1, repeat=repeat)]
+    if asked.motion == CROSSED.name:
+        return glove.crossed(CROSSED.seconds / 3, repeat)
+    return [glove.also("natural", NEW_WEARING_S, glove.wearings + repeat)]
