@@ -152,7 +152,7 @@ def _cut(
     for index, (take, measured) in enumerate(zip(takes.takes, takes.reference, strict=True)):
         parts = pieces(take.time_s, measured) if in_pieces[index] else [slice(0, len(take.time_s))]
         deviations = take.reference_sd_at_frames(takes.layout.rotations)
-        for number, known in enumerate(parts):
+        for number, known in enumerate(part for part in parts if part.stop > part.start):
             rows = slice(0, known.stop) if with_history else known
             owner.append(index)
             place.append(number)

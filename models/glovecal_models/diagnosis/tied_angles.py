@@ -10,8 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-EVERY = 4
-"""Of the rows: neighbours say nearly the same."""
+EVERY, FEWEST = 4, 100
+"""Of so many rows and more: neighbours say nearly the same."""
+FEWEST_OF_A_CUBIC = 10
+"""Through fewer a cubic goes by chance."""
 
 
 def tied_angles(angles: np.ndarray, share: float) -> list[set[int]]:
@@ -21,7 +23,9 @@ def tied_angles(angles: np.ndarray, share: float) -> list[set[int]]:
     others together: that one for both, and for that one the more telling of both. The one that follows most
     closely is taken first, since two that it ties need not tell of each other.
     """
-    angles = angles[::EVERY]
+    if len(angles) < FEWEST_OF_A_CUBIC:
+        return [set() for _ in range(angles.shape[1])]
+    angles = angles[::EVERY] if len(angles) >= FEWEST else angles
     count, centred = angles.shape[1], angles - angles.mean(axis=0)
     centred /= np.maximum(np.linalg.norm(centred, axis=0), 1e-9)
     cubics = np.concatenate([np.linalg.qr(_cubic(column))[0] for column in centred.T], axis=1)  # (N, 3 R)

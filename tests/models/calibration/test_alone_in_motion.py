@@ -77,3 +77,18 @@ def test_a_right_effect_saves_error_with_the_take_that_decides(takes):
     }  # fmt: skip
     assert left["alone"][1] < 0.9 * left["alone"][0]
     assert left["alone"][1] < left["whole"][1]
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3, 7])
+def test_a_take_of_few_frames_that_is_alone_breaks_nothing(takes, frames):
+    last = takes[-1]
+    until = last.time_s[frames - 1]
+    known = last.reference_time_s <= until
+    cut = replace(
+        last, time_s=last.time_s[:frames], readings=last.readings[:frames],
+        reference_time_s=last.reference_time_s[known], reference=last.reference[known],
+        context={name: values[:frames] for name, values in last.context.items()},
+    )  # fmt: skip
+    found = held_out_errors(prepared([*takes[:4], cut], "w1-ramps-1"), SENSORS, (), SETTINGS)
+    whole = held_out_errors(prepared([*takes[:4], cut], "w1-t5"), SENSORS, (), SETTINGS)
+    assert found.count == whole.count

@@ -43,6 +43,13 @@ def test_angles_that_move_freely_are_not(columns):
     assert tied_angles(angles(0.4)[:, columns], SHARE) == [set() for _ in columns]
 
 
+@pytest.mark.parametrize("rows", [0, 1, 5, 9, 10, 99, 100])
+def test_few_rows_tell_little_and_break_nothing(rows):
+    tied = tied_angles(angles(0.4)[:rows], SHARE)
+    assert len(tied) == 5
+    assert rows >= 10 or not any(tied)
+
+
 def test_noise_above_the_share_hides_that_an_angle_follows():
     assert tied_angles(angles(4.0)[:, [0, 1, 3, 4]], SHARE) == [set()] * 4
 
