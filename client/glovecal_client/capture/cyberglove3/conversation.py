@@ -62,6 +62,7 @@ def question(link: Link, sent: bytes, end: re.Pattern[bytes]) -> bytes:
 
     What a late answer left on the way is read away first: it would be taken for that of the next question.
     """
+    heard = b""
     for _ in range(_TRIES):
         heard = ask(link, sent, end)
         if end.search(heard):
