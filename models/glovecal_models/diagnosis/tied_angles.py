@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-EVERY, FEWEST = 4, 100
+EVERY, ENOUGH_TO_THIN = 4, 100
 """Of so many rows and more: neighbours say nearly the same."""
 FEWEST_OF_A_CUBIC = 10
 """Through fewer a cubic goes by chance."""
@@ -25,7 +25,7 @@ def tied_angles(angles: np.ndarray, share: float) -> list[set[int]]:
     """
     if len(angles) < FEWEST_OF_A_CUBIC:
         return [set() for _ in range(angles.shape[1])]
-    angles = angles[::EVERY] if len(angles) >= FEWEST else angles
+    angles = angles[::EVERY] if len(angles) >= ENOUGH_TO_THIN else angles
     count, centred = angles.shape[1], angles - angles.mean(axis=0)
     centred /= np.maximum(np.linalg.norm(centred, axis=0), 1e-9)
     cubics = np.concatenate([np.linalg.qr(_cubic(column))[0] for column in centred.T], axis=1)  # (N, 3 R)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -78,8 +79,14 @@ def in_phase(page: Page, *phases: str) -> None:
 
 
 def press(page: Page, key: str, address: str, came_of_it: Callable[[dict[str, Any]], Any]) -> None:
-    page.keyboard.press(key)
-    eventually(lambda: came_of_it(sampling(address)), f"{key}: {sampling(address)}", 30.0)
+    """Once more where a busy computer lost the glove for a moment, and the key with it."""
+    for patience_s in (10.0, 30.0):
+        in_phase(page, "waiting", "paused", "bad")
+        page.keyboard.press(key)
+        with contextlib.suppress(AssertionError):
+            eventually(lambda: came_of_it(sampling(address)), key, patience_s)
+            return
+    raise AssertionError(f"{key}: {sampling(address)}")
 
 
 SAID_IN_A_MOTION, SAID_IN_A_HOLD = 3, 4
