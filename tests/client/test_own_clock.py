@@ -102,11 +102,16 @@ def test_a_clock_that_is_set_begins_a_new_line() -> None:
     assert abs(clock.line.drift) < 1e-6
 
 
-def test_answers_of_whole_frames_bound_the_clock_far_below_one(tmp_path: Path) -> None:
-    faults = Faults()
+def ahead(folder: Path, faults: Faults) -> tuple[EmulatedCyberGlove3, PseudoTerminal]:
+    """A glove whose clock goes ahead, and its port."""
     faults.offset_s = 0.1234
     glove = EmulatedCyberGlove3(StillHand(), faults)  # type: ignore[arg-type]
-    port = PseudoTerminal(tmp_path / "emulated-cyberglove3")
+    return glove, PseudoTerminal(folder / "emulated-cyberglove3")
+
+
+def test_answers_of_whole_frames_bound_the_clock_far_below_one(tmp_path: Path) -> None:
+    faults = Faults()
+    glove, port = ahead(tmp_path, faults)
     with Emulation(glove, port, faults):
         link = SerialLink(port.name, 115200)
         reading = read_clock(link, 30.0)
@@ -135,9 +140,7 @@ class DropsQuestions(SerialLink):
 
 def test_a_question_that_is_lost_is_asked_again(tmp_path: Path) -> None:
     faults = Faults()
-    faults.offset_s = 0.1234
-    glove = EmulatedCyberGlove3(StillHand(), faults)  # type: ignore[arg-type]
-    port = PseudoTerminal(tmp_path / "emulated-cyberglove3")
+    glove, port = ahead(tmp_path, faults)
     with Emulation(glove, port, faults):
         link = DropsQuestions(port.name)
         reading = read_clock(link, 30.0, wanted_s=FRAME_S)

@@ -15,8 +15,7 @@ from wandering_reference import WANDER_DEG, with_wander
 
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
-from glovecal_models.simulation.session import RecordedSession, _record, record_session
-from glovecal_models.simulation.session_glove import SessionGlove
+from glovecal_models.simulation.session import RecordedSession, record_session
 from glovecal_models.simulation.session_plan import FIVE_SENSORS, SessionPlan, TakeMotion
 from glovecal_models.simulation.session_schedule import FULL_BATTERY_V, one_more
 from glovecal_models.takes.take import Take
@@ -138,10 +137,7 @@ class BlindGlove:
                 since_donned_s=donned.since_donned_s + later_s,
             ),
         )
-        glove = SessionGlove(plan)
-        return [
-            self._wandering(_record(plan, glove, (start,), self.session._hidden)[0].take) for start in starts
-        ]
+        return [self._wandering(self.session.at(start).take) for start in starts]
 
     @property
     def duration_s(self) -> float:

@@ -89,9 +89,9 @@ def held_out_errors(
         parts, _, place = _cut(takes, [True] * len(number))
         folds = [place == at for at in np.unique(place)]
     elif any(alone):
-        parts, take, place = _cut(takes, alone, with_history=True)
+        parts, owner, place = _cut(takes, alone, with_history=True)
         folds = [
-            np.where(np.array(alone)[take], place % len(folds) == at, held[take])
+            np.where(np.array(alone)[owner], place % len(folds) == at, held[owner])
             for at, held in enumerate(folds)
         ]
     for at, held in enumerate(folds):
@@ -173,5 +173,5 @@ def _cut(
                 )
             )
     prepared = PreparedTakes.of(found, takes.layout)
-    parts = replace(prepared, reference=tuple(reference), scale=takes.scale)
-    return parts, np.array(owner), np.array(place)
+    in_parts = replace(prepared, reference=tuple(reference), scale=takes.scale)
+    return in_parts, np.array(owner), np.array(place)

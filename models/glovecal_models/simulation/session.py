@@ -57,8 +57,12 @@ class RecordedSession:
         ``wearing`` counts from 0; one above the plan's is a new wearing. The same arguments give the same
         take; another ``repeat`` gives another. Raises BadInput.
         """
-        starts = one_more(self.plan, motion, take_s, wearing, repeat)
-        return _record(self.plan, SessionGlove(self.plan), starts, self._hidden)[0]
+        [start] = one_more(self.plan, motion, take_s, wearing, repeat)
+        return self.at(start)
+
+    def at(self, start: TakeStart) -> RecordedTake:
+        """One more take after the session, in circumstances of its own: battery, power, time."""
+        return _record(self.plan, SessionGlove(self.plan), (start,), self._hidden)[0]
 
 
 def record_session(plan: SessionPlan, causes: Sequence[Cause] = ()) -> RecordedSession:

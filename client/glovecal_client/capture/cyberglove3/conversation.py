@@ -33,12 +33,9 @@ class Reply:
 
 def command(link: Link, sent: bytes) -> Reply:
     """Give a command. Raises DeviceLost when nothing ended with NUL comes back, three times."""
-    heard = b""
-    for _ in range(_TRIES):
-        heard = ask(link, sent, _NUL)
-        if heard.endswith(b"\0"):
-            return Reply(heard, sent in heard)
-        quiet(link)
+    heard = question(link, sent, _NUL)
+    if heard.endswith(b"\0"):
+        return Reply(heard, sent in heard)
     raise DeviceLost(f"the glove does not answer {sent!r}; heard {heard[:24]!r}. Is it a CyberGlove III?")
 
 
@@ -58,7 +55,7 @@ def battery_volts(link: Link) -> float | None:
 
 
 def question(link: Link, sent: bytes, end: re.Pattern[bytes]) -> bytes:
-    """The answer to what changes nothing in the glove: asked up to three times until it comes.
+    """The answer to what may be said twice: asked up to three times until it comes.
 
     What a late answer left on the way is read away first: it would be taken for that of the next question.
     """
