@@ -31,7 +31,7 @@ def next_take_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_
     """Confidence sets before and after each recorded take, and the motions that were asked for."""
     takes, random = list(glove.takes), np.random.default_rng(glove.seed)
     found = diagnose(takes, glove.layout, linear=glove.linear, limits=limits.diagnosis)
-    sets, motions = [list(found.naming.confidence_set)], []
+    sets, motions = [_told(found)], []
     while len(motions) < MOST_TAKES and len(sets[-1]) > 1 and _decides(found):
         assert found.next_take is not None
         motions.append(found.next_take.motion)
@@ -41,14 +41,18 @@ def next_take_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_
         else:
             takes.extend(_recorded(glove, found.next_take, len(motions) - 1))
         found: Diagnosis = diagnose(takes, glove.layout, linear=glove.linear, limits=limits.diagnosis)
-        sets.append(list(found.naming.confidence_set))
+        sets.append(_told(found))
     return {"confidence_sets": sets, "motions": motions}
+
+
+def _told(found: Diagnosis) -> list[str]:
+    return [] if found.named is None else list(found.named.confidence_set)
 
 
 def _decides(found: Diagnosis) -> bool:
     """Whether the take asked for is about the set, not about what could not be judged."""
     asked = found.next_take
-    return asked is not None and bool(set(asked.separates) & set(found.naming.confidence_set))
+    return asked is not None and bool(set(asked.separates) & set(_told(found)))
 
 
 def _tapped(glove: BlindGlove, random: np.random.Generator) -> KnownLatency:

@@ -141,7 +141,7 @@ def diagnose(
             wholes=wholes,
         )  # fmt: skip
     progress("done", 1.0)
-    return Diagnosis(
+    diagnosis = Diagnosis(
         joints=problem.joints,
         rmse_deg=_held_out_errors(design),
         noise_floors=dict(noise_floors),
@@ -151,22 +151,26 @@ def diagnose(
         reference_problems=problems,
         findings=findings,
         residual=residual,
-        next_take=_next_take(naming, by_name, takes) or take_to_decide(impossible, residual),
+        next_take=None,
         actions=actions,
         effects=by_name,
         linear=linear,
         limits=limits,
         camera=seen,
     )
+    asked = _next_take(diagnosis, by_name, takes) or take_to_decide(impossible, residual)
+    return replace(diagnosis, next_take=asked)
 
 
-def _next_take(naming: Naming, effects: Mapping[str, Effect], takes: Sequence[Take]) -> NextTake | None:
-    found = {item.effect: item for item in naming.ranked}
+def _next_take(diagnosis: Diagnosis, effects: Mapping[str, Effect], takes: Sequence[Take]) -> NextTake | None:
+    """For what is told as the confidence set: what a signature names alone is repaired before rivals are."""
+    found = {item.effect: item for item in diagnosis.naming.ranked}
+    told = diagnosis.named
 
     def decides(effect: Effect, motion: Motion) -> bool:
         return effect.name not in found or effect.decided_by(motion, found[effect.name], takes)
 
-    return next_take(naming.confidence_set, effects, decides)
+    return next_take(told.confidence_set if told else (), effects, decides)
 
 
 def _has(known: Sequence[KnownEffect]) -> set[str]:

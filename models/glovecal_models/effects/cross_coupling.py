@@ -14,7 +14,7 @@ import numpy as np
 from glovecal_models.effects.base.effect import InstantEffect
 from glovecal_models.effects.base.facts import Control, Rival, Settings
 from glovecal_models.effects.base.joint_units import fit_joint_units, in_joint_units
-from glovecal_models.effects.base.motions import ONE_FINGER
+from glovecal_models.effects.base.motions import CUPPED_PALM, ONE_FINGER
 from glovecal_models.effects.base.signals import Signals
 
 PRIOR_DEG = 3.0
@@ -31,7 +31,7 @@ class CrossCoupling(InstantEffect):
     shows_in: ClassVar = ("joint", "sensor")
     shown_over: ClassVar = "neighbour"
     shown_by: ClassVar = ONE_FINGER
-    rivals: ClassVar = (Rival("palm_arch", ONE_FINGER), Rival("contact_pressure", ONE_FINGER))
+    rivals: ClassVar = (Rival("palm_arch", CUPPED_PALM), Rival("contact_pressure", ONE_FINGER))
     caveat = "a common cause that was not recorded, such as grip pressure or a strap, looks the same"
     control: ClassVar[Control] = "circularly shifted"
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from glovecal_models.effects.base.effect import InstantEffect
 from glovecal_models.effects.base.facts import Control, Settings
-from glovecal_models.effects.base.motions import ONE_FINGER
+from glovecal_models.effects.base.motions import CUPPED_PALM
 from glovecal_models.effects.base.signals import Signals
 
 PALM = "PALM_ARCH"
@@ -31,7 +31,7 @@ class PalmArch(InstantEffect):
     shows_in: ClassVar = (f"sensor {PALM}", f"joint {PALM}")
     shown_over: ClassVar = "neighbour"
     neighbours: ClassVar = (PALM,)
-    shown_by: ClassVar = ONE_FINGER
+    shown_by: ClassVar = CUPPED_PALM
     control: ClassVar[Control] = "circularly shifted"
 
     def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:

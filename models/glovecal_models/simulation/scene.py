@@ -27,6 +27,7 @@ PRE_ROLL_S = (20.0, 60.0)
 """How long the hand moved or rested in the glove before recording began."""
 PALM_OF_ITS_OWN_DEG = 3.0
 """How far a person cups the palm beyond what thumb and outer fingers ask for."""
+CUPPED_ON_PURPOSE_DEG = 10.0
 
 
 @dataclass(frozen=True)
@@ -137,5 +138,6 @@ def _perform(plan: SessionPlan, start: TakeStart, time: np.ndarray) -> tuple[np.
     swell = np.sin(2 * np.pi * time / random.uniform(4.0, 9.0) + random.uniform(0, 2 * np.pi))
     palm = ROTATIONS.index("PALM_ARCH")
     if start.motion != "still":
-        hand[:, palm] = np.maximum(hand[:, palm] + PALM_OF_ITS_OWN_DEG * swell, 0.0)
+        cupped_deg = CUPPED_ON_PURPOSE_DEG if start.motion == "palm" else PALM_OF_ITS_OWN_DEG
+        hand[:, palm] = np.maximum(hand[:, palm] + cupped_deg * swell, 0.0)
     return hand, poses if start.motion == "poses" else ("",) * len(poses)

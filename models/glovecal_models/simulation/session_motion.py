@@ -2,7 +2,8 @@
 
 Natural motion takes the postures of ``free_motion`` at the pace of everyday use (near 40 degrees a second
 RMS, with holds). The others are takes made to tell causes apart: fast oscillation, ramps at two speeds with
-inner loops and holds, one finger at a time, repeated poses, a hand that lies still.
+inner loops and holds, one finger at a time, a palm that is cupped while the fingers keep still, repeated
+poses, a hand that lies still.
 """
 
 from __future__ import annotations
@@ -67,6 +68,7 @@ def take_segment(motion: TakeMotion, duration_s: float, random: np.random.Genera
         "ramps": _ramps,
         "holds": _holds,
         "one_finger": _one_finger,
+        "palm": _still_fingers,
         "poses": _poses,
     }
     return Segment(motion, makers[motion](duration_s, random), Unrest(random))
@@ -162,6 +164,20 @@ def _one_finger(duration_s: float, random: np.random.Generator) -> HandMotion:
         [""] * len(postures),
         hold_s=[0.5, *[0.0] * (len(postures) - 2), 0.5],
         move_s=[move] * (len(postures) - 1),
+        random=random,
+    )
+
+
+def _still_fingers(duration_s: float, random: np.random.Generator) -> HandMotion:
+    """Flat, half bent, and with the thumb across; the palm is cupped in each of them."""
+    flat, bent = posture_vector(POSTURES["flat"]), posture_vector(POSTURES["rest"]) + 10
+    across = flat.copy()
+    across[DRIVEN.index("T_TMC")] = ACTIVE_RANGE_DEG["T_TMC"][1]
+    return PostureSequence(
+        within_range(np.array([flat, bent, across])),
+        [""] * 3,
+        hold_s=[(duration_s - 2.0) / 3] * 3,
+        move_s=[1.0] * 2,
         random=random,
     )
 

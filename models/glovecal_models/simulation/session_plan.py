@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 
-TakeMotion = Literal["natural", "fast", "ramps", "holds", "one_finger", "poses", "still"]
-TAKE_MOTIONS: tuple[TakeMotion, ...] = ("natural", "fast", "ramps", "holds", "one_finger", "poses", "still")
+TakeMotion = Literal["natural", "fast", "ramps", "holds", "one_finger", "poses", "still", "palm"]
+TAKE_MOTIONS: tuple[TakeMotion, ...] = get_args(TakeMotion)
 SHORTEST_TAKE_S = 5.0
 FIVE_SENSORS = ("I_MCP", "I_PIP", "M_MCP", "M_PIP", "R_MCP")
 

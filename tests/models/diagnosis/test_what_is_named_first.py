@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from glovecal_models.diagnosis.confidence_set import beside_findings
+from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.naming import Naming, beside_wholes, saved_share_of
 from glovecal_models.diagnosis.signatures import is_outweighed, may_explain
 from glovecal_models.diagnosis.text import part_sentence
@@ -15,6 +16,9 @@ from glovecal_models.effects.base.assessment import Assessment, JointErrors
 from glovecal_models.effects.base.signature_effect import Finding
 from glovecal_models.effects.catalogue import catalogue, effect
 from glovecal_models.layout import Layout
+from glovecal_models.simulation.causes.form import Cause
+from glovecal_models.simulation.session import record_session
+from glovecal_models.simulation.session_plan import SessionPlan
 
 BLOCKS = 12
 
@@ -103,3 +107,15 @@ def test_a_ranked_effect_that_is_no_rival_of_a_finding_stays_alone():
     found = naming(ranked("lag", 0.3))
     fault = Finding("sensor_fault", ("J0",), "it jumps", rivals=("hysteresis",))
     assert beside_findings(found, [fault], layout) == found
+
+
+def test_repeated_frames_are_dropped_before_a_take_is_asked_for_that_tells_apart_what_they_look_like():
+    causes = [Cause("repeated_samples", "padded_at_random", strength_deg=1.0)]
+    plan = SessionPlan(seed=3, rate_hz=100.0, bits=12, wearings=2, takes_per_wearing=3, take_s=25.0)
+    document = {"name": "five", "sensors": list(plan.sensors)}
+    layout = Layout.from_document(document | {"rotations": {name: [name] for name in plan.sensors}})
+    found = diagnose(record_session(plan, causes).takes, layout)
+    assert found.named is not None
+    assert found.named.confidence_set == ("repeated_samples",)
+    assert len(found.naming.confidence_set) > 1, "a delay, as far as the error tells"
+    assert found.next_take is None or not set(found.next_take.separates) & set(found.naming.confidence_set)

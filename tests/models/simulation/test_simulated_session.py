@@ -118,7 +118,7 @@ def test_natural_motion_has_the_speed_of_everyday_use_and_rests():
 
 
 def test_motions_differ_as_their_names_say():
-    session = record_session(SessionPlan(seed=6, wearings=1, takes_per_wearing=7, motions=TAKE_MOTIONS))
+    session = record_session(SessionPlan(seed=6, wearings=1, takes_per_wearing=8, motions=TAKE_MOTIONS))
     truth = dict(zip(TAKE_MOTIONS, session.truth, strict=True))
     take = dict(zip(TAKE_MOTIONS, session.takes, strict=True))
     speed = {motion: speed_deg_s(angles, 60.0) for motion, angles in truth.items()}
@@ -139,6 +139,15 @@ def test_motions_differ_as_their_names_say():
     assert (index & middle).mean() < 0.1 * index.mean()
     held = truth["ramps"][-19 * 60 :]
     assert (np.abs(np.diff(held, axis=0)).max(axis=1) * 60 < 25).mean() > 0.85
+
+
+def test_a_palm_is_cupped_while_the_fingers_keep_still():
+    sensors = ("I_MCP", "I_PIP", "PALM_ARCH")
+    plan = SessionPlan(seed=6, sensors=sensors, wearings=1, takes_per_wearing=2, motions=("palm", "natural"))
+    truth = record_session(plan).truth
+    speed = [np.abs(np.diff(angles, axis=0)).mean(axis=0) for angles in truth]
+    assert np.ptp(truth[0][:, 2]) > 12
+    assert np.all(speed[0][:2] < 0.4 * speed[1][:2])
 
 
 def test_fast_oscillation_lies_between_2_and_3_5_hz():

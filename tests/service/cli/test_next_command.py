@@ -53,6 +53,7 @@ def test_an_association_has_its_command():
     ("motion", "command"),
     [
         ("ramps", "glovecal record GLOVE ramps --seconds 40"),
+        ("palm", "glovecal record GLOVE palm --seconds 40"),
         ("one_finger", "glovecal record GLOVE one-finger --seconds 40"),
         ("more_wearings", "glovecal record GLOVE free-motion --seconds 40"),
         ("taps", "glovecal take latency GLOVE"),

@@ -21,6 +21,12 @@ ONE_FINGER = Motion(
     "Rest the hand on a table and move one finger after another while the others lie still.",
     30,
 )
+CUPPED_PALM = Motion(
+    "palm",
+    "Cup the palm and flatten it again, as far as it goes, every few seconds, while the fingers keep still:"
+    " straight first, then half bent, then with the thumb laid across the palm.",
+    40,
+)
 SHUFFLED = Motion(
     "shuffled",
     "Set the same angles once more, in another order, without touching the mounting.",
