@@ -93,10 +93,16 @@ def test_clocks_are_measured_told_and_kept_with_the_takes(
             with pytest.raises(QueryRefused, match="no command 'format'"):
                 ask_json(session, f"{keys[hand].control}?do=format", timeout_s=20)
         with in_process_client(settings) as rest:
-            answers = rest.post("/glove-commands", {"gloves": ["left", "right"]})["answers"]
-            assert [item["problem"] for item in answers] == [
-                "the glove records on its card: stop that before 'status'"
-            ] * 2
+
+            def refused() -> bool:
+                """Not yet where a glove is just being opened again, as happens on a busy computer."""
+                answers = rest.post("/glove-commands", {"gloves": ["left", "right"]})["answers"]
+                return all(
+                    item["problem"] == "the glove records on its card: stop that before 'status'"
+                    for item in answers
+                )
+
+            eventually(refused, "both gloves answer that they record on their card")
         asked = {hand: store.recordings.request(hand, name="both") for hand in gloves}
         for one in asked.values():
             recorded = lambda one=one: store.recordings.get(one.id).facts.get("recorded", 0)  # noqa: E731
