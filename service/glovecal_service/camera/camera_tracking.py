@@ -9,7 +9,6 @@ from __future__ import annotations
 import secrets
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from importlib import metadata
@@ -24,12 +23,10 @@ from glovecal_client.errors import CaptureRefused
 from glovecal_client.pictures.source import PictureSource
 from glovecal_client.wire.pose import Pose, PoseFlag, RotationFlag, encode_pose
 from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS
-from glovecal_models.colour_glove.pictures.classify import ColourTable
-from glovecal_models.colour_glove.pictures.white_balance import Gains, blind_gains
-from glovecal_models.colour_glove.pose.error_learning import drawn_colours
 from glovecal_models.colour_glove.pose_estimate import STAGES, PoseEstimate
 from glovecal_models.errors import BadInput, Cancelled
 from glovecal_service.camera.camera_health import HAND, NO_HAND, CameraHealth
+from glovecal_service.camera.camera_light import CameraLight
 from glovecal_service.camera.camera_link import CameraAnswers, CameraLink
 from glovecal_service.camera.camera_settings import CameraSettings
 from glovecal_service.camera.drawn_view import SeenPicture, drawn_view
@@ -43,8 +40,6 @@ STATUS_EVERY_S = 1.0
 CHECK_EVERY_S = 0.2
 STALE_AFTER_S, STALE_AGAIN_S = 0.5, 1.0
 """As of a glove that is silent."""
-BALANCED_ON, APART_S = 4, 0.3
-"""Pictures from which the light's gains are told, and how far apart they are at least."""
 COMMANDS = {
     "stage": f"how far each picture is followed: {', '.join(STAGES)}",
     "balance": "tell the light's gains from the last pictures of the glove",
@@ -94,10 +89,7 @@ class CameraTracking:
         self._tracker: Tracker | None = None
         self._reader: PictureReader | None = None
         self._seen: SeenPicture | None = None
-        self._gains = Gains()
-        self._in_this_light: ColourTable | None = None
-        self._of_glove: deque[np.ndarray] = deque(maxlen=BALANCED_ON)
-        self._of_glove_s = 0.0
+        self._light = CameraLight()
         self._last: Pose | None = None
         self._last_s = self._stale_s = self._status_s = self._checked_s = 0.0
         self._no_pose = 0
@@ -167,7 +159,7 @@ class CameraTracking:
         pixels, tracker = taken.picture.pixels, self._tracker
         try:
             self._check_size(pixels)
-            labels = self._labels(pixels)
+            labels = self._light.labels(pixels, self._setup)
             self._kept.keep_labels(labels, self._source, taken.picture.monotonic_ns, taken.picture.wall_ns)
             self._check(pixels, labels)
             estimate = tracker.track([labels], taken.monotonic_ns / 1e9)
@@ -186,18 +178,6 @@ class CameraTracking:
         spent_ms = 1000 * (time.perf_counter() - began)
         latency_ms = self._publish(taken, estimate)
         self.health.note_pose(estimate, latency_ms, spent_ms)
-
-    def _labels(self, pixels: np.ndarray) -> np.ndarray:
-        assert self._setup is not None
-        if pixels.ndim == 2:
-            return pixels
-        now = time.monotonic()
-        if now - self._of_glove_s >= APART_S:
-            self._of_glove_s = now
-            self._of_glove.append(pixels)
-        if self._in_this_light is not None:
-            return self._in_this_light.labels(pixels)
-        return self._setup.colours.labels(self._gains.corrected(pixels))
 
     def _check(self, pixels: np.ndarray, labels: np.ndarray) -> None:
         """Now and then: it takes as long as looking the hand up."""
@@ -267,13 +247,10 @@ class CameraTracking:
         return self._balance(self._setup) if name == "balance" else self._choose_stage(self._setup, argument)
 
     def _balance(self, setup: TrackingSetup) -> dict[str, Any]:
-        pictures = list(self._of_glove)
-        gains, distance, before = blind_gains(pictures, setup.colours, setup.first.lookup)
-        own = self._settings.colours is not None  # a table from pictures cannot be drawn in another light
-        self._gains, self._in_this_light = gains, None if own else drawn_colours(setup.hand, gains)
+        found = self._light.balance(setup, own_colours=self._settings.colours is not None)
         self.health.forget_poses()
         self._link.publish_status()
-        return {**asdict(self._gains), "distance_px2": distance, "distance_before_px2": before}
+        return found
 
     def _choose_stage(self, setup: TrackingSetup, argument: str) -> dict[str, Any]:
         self._tracker = setup.tracker(argument)
@@ -318,7 +295,7 @@ class CameraTracking:
             "stamped_twice": self._status.duplicates,
             "dropped": missing,
             "reconnects": self._status.reconnects,
-            "gains": asdict(self._gains),
+            "gains": asdict(self._light.gains),
             "calibrated": self._setup is not None and self._setup.is_calibrated,
             "kept": settings.keep,
             "kept_pictures": self._kept.pictures,
