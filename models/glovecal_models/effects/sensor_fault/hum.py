@@ -5,7 +5,8 @@ tone is one sharp line in the spectrum; movement, tremor and every other effect 
 errors is averaged over pieces of takes (Bartlett 1950), and a line must stand out from the median around it.
 It must be in the readings, or else the reference hums; not in the joint's angle, or else the joint moves with
 it (a machine, a vibrating tool) and the sensor follows too weakly or too late; and not in other sensors, or
-else no sensor fails.
+else no sensor fails. Pieces in which a joint swings to and fro are left out: what a bend of a sensor, a delay
+or a neighbour makes of its swings are lines too, at multiples of their frequency.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ FEWEST_PIECES = 4
 SLOWEST_HZ = 4.0
 """Below, hands move."""
 AROUND_BINS = 20
+FEWEST_FRAMES = 8 * AROUND_BINS
 OVER_AROUND = 8.0
 """Times the median: noise averaged over four pieces gets there once in 10^9."""
 LINE_BINS = 2
@@ -34,6 +36,9 @@ IN_READINGS = 0.5
 """Of the line's power in the errors: the readings must have it."""
 IN_ANGLE = 0.25
 """Of the line's power in the errors, which the joint's angle may have at most."""
+SWING_HZ, SWING_DEG = 1.5, 3.0
+"""A joint swings where this frequency or a higher one is its strongest, with so many degrees RMS in all: free
+motion has its strongest below 0.7 Hz, fast swings at 2 to 3.5 Hz (simulated)."""
 OTHERS_SHARE = 0.25
 """Of the other sensors, which may have the line too."""
 
@@ -53,7 +58,8 @@ class Hum:
 
 def hums(sensors: Sequence[ReadingErrors | None]) -> list[Hum | None]:
     """For each sensor its strongest tone."""
-    found = [None if each is None else _tone(each) for each in sensors]
+    swings = _swinging([each for each in sensors if each is not None])
+    found = [None if each is None else _tone(each, swings) for each in sensors]
     return [
         None if tone is None or _is_common(tone, found[:place] + found[place + 1 :]) else tone
         for place, tone in enumerate(found)
@@ -66,14 +72,33 @@ def _is_common(tone: Hum, others: Sequence[Hum | None]) -> bool:
     return len(alike) > OTHERS_SHARE * len(others)
 
 
-def _tone(sensor: ReadingErrors) -> Hum | None:
-    frames = 2 * round(PIECE_S * sensor.rate_hz / 2)
-    if frames < 8 * AROUND_BINS:
+def _swinging(sensors: Sequence[ReadingErrors]) -> np.ndarray:
+    """(J,) for each whole piece of the takes: whether any joint swings in it."""
+    found = np.zeros(0, dtype=bool)
+    for sensor in sensors:
+        frames = _frames(sensor)
+        if frames < FEWEST_FRAMES:
+            continue
+        angles = np.concatenate([_pieces(part, frames) for part in sensor.angles])
+        power = _power(np.nan_to_num(angles), np.hanning(frames))
+        strongest_hz = np.fft.rfftfreq(frames, 1.0 / sensor.rate_hz)[power.argmax(axis=1)]
+        swings = (strongest_hz >= SWING_HZ) & (np.nan_to_num(angles).std(axis=1) >= SWING_DEG)
+        found = swings | (found if len(found) else False)
+    return found
+
+
+def _frames(sensor: ReadingErrors) -> int:
+    return 2 * round(PIECE_S * sensor.rate_hz / 2)
+
+
+def _tone(sensor: ReadingErrors, swings: np.ndarray) -> Hum | None:
+    frames = _frames(sensor)
+    if frames < FEWEST_FRAMES:
         return None
     window = np.hanning(frames)
     whole = [_pieces(part, frames) for part in sensor.errors]
     errors = np.concatenate(whole)
-    measured = np.isfinite(errors).all(axis=1)
+    measured = np.isfinite(errors).all(axis=1) & ~swings
     if measured.sum() < FEWEST_PIECES:
         return None
     power = _spectrum(errors[measured], window)
@@ -118,7 +143,12 @@ def _pieces(values: np.ndarray, frames: int) -> np.ndarray:
 
 def _spectrum(pieces: np.ndarray, window: np.ndarray) -> np.ndarray:
     """(F,) mean power of the pieces (J, N) without their straight lines."""
+    return np.mean(_power(pieces, window), axis=0)
+
+
+def _power(pieces: np.ndarray, window: np.ndarray) -> np.ndarray:
+    """(J, F) of each of the pieces (J, N) without its straight line."""
     place = np.arange(len(window)) - (len(window) - 1) / 2
     slope = pieces @ place / float(place @ place)
     level = pieces - pieces.mean(axis=1, keepdims=True) - slope[:, None] * place
-    return np.mean(np.abs(np.fft.rfft(level * window)) ** 2, axis=0)
+    return np.abs(np.fft.rfft(level * window)) ** 2
