@@ -25,9 +25,10 @@ from the whole hand. Sizes are multiples of the noise floor.
 Open forms were there while the diagnosis was made. Set-aside forms were written by two authors who saw \
 neither diagnosis nor limits; hashes were committed first. One, who saw no other form, wrote what is to be \
 met most often in a real glove: by the judgement of a third reader 39 of those 57 have the law of an open \
-form in another hand, and 18 are near relatives; they were asked once before, on earlier programs. The \
-other was told the laws of all forms there are and had to find other ones that one may really meet; these \
-were asked once. The parts below tell both apart. The clean twin is the same glove without the cause: a \
+form in another hand, and 18 are near relatives. The \
+other was told the laws of all forms there are and had to find other ones that one may really meet. Both \
+have been asked by several states of the programs since, and their figures read, so that they prove less \
+than at first. The parts below tell both apart. The clean twin is the same glove without the cause: a \
 sensor that lost the angle cannot be brought back to it. So the ceiling is asked of each repaired glove \
 that stays above 1.1 times its twin: "none" means that a black box on all that was recorded finds nothing \
 more.
