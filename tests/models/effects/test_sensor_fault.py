@@ -13,9 +13,6 @@ from glovecal_models.effects.base.signature_effect import Recorded, frames_insid
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.effects.sensor_fault.sensor_fault import SensorFault
 from glovecal_models.layout import Layout
-from glovecal_models.simulation.causes.form import Cause
-from glovecal_models.simulation.session import record_session
-from glovecal_models.simulation.session_plan import SessionPlan
 
 FAULT = SensorFault()
 
@@ -299,16 +296,6 @@ def in_first(takes, tone):
         replace(take, readings=np.round(take.readings + 2.0 * each * [1.0, 0.0, 0.0]))
         for take, each in zip(takes, tone, strict=True)
     ]
-
-
-@pytest.mark.parametrize("seed", [0, 5])
-def test_fast_swings_of_a_glove_that_is_late_are_no_hum(seed):
-    """The take that tells a lag from a latency."""
-    choices = {"rate_hz": 100.0, "nuisance": "white", "wearings": 2, "takes_per_wearing": 2, "take_s": 25.0}
-    plan = SessionPlan(seed=seed, **choices)
-    session = record_session(plan, [Cause("glove_latency", "transport_delay", strength_deg=1.0)])
-    takes = [*session.takes, session.also("fast", 45.0, 1).take]
-    assert FAULT.find(takes, {name: name for name in plan.sensors}) == ()
 
 
 def test_what_all_sensors_or_the_reference_have_is_no_hum(glove):

@@ -97,10 +97,8 @@ def test_clocks_are_measured_told_and_kept_with_the_takes(
             def refused() -> bool:
                 """Not yet where a glove is just being opened again, as happens on a busy computer."""
                 answers = rest.post("/glove-commands", {"gloves": ["left", "right"]})["answers"]
-                return all(
-                    item["problem"] == "the glove records on its card: stop that before 'status'"
-                    for item in answers
-                )
+                sentence = "the glove records on its card: stop that before 'status'"
+                return [item["problem"] for item in answers] == [sentence] * 2
 
             eventually(refused, "both gloves answer that they record on their card")
         asked = {hand: store.recordings.request(hand, name="both") for hand in gloves}
