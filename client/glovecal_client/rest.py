@@ -1,7 +1,7 @@
 """The REST client: everything the ``glovecal`` command asks of the service, and what scripts need.
 
 httpx does the HTTP (streamed uploads, pluggable transports: the same client speaks to an application inside
-its own process). It is an extra, ``pip install 'glovecal-client[rest]'``, imported when first needed.
+its own process). It is in the extra ``[rest]``, imported when first needed.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from urllib.parse import quote, urlsplit
 
 from glovecal_client.errors import BadName, ClientError, ServiceError
 from glovecal_client.frames_to_predict import frames_to_predict
+from glovecal_client.installation import not_installed
 from glovecal_client.layout_file import is_json, layout_name
 
 if TYPE_CHECKING:
@@ -278,7 +279,5 @@ def _import_httpx() -> Any:
     try:
         import httpx
     except ModuleNotFoundError as error:
-        raise ClientError(
-            "the REST client needs httpx: pip install 'glovecal-client[rest]' (or httpx)"
-        ) from error
+        raise ClientError(not_installed("the REST client", "httpx")) from error
     return httpx

@@ -130,7 +130,7 @@ def improve(
 
     ``layout`` and ``method`` as for ``train``. Errors are on ``held_out`` when it is given, else on takes
     held out of each fit. At most ``max_steps`` effects are added.
-    ``ceiling``: see whether anything is left to gain at the end (pip extra ``ceiling``).
+    ``ceiling``: see whether anything is left to gain at the end (extra ``ceiling``).
     Raises NotTrainable, BadInput, Cancelled.
     """
     from glovecal_models.calibration.training_settings import TrainingSettings

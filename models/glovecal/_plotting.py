@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from glovecal_models.installation import not_installed
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -19,9 +21,7 @@ def axes_for(ax: Axes | None, rows: int = 6) -> Axes:
     try:
         from matplotlib import pyplot
     except ImportError as error:
-        raise ImportError(
-            "plot() needs matplotlib, which is not installed: pip install matplotlib"
-        ) from error
+        raise ImportError(not_installed("plot()", "matplotlib")) from error
     _, new = pyplot.subplots(figsize=(7.0, 1.4 + 0.32 * rows), layout="constrained")
     return new
 

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
+from glovecal_models.installation import not_installed
+
 Cell = str | int | float | bool | None
 MOST_ROWS, MOST_COLUMNS = 60, 12
 """What is printed; a frame holds everything."""
@@ -81,9 +83,7 @@ class Table:
         try:
             pandas = import_module("pandas")
         except ImportError as error:
-            raise ImportError(
-                "to_frame() needs pandas, which is not installed: pip install pandas"
-            ) from error
+            raise ImportError(not_installed("to_frame()", "pandas")) from error
         return pandas.DataFrame(list(self.rows), columns=list(self.names))
 
     def _printed(self) -> tuple[list[str], list[list[str]], list[bool]]:

@@ -12,6 +12,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from glovecal_client.errors import BadName, BadOption, DeviceError, UnknownDevice
+from glovecal_client.installation import not_installed
 from glovecal_client.names import check_channel_name
 from glovecal_client.wire.frame import MAX_CONTEXT, MAX_SENSORS
 
@@ -158,10 +159,7 @@ def _device_class(name: str) -> type[Device]:
             try:
                 return point.load()
             except ImportError as error:
-                raise DeviceError(
-                    f"device {name!r} cannot be loaded: {error}. A serial glove needs pyserial: "
-                    "pip install 'glovecal-client[capture]'"
-                ) from error
+                raise DeviceError(not_installed(f"device {name!r}", error.name or point.module)) from error
     known = device_names()
     near = difflib.get_close_matches(name, known, n=1)
     hint = f"did you mean {near[0]!r}?" if near else f"installed are {', '.join(known) or 'none'}"

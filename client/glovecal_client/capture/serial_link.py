@@ -8,6 +8,7 @@ import time
 from typing import Any
 
 from glovecal_client.errors import DeviceError, DeviceLost
+from glovecal_client.installation import not_installed
 
 _POLL_S = 0.02
 """Longest single wait for bytes; bounds how late a timeout is noticed."""
@@ -19,9 +20,7 @@ def import_pyserial() -> Any:
     try:
         import serial
     except ImportError as error:
-        raise DeviceError(
-            "a serial glove needs pyserial, which is not installed: pip install 'glovecal-client[capture]'"
-        ) from error
+        raise DeviceError(not_installed("a serial glove", "pyserial")) from error
     return serial
 
 

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from glovecal_client.errors import BadOption, DeviceError
+from glovecal_client.installation import not_installed
 
 LARGEST_CAMERA = 63
 
@@ -81,5 +82,5 @@ def opencv() -> Any:
     try:
         import cv2
     except ImportError as error:
-        raise DeviceError(f"pictures need OpenCV ({error}): pip install 'glovecal-client[camera]'") from error
+        raise DeviceError(not_installed("reading pictures", "opencv-python-headless")) from error
     return cv2

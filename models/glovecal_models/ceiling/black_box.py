@@ -15,6 +15,9 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from threadpoolctl import threadpool_limits
 
+from glovecal_models.errors import BadInput
+from glovecal_models.installation import not_installed
+
 RIDGE_SHARE = 0.02
 """Penalty as a share of the rows, for columns of standard deviation one."""
 PRODUCT_RIDGE_SHARES = (1e-3, 1e-2, 1e-1)
@@ -81,8 +84,10 @@ class _Box:
         self, columns: np.ndarray, target: np.ndarray, take: np.ndarray, seed: int,
         products: Sequence[tuple[int, ...]],
     ) -> None:  # fmt: skip
-        from sklearn.ensemble import HistGradientBoostingRegressor  # a second to import
-
+        try:
+            from sklearn.ensemble import HistGradientBoostingRegressor  # a second to import
+        except ModuleNotFoundError as error:
+            raise BadInput(not_installed("the ceiling", "scikit-learn")) from error
         self._products = products
         self._standard = _Standard(columns)
         x = self._standard.of(columns)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from glovecal_models.errors import BadInput, BadTakeTable
+from glovecal_models.installation import not_installed
 from glovecal_models.takes.raw_table import (
     MOST_CELLS,
     Column,
@@ -189,9 +190,7 @@ def load_pyarrow() -> Any:
         import pyarrow
         import pyarrow.parquet
     except ImportError as error:
-        raise BadInput(
-            "Parquet tables need pyarrow: pip install 'glovecal-models[parquet]' (or use CSV)"
-        ) from error
+        raise BadInput(f"{not_installed('a Parquet table', 'pyarrow')} (or use CSV)") from error
     return pyarrow
 
 

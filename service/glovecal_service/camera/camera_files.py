@@ -10,6 +10,7 @@ from typing import Literal, get_args
 from glovecal_client.private_files import PRIVATE_FOLDER
 from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier
+from glovecal_service.camera.packages import camera_not_installed
 from glovecal_service.store.errors import NotFound
 
 Kind = Literal["colours", "calibrations"]
@@ -63,7 +64,7 @@ def _check(kind: Kind, file: Path) -> None:
         from glovecal_models.colour_glove.camera_file import read_cameras
         from glovecal_models.colour_glove.pictures.classify import ColourTable
     except ModuleNotFoundError as error:
-        raise BadInput(f"cameras need {error.name}: pip install 'glovecal-service[camera]'") from error
+        raise BadInput(camera_not_installed("a camera's file")) from error
     if kind == "colours":
         ColourTable.load(file)
     else:

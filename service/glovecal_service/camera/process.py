@@ -17,6 +17,7 @@ from glovecal_client.private_files import keep_private
 from glovecal_models.errors import GlovecalError
 from glovecal_models.threads import pin_blas_to_one_thread
 from glovecal_service.camera.camera_settings import CameraSettings
+from glovecal_service.camera.packages import camera_not_installed
 
 if TYPE_CHECKING:
     from glovecal_service.camera.camera_tracking import CameraSummary
@@ -30,7 +31,7 @@ def run_camera(settings: CameraSettings, stop: threading.Event) -> CameraSummary
     try:
         from glovecal_service.camera.camera_tracking import CameraTracking
     except ModuleNotFoundError as error:
-        raise DeviceError(f"a camera needs {error.name}: pip install 'glovecal-service[camera]'") from error
+        raise DeviceError(camera_not_installed("a camera")) from error
     keep_private()
     pin_blas_to_one_thread()
     sys.setswitchinterval(GIL_SWITCH_S)

@@ -26,6 +26,7 @@ from sqlalchemy.exc import (
     StatementError,
 )
 
+from glovecal_client.installation import not_installed
 from glovecal_models.errors import BadInput
 from glovecal_service.store.errors import StorageFull, StoreDamaged, StoreUnavailable
 from glovecal_service.store.json_text import json_text
@@ -105,7 +106,9 @@ def _engine(url: str) -> Engine:
         if parsed.drivername not in ("sqlite", "sqlite+pysqlite", "postgresql+psycopg"):
             raise ArgumentError(f"driver {parsed.drivername!r} is not supported")
         engine = create_engine(parsed, pool_pre_ping=True, json_serializer=json_text, max_overflow=40)
-    except (ArgumentError, NoSuchModuleError, ModuleNotFoundError) as error:
+    except ModuleNotFoundError as error:
+        raise BadInput(not_installed("GLOVECAL_DATABASE with PostgreSQL", "psycopg[binary]")) from error
+    except (ArgumentError, NoSuchModuleError) as error:
         raise BadInput(
             f"GLOVECAL_DATABASE: {error}; use sqlite:///FILE or postgresql+psycopg://USER@HOST/DATABASE"
         ) from error

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from glovecal_service.camera.packages import camera_not_installed
 from glovecal_service.cli.terminal.refusal import Refusal
 
 
@@ -14,7 +15,4 @@ def camera_extra() -> Iterator[None]:
     try:
         yield
     except ModuleNotFoundError as error:
-        raise Refusal(
-            f"the colour glove needs {error.name}, which is not installed: "
-            "pip install 'glovecal-service[camera]'"
-        ) from error
+        raise Refusal(camera_not_installed("the colour glove")) from error
