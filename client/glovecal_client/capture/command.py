@@ -10,6 +10,7 @@ import textwrap
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from importlib.metadata import version
 from pathlib import Path
 
 from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings, CaptureSummary
@@ -122,6 +123,7 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     installed = ", ".join(device_names())
+    parser.add_argument("--version", action="version", version=f"glovecal-capture {version('glovecal-client')}")
     parser.add_argument("--device", required=True, help=f"NAME or NAME:ARGUMENT; installed: {installed}")
     parser.add_argument(
         "--option", action="append", default=[], metavar="KEY=VALUE", help="for the device, see below"
