@@ -52,7 +52,7 @@ def run(*command: str, groups: tuple[str, ...] = (), dev: bool = False, beside: 
 
     ``beside``: folders whose modules a script may import beside its own.
     """
-    options = ["run", "--frozen", "--all-packages", "--no-default-groups"]
+    options = ["run", "--frozen", "--all-packages", "--all-extras", "--no-default-groups"]
     for group in (*groups, *(("dev",) if dev else ())):
         options += ["--group", group]
     if SMOKE in sys.argv:
