@@ -28,11 +28,11 @@ class FrameLog:
     def __init__(self, path: Path, file: FileIO, meta: dict[str, Any], records: int, end: int) -> None:
         self.path = path
         self.meta = meta
-        self.records = records
+        self.records: int = records
         """Records in the file."""
-        self.good_bytes = end
+        self.good_bytes: int = end
         """Where the last whole record ends."""
-        self.lost_records = 0
+        self.lost_records: int = 0
         """Records given up because the disk stayed full for too long."""
         self._file = file
         self._waiting: deque[bytes] = deque()

@@ -39,7 +39,7 @@ class Refused(ServiceError):
 
     def __init__(self, status: int, title: str, detail: str, problem: Mapping[str, Any]) -> None:
         super().__init__(status, title, detail)
-        self.problem = dict(problem)
+        self.problem: dict[str, Any] = dict(problem)
 
     def __str__(self) -> str:
         return self.detail or self.title
@@ -64,7 +64,7 @@ class RestClient:
         if parts.scheme not in ("http", "https") or not parts.netloc:
             raise BadName(f"{url!r} is not the address of a service; write it like http://127.0.0.1:8600")
         httpx = _import_httpx()
-        self.url = url.rstrip("/")
+        self.url: str = url.rstrip("/")
         self.warnings: list[str] = []
         """What answers said in ``Warning`` headers, each once: rows of a list that are damaged."""
         self._http = httpx.Client(

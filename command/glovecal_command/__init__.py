@@ -1,4 +1,4 @@
-"""The command ``glovecal`` of the distribution ``glovecal``: the service's, or a sentence where it is missing.
+"""The command ``glovecal`` of the distribution ``glovecal``: the service's, or a sentence if it is missing.
 
 ``pip install glovecal`` brings the client alone, ``glovecal[service]`` what this command needs; tools that
 install one distribution for its commands (uv tool, pipx) take them from the one that was named.

@@ -123,7 +123,9 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     installed = ", ".join(device_names())
-    parser.add_argument("--version", action="version", version=f"glovecal-capture {version('glovecal-client')}")
+    parser.add_argument(
+        "--version", action="version", version=f"glovecal-capture {version('glovecal-client')}"
+    )
     parser.add_argument("--device", required=True, help=f"NAME or NAME:ARGUMENT; installed: {installed}")
     parser.add_argument(
         "--option", action="append", default=[], metavar="KEY=VALUE", help="for the device, see below"

@@ -24,7 +24,7 @@ class LogFolder:
 
     def __init__(self, data: Path, keys: GloveKeys) -> None:
         """Create the folder if needed and lock it. Raises CaptureRefused."""
-        self.path = data / "capture" / keys.site / keys.glove
+        self.path: Path = data / "capture" / keys.site / keys.glove
         try:
             self.path.mkdir(parents=True, exist_ok=True)
             with suppress(PermissionError):  # a file system without permissions takes recordings all the same

@@ -21,7 +21,7 @@ class ReopeningDevice:
         self._pause_s = _FIRST_PAUSE_S
         self._next_try = 0.0
         self.is_open = False
-        self.openings = 0
+        self.openings: int = 0
         """How often it was opened."""
 
     def read(self, timeout_s: float) -> Reading | None:
@@ -58,6 +58,6 @@ class ReopeningDevice:
 
     def close(self) -> None:
         """Close the device; one that is gone may complain, which tells nothing new."""
-        self.is_open = False
+        self.is_open: bool = False
         with contextlib.suppress(Exception):
             self._device.close()

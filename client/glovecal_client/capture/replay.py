@@ -19,7 +19,7 @@ class ReplayDevice:
     A reading that is missing in the recording comes as NaN, for the daemon to refuse and count.
     """
 
-    option_help: ClassVar = {
+    option_help: ClassVar[dict[str, str]] = {
         "speed": "TIMES (1 is as recorded)",
         "loop": "yes|no (no)",
         "layout": "NAME (as in the recording)",
@@ -36,13 +36,13 @@ class ReplayDevice:
         self._speed = speed
         self._loop = loop
         self._frames: Iterator[ReplayedFrame] | None = None
-        self.name = f"replay:{path.name}"
-        self.layout = layout or self._recording.layout
-        self.sensors = self._recording.sensors
-        self.context = self._recording.context
-        self.hand = self._recording.hand
-        self.simulated = self._recording.simulated
-        self.rate_hz = nominal_rate_hz(self._recording) * speed
+        self.name: str = f"replay:{path.name}"
+        self.layout: str = layout or self._recording.layout
+        self.sensors: tuple[str, ...] = self._recording.sensors
+        self.context: tuple[str, ...] = self._recording.context
+        self.hand: str = self._recording.hand
+        self.simulated: bool = self._recording.simulated
+        self.rate_hz: float = nominal_rate_hz(self._recording) * speed
         self._count = sum(1 for _ in self._recording.frames())
 
     @classmethod

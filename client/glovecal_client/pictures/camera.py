@@ -16,7 +16,7 @@ class CameraPictures:
     simulated = False
 
     def __init__(self, number: int) -> None:
-        self.name = f"camera:{number}"
+        self.name: str = f"camera:{number}"
         self.rate_hz = USUAL_HZ
         self._number = number
         self._cv2 = opencv()
@@ -30,7 +30,7 @@ class CameraPictures:
             raise DeviceLost(f"{self.name} cannot be opened: is it plugged in, and free of other programs?")
         camera.set(self._cv2.CAP_PROP_BUFFERSIZE, 1)  # an old picture would have a new time stamp
         said = camera.get(self._cv2.CAP_PROP_FPS)
-        self.rate_hz = said if 1 <= said <= 1000 else USUAL_HZ
+        self.rate_hz: float = said if 1 <= said <= 1000 else USUAL_HZ
         self._camera = camera
 
     def read(self) -> Picture:

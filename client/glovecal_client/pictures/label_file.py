@@ -50,7 +50,9 @@ class LabelWriter:
             self._file = FileIO(path, "xb", opener=open_private)
         except FileExistsError as error:
             raise DeviceError(f"{path} exists already; name a new file") from error
-        self.path, self.size, self.pictures = path, size, 0
+        self.path: Path = path
+        self.size: tuple[int, int] = size
+        self.pictures: int = 0
         self._append(MAGIC + _PAIR.pack(len(text), zlib.crc32(text)) + text)
 
     def write(self, labels: np.ndarray, monotonic_ns: int, wall_ns: int) -> None:
@@ -77,9 +79,10 @@ class LabelFilePictures:
     """A source whose pictures are label images, (H, W) uint8."""
 
     def __init__(self, path: Path) -> None:
-        self.name, self._path = f"labels:{path}", path
+        self.name: str = f"labels:{path}"
+        self._path = path
         self.simulated = False
-        self.rate_hz = 30.0
+        self.rate_hz: float = 30.0
         self._file: BinaryIO | None = None
 
     def open(self) -> None:
@@ -90,13 +93,13 @@ class LabelFilePictures:
         except OSError as error:
             raise DeviceLost(f"{self._path} cannot be read: {error.strerror or error}") from error
         try:
-            self.about = _header(file, self._path)
+            self.about: dict[str, Any] = _header(file, self._path)
         except DeviceLost:
             file.close()
             raise
         self._file, self._number = file, 0
         self._size = self.about["height"], self.about["width"]
-        self.simulated = self.about.get("simulated") is True
+        self.simulated: bool = self.about.get("simulated") is True
 
     def read(self) -> Picture:
         if self._file is None:

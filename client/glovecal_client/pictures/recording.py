@@ -71,7 +71,7 @@ class VideoRecording:
             while not self._stop.is_set():
                 self._writer.write(self._source.read())
         except (ClientError, OSError) as error:
-            self.problem = str(error)
+            self.problem: str = str(error)
 
 
 def describe_video(video: Path, source: PictureSource, pictures: int, problem: str, **facts: Any) -> Path:

@@ -20,7 +20,8 @@ class RenderedPictures:
     simulated = True
 
     def __init__(self, draw: Draw | None = None, rate_hz: float = 30.0, name: str = "rendered") -> None:
-        self.name, self.rate_hz = name, rate_hz
+        self.name: str = name
+        self.rate_hz: float = rate_hz
         self._draw = draw or sweeping_bar
         self._began_s: float | None = None
         self._number = 0

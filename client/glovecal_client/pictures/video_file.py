@@ -34,7 +34,8 @@ class VideoWriter:
         for each in (path, times_path(path)):
             if each.exists():
                 raise DeviceError(f"{each} exists already; name a new file")
-        self.path, self.pictures = path, 0
+        self.path: Path = path
+        self.pictures: int = 0
         self._rate_hz = rate_hz
         self._cv2 = opencv()
         self._writer: Any = None
@@ -77,7 +78,8 @@ class VideoFilePictures:
     """A video that was written here, with its stamps; one without a table has none and is refused."""
 
     def __init__(self, path: Path) -> None:
-        self.name, self._path = f"video:{path}", path
+        self.name: str = f"video:{path}"
+        self._path = path
         self.about: dict[str, Any] = {}
         """What was said of it when it was recorded; empty where nothing is."""
         self.simulated = False
@@ -90,10 +92,10 @@ class VideoFilePictures:
         self.close()
         self._stamps = read_times(self._path)
         self.about = read_about(self._path)
-        self.simulated = self.about.get("simulated") is True
+        self.simulated: bool = self.about.get("simulated") is True
         if len(self._stamps) > 1:
             span_s = (self._stamps[-1][0] - self._stamps[0][0]) / 1e9
-            self.rate_hz = (len(self._stamps) - 1) / max(span_s, 1e-3)
+            self.rate_hz: float = (len(self._stamps) - 1) / max(span_s, 1e-3)
         video = self._cv2.VideoCapture(str(self._path))
         if not video.isOpened():
             raise DeviceLost(f"{self._path} cannot be read as a video")

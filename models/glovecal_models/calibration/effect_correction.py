@@ -29,7 +29,9 @@ class SignalScale:
     """Sensors in standard deviations, as effects see their neighbours; the same in training and serving."""
 
     def __init__(self, sensors: Sequence[str], centre: np.ndarray, scale: np.ndarray) -> None:
-        self.sensors, self.centre, self.scale = tuple(sensors), centre, np.maximum(scale, 1e-9)
+        self.sensors: tuple[str, ...] = tuple(sensors)
+        self.centre: np.ndarray = centre
+        self.scale: np.ndarray = np.maximum(scale, 1e-9)
 
     def others(self, readings: np.ndarray) -> dict[str, np.ndarray]:
         """Each sensor (N,), from ``readings`` (N, S) raw counts."""
@@ -104,9 +106,11 @@ class EffectCorrection:
         self._started_s: float | None = None
         self.faulty_sensors: tuple[str, ...] = ()
         """Those that fail in the last frame."""
-        self.context = tuple(dict.fromkeys(name for effect in self._effects for name in effect.context))
+        self.context: tuple[str, ...] = tuple(
+            dict.fromkeys(name for effect in self._effects for name in effect.context)
+        )
         """Context columns that the effects read."""
-        self.settling_s = max(
+        self.settling_s: float = max(
             (
                 effect.transient_s(item.shape[item.weights.any(axis=1)])
                 for effect, (item, _) in zip(self._effects, self._lanes, strict=True)

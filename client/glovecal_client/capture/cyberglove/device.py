@@ -51,12 +51,12 @@ class CyberGlove:
 
     name = "cyberglove"
     context: tuple[str, ...] = ()
-    counts = (1.0, 255.0)
+    counts: tuple[float, float] = (1.0, 255.0)
     option_help = OPTION_HELP
 
     def __init__(self, port: str | None = None, options: CyberGloveOptions | None = None) -> None:
         self.port = port
-        self.options = options or CyberGloveOptions()
+        self.options: CyberGloveOptions = options or CyberGloveOptions()
         self.layout = self.options.layout or "cyberglove18"
         self.sensors = SENSORS[self.layout]
         self.rate_hz = self.options.rate_hz or DEFAULT_RATE_HZ
@@ -143,9 +143,12 @@ class CyberGlove:
 
     def _adopt(self, identity: Identity, setup: StreamSetup, baud: int) -> None:
         self.identity = identity
-        self.layout, self.sensors = identity.layout, SENSORS[identity.layout]
-        self.hand, self.simulated = identity.hand, identity.simulated
-        self.rate_hz, self.notice = setup.rate_hz, setup.notice
+        self.layout: str = identity.layout
+        self.sensors: tuple[str, ...] = SENSORS[identity.layout]
+        self.hand: str = identity.hand
+        self.simulated: bool = identity.simulated
+        self.rate_hz: float = setup.rate_hz
+        self.notice: str = setup.notice
         if self.notice:
             _logger.warning("%s: %s", self.port, self.notice)
         self._index = np.array(layout_index(identity.sensors))

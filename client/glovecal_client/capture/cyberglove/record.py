@@ -83,9 +83,9 @@ class RecordReader:
 
     def __init__(self, record_format: RecordFormat) -> None:
         self.format = record_format
-        self.bad_frames = 0
-        self.resyncs = 0
-        self.skipped_bytes = 0
+        self.bad_frames: int = 0
+        self.resyncs: int = 0
+        self.skipped_bytes: int = 0
         self.errors: Counter[str] = Counter()
         self._buffer = bytearray()
         self._in_step = False

@@ -30,9 +30,9 @@ class CyberGlove3(StreamedGlove):
     """22 or 18 sensors, in the order of the layouts of CyberGlove I/II."""
 
     name = "cyberglove3"
-    counts = (1.0, float(LARGEST))
-    commands: ClassVar = COMMANDS
-    option_help: ClassVar = {
+    counts: tuple[float, float] | None = (1.0, float(LARGEST))
+    commands: ClassVar[dict[str, str]] = COMMANDS
+    option_help: ClassVar[dict[str, str]] = {
         "layout": f"{'|'.join(LAYOUTS)} (cyberglove3-22)",
         "multiplier": "1|2|3|4 (3): records for each frame of its clock; 4 may lose records over WiFi",
         "frame_rate": "HZ of its clock (30; other with an LTC signal)",
@@ -46,19 +46,19 @@ class CyberGlove3(StreamedGlove):
 
     def __init__(self, address: str, options: OptionValues) -> None:
         """Raises BadOption."""
-        self.baud = options.whole("baud", 115200, 1200, 3_000_000)
+        self.baud: int = options.whole("baud", 115200, 1200, 3_000_000)
         super().__init__(address, options)
-        self.layout = options.choice("layout", {name: name for name in LAYOUTS})
-        self.sensors = LAYOUTS[self.layout]
+        self.layout: str = options.choice("layout", {name: name for name in LAYOUTS})
+        self.sensors: tuple[str, ...] = LAYOUTS[self.layout]
         self._multiplier = options.whole("multiplier", 3, 1, 4)
         self._frame_rate = options.number("frame_rate", 30.0, 10.0, 60.0)
         self._by_its_clock = options.choice("clock", {"computer": False, "glove": True})
         self._set_destinations = options.choice("destinations", {"set": True, "leave": False})
         self._ask_battery = options.choice("battery", {"ask": True, "leave": False})
-        self.clock_kind = options.choice("timecode", {"none": "own", "ltc": "ltc"})
+        self.clock_kind: str = options.choice("timecode", {"none": "own", "ltc": "ltc"})
         self._on_card = False
         self._over_network = address.startswith("tcp:")
-        self.rate_hz = self._frame_rate * self._multiplier
+        self.rate_hz: float = self._frame_rate * self._multiplier
 
     def command(self, name: str, argument: str) -> dict[str, Any]:
         """One of ``card_commands``; the stream pauses meanwhile. Raises DeviceLost, BadOption.
@@ -80,7 +80,7 @@ class CyberGlove3(StreamedGlove):
             on, off = (b"w", b"u") if self._over_network else (b"u", b"w")
             replies += [command(link, b"1e" + on), command(link, b"1d" + off)]
         replies.append(command(link, b"1m" + bytes([self._multiplier])))
-        self.notice = "; ".join(_notices(volts, sum(not reply.echoed for reply in replies)))
+        self.notice: str = "; ".join(_notices(volts, sum(not reply.echoed for reply in replies)))
         link.write(START)
 
     def stop(self, link: Link) -> None:

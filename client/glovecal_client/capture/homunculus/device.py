@@ -26,8 +26,8 @@ class Homunculus(StreamedGlove):
 
     name = "homunculus"
     layout = "homunculus"
-    sensors = SENSORS
-    option_help: ClassVar = {
+    sensors: tuple[str, ...] = SENSORS
+    option_help: ClassVar[dict[str, str]] = {
         "largest": "the largest count of the converter (4095)",
         "rate": "HZ, how often it sends (60); only for times of lines that come together",
         "baud": "BAUD (115200)",
@@ -36,11 +36,11 @@ class Homunculus(StreamedGlove):
 
     def __init__(self, address: str, options: OptionValues) -> None:
         """Raises BadOption."""
-        self.baud = options.whole("baud", 115200, 1200, 3_000_000)
+        self.baud: int = options.whole("baud", 115200, 1200, 3_000_000)
         super().__init__(address, options)
-        self.rate_hz = options.number("rate", 60.0, 0.5, 1000.0)
+        self.rate_hz: float = options.number("rate", 60.0, 0.5, 1000.0)
         self._largest = options.whole("largest", 4095, 1, 65535)
-        self.counts = (0.0, float(self._largest))
+        self.counts: tuple[float, float] | None = (0.0, float(self._largest))
 
     def new_parser(self) -> StreamParser:
         return LineReader(self.parse_line, self.counters)

@@ -29,21 +29,24 @@ class LineGlove(StreamedGlove):
     """A glove as its description says."""
 
     name = "line"
-    option_help: ClassVar = {"port": "PORT|tcp:PORT|udp:PORT, where the glove is (required)", **COMMON_HELP}
+    option_help: ClassVar[dict[str, str]] = {
+        "port": "PORT|tcp:PORT|udp:PORT, where the glove is (required)",
+        **COMMON_HELP,
+    }
 
     def __init__(self, description: LineDescription, address: str, options: OptionValues) -> None:
         """Raises BadOption."""
-        self.baud = description.baud
+        self.baud: int = description.baud
         super().__init__(address, options)
         self._parse = DescribedLine(description)
         self._description = description
-        self.layout = description.layout
-        self.sensors = description.sensors
-        self.context = tuple(name for name, _, _ in description.context)
-        self.rate_hz = description.rate_hz
+        self.layout: str = description.layout
+        self.sensors: tuple[str, ...] = description.sensors
+        self.context: tuple[str, ...] = tuple(name for name, _, _ in description.context)
+        self.rate_hz: float = description.rate_hz
         if description.lowest is not None and description.highest is not None:
-            self.counts = (description.lowest, description.highest)
-        self.notice = f"readings in {description.unit}" if description.unit else ""
+            self.counts: tuple[float, float] | None = (description.lowest, description.highest)
+        self.notice: str = f"readings in {description.unit}" if description.unit else ""
 
     @classmethod
     def from_options(cls, argument: str | None, options: Mapping[str, str]) -> LineGlove:

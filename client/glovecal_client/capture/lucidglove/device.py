@@ -29,8 +29,8 @@ class LucidGlove(StreamedGlove):
     """Five flexion sensors; with ``sensors=splay`` or ``joints`` also those sent beside them."""
 
     name = "lucidglove"
-    rate_hz = 100.0
-    option_help: ClassVar = {
+    rate_hz: float = 100.0
+    option_help: ClassVar[dict[str, str]] = {
         "encoding": "alpha|legacy (alpha)",
         "sensors": f"{'|'.join(KEYS)} (flexion)",
         "largest": "4095 on an ESP32, 1023 on an AVR (4095)",
@@ -42,21 +42,21 @@ class LucidGlove(StreamedGlove):
 
     def __init__(self, address: str, options: OptionValues) -> None:
         """Raises BadOption."""
-        self.baud = options.whole("baud", 115200, 1200, 3_000_000)
+        self.baud: int = options.whole("baud", 115200, 1200, 3_000_000)
         super().__init__(address, options)
         largest = options.whole("largest", 4095, 1, 65535)
         chosen = options.choice("sensors", {name: name for name in KEYS})
         legacy = options.choice("encoding", {"alpha": False, "legacy": True})
         if legacy and chosen != "flexion":
             raise BadOption(f"lucidglove: encoding=legacy sends no {chosen}; leave sensors={chosen} out")
-        self.layout = options.text("layout", "lucidglove" if chosen == "flexion" else "")
+        self.layout: str = options.text("layout", "lucidglove" if chosen == "flexion" else "")
         if not self.layout:
             raise BadOption(
                 f"lucidglove: sensors={chosen} needs layout=NAME, a layout of your own with its sensors "
                 f"({', '.join(self._names(chosen))})"
             )
-        self.sensors = self._names(chosen)
-        self.counts = (0.0, float(largest))
+        self.sensors: tuple[str, ...] = self._names(chosen)
+        self.counts: tuple[float, float] | None = (0.0, float(largest))
         keys = KEYS["flexion"] | KEYS[chosen]
         self._parse = (
             LegacyLine(largest) if legacy else AlphaLine([keys[name] for name in self.sensors], largest)

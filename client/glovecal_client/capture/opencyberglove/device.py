@@ -23,10 +23,10 @@ class OpenCyberGlove(StreamedGlove):
 
     name = "opencyberglove"
     layout = "opencyberglove"
-    sensors = tuple(f"TENSILE_{number}" for number in range(SENSORS))
-    counts = (0.0, float(LARGEST))
-    rate_hz = 120.0
-    option_help: ClassVar = {
+    sensors: tuple[str, ...] = tuple(f"TENSILE_{number}" for number in range(SENSORS))
+    counts: tuple[float, float] | None = (0.0, float(LARGEST))
+    rate_hz: float = 120.0
+    option_help: ClassVar[dict[str, str]] = {
         "clock": f"{'|'.join(_TICKS_PER_SECOND)} (computer; microseconds are documented)",
         "context": "none|temperature_c (none; the packet's temperature is kept with each frame)",
         "baud": "BAUD (1000000)",
@@ -35,10 +35,12 @@ class OpenCyberGlove(StreamedGlove):
 
     def __init__(self, address: str, options: OptionValues) -> None:
         """Raises BadOption."""
-        self.baud = options.whole("baud", 1_000_000, 1200, 4_000_000)
+        self.baud: int = options.whole("baud", 1_000_000, 1200, 4_000_000)
         super().__init__(address, options)
         self._ticks_per_second = options.choice("clock", _TICKS_PER_SECOND)
-        self.context = options.choice("context", {"none": (), "temperature_c": ("temperature_c",)})
+        self.context: tuple[str, ...] = options.choice(
+            "context", {"none": (), "temperature_c": ("temperature_c",)}
+        )
 
     def new_parser(self) -> StreamParser:
         return PacketReader(self.counters, temperature=bool(self.context))

@@ -69,7 +69,7 @@ def place_of(address: str, baud: int, device: str) -> Place:
 class SerialPlace:
     """A serial port at one baud rate."""
 
-    silent_s = 0.4
+    silent_s: float = 0.4
 
     def __init__(self, path: str, baud: int) -> None:
         self.name = path
@@ -88,11 +88,11 @@ class TcpPlace:
     The port stays open when a glove is lost, so that one that connects only once is not turned away.
     """
 
-    silent_s = 5.0
+    silent_s: float = 5.0
     """Wireless networks pause; a connection that was closed is seen at once."""
 
     def __init__(self, host: str, port: int) -> None:
-        self.name = f"tcp:{host}:{port}"
+        self.name: str = f"tcp:{host}:{port}"
         self._address = host, port
         self._listener: socket.socket | None = None
 
@@ -146,10 +146,10 @@ class _TcpLink:
 class UdpPlace:
     """A port to which a glove sends datagrams. A glove is there when one has come."""
 
-    silent_s = 0.4
+    silent_s: float = 0.4
 
     def __init__(self, host: str, port: int) -> None:
-        self.name = f"udp:{host}:{port}"
+        self.name: str = f"udp:{host}:{port}"
         self._address = host, port
 
     def open(self) -> Link:

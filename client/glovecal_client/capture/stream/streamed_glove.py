@@ -44,7 +44,7 @@ class StreamedGlove:
     sensors: tuple[str, ...] = ()
     context: tuple[str, ...] = ()
     counts: tuple[float, float] | None = None
-    rate_hz = 60.0
+    rate_hz: float = 60.0
     baud = 115200
     clock_kind = "own"
     """Or "ltc": its clock follows a time code that other devices follow too."""
@@ -52,12 +52,12 @@ class StreamedGlove:
 
     def __init__(self, address: str, options: OptionValues) -> None:
         """Raises BadOption. A subclass reads its own options before or after this."""
-        self.hand = options.choice("hand", {name: name for name in ("unknown", "left", "right")})
-        self.simulated = options.choice("simulated", {"no": False, "yes": True}) or (
+        self.hand: str = options.choice("hand", {name: name for name in ("unknown", "left", "right")})
+        self.simulated: bool = options.choice("simulated", {"no": False, "yes": True}) or (
             PurePath(address).name.startswith(EMULATED_PREFIX)
         )
         self.notice = ""
-        self.counters = Counters()
+        self.counters: Counters = Counters()
         self._place: Place = place_of(address, self.baud, self.name)
         self._link: Link | None = None
         self._ready: deque[Reading] = deque()

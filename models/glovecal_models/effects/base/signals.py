@@ -59,7 +59,9 @@ class GloveFrames(Sequence[Signals]):
     ) -> None:
         """``time_s`` (G,) on each glove's own clock, ``own`` (G, L); ``others`` gives signals (G,) by name
         and is asked when they are needed; what follows is as in ``Signals``, glove by glove."""
-        self.time_s, self.own, self._others = time_s, own, others
+        self.time_s: np.ndarray = time_s
+        self.own: np.ndarray = own
+        self._others = others
         self._context, self._wearing, self._zero_deg = context, wearing, zero_deg
 
     def __len__(self) -> int:
