@@ -1,14 +1,13 @@
-"""BVH files hold against an independent reader (bvhio): its joints are where our kinematics put them."""
+"""BVH files hold against an independent reader (pybvh): its joints are where our kinematics put them."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
 
-import bvhio
 import numpy as np
+import pybvh
 import pytest
-from pyglm import glm
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
@@ -38,17 +37,14 @@ def moving(label: str = "R", palm: Palm = "rigid", count: int = 12) -> HandMotio
 
 
 def read(path: Path, frame: int) -> dict[str, np.ndarray]:
-    """(3,) mm of every joint and end as bvhio's own kinematics finds them."""
-    root = bvhio.readAsHierarchy(str(path))
-    rest = {joint.Name: joint.RotationWorld for joint, *_ in root.loadRestPose().layout()}
-    ends = {joint.Name: joint.EndSite for joint, *_ in bvhio.readAsBvh(str(path)).Root.layout()}
-    found = {}
-    for joint, *_ in root.loadPose(frame).layout():
-        found[joint.Name] = joint.PositionWorld
-        if ends[joint.Name] is not None:  # with its own axes turned as its bone is
-            turned = joint.RotationWorld * glm.inverse(rest[joint.Name])
-            found[f"{joint.Name}_End"] = joint.PositionWorld + turned * ends[joint.Name]
-    return {name: 10 * np.array(place.to_tuple()) for name, place in found.items()}
+    """(3,) mm of every joint and end as pybvh's own kinematics finds them."""
+    motion = pybvh.Bvh.from_file(path)
+    places = 10 * motion.node_positions(frame)
+    names = [
+        f"{node.parent.name}_End" if node.parent and node.is_end_site() else node.name
+        for node in motion.nodes
+    ]
+    return dict(zip(names, places, strict=True))
 
 
 @pytest.mark.parametrize("palm", ["rigid", "arching"])
