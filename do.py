@@ -15,6 +15,8 @@
                             study active: active sampling against the fixed protocol (half an hour);
                             study camera: a camera as the reference against true angles (half an hour);
                             study camera-errors: what the colour glove's tracker errs by (quarter of an hour)
+    python3 do.py fresh     demo and test on bare Debian systems, as a table (hours; needs root, debootstrap;
+                            fresh trixie -- tests/client: these tests only)
     python3 do.py picture   README's picture of the studio, from the running page (needs Chromium)
 
 uv is installed into .tools and the locked packages into .venv; nothing outside this folder is touched.
@@ -127,6 +129,11 @@ def picture(arguments: list[str]) -> int:
     return run("python", "tests/bench/studio_picture.py", *arguments, dev=True, beside=STUDIO)
 
 
+def fresh(arguments: list[str]) -> int:
+    """Needs no locked package: nothing is installed for it."""
+    return subprocess.run([sys.executable, "tests/fresh/fresh.py", *arguments], cwd=ROOT).returncode
+
+
 def docs(arguments: list[str]) -> int:
     """A warning is an error: a link that leads nowhere must not get into the site. docs FOLDER: elsewhere."""
     with tempfile.TemporaryDirectory() as temporary:
@@ -166,6 +173,7 @@ VERBS = {
     "bench": bench,
     "paper": paper,
     "study": study,
+    "fresh": fresh,
     "picture": picture,
     "docs": docs,
 }

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -29,6 +30,7 @@ VERBS = (
     "paper",
     "study",
     "study active",
+    "fresh",
 )
 
 
@@ -133,6 +135,12 @@ def test_study_of_active_sampling_compares_two_ways(smoke) -> None:
     said = smoke["study active"].result()
     errors = [said.number(rf"\| {way} \| \d+ \| \d+ \| ([\d.]+) ") for way in ("any step", "active")]
     assert all(0 < error < 90 for error in errors)
+
+
+def test_fresh_asks_a_new_clone(smoke, not_here: Callable[[str], NoReturn]) -> None:
+    if shutil.which("git") is None or not (ROOT / ".git").exists():
+        not_here("needs git and a checkout that can be cloned")
+    assert smoke["fresh"].result().number(r"\| ended with code (\d+), \d+ s \|") == 0
 
 
 def test_smoke_refuses_where_nothing_is_installed(tmp_path: Path) -> None:
