@@ -90,9 +90,12 @@ class SamplingRunner:
                 self._finish(store, live)
         except (StoreUnavailable, StorageFull, SQLAlchemyError, OSError):
             raise
+        except (GlovecalError, ClientError) as error:
+            self._give_up(store, live.record, str(error))
         except Exception as error:  # one sampling that fails must end neither the others nor this thread
             _log.exception("sampling %s fails", live.record.id)
-            self._give_up(store, live.record, str(error) or type(error).__name__)
+            what = f"an error in Glovecal itself ({type(error).__name__}): the service's log tells where"
+            self._give_up(store, live.record, what)
 
     def _recordings_are_done(self, store: Store, record: SamplingRecord) -> bool:
         """What waits for repair is used as it is, if there is anything."""
