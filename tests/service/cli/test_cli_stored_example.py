@@ -7,7 +7,6 @@ shift, a linear calibration with a declared effect, a diagnosis and a whole impr
 from __future__ import annotations
 
 import json
-import tarfile
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from cli_running import glovecal
+from unpacked_example import unpacked_example
 
 from glovecal_models.calibration import artifact
 from glovecal_models.calibration.predictor import GlovePredictor
@@ -33,10 +33,7 @@ EVERY_SO_MANY = 40
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    into = tmp_path_factory.mktemp("stored")
-    with tarfile.open(STORED / "data-2026-11-22.tar.xz") as packed:
-        packed.extractall(into, filter="data")
-    return into / "data"
+    return unpacked_example(tmp_path_factory.mktemp("stored"))
 
 
 @pytest.fixture(scope="module")

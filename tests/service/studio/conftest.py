@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import shutil
 import sys
-import tarfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -19,22 +18,20 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from realtime_support import free_endpoint, part_of_service, store_model
 from studio_support import Open, Opened, running_browser
+from unpacked_example import unpacked_example
 
 from glovecal_service.serve import real_time, web
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 
-STORED = Path(__file__).parents[1] / "stored_example" / "data-2026-11-22.tar.xz"
 HARMLESS = "GPU stall due to ReadPixels"
 
 
 @pytest.fixture(scope="package")
 def settings(tmp_path_factory: pytest.TempPathFactory) -> Settings:
-    folder = tmp_path_factory.mktemp("studio")
-    with tarfile.open(STORED) as packed:
-        packed.extractall(folder, filter="data")
+    data = unpacked_example(tmp_path_factory.mktemp("studio"))
     port = int(free_endpoint().rpartition(":")[2])
-    return Settings(data=folder / "data", zenoh=free_endpoint(), port=port, workers=1)
+    return Settings(data=data, zenoh=free_endpoint(), port=port, workers=1)
 
 
 @pytest.fixture(scope="package")
