@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
+import sysconfig
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NoReturn
@@ -19,7 +21,8 @@ sys.dont_write_bytecode = False
 MASK = os.umask(0o022)
 os.umask(MASK)
 SAFE_PATH = "PYTHONSAFEPATH"
-
+OURS = {"tests", "docs", "pytest", "_pytest"}
+"""pytest warns of what tests leave behind."""
 
 COMPUTING = ("models", "paper", "study", "architecture")
 
@@ -37,6 +40,18 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         path: (number + 0.5) / len(paths) for paths in kinds.values() for number, path in enumerate(paths)
     }
     items[:] = [item for path in sorted(files, key=place.__getitem__) for item in files[path]]
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """A warning in our lines is an error; one in the lines of what is installed is told and fails nothing.
+
+    What was not closed is noticed anywhere: that stays an error.
+    """
+    installed = {path.name.partition(".")[0] for path in Path(sysconfig.get_path("purelib")).iterdir()}
+    names = "|".join(re.escape(name) for name in installed if name.isidentifier() and name not in OURS)
+    theirs = rf"({names})(\.|\Z)|.*[\\/]site-packages[\\/]"  # by its path where it is being compiled
+    config.addinivalue_line("filterwarnings", f"default:::{theirs}")
+    config.addinivalue_line("filterwarnings", "error::ResourceWarning")
 
 
 @pytest.fixture(autouse=True)
