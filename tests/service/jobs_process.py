@@ -27,4 +27,5 @@ if __name__ == "__main__":
         import distributed  # noqa: F401  # whole here, and replaced by what lies in that folder for children
 
         os.environ["PYTHONPATH"] = of_children[0]
+        sys.path.insert(0, of_children[0])  # newer Pythons hand this to children instead
     run_jobs(Settings(data=Path(data), database=database or None, artifacts=None, scheduler=None, workers=1))
