@@ -7,6 +7,7 @@
     │   └── NotTrainable    the samples cannot carry a model (too few, constant, NaN ...)
     ├── DamagedArtifact     a stored file is not what it was when it was written
     ├── LayoutMismatch      readings or takes of one layout given to a model of another
+    ├── WorkerDied          a process of a long computation was ended from outside, or could not be started
     └── Cancelled           the user stopped a long computation
 
 Messages name the thing, the value and what would be right.
@@ -70,6 +71,10 @@ class DamagedArtifact(GlovecalError):
 
 class LayoutMismatch(BadInput):
     """Readings or takes of one layout were given to a model of another."""
+
+
+class WorkerDied(GlovecalError):
+    """A worker process was ended from outside (memory ran out), or could not be started."""
 
 
 class Cancelled(GlovecalError):

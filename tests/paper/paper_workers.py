@@ -2,104 +2,59 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from multiprocessing import get_context
-from queue import Empty
-from typing import Any
+from dataclasses import dataclass, field
+from functools import partial
 
 from paper_job import PaperJob, PaperResult, run_job
 
-from glovecal_models.threads import begin_worker
+from glovecal_models.worker_processes import work_off as work_off_tasks
 
-LOOK_S = 0.5
-LOG_EVERY_S = 20.0
-
-_told: Any = None
-"""Of a worker: the queue to the parent, (job, sentence, fraction)."""
+EVERY_S = 20.0
+"""How often a job that runs says how far it is."""
 
 
 def work_off(
     jobs: Sequence[PaperJob], seed: int, quick: bool, workers: int, keep: Callable[[PaperResult], None]
 ) -> list[str]:
     """Run all jobs and ``keep`` each result at once; the names of those that failed, already reported."""
-    if not jobs:
-        return []
-    context = get_context("spawn")
-    told = context.Queue()
-    progress, failed = _Progress(len(jobs)), []
-    with ProcessPoolExecutor(workers, context, _start_worker, (told,)) as pool:
-        running: dict[Future[PaperResult], PaperJob] = {}
-        waiting = list(jobs)
-        while waiting or running:
-            while waiting and len(running) < workers:  # no more, so that Ctrl-C has little to wait for
-                job = waiting.pop(0)
-                running[pool.submit(_run, job, seed, quick)] = job
-            for future in wait(running, LOOK_S, FIRST_COMPLETED).done:
-                job, problem = running.pop(future), future.exception()
-                if problem is None:
-                    keep(future.result())
-                    progress.done(job.name, f"took {future.result().took_s:.0f} s")
-                else:
-                    failed.append(job.name)
-                    progress.done(job.name, f"failed: {type(problem).__name__}: {problem}")
-            progress.show(_latest(told))
+    failed = []
+
+    def take(number: int, result: PaperResult | str) -> None:
+        name = jobs[number].name
+        if isinstance(result, str):
+            failed.append(name)
+            _say(f"{name}: failed: {result}")
+        else:
+            keep(result)
+            _say(f"{name}: took {result.took_s:.0f} s")
+
+    work_off_tasks(partial(_run, seed=seed, quick=quick), jobs, workers, take, "the paper's figures")
     return failed
 
 
-def _start_worker(told: Any) -> None:
-    global _told
-    _told = told
-    begin_worker()
+def _run(job: PaperJob, seed: int, quick: bool) -> PaperResult | str:
+    _say(f"{job.name}: begins")
+    try:
+        return run_job(job, seed, quick, _Progress(job.name))
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
 
 
-def _run(job: PaperJob, seed: int, quick: bool) -> PaperResult:
-    _told.put((job.name, "begins", 0.0))
-    return run_job(job, seed, quick, lambda sentence, share: _told.put((job.name, sentence, share)))
-
-
-def _latest(told: Any) -> dict[str, tuple[str, float]]:
-    """What each job said last."""
-    said: dict[str, tuple[str, float]] = {}
-    while True:
-        try:
-            job, sentence, share = told.get_nowait()
-        except Empty:
-            return said
-        said[job] = (sentence, share)
-
-
+@dataclass
 class _Progress:
-    """One line on a terminal; now and then a line in a log."""
+    """A line now and then, on standard error, by the process that works on the job."""
 
-    def __init__(self, total: int) -> None:
-        self._total, self._finished = total, 0
-        self._now: dict[str, tuple[str, float]] = {}
-        self._over: set[str] = set()
-        self._shown_s, self._is_terminal = 0.0, sys.stderr.isatty()
+    job: str
+    said_s: float = field(default_factory=time.monotonic)
 
-    def show(self, said: dict[str, tuple[str, float]]) -> None:
-        begun = [job for job in said if job not in self._now]
-        self._now |= {job: what for job, what in said.items() if job not in self._over}
-        every_s = LOOK_S if self._is_terminal else LOG_EVERY_S
-        if not self._now or (time.monotonic() - self._shown_s < every_s and not begun):
-            return
-        self._shown_s = time.monotonic()
-        each = [f"{job} {100 * share:.0f} % ({sentence})" for job, (sentence, share) in self._now.items()]
-        self._say(f"{self._finished} of {self._total} done; {'; '.join(each)}", is_last=False)
+    def __call__(self, sentence: str, share: float) -> None:
+        if time.monotonic() - self.said_s > EVERY_S:
+            self.said_s = time.monotonic()
+            _say(f"{self.job}: {100 * share:.0f} % ({sentence})")
 
-    def done(self, job: str, how: str) -> None:
-        self._finished += 1
-        self._over.add(job)
-        self._now.pop(job, None)
-        self._say(f"{job}: {how}", is_last=True)
 
-    def _say(self, text: str, *, is_last: bool) -> None:
-        if self._is_terminal:
-            width = os.get_terminal_size(sys.stderr.fileno()).columns - 1
-            print(f"\r{text[:width]:<{width}}", end="\n" if is_last else "", file=sys.stderr, flush=True)
-        else:
-            print(text, file=sys.stderr, flush=True)
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)

@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from multiprocessing import get_context
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any, Protocol
 
 from blind_glove import BlindGlove
 from finished_gloves import FinishedGloves
 
 from glovecal_models.improvement.limits import ImprovementLimits
-from glovecal_models.threads import begin_worker
+from glovecal_models.worker_processes import work_off
 
 WORKERS = 2
 Answer = Callable[[BlindGlove], dict[str, Any]]
@@ -42,45 +41,38 @@ def answers(
     asked are waited for.
     """
     waiting = [glove for glove in gloves if finished.get(glove.key) is None]
-    if time.monotonic() >= until:
-        waiting.clear()
     known = sum(finished.get(glove.key) is not None for glove in gloves)
     progress = _Progress(label, len(gloves), known)
-    if waiting:
-        with ProcessPoolExecutor(workers, get_context("spawn"), begin_worker) as pool:
-            running: dict[Future[tuple[dict[str, Any], float]], BlindGlove] = {}
-            while waiting or running:
-                if time.monotonic() >= until:
-                    waiting.clear()
-                while waiting and len(running) <= workers:  # few, so that Ctrl-C has little to wait for
-                    glove = waiting.pop(0)
-                    running[pool.submit(_timed, job, glove)] = glove
-                if not running:
-                    break
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
-                    glove = running.pop(future)
-                    _keep(future, glove, finished)
-                    progress.step(f"{glove.truth} {glove.number}")
+
+    def asked() -> Iterator[BlindGlove]:
+        for glove in waiting:
+            if time.monotonic() >= until:
+                return
+            yield glove
+
+    def keep(number: int, found: tuple[dict[str, Any], float] | str) -> None:
+        glove = waiting[number]
+        if isinstance(found, str):
+            print(
+                f"\n{glove.part}: glove {glove.truth} {glove.number} (seed {glove.seed}) failed: {found}",
+                file=sys.stderr,
+            )
+        else:
+            finished.keep(glove.key, *found)
+        progress.step(f"{glove.truth} {glove.number}")
+
+    work_off(partial(_timed, job), asked(), workers, keep, label)
     progress.end()
     return [(glove, answer) for glove in gloves if (answer := finished.get(glove.key)) is not None]
 
 
-def _timed(job: Answer, glove: BlindGlove) -> tuple[dict[str, Any], float]:
-    """The answer, and the seconds of processor time that it took."""
+def _timed(job: Answer, glove: BlindGlove) -> tuple[dict[str, Any], float] | str:
+    """The answer, and the seconds of processor time that it took; the error's text where there is none."""
     begin = time.process_time()
-    return job(glove), time.process_time() - begin
-
-
-def _keep(future: Future[tuple[dict[str, Any], float]], glove: BlindGlove, finished: FinishedGloves) -> None:
-    problem = future.exception()
-    if problem is None:
-        finished.keep(glove.key, *future.result())
-    else:
-        print(
-            f"\n{glove.part}: glove {glove.truth} {glove.number} (seed {glove.seed}) failed: "
-            f"{type(problem).__name__}: {problem}",
-            file=sys.stderr,
-        )
+    try:
+        return job(glove), time.process_time() - begin
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
 
 
 class _Progress:

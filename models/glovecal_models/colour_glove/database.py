@@ -9,13 +9,12 @@ named after a hash of everything it was built from, as plain arrays that are map
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import os
 import shutil
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from tempfile import mkdtemp
 
@@ -31,7 +30,7 @@ from glovecal_models.colour_glove.rasterise import z_buffer
 from glovecal_models.colour_glove.skin import HandSkin, posed
 from glovecal_models.errors import BadInput
 from glovecal_models.progress import Cancel, Report, part, stop_if
-from glovecal_models.threads import begin_worker
+from glovecal_models.worker_processes import work_off
 
 ENTRIES, PAPER_ENTRIES, MOST_ENTRIES = 20_000, 100_000, 1_000_000
 VIEW_PX, VIEW_FOCAL_PX, VIEW_DISTANCE_MM = 128, 230.0, 500.0
@@ -215,25 +214,14 @@ def _build(
     lows = range(0, count, _AT_ONCE)
     workers = min(workers or os.cpu_count() or 1, len(lows))
     said = part(report, 0.1, 1.0)
+    done = itertools.count(1)
+
+    def rendered(*_: object) -> None:
+        if said:
+            said("rendering", next(done) / len(lows))
+
     entries = partial(_render_entries, place, skin, pattern)
-    if workers == 1:
-        for done, low in enumerate(lows, 1):
-            stop_if(cancelled, "building the database")
-            entries(low)
-            if said:
-                said("rendering", done / len(lows))
-    else:
-        with ProcessPoolExecutor(workers, get_context("spawn"), begin_worker) as pool:
-            waiting = [pool.submit(entries, low) for low in lows]
-            try:
-                for done, future in enumerate(as_completed(waiting), 1):
-                    future.result()
-                    stop_if(cancelled, "building the database")
-                    if said:
-                        said("rendering", done / len(lows))
-            except BaseException:
-                pool.shutdown(cancel_futures=True)
-                raise
+    work_off(entries, lows, workers, rendered, "building the database", cancelled)
     listed = {name: shape for name, (shape, _) in shapes.items()}
     (place / "database.json").write_text(json.dumps(listed), encoding="utf-8")
 

@@ -13,11 +13,9 @@ import math
 import os
 from collections import defaultdict
 from collections.abc import Collection, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -43,8 +41,8 @@ from glovecal_models.colour_glove.skin import RADII_MM, HandSkin, hand_skin, pos
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.progress import Cancel, Report, part, stop_if
-from glovecal_models.threads import begin_worker
+from glovecal_models.progress import Cancel, Report, part
+from glovecal_models.worker_processes import work_off
 
 CLIPS = 24
 """Each with a hand of its own."""
@@ -196,24 +194,13 @@ def _over_clips(
 ) -> list:  # type: ignore[no-untyped-def, type-arg]
     workers = min(workers or os.cpu_count() or 1, clips)
     found: dict[int, object] = {}
-    if workers == 1:
-        for clip in range(clips):
-            stop_if(cancelled, "learning the tracker's errors")
-            found[clip] = job(clip)
-            if report:
-                report("learning errors", (clip + 1) / clips)
-    else:
-        with ProcessPoolExecutor(workers, get_context("spawn"), begin_worker) as pool:
-            waiting = {pool.submit(job, clip): clip for clip in range(clips)}
-            try:
-                for done, future in enumerate(as_completed(waiting), 1):
-                    found[waiting[future]] = future.result()
-                    stop_if(cancelled, "learning the tracker's errors")
-                    if report:
-                        report("learning errors", done / clips)
-            except BaseException:
-                pool.shutdown(cancel_futures=True)
-                raise
+
+    def take(clip: int, errors: object) -> None:
+        found[clip] = errors
+        if report:
+            report("learning errors", len(found) / clips)
+
+    work_off(job, range(clips), workers, take, "learning the tracker's errors", cancelled)
     return [found[clip] for clip in range(clips)]
 
 

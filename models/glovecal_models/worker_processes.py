@@ -1,0 +1,274 @@
+"""Tasks worked off by processes of our own, which end with the call, whatever ends it.
+
+Not ``concurrent.futures``, nor a library built like it (loky, joblib): there the caller's thread shares locks
+with the threads that serve the pipes, and a Ctrl-C or a killed worker can leave one taken: the call never
+returns. Here the caller's thread only uses queues written in C, in which Ctrl-C leaves nothing half done; all
+else happens in threads that no signal interrupts: one starts and ends the workers, and each worker has one
+that talks to it, over two pipes, one task at a time.
+
+A worker is a fresh interpreter. It imports the module of its work, not the caller's script, which therefore
+needs no ``if __name__ == "__main__":``. It has nothing to lose, so it is killed, after the last task as after
+a Ctrl-C; when the caller itself is killed, it sees the end of its pipe and goes. Ctrl-C on a terminal does
+not reach it: it is in a process group of its own.
+
+Pickled values travel between a process and the workers it started, through pipes that nobody else can open.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import traceback
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from itertools import islice
+from queue import Empty, SimpleQueue
+from typing import Any, BinaryIO, TypeVar
+
+from glovecal_models.errors import WorkerDied
+from glovecal_models.progress import Cancel, stop_if
+from glovecal_models.threads import pin_blas_to_one_thread
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+POLL_S = 0.1
+"""How long it may take until a call is seen to be cancelled."""
+_PROGRAM = (
+    "import pickle, sys; requests = open(0, 'rb'); sys.path[:] = pickle.load(requests); "
+    "from glovecal_models.worker_processes import serve; serve(requests)"
+)
+_LENGTH_BYTES = 8
+
+
+def work_off(
+    work: Callable[[Task], Result],
+    tasks: Iterable[Task],
+    workers: int,
+    take: Callable[[int, Result], None],
+    what: str,
+    cancelled: Cancel | None = None,
+) -> None:
+    """Call ``work`` on each task in one of ``workers`` processes, and ``take`` on its number and its result.
+
+    ``work`` is a function that can be imported, or a ``partial`` of one: each process is sent it once. One
+    worker is this process. The next of ``tasks`` is asked for when a worker is free. Results come in any
+    order; ``take`` runs in the caller's thread. ``what`` is the whole computation, for messages ("the
+    training"). Raises Cancelled, WorkerDied, and what ``work``, ``take`` and ``tasks`` raise. No worker
+    outlives the call.
+    """
+    numbered = enumerate(tasks)
+    if workers == 1:
+        for number, task in numbered:
+            stop_if(cancelled, what)
+            take(number, work(task))
+        return
+    orders: SimpleQueue[Any] = SimpleQueue()
+    answers: SimpleQueue[Any] = SimpleQueue()
+    overseer = threading.Thread(target=_oversee, args=(work, what, orders, answers), daemon=True)
+    try:
+        overseer.start()
+        unanswered = 0
+        for order in islice(numbered, workers):
+            orders.put(order)
+            unanswered += 1
+        while unanswered:
+            stop_if(cancelled, what)
+            try:
+                number, result, error = answers.get(timeout=POLL_S)
+            except Empty:
+                continue
+            if error is not None:
+                raise error
+            unanswered -= 1
+            for order in islice(numbered, 1):
+                orders.put(order)
+                unanswered += 1
+            take(number, result)
+    finally:
+        orders.put(_STOP)
+        while overseer.ident is not None and answers.get() is not _STOP:  # else it has begun no worker
+            pass
+
+
+_STOP = None
+
+
+def _oversee(work: object, what: str, orders: SimpleQueue[Any], answers: SimpleQueue[Any]) -> None:
+    """Hand each order to a worker that is free, or to a new one; at ``_STOP`` end all of them."""
+    workers: list[_Worker] = []
+    free: list[_Worker] = []
+    try:
+        while (order := orders.get()) is not _STOP:
+            if isinstance(order, _Worker):
+                free.append(order)
+                continue
+            if not free:
+                free.append(_Worker(work, what, orders, answers))
+                workers.append(free[-1])
+            free.pop().orders.put(order)
+    except BaseException as error:
+        answers.put((0, None, error))
+        while orders.get() is not _STOP:
+            pass
+    finally:
+        for worker in workers:
+            worker.kill()
+        for worker in workers:
+            worker.thread.join()
+        answers.put(_STOP)
+
+
+class _Worker:
+    """A process and the thread that talks to it. Puts itself into ``frees`` when it has answered."""
+
+    def __init__(self, work: object, what: str, frees: SimpleQueue[Any], answers: SimpleQueue[Any]) -> None:
+        self.orders: SimpleQueue[Any] = SimpleQueue()
+        self._what, self._frees, self._answers = what, frees, answers
+        self._process: subprocess.Popen[bytes] | None = None
+        self._killed = False
+        self.thread = threading.Thread(target=self._run, args=(work,), daemon=True)
+        self.thread.start()
+
+    def kill(self) -> None:
+        self._killed = True
+        self.orders.put(_STOP)
+        if self._process is not None:
+            self._process.kill()
+
+    def _run(self, work: object) -> None:
+        number = 0
+        try:
+            process = self._process = _begin()
+            if self._killed:  # too early for it to see the process
+                process.kill()
+            assert process.stdin is not None
+            assert process.stdout is not None
+            pickle.dump([place for place in sys.path if isinstance(place, str)], process.stdin)
+            _send(process.stdin, work)
+            while (order := self.orders.get()) is not _STOP:
+                number, task = order
+                _send(process.stdin, task)
+                result, error = pickle.loads(_received(process.stdout))
+                self._frees.put(self)
+                self._answers.put((number, result, error))
+        except (OSError, EOFError):
+            self._answers.put((number, None, WorkerDied(self._how_it_ended())))
+        except BaseException as error:
+            self._answers.put((number, None, error))
+        finally:
+            if self._process is not None:
+                _end(self._process)
+
+    def _how_it_ended(self) -> str:
+        if self._process is None:
+            return f"{self._what}: no worker process can be started here; use one worker"
+        code = self._process.wait()
+        how = f"exit code {code}"
+        if code < 0:
+            how = signal.Signals(-code).name + (" (out of memory?)" if code == -9 else "")
+        return f"{self._what}: a worker process was ended by {how}; use fewer workers"
+
+
+def _begin() -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-P", "-c", _PROGRAM],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        process_group=0,
+        creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),  # the same for Windows
+    )
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.kill()
+    for stream in (process.stdin, process.stdout):
+        with suppress(OSError):  # what was not sent yet cannot be any more
+            if stream is not None:
+                stream.close()
+    process.wait()
+
+
+def _send(stream: BinaryIO | Any, value: object) -> None:
+    _send_bytes(stream, pickle.dumps(value, pickle.HIGHEST_PROTOCOL))
+
+
+def _send_bytes(stream: BinaryIO | Any, data: bytes) -> None:
+    stream.write(len(data).to_bytes(_LENGTH_BYTES, "little"))
+    stream.write(data)
+    stream.flush()
+
+
+def _received(stream: BinaryIO | Any) -> bytes:
+    """Raises EOFError when the other side is gone."""
+    length = int.from_bytes(_read(stream, _LENGTH_BYTES), "little")
+    return _read(stream, length)
+
+
+def _read(stream: BinaryIO | Any, length: int) -> bytes:
+    data = stream.read(length)
+    if len(data) < length:
+        raise EOFError
+    return data
+
+
+def serve(requests: BinaryIO) -> None:
+    """A worker's life, in a process of its own. Never returns."""
+    try:
+        _serve(requests)
+    except OSError:
+        pass  # the caller is gone
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        os._exit(1)  # an ordinary end would wait for the thread that reads
+
+
+def _serve(requests: BinaryIO) -> None:
+    answers = os.fdopen(os.dup(1), "wb")
+    _send_prints_to_stderr()
+    received: SimpleQueue[bytes] = SimpleQueue()
+    threading.Thread(target=_receive, args=(requests, received), daemon=True).start()
+    pin_blas_to_one_thread()
+    sent_work, work = received.get(), None
+    while True:
+        sent_task = received.get()
+        try:
+            work = work or pickle.loads(sent_work)
+            answer = pickle.dumps((work(pickle.loads(sent_task)), None), pickle.HIGHEST_PROTOCOL)
+        except Exception as error:
+            answer = pickle.dumps((None, _portable(error)))
+        _send_bytes(answers, answer)
+
+
+def _receive(requests: BinaryIO, received: SimpleQueue[bytes]) -> None:
+    """Reads all the time, also while a task runs: the end of the pipe is the end of the caller."""
+    with suppress(OSError, EOFError):
+        while True:
+            received.put(_received(requests))
+    os._exit(1)
+
+
+def _send_prints_to_stderr() -> None:
+    """Standard output carries answers, and libraries print to it."""
+    sys.stdout = sys.stderr
+    try:
+        os.dup2(2, 1)
+    except OSError:  # standard error is closed
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+
+
+def _portable(error: Exception) -> Exception:
+    """The error with a note of where it was raised, or a description where it cannot be pickled."""
+    note = f"Raised in a worker process:\n{traceback.format_exc()}"
+    error.add_note(note)
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        error = RuntimeError(f"{type(error).__name__}: {error}")
+        error.add_note(note)
+    return error
