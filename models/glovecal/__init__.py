@@ -36,7 +36,7 @@ from glovecal_models.effects.base.history_effect import ArrayStateEffect, Histor
 from glovecal_models.effects.base.joint_units import fit_joint_units, in_joint_units
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.base.signature_effect import SignatureEffect
-from glovecal_models.errors import BadInput, Cancelled, GlovecalError, NotTrainable
+from glovecal_models.errors import BadInput, Cancelled, GlovecalError, NotTrainable, WorkerDied
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
@@ -71,6 +71,7 @@ __all__ = [
     "Take",
     "Takes",
     "WhereItFails",
+    "WorkerDied",
     "add_effect",
     "compare",
     "detectable",

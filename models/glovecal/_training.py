@@ -38,9 +38,8 @@ def train(
     rotation), ``polynomial_gpr``, ``general_gpr`` or ``raw`` (no calibration). ``samples``: at most so many
     for one rotation. ``folds``: for the held-out error; 0 trains without one, which is faster. ``keep_dead``:
     refuse sensors that never move instead of leaving them out. ``workers``: processes that fit rotations side
-    by side, which pays for whole gloves; a script then calls it under ``if __name__ == "__main__":``. The
-    same takes and choices give the same model, to the byte, whatever the workers. Raises NotTrainable,
-    BadInput, Cancelled.
+    by side, which pays for whole gloves. The same takes and choices give the same model, to the byte,
+    whatever the workers. Raises NotTrainable, BadInput, Cancelled, WorkerDied (out of memory).
     """
     from glovecal_models.calibration.training import assemble
     from glovecal_models.calibration.training import train as train_inner

@@ -27,6 +27,9 @@ FORBIDDEN = {
     "service": set(),
 }  # fmt: skip
 PICKLES = {"pickle", "cPickle", "dill", "cloudpickle", "joblib", "shelve", "marshal"}
+PICKLES_FOR_ITS_WORKERS = SOURCES["models"] / "worker_processes.py"
+POOLS = ("ProcessPoolExecutor", "multiprocessing.pool", ".Pool(")
+"""They hang at Ctrl-C, and pickle without a word."""
 
 
 @cache
@@ -47,8 +50,16 @@ def imports(path: Path) -> set[str]:
 @pytest.mark.parametrize("distribution", SOURCES)
 def test_no_forbidden_import(distribution):
     for path in sorted(SOURCES[distribution].rglob("*.py")):
-        wrong = imports(path) & (FORBIDDEN[distribution] | PICKLES)
+        pickles = {"pickle"} if path == PICKLES_FOR_ITS_WORKERS else set()
+        wrong = imports(path) & (FORBIDDEN[distribution] | PICKLES) - pickles
         assert not wrong, f"{path.relative_to(ROOT)} imports {sorted(wrong)}"
+
+
+def test_there_is_one_pool_of_processes():
+    for path in sorted([*ROOT.glob("*/glovecal*/**/*.py"), *ROOT.glob("tests/*/*.py")]):
+        assert path == Path(__file__) or not any(
+            pool in path.read_text(encoding="utf-8") for pool in POOLS
+        ), path
 
 
 def test_a_page_of_the_studio_computes_nothing_that_rest_cannot_give():

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import random
-import signal
 import subprocess
 import sys
 import time
@@ -154,19 +153,21 @@ def test_where_no_process_starts_it_is_said(monkeypatch) -> None:
 
 
 def test_errors_of_the_work_keep_their_type_and_say_where_they_were_raised() -> None:
-    with pytest.raises(ValueError, match="math domain error|nonnegative") as caught:
+    with pytest.raises(ValueError, match=r"math domain error|nonnegative") as caught:
         results(math.sqrt, [1.0, -1.0])
     assert "in a worker process" in caught.value.__notes__[0]
     with pytest.raises(BadInput, match="no such thing"):
-        results(eval, ["exec('from glovecal_models.errors import BadInput; raise BadInput(\"no such thing\")')"])
-    unpicklable = "exec('class E(Exception):\\n  def __init__(self, a, b): super().__init__(a)\\nraise E(1, 2)')"
+        results(
+            eval, ["exec('from glovecal_models.errors import BadInput; raise BadInput(\"no such thing\")')"]
+        )
+    unpicklable = (
+        "exec('class E(Exception):\\n  def __init__(self, a, b): super().__init__(a)\\nraise E(1, 2)')"
+    )
     with pytest.raises(RuntimeError, match="E: 1"):
         results(eval, [unpicklable])
 
 
-@pytest.mark.parametrize(
-    ("work", "task"), [(len, lambda: 0), (lambda task: task, 0), (eval, "lambda: 0")]
-)
+@pytest.mark.parametrize(("work", "task"), [(len, lambda: 0), (lambda task: task, 0), (eval, "lambda: 0")])
 def test_what_cannot_be_sent_is_an_error_and_no_hang(work, task) -> None:
     with pytest.raises(Exception, match="pickle"):
         results(work, [task])

@@ -108,7 +108,7 @@ class Dispatcher:
         if self._runs:
             self._busy_at = now
         elif self.workers.started and now - self._busy_at > self._workers_idle_s:
-            self.workers.close()
+            self.workers.reset()
 
     def _begin(self, job: JobRecord) -> None:
         kind = self._kinds.get(job.kind)

@@ -159,6 +159,7 @@ class JobRun:
                 self._hand_out(plan, results)
                 return
             except WorkersLost as error:
+                self._raise_if_stopped()
                 if restart == WORKER_RESTARTS:
                     raise
                 log.warning("training processes lost, starting again", job=self._job.id, reason=str(error))

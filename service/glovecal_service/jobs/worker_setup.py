@@ -1,5 +1,5 @@
-"""What a worker process does before its first task: step back behind the live stream, pin BLAS, close
-a port."""
+"""What a worker process does before its first task: be silent, step back behind the live stream, pin BLAS,
+close a port."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from distributed import Worker
 
 from glovecal_client.private_files import keep_private
 from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_service.jobs.dask_log import silence_dask
 from glovecal_service.jobs.niceness import NICENESS
 
 
 def dask_setup(worker: Worker) -> None:
     """Called by Dask in each worker (``preload``)."""
+    silence_dask()
     if hasattr(os, "nice"):
         os.nice(NICENESS - os.nice(0))
     pin_blas_to_one_thread()

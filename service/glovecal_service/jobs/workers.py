@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from glovecal_models.errors import GlovecalError
+from glovecal_service.jobs.dask_log import silence_dask
 from glovecal_service.jobs.job_kind import Task
 from glovecal_service.jobs.task_run import TaskOutcome, run_task
 from glovecal_service.settings import Settings
@@ -81,6 +82,7 @@ class Workers:
         self._client: Client | None = None
         self._cluster: LocalCluster | None = None
         self._absent_since: float | None = None
+        self._closed = False
 
     @property
     def started(self) -> bool:
@@ -137,7 +139,10 @@ class Workers:
                 self._close()
 
     def close(self) -> None:
-        self.reset()
+        """For good: a job that was just about to start workers starts none."""
+        with self._lock:
+            self._closed = True
+            self._close()
 
     def pids(self) -> list[int]:
         """Process ids of the workers, none before they are started."""
@@ -148,7 +153,10 @@ class Workers:
         from dask.config import set as configure
         from distributed import Client
 
+        silence_dask()
         with self._lock:
+            if self._closed:
+                raise WorkersLost("the service is stopping")
             if self._client is None:
                 configure(_CONFIG)
                 if sys.platform == "linux" and len(os.fsencode(tempfile.gettempdir())) <= _LONGEST_FOLDER:
@@ -181,7 +189,7 @@ class Workers:
             dashboard_address="127.0.0.1:0",
             scheduler_kwargs={"dashboard": False},
             local_directory=str(folder),
-            silence_logs=logging.CRITICAL,
+            silence_logs=logging.CRITICAL,  # until a worker silences itself
             preload=["glovecal_service.jobs.worker_setup"],
         )
         scheduler, loop = self._cluster.scheduler, self._cluster.loop

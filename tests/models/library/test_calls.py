@@ -6,8 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from multiprocessing import active_children
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import pytest
@@ -30,15 +28,15 @@ def blas_threads() -> set[int]:
     return {item["num_threads"] for item in threadpool_info() if item["user_api"] == "blas"}
 
 
-def living_in_group(group: int) -> list[int]:
-    """Processes of a process group that are no zombies."""
+def living_in_session(session: int) -> list[int]:
+    """Processes of a session that are no zombies."""
     found = []
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
-            state, _, of_group = stat.read_text().rpartition(")")[2].split()[:3]
+            state, _, _, of_session = stat.read_text().rpartition(")")[2].split()[:4]
         except OSError:
             continue  # it ended meanwhile
-        if int(of_group) == group and state != "Z":
+        if int(of_session) == session and state != "Z":
             found.append(int(stat.parent.name))
     return found
 
@@ -107,43 +105,28 @@ def test_ctrl_c_ends_it_and_leaves_nothing_behind(call: str, tmp_path: Path):
     assert process.returncode == -signal.SIGINT
     assert "KeyboardInterrupt" in said
     deadline = time.monotonic() + 60.0
-    while alive := living_in_group(process.pid):
+    while alive := living_in_session(process.pid):
         assert time.monotonic() < deadline, alive
         time.sleep(0.05)
 
 
-def staying(before: set[BaseProcess]) -> set[BaseProcess]:
-    """The child processes begun since `before` and still there after ten seconds.
-
-    Those from before are other tests' (a service that serves a whole file of them).
-    """
-    end = time.monotonic() + 10.0
-    while (new := set(active_children()) - before) and time.monotonic() < end:
-        time.sleep(0.05)
-    return new
-
-
 def test_workers_give_the_same_model_to_the_byte(model, takes):
     told: list[float] = []
-    before = set(active_children())
     ours = glovecal.train(
         takes, subject="anna", samples=300, workers=2, progress=lambda text, share: told.append(share)
     )
     assert ours.id == model.id
     assert told == sorted(told)
-    assert not staying(before)
     with pytest.raises(glovecal.Cancelled):
         glovecal.train(takes, workers=2, cancelled=lambda: True)
-    assert not staying(before)
 
 
-def test_a_script_that_cannot_be_imported_is_told_so(tmp_path: Path):
+def test_a_script_uses_workers_without_a_guard(tmp_path: Path):
     script = tmp_path / "script.py"
     script.write_text(
-        LONG.format(call="glovecal.train(takes, workers=2)")
+        LONG.format(call="print(glovecal.train(takes, workers=2, samples=50).subject)")
         .replace('if __name__ == "__main__"', "if True")
         .replace("seed=1", "seed=1, wearings=1, takes_per_wearing=2, take_s=5")
     )
     run = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=120)
-    assert run.returncode == 1
-    assert 'under if __name__ == "__main__":' in run.stderr
+    assert (run.returncode, run.stdout, run.stderr) == (0, "begins\nunnamed\n", "")
