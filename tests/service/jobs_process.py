@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 import time
@@ -22,6 +23,7 @@ def run_jobs(settings: Settings) -> None:
 
 
 if __name__ == "__main__":
+    logging.basicConfig(level=logging.INFO)  # on standard error, as the service does
     data, database, *of_children = sys.argv[1:]
     if of_children:
         import distributed  # noqa: F401  # whole here, and replaced by what lies in that folder for children

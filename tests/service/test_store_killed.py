@@ -2,6 +2,7 @@
 
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -25,9 +26,10 @@ KILLS = 5
 IMPORTS_KILLED = 3
 
 
-def start_jobs(settings: Settings) -> subprocess.Popen[str]:
+def start_jobs(settings: Settings, log: Path) -> subprocess.Popen[str]:
     command = [sys.executable, str(HERE / "jobs_process.py"), str(settings.data), settings.database or ""]
-    return subprocess.Popen(command, start_new_session=True, text=True)
+    with log.open("w") as stderr:
+        return subprocess.Popen(command, start_new_session=True, text=True, stderr=stderr)
 
 
 def kill(process: subprocess.Popen) -> None:
@@ -95,12 +97,12 @@ def test_a_killed_service_repeats_only_the_fits_in_flight(sqlite_settings, tmp_p
     with Store.open(sqlite_settings) as store:
         payload = {"numbers": [1, 2, 3, 4, 5, 6], "seconds": 0.4, "ledger": str(ledger)}
         job = store.jobs.create("count", payload)
-        process = start_jobs(sqlite_settings)
+        process = start_jobs(sqlite_settings, tmp_path / "killed.log")
         wait_for(lambda: len(noted(ledger, "done")) >= 2)
         kill(process)
         before = noted(ledger, "done")
         assert store.jobs.get(job.id).state == "running"
-        process = start_jobs(sqlite_settings)
+        process = start_jobs(sqlite_settings, tmp_path / "ended.log")
         try:
             assert result_of(store, job.id)["sums"] == [1, 3, 6, 10, 15, 21]
             assert process.wait(120) == 0
@@ -113,3 +115,5 @@ def test_a_killed_service_repeats_only_the_fits_in_flight(sqlite_settings, tmp_p
         # a fit may be done and not yet on disk when the kill comes: there is one worker
         assert len(repeated) <= 1
         assert set(before) | set(after) == {1, 2, 3, 4, 5, 6}
+    log = (tmp_path / "ended.log").read_text()
+    assert not re.search("Traceback|distributed|tornado", log), log
