@@ -112,7 +112,7 @@ class EffectCorrection:
         """Context columns that the effects read."""
         self.settling_s: float = max(
             (
-                effect.transient_s(item.shape[item.weights.any(axis=1)])
+                effect.transient_s(item.shape[item.weights.any(axis=1)], item.settings)
                 for effect, (item, _) in zip(self._effects, self._lanes, strict=True)
             ),
             default=0.0,

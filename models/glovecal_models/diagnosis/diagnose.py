@@ -34,6 +34,7 @@ from glovecal_models.diagnosis.reference_problems import reference_problems
 from glovecal_models.diagnosis.resampled import SMOOTHING
 from glovecal_models.diagnosis.signatures import are_held_levels, signature_findings
 from glovecal_models.diagnosis.unexplained_residual import UnexplainedResidual, unexplained_residual
+from glovecal_models.diagnosis.unsettled import unsettled_effects, without_unsettled
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Motion
 from glovecal_models.effects.base.signature_effect import FoundBefore
@@ -91,6 +92,7 @@ def diagnose(
     saved = problem.saved_by_known(design)
     seen = camera_errors(problem, takes) if problem.has_camera else None
     has_effects = [item.effect for item in known]
+    has_names = [item.effect.name for item in known if item.joints]
     wholes = [item for item in has_effects if item.also_explained_by]
     found = beside_wholes(beside_known(found, saved, has_effects, limits), wholes)
     if seen is not None:
@@ -129,15 +131,20 @@ def diagnose(
         residual = UnexplainedResidual(obstacle="single poses")
     else:
         after = problem.with_first(naming, by_name, design)
-        rest = after.design()
+        rest = without_unsettled(after.design(), after.known)
         likely = [item.effect for item in impossible if item.saves_much]
         residual = unexplained_residual(
             rest, problem.even, layout, seed, floors=noise_floors, undecided=likely,
             stated_deg={} if seen is None else seen.stated_deg,
         )  # fmt: skip
+        residual = replace(
+            residual,
+            after=tuple(dict.fromkeys((*has_names, *(item.effect for item in naming.ranked[:1])))),
+            unsettled=unsettled_effects(rest, after.known),
+        )
         there = {(item.effect.name, joint) for item in after.known for joint in item.joints}
         actions = actions_for(
-            residual.associations, rest, layout, there, linear=linear, seed=seed, saved_by_known=saved,
+            residual.associations, after.design(), layout, there, linear=linear, seed=seed, saved_by_known=saved,
             wholes=wholes,
         )  # fmt: skip
     progress("done", 1.0)

@@ -12,7 +12,7 @@ from glovecal_models.calibration.added_effect import form_values
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Settings
-from glovecal_models.effects.base.history_effect import ArrayStateEffect
+from glovecal_models.effects.base.history_effect import ArrayStateEffect, HistoryEffect
 from glovecal_models.effects.base.learned_form import FormTerm, LearnedForm
 from glovecal_models.effects.base.signals import Signals
 
@@ -69,6 +69,16 @@ class KnownEffect:
         columns = {name: [part[:, [at]] for part in found] for at, name in enumerate(names)}
         self.kept.append((takes, columns))
         return columns
+
+    def settles_after_s(self, takes: Sequence[Signals], lane: int, joint: str) -> float:
+        """How long a take's unknown start shows in the columns of ``joint``, a lane of ``takes``; 0 where it
+        remembers nothing of the joint's motion."""
+        if joint not in self.joints or not isinstance(self.effect, HistoryEffect):
+            return 0.0
+        single = [one_lane(take, lane) for take in takes]
+        settings = self.effect.fit_repair_constants(single)
+        settings = self.effect.settings_as_stored(single, settings, self.stored)
+        return self.effect.transient_s(self.shapes[self.joints.index(joint)][None, :], settings)
 
     def columns(
         self,

@@ -76,6 +76,10 @@ class UnexplainedResidual:
     """Recorded columns that it depends on, the one that explains most first."""
     undecided: tuple[str, ...] = ()
     """Effects that these takes cannot decide and that may explain it."""
+    after: tuple[str, ...] = ()
+    """Effects of the model, and the one that is named: the residual is what is left after them."""
+    unsettled: tuple[str, ...] = ()
+    """Those among them whose memory outlasts the takes: offsets of whole takes are not judged."""
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS
 
     @property

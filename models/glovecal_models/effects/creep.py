@@ -58,6 +58,10 @@ class Creep(ArrayStateEffect):
         longest = max((float(take.time_s[-1] - take.time_s[0]) for take in takes), default=0.0)
         return None if longest >= 8.0 else f"the longest take lasts {longest:.0f} s; creep needs 8 s or more"
 
+    def transient_s(self, shape: np.ndarray, settings: Settings) -> float:
+        """Of the slowest relaxation, those beside the shape's among them."""
+        return super().transient_s(shape, settings) * max([1.0, *_beside(settings)])
+
     def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
         longest = max(float(take.time_s[-1] - take.time_s[0]) for take in takes)
         slow = np.array([tau for tau in SLOW_S if tau <= LONGEST_SHARE * longest] or SLOW_S[:1])

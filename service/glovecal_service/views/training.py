@@ -45,7 +45,9 @@ def effect_view(added: AddedEffect) -> dict[str, Any]:
         "curves": {name: item.document() for name, item in curve_views(added.curves).items()},
         "context": list(effect.context),
         "has_memory": effect.has_memory,
-        "settling_s": effect.transient_s(added.shape[[name in added.active for name in added.rotations]]),
+        "settling_s": effect.transient_s(
+            added.shape[[name in added.active for name in added.rotations]], added.settings
+        ),
         "evidence": plain(current_evidence(added.evidence)),
         "declaration": plain(added.settings.get("declaration")),
     }

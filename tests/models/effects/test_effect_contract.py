@@ -353,10 +353,10 @@ def test_it_says_what_it_lacks_and_how_long_it_settles(
             effect.unavailable_inputs(settings, [], signals[0].wearing)
             == f"context {effect.context[0]} is not sent"
         )
-    transient_s = effect.transient_s(effect.grid(signals, settings)[-1])
+    transient_s = effect.transient_s(effect.grid(signals, settings)[-1], settings)
     assert (transient_s >= 1.0) == effect.has_memory
     assert effect.needs_time or not effect.has_memory
-    assert effect.transient_s(np.zeros((0, len(effect.parameters)))) == 0.0
+    assert effect.transient_s(np.zeros((0, len(effect.parameters))), settings) == 0.0
 
 
 def test_a_wearing_without_a_name_and_an_unknown_one_are_told_apart(signals: list[Signals]) -> None:
@@ -367,8 +367,10 @@ def test_a_wearing_without_a_name_and_an_unknown_one_are_told_apart(signals: lis
 
 
 def test_creep_settles_with_its_slow_part_and_time_itself_needs_times() -> None:
-    assert catalogue()["creep"].transient_s(np.array([[0.6, 2.5, 10.0], [1.6, 6.3, 25.0]])) == 25.0
-    assert catalogue()["lag"].transient_s(np.array([[0.05]])) == 1.0
+    shapes, creep = np.array([[0.6, 2.5, 10.0], [1.6, 6.3, 25.0]]), catalogue()["creep"]
+    assert creep.transient_s(shapes, {}) == 25.0
+    assert creep.transient_s(shapes, {"beside": [4.0, 1 / 64]}) == 100.0, "a slower relaxation stands beside"
+    assert catalogue()["lag"].transient_s(np.array([[0.05]]), {}) == 1.0
     assert [effect.needs_time for effect in DECLARED] == [False, True, True]
     assert [effect.has_memory for effect in DECLARED] == [False, True, False]
 

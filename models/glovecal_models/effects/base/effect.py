@@ -88,8 +88,9 @@ class Effect(EffectFacts, ABC):
         """Whether it learned what is special about this wearing."""
         return False
 
-    def transient_s(self, shape: np.ndarray) -> float:
-        """How long a state started anew still shows, for lanes of ``shape`` (L, P); 0 without a memory."""
+    def transient_s(self, shape: np.ndarray, settings: Settings) -> float:
+        """How long a state started anew still shows, seconds, for lanes of ``shape`` (L, P); 0 without a
+        memory."""
         if not self.has_memory or not len(shape):
             return 0.0
         times = [shape[:, at].max() for at, item in enumerate(self.parameters) if item.unit == "s"]

@@ -40,7 +40,7 @@ class SlowContextEffect(ContextEffect):
     may_act_in_steps: ClassVar[bool] = True
     take_sd_deg: ClassVar[float] = 0.5  # what came before the first frame is known by its slope only
 
-    def transient_s(self, shape: np.ndarray) -> float:
+    def transient_s(self, shape: np.ndarray, settings: Settings) -> float:
         return KNOWN_AFTER_S if len(shape) else 0.0
 
     def fit_constants(self, takes: Sequence[Signals]) -> Settings:

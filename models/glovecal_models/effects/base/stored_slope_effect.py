@@ -78,7 +78,7 @@ class StoredSlopeEffect(ContextEffect):
 
     has_memory: ClassVar[bool] = True
 
-    def transient_s(self, shape: np.ndarray) -> float:
+    def transient_s(self, shape: np.ndarray, settings: Settings) -> float:
         return MEMORY_S if len(shape) else 0.0
 
     def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:

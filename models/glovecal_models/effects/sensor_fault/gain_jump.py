@@ -2,8 +2,9 @@
 
 The reading is fitted by a line in the reference. One line for the whole take, one line on each side of the
 best moment, and one line that changes steadily with time: a jump is named only when two lines leave far less
-than both others, and when the error steps right there from one frame to the next, as it does nowhere else.
-Postures that are held one after another also look like two lines, but no hand changes posture in a frame.
+than both others, and when the error steps right there from one frame to the next, as it does nowhere else, and
+stays where it stepped to: noise comes back with the next frame. Postures that are held one after another also
+look like two lines, but no hand changes posture in a frame.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ BETTER_THAN_ONE = 0.5
 """Share of the squared error of one line that two may leave."""
 BETTER_THAN_DRIFT = 0.7
 STEP_SHARE = 0.5
-"""Of the change between the two lines at that angle."""
+"""Of the change between the two lines at that angle, which the step must reach, and the error after it keep."""
 TYPICAL_SHARE = 0.7
 """Of the RMS of that change over the take, which the change at the step must reach."""
 STEP_OVER_OTHERS = 1.3
@@ -124,7 +125,11 @@ def _is_abrupt(time: np.ndarray, error: np.ndarray, change: np.ndarray, cut: int
     # Where the two lines cross, no step could be seen, and none is believed.
     typical = float(np.sqrt(np.mean(change**2)))
     expected = max(float(np.abs(change[near]).max()), TYPICAL_SHARE * typical)
-    around = np.concatenate([steps[max(at - AROUND_FRAMES, 0) : at], steps[at + 1 : at + 1 + AROUND_FRAMES]])
+    before, after = slice(max(at - AROUND_FRAMES, 0), at), slice(at, at + AROUND_FRAMES)
+    around = np.concatenate([steps[before], steps[at + 1 : at + 1 + AROUND_FRAMES]])
+    kept = abs(float(np.median(error[after]) - np.median(error[before]))) if at else 0.0
+    if kept < STEP_SHARE * expected:
+        return False
     limit = max(
         STEP_SHARE * expected,
         STEP_OVER_OTHERS * float(np.percentile(steps[~near], 99.5)),
