@@ -33,8 +33,13 @@ from glovecal_models.diagnosis.problem import DiagnosisProblem
 from glovecal_models.diagnosis.reference_problems import reference_problems
 from glovecal_models.diagnosis.resampled import SMOOTHING
 from glovecal_models.diagnosis.signatures import are_held_levels, signature_findings
-from glovecal_models.diagnosis.unexplained_residual import UnexplainedResidual, unexplained_residual
+from glovecal_models.diagnosis.unexplained_residual import (
+    UnexplainedResidual,
+    unexplained_residual,
+    within_slip,
+)
 from glovecal_models.diagnosis.unsettled import unsettled_effects, without_unsettled
+from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Motion
 from glovecal_models.effects.base.signature_effect import FoundBefore
@@ -74,15 +79,14 @@ def diagnose(
         if report:
             report(text, share)
 
-    progress("checking the reference", 0.0)
+    progress("preparing the takes", 0.0)
     problem = DiagnosisProblem.of(takes, layout, linear, known, limits)
-    problems = reference_problems(takes, layout, limits)
     design = problem.design()
     every = candidates(design.signals)
     tried = every if effects is None else list(effects)
     by_name = {item.name: item for item in (*every, *tried)}
     if are_pose_labels(takes):
-        return _of_pose_labels(takes, layout, design, tried, problems, seed, limits)
+        return _of_pose_labels(takes, layout, design, tried, seed, limits)
     if noise_floors is None:
         noise_floors = takes_noise(takes, problem.joints)
     has = _has(known)
@@ -97,6 +101,7 @@ def diagnose(
     found = beside_wholes(beside_known(found, saved, has_effects, limits), wholes)
     if seen is not None:
         found = beside_camera(found, seen, problem, design)
+    found = _beside_slip(found, design, known)
     naming, beside, screened = named(found, limits), problem, design
     undecided = exceeding_named(impossible, naming)
     if undecided:
@@ -108,6 +113,7 @@ def diagnose(
         found = beside_wholes(beside_known(found, saved, has_effects, limits), wholes)
         if seen is not None:
             found = beside_camera(found, seen, beside, screened)
+        found = _beside_slip(found, design, known)
         naming = named(found, limits)
     impossible += [NotIdentifiable(item.name, SINGLE_POSES) for item in waiting]
     naming = _with_alikes_ordered(naming, beside, screened, by_name)
@@ -155,7 +161,7 @@ def diagnose(
         naming=naming,
         assessments=tuple(found),
         not_identifiable=tuple(impossible),
-        reference_problems=problems,
+        reference_problems=reference_problems(takes, layout, limits, apart_by=_apart_by(naming, known)),
         findings=findings,
         residual=residual,
         next_take=None,
@@ -167,6 +173,27 @@ def diagnose(
     )
     asked = _next_take(diagnosis, by_name, takes) or take_to_decide(impossible, residual)
     return replace(diagnosis, next_take=asked)
+
+
+def _beside_slip(
+    found: Sequence[Assessment], design: ForwardDesign, known: Sequence[KnownEffect]
+) -> list[Assessment]:
+    """The same, where the model has effects: what changes from take to take is a further cause only where
+    more is left of that than in a healthy glove."""
+    between_takes = [item for item in found if item.p_value is not None and item.significant_joints]
+    if not any(item.joints for item in known) or not between_takes:
+        return list(found)
+    slips = within_slip(design)
+    return [replace(item, within_slip=slips) if item in between_takes else item for item in found]
+
+
+def _apart_by(naming: Naming, known: Sequence[KnownEffect]) -> frozenset[str]:
+    """Rotations whose takes may read differently at one angle: what is named, or what the model has, changes
+    from take to take there."""
+    first = naming.ranked[:1] if naming.ranked and naming.ranked[0].p_value is not None else ()
+    named_there = {item.joints[i] for item in first for i in item.significant_joints}
+    known_there = {name for item in known if item.effect.changes_between_takes for name in item.joints}
+    return frozenset(named_there | known_there)
 
 
 def _next_take(diagnosis: Diagnosis, effects: Mapping[str, Effect], takes: Sequence[Take]) -> NextTake | None:
@@ -222,7 +249,6 @@ def _of_pose_labels(
     layout: Layout,
     design: ForwardDesign,
     tried: Sequence[Effect],
-    problems: tuple[str, ...],
     seed: int,
     limits: DiagnosisLimits,
 ) -> Diagnosis:
@@ -237,7 +263,7 @@ def _of_pose_labels(
         not_identifiable=tuple(
             NotIdentifiable(item.name, ONLY_POSE_NAMES) for item in tried if item.stage != "never"
         ),
-        reference_problems=problems,
+        reference_problems=reference_problems(takes, layout, limits),
         findings=(),
         residual=UnexplainedResidual(obstacle="no measured angle"),
         next_take=hold_next_take(drift),

@@ -7,7 +7,7 @@ Each take gets a line of the reference over the joint's own reading; takes are h
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,8 +41,13 @@ def contradictions(
     measured: Sequence[tuple[Take, np.ndarray]],
     inputs: Sequence[np.ndarray],
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
+    *,
+    may_be_apart: bool = False,
 ) -> list[str]:
-    """Sentences; ``measured``: takes and angles at their frames, ``inputs``: the own sensor's readings."""
+    """Sentences; ``measured``: takes and angles at their frames, ``inputs``: the own sensor's readings.
+
+    ``may_be_apart``: an effect makes the sensor read differently from take to take.
+    """
     lines = [
         _line(take, own[np.isfinite(values)], values[np.isfinite(values)])
         for (take, values), own in zip(measured, inputs, strict=True)
@@ -51,7 +56,8 @@ def contradictions(
     radians = _in_radians(rotation, sure, limits.reference_radians_within)
     clear = [item for item in lines if abs(item.correlation) > limits.reference_clear_correlation]
     signs = [] if radians else _against_each_other(rotation, clear)
-    return radians or signs or _apart(rotation, _of_one_sign(sure), limits)
+    apart = [] if may_be_apart else _apart(rotation, _of_one_sign(sure), limits)
+    return radians or signs or apart
 
 
 def _line(take: Take, reading: np.ndarray, angle: np.ndarray) -> _Line:
@@ -122,9 +128,17 @@ def _some(names: Sequence[str]) -> str:
 
 
 def reference_problems(
-    takes: Sequence[Take], layout: Layout, limits: DiagnosisLimits = DIAGNOSIS_LIMITS
+    takes: Sequence[Take],
+    layout: Layout,
+    limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
+    *,
+    apart_by: Set[str] = frozenset(),
 ) -> tuple[str, ...]:
-    """Sentences; none when the reference looks right, or names poses and measures no angle."""
+    """Sentences; none when the reference looks right, or names poses and measures no angle.
+
+    ``apart_by``: rotations whose sensor an effect makes read differently from take to take: there takes that
+    differ contradict no reference.
+    """
     if are_pose_labels(takes):
         return ()
     problems: list[str] = []
@@ -140,7 +154,10 @@ def reference_problems(
             ]
             problems.extend(_of_rotation(rotation, measured, inputs, has_own, limits))
             if has_own:
-                problems.extend(contradictions(rotation, measured, inputs, limits))
+                may_be_apart = rotation in apart_by
+                problems.extend(
+                    contradictions(rotation, measured, inputs, limits, may_be_apart=may_be_apart)
+                )
     radians = radians_problem(takes)
     return tuple(problems) if radians is None else (radians[0].upper() + radians[1:], *problems)
 

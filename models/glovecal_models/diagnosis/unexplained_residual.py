@@ -147,6 +147,13 @@ def unexplained_residual(
     )
 
 
+def within_slip(design: ForwardDesign) -> tuple[int, ...]:
+    """Joints of ``design`` whose slow error is no larger than a healthy glove's."""
+    means = [second_means(design, joint) for joint in range(len(design.rotations))]
+    slow = enumerate(_slow(design, means))
+    return tuple(joint for joint, item in slow if item.size_deg <= _healthy(item, design.limits))
+
+
 def _slow(design: ForwardDesign, means: Sequence[Sequence[SecondMeans]]) -> list[SlowError]:
     return [
         slow_error(takes, products.residual, design.limits)

@@ -91,6 +91,9 @@ class Assessment:
     """Squared degrees per row that the effects of the model save on each joint; empty where it has none."""
     within_camera: tuple[int, ...] = ()
     """Joints on which what it saves may as well be an error of the camera that measured the angles."""
+    within_slip: tuple[int, ...] = ()
+    """Joints whose slow error, beside the model's effects, is no larger than that of a healthy glove, which
+    slips a little: what changes from take to take is nothing else there."""
     of_known: tuple[int, ...] = ()
     """Joints on which the memory is of what the model's effects add there, not of the joint's own motion."""
     part_of: str = ""
@@ -108,7 +111,7 @@ class Assessment:
         model may have left there, and is not the camera's; none where it seems to explain a part of one."""
         if self.part_of:
             return ()
-        mine = (i for i in self._beyond_control if i not in self.within_camera)
+        mine = (i for i in self._beyond_control if i not in (*self.within_camera, *self.within_slip))
         return tuple(i for i in mine if not self._is_within_known(i))
 
     @cached_property
