@@ -13,6 +13,7 @@
     python3 do.py study     the blind study of the diagnosis: figures, confusion matrix, a page (hours;
                             --quick, --minutes N; --page docs/study.md writes what was found);
                             study active: active sampling against the fixed protocol (half an hour);
+                            study demos: is anything told in fifty demos that is not so? (half an hour);
                             study camera: a camera as the reference against true angles (half an hour);
                             study camera-errors: what the colour glove's tracker errs by (quarter of an hour)
     python3 do.py fresh     demo and test on bare Debian systems, as a table (hours; needs root, debootstrap;
@@ -118,6 +119,8 @@ def paper(arguments: list[str]) -> int:
 def study(arguments: list[str]) -> int:
     if arguments[:1] == ["active"]:
         return run("python", "tests/study/active_sampling.py", *arguments[1:], beside=SIMULATED)
+    if arguments[:1] == ["demos"]:
+        return run("python", "tests/study/demo_table.py", *arguments[1:])
     if arguments[:1] == ["camera-errors"]:
         return run("python", "tests/study/tracked_errors.py", *arguments[1:])
     if arguments[:1] == ["camera"]:

@@ -146,7 +146,7 @@ def test_a_diagnosis_has_a_title_a_summary_and_contents(diagnosis: dict[str, Any
     assert [re.sub("<.*?>", "", item) for item in re.findall(r"<dt>.*?</dt>", head)] == [
         "Verdict", "Size", "Place", "Next",
     ]  # fmt: skip
-    assert "reduces the held-out error from 3.60 to 1.20 degrees (control: 3.50)" in head
+    assert "explains 89 % of the squared error of these sensors on held-out takes (control: 5 %)" in head
     assert "<code>glovecal add-effect da3a26b60b00" in head
     assert MODEL_ID[:12] not in page[page.index("<h1>") : page.index("</h1>")]
     assert MODEL_ID in page[page.index('id="details"') :]

@@ -12,7 +12,7 @@ from glovecal_models.diagnosis.next_take import NextTake
 from glovecal_models.diagnosis.not_identifiable import SINGLE_POSES, NotIdentifiable
 from glovecal_models.diagnosis.residual_association import ResidualAssociation
 from glovecal_models.diagnosis.unexplained_residual import SlowExcess, UnexplainedResidual
-from glovecal_models.effects.base.assessment import Assessment
+from glovecal_models.effects.base.assessment import Assessment, HeldOutRmse
 
 MOST_ASSOCIATIONS = 3
 UNITS = "The reference only names poses: errors are shares of the step from 0 to 1, not degrees."
@@ -32,6 +32,7 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
         sentences.append(nothing_named_sentence(diagnosis))
     sentences += [within_known_sentence(item) for item in diagnosis.assessments if item.within_known]
     sentences += [part_sentence(item) for item in diagnosis.assessments if item.part_of]
+    sentences += [within_slip_sentence(item) for item in diagnosis.assessments if _is_within_slip(item)]
     if diagnosis.next_take is not None:
         sentences.append(next_take_sentence(diagnosis.next_take))
     sentences.append(residual_sentence(diagnosis.residual, by_column=diagnosis.by_column))
@@ -72,12 +73,9 @@ def named_sentence(diagnosis: Diagnosis) -> str | None:
 def ranked_sentence(diagnosis: Diagnosis) -> str:
     """The first of the ranking, with its evidence and its confidence set."""
     item = diagnosis.naming.ranked[0]
-    rmse, where = item.rmse_deg, ", ".join(item.joints[i] for i in item.significant_joints)
+    where = ", ".join(item.joints[i] for i in item.significant_joints)
     p_value = "" if item.p_value is None else f", p = {item.p_value:.2g}"
-    start = (
-        f"{item.effect} on {where} reduces the held-out error from {rmse.before:.2f} to {rmse.after:.2f}"
-        f" degrees (control: {rmse.control:.2f}{p_value})"
-    )
+    start = f"{item.effect} on {where} explains {explained(item.rmse_deg, p_value)}"
     named, rivals = diagnosis.effects[item.effect], diagnosis.naming.confidence_set[1:]
     more = named.consequence(item, diagnosis.naming.confidence_set)
     if diagnosis.linear and named.learned_by is not None:
@@ -88,13 +86,24 @@ def ranked_sentence(diagnosis: Diagnosis) -> str:
     return f"{start}; {named.caveat}. {more}".rstrip() if named.caveat else f"{start}. {more}".rstrip()
 
 
+def explained(rmse: HeldOutRmse, p_value: str = "") -> str:
+    """What an effect and its control explain, as shares of the squared error of the sensors that read the
+    rotations. Degrees are those of a model: only training, adding an effect and comparing tell them."""
+    of_effect, of_control = (
+        max(1.0 - (left / max(rmse.before, 1e-9)) ** 2, 0.0) for left in (rmse.after, rmse.control)
+    )
+    return (
+        f"{100 * of_effect:.0f} % of the squared error of these sensors on held-out takes (control:"
+        f" {100 * of_control:.0f} %{p_value})"
+    )
+
+
 def by_column_sentence(actions: Sequence[Action]) -> str:
     """Of an effect that is named because the residual goes along with the column that measures its cause."""
-    rmse, where = together(actions), ", ".join(item.rotation for item in actions)
+    where = ", ".join(item.rotation for item in actions)
     return (
-        f"{actions[0].effect} on {where} reduces the held-out error from {rmse.before:.2f} to"
-        f" {rmse.after:.2f} degrees (control: {rmse.control:.2f}) in a form that these takes tell; no usual"
-        f" form of it does. The error goes along with {actions[0].association.phrase}, which measures it."
+        f"{actions[0].effect} on {where} explains {explained(together(actions))} in a form that these takes"
+        f" tell; no usual form of it does. The error goes along with {actions[0].association.phrase}, which measures it."
     )
 
 
@@ -130,12 +139,24 @@ def part_sentence(item: Assessment) -> str:
     )
 
 
-def candidate_sentence(item: Assessment) -> str:
-    """The held-out error without an effect, with it and with its control."""
-    rmse = item.rmse_deg
+def within_slip_sentence(item: Assessment) -> str:
+    """Of an effect that changes from take to take no more than a healthy glove slips."""
+    where = ", ".join(item.joints[i] for i in item.within_slip)
     return (
-        f"{item.effect}: {rmse.before:.2f} to {rmse.after:.2f} degrees (control: {rmse.control:.2f}); largest"
-        f" on {item.largest_contrast_joint}.{_in_steps(item)}"
+        f"{item.effect} is not named: the slow error of {where} is no larger than a healthy glove's, which slips"
+        " a little."
+    )
+
+
+def _is_within_slip(item: Assessment) -> bool:
+    return bool(item.within_slip) and not item.significant_joints
+
+
+def candidate_sentence(item: Assessment) -> str:
+    """What an effect and its control explain."""
+    return (
+        f"{item.effect} explains {explained(item.rmse_deg)}; most on"
+        f" {item.largest_contrast_joint}.{_in_steps(item)}"
     )
 
 
@@ -175,10 +196,10 @@ def residual_sentence(
         shared = residual.shared
         parts.append(f"joints share an error of {shared.size_deg:.1f} degrees (p = {shared.p_value:.2g})")
     known = "identifiable effect" if residual.undecided else "known effect"
-    start = f"No {known} explains the residual"
+    start = f"No {known} explains {_rest(residual)}"
     if by_column:
         start = f"Until {by_column[0].effect} is added, its error is in the residual"
-    sentence = f"{start}: {' and '.join(parts)}; {_associated(residual.associations)}."
+    sentence = f"{start}: {' and '.join(parts)}; {_associated(residual.associations)}.{_unsettled(residual)}"
     undecided = " or ".join(residual.undecided)
     return (
         f"{sentence} Possible cause that these takes cannot decide: {undecided}." if undecided else sentence
@@ -190,17 +211,38 @@ def _not_significant(residual: UnexplainedResidual, is_noise: bool | None) -> st
     largest = max(item.size_deg for item in residual.judged)
     slow = f"slow errors (over 1 s) of at most {largest:.1f} degrees RMS"
     if residual.is_within_floors if is_noise is None else is_noise:
-        return f"The residual looks like noise: {slow}."
+        return f"{_capital(_rest(residual))} looks like noise: {slow}.{_unsettled(residual)}"
     known = [item for item in residual.floor_ratios.values() if item.is_judgeable]
     times = (
         f"; errors of at most {max(item.times for item in known):.1f} times the noise floor" if known else ""
     )
-    return f"The residual is no larger than in healthy gloves: {slow}{times}."
+    return f"{_capital(_rest(residual))} is no larger than in healthy gloves: {slow}{times}.{_unsettled(residual)}"
+
+
+def _rest(residual: UnexplainedResidual) -> str:
+    """What is judged: where effects were added or named, what is left after them."""
+    within = "what is left within takes" if residual.unsettled else "what is left"
+    return f"{within} after {' and '.join(residual.after)}" if residual.after else "the residual"
+
+
+def _capital(text: str) -> str:
+    return text[0].upper() + text[1:]
+
+
+def _unsettled(residual: UnexplainedResidual) -> str:
+    """What was not judged, as a further sentence; empty where all was."""
+    names = residual.unsettled
+    if not names:
+        return ""
+    return (
+        f" Offsets of whole takes are not judged: {' and '.join(names)} {'remember' if names[1:] else 'remembers'}"
+        " longer than these takes last, and what came before them was not recorded."
+    )
 
 
 def _above_floor(name: str, item: FloorRatio) -> str:
     return (
-        f"the held-out error of {name} is {item.rmse_deg:.2f} degrees, {item.times:.1f} times its noise floor"
+        f"the error of {name}'s readings is {item.rmse_deg:.2f} degrees, {item.times:.1f} times its noise floor"
         f" of {item.floor.floor_deg:.2f} (lower 95 % bound {item.lower_times:.1f}; healthy gloves: at most"
         f" {item.limits.healthy_floors:g})"
     )
@@ -219,13 +261,11 @@ def action_sentence(action: Action) -> str:
             f"{item.rotation}: the residual is associated with {item.phrase}; no effect of it reduces the"
             " held-out error more than its control."
         )
-    rmse = action.rmse_deg
     unnamed = "" if action.is_physical else " (no cause is claimed)"
     within = " That is no more than the model's own effects may have left there." * action.is_within_known
     return (
-        f"{item.rotation}: the residual is associated with {item.phrase}; {action.effect}{unnamed} reduces"
-        f" the held-out error from {rmse.before:.2f} to {rmse.after:.2f} degrees (control:"
-        f" {rmse.control:.2f}).{within}"
+        f"{item.rotation}: the residual is associated with {item.phrase}; {action.effect}{unnamed} explains"
+        f" {explained(action.rmse_deg)}.{within}"
     )
 
 

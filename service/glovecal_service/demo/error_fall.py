@@ -71,22 +71,47 @@ def verdict(hidden: HiddenSession, found: Findings) -> list[str]:
         f"{truth.description}",
         floor,
     ]
+    wrong = [f"Wrong: {said}." for said in told_wrongly(hidden, found)]
     if is_right(hidden, found):
-        also = _named_after(found)
         if truth.name.startswith("unknown:"):
             return [
                 *told,
                 "Right: no effect of the catalogue was named, and an unexplained residual was reported.",
+                *wrong,
             ]
-        if also is not None:
-            return [*told, f"Right: {named} was named. Wrong: {also} was named afterwards."]
-        return [*told, f"Right: {named} was named."]
+        return [*told, f"Right: {named} was named.", *wrong]
     if truth.name.startswith("unknown:"):
         said = f"{named} was named" if named else "no unexplained residual was reported"
         return [*told, f"Wrong: {said}; this effect is not in the catalogue."]
     if truth.name in _confidence_set(found):
         return [*told, f"Partly right: {named} was named first; {truth.name} is in the confidence set."]
     return [*told, f"Wrong: {'nothing' if named is None else named} was named."]
+
+
+def told_wrongly(hidden: HiddenSession, found: Findings) -> list[str]:
+    """What was told beside the first name and is not so; each as the end of a sentence.
+
+    The references are right, and whatever a catalogue's effect leaves once it was added is its own.
+    """
+    truth, wrong = hidden.truth, []
+    for when, diagnosis in (("", found.diagnosis), (" afterwards", found.diagnosis_after or {})):
+        wrong += [f"{item!r} was told{when}" for item in diagnosis.get("reference_problems") or ()]
+        findings = diagnosis.get("findings") or ()
+        strange = {item["effect"] for item in findings} - {truth.name if truth else "", _named(found)}
+        wrong += [f"{name} was found{when}" for name in sorted(strange)]
+    after = _named_after(found)
+    if after is not None and after != (truth.name if truth else None):
+        wrong.append(f"{after} was named afterwards")
+    if truth is None and found.diagnosis["unexplained_residual"]["is_significant"]:
+        wrong.append("an unexplained residual was reported of a healthy glove")
+    is_catalogued = truth is not None and not truth.name.startswith("unknown:")
+    again = found.diagnosis_after
+    if again is not None and is_catalogued and again["unexplained_residual"]["is_significant"]:
+        wrong.append("an unexplained residual was reported afterwards")
+    floor, errors = floor_deg(found), errors_deg(found)
+    if floor is not None and min(errors.values()) < floor:
+        wrong.append("an error was told that lies below its noise floor")
+    return list(dict.fromkeys(wrong))
 
 
 def is_right(hidden: HiddenSession, found: Findings) -> bool:

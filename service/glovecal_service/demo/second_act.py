@@ -95,11 +95,14 @@ def second_act(
     _say_diagnosis(found.diagnosis, say)
     named = found.diagnosis["named"]
     if named is not None:
-        _add(service, found, named, say, progress)
+        _add(service, found, named, progress)
     if found.child is None:
+        if found.addition is not None:
+            say(f"Not added: {found.addition['sentence']}")
         live()
         return
     found.comparisons["with_effect"] = service.post(f"/models/{found.child}/compare", tests)
+    say(_added(found))
     again = service.post(f"/models/{found.child}/diagnose", {})
     live()
     found.diagnosis_after = _finished(service, again, progress)
@@ -111,7 +114,7 @@ def _train(service: RestClient, found: Findings, method: str, takes: list[str]) 
     return service.post("/models/train", body | TRAINING | {"activate": method == DIAGNOSED})["id"]
 
 
-def _add(service: RestClient, found: Findings, named: dict[str, Any], say: Say, progress: Say) -> None:
+def _add(service: RestClient, found: Findings, named: dict[str, Any], progress: Say) -> None:
     """As ``glovecal diagnose`` proposes it; the effect stays only if the error on takes left out falls."""
     corrected = {item["effect"] for item in found.diagnosis["candidates"]} - {"clock_offset"}
     body = {"effect": named["effect"], "activate": True}
@@ -119,7 +122,17 @@ def _add(service: RestClient, found: Findings, named: dict[str, Any], say: Say, 
         body["rotations"] = named["where"]
     job = service.post(f"/models/{found.models[DIAGNOSED]}/effects", body)
     found.addition = _finished(service, job, progress)
-    say(f"Added: {found.addition['sentence']}")
+
+
+def _added(found: Findings) -> str:
+    """The error before and after, as everything else here has it: on the test takes, over all rotations. The
+    service's own sentence has those of the rotations that were learned anew, on takes left out of training."""
+    addition = found.addition or {}
+    before, after = (found.comparisons[name]["overall"]["rmse_deg"] for name in (DIAGNOSED, "with_effect"))
+    return (
+        f"Added: {addition['effect']} on {', '.join(addition['where'])}. Held-out error, all rotations: from"
+        f" {before:.2f} to {after:.2f} degrees."
+    )
 
 
 def _finished(service: RestClient, job: dict[str, Any], progress: Say) -> dict[str, Any]:

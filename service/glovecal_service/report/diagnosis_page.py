@@ -7,6 +7,8 @@ from typing import Any
 
 from markupsafe import Markup
 
+from glovecal_models.diagnosis.text import explained
+from glovecal_models.effects.base.assessment import HeldOutRmse
 from glovecal_service.next_command import action_command, next_command
 from glovecal_service.report.caption import Caption
 from glovecal_service.report.diagnosis_pictures import (
@@ -160,12 +162,9 @@ def _held_facts(held: Mapping[str, Any]) -> list[Fact]:
 
 
 def _size(item: Mapping[str, Any]) -> str:
-    before, after, control = (
-        degrees(item.get(f"rmse_{when}_deg")) for when in ("before", "after", "control")
-    )
+    rmse = HeldOutRmse(*(item.get(f"rmse_{when}_deg") or 0.0 for when in ("before", "after", "control")))
     p_value = item.get("p_value")
-    p = "" if p_value is None else f", p = {p_value:.2g}"
-    return f"reduces the held-out error from {before} to {after} degrees (control: {control}{p})"
+    return f"explains {explained(rmse, '' if p_value is None else f', p = {p_value:.2g}')}"
 
 
 def _is(item: Mapping[str, Any], named: Mapping[str, Any]) -> bool:

@@ -42,7 +42,7 @@ def saved_beside_controls(candidates: Candidates) -> tuple[str, str]:
         axes.barh([0], [0], color=CONTROL, alpha=0.7, label="its control")
         axes.axvline(0, color=QUIET, linewidth=0.8)
         axes.set_yticks(rows, [item["effect"] for item in shown])
-        axes.set_xlabel("held-out error reduced by, degrees")
+        axes.set_xlabel("error of the sensors reduced by, degrees, on held-out takes")
         legend_above(axes)
 
     return svg(draw, 9, 1.5 + 0.34 * len(shown)), _saved_sentence(candidates)
@@ -135,6 +135,7 @@ def _saved_sentence(candidates: Candidates) -> str:
     first, *others = significant
     rest = f"; also significant: {', '.join(item['effect'] for item in others)}" if others else ""
     return (
-        f"{tried}. {first['effect']} reduces the held-out error by {_saved(first, 'rmse_after_deg'):.2f} "
-        f"degrees (control: {_saved(first, 'rmse_control_deg'):.2f}){rest}."
+        f"{tried}. {first['effect']} reduces the error of the sensors by "
+        f"{_saved(first, 'rmse_after_deg'):.2f} degrees (control: "
+        f"{_saved(first, 'rmse_control_deg'):.2f}){rest}."
     )

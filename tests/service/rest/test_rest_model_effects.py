@@ -88,7 +88,7 @@ def test_a_diagnosis_names_the_hidden_cause_and_has_a_page(walk: Walk) -> None:
     page = walk.client.download(f"/jobs/{job['id']}/report").decode()
     assert page.startswith("<!doctype html>")
     assert "hysteresis is missing." in page
-    assert "hysteresis reduces the held-out error by" in page
+    assert "hysteresis reduces the error of the sensors by" in page
     assert page.count("<figure") == page.count("<figcaption>") == page.count("<svg")
 
 

@@ -123,7 +123,7 @@ def test_the_missing_effect_is_seen_named_added_and_live(
     add = main.get_by_role("button", name=f"Add {CAUSE}").first
     add.wait_for(timeout=PATIENCE_MS)
     expect(main).to_contain_text(
-        re.compile(rf"{CAUSE} on .* reduces the held-out error from [\d.]+ to [\d.]+")
+        re.compile(rf"{CAUSE} on .* explains \d+ % of the squared error of these sensors")
     )
     expect(main.get_by_role("progressbar")).to_be_hidden(timeout=PATIENCE_MS)
     picture("2-diagnose")

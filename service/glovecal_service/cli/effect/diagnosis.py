@@ -40,9 +40,9 @@ ASSOCIATIONS = {
     "p_value": "p, corrected",
 }
 LEGEND = (
-    "Held-out error in degrees, readings and reference identically smoothed. A control has the same freedom "
-    "as its effect and cannot be right: what it saves, flexibility saves. Noise floors are of "
-    "errors that are not smoothed."
+    "Errors of what the sensors read, in degrees, on held-out takes, readings and reference identically "
+    "smoothed; not the model's error of angles. A control has the same freedom as its effect and cannot be "
+    "right: what it saves, flexibility saves. Noise floors are of errors that are not smoothed."
 )
 Expressions = Annotated[
     list[str] | None,

@@ -10,13 +10,13 @@ from nicegui import ui
 from glovecal_service.studio.amounts import degrees
 from glovecal_service.studio.table import cell, row_head, table
 
-HEADS = ("Effect", "Error reduced by", "Held-out error", "With its control", "Significant on")
+HEADS = ("Effect", "Error reduced by", "Error of the sensors", "With its control", "Significant on")
 
 
 def candidate_table(candidates: Sequence[Mapping[str, Any]]) -> None:
     """``candidates``: of a diagnosis, the best first."""
     largest = max([0.01, *(_saved(item, "rmse_after_deg") for item in candidates)])
-    with table("Held-out error with each effect", HEADS, "candidate-table"):
+    with table("Error of the sensors with each effect, on held-out takes", HEADS, "candidate-table"):
         for item in candidates:
             _row(item, largest)
 
