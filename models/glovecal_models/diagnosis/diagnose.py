@@ -183,8 +183,13 @@ def _beside_slip(
     between_takes = [item for item in found if item.p_value is not None and item.significant_joints]
     if not any(item.joints for item in known) or not between_takes:
         return list(found)
-    slips = within_slip(design)
-    return [replace(item, within_slip=slips) if item in between_takes else item for item in found]
+    slips = set(within_slip(design))
+    return [
+        replace(item, within_slip=tuple(i for i in item.significant_joints if i in slips))
+        if item.p_value is not None
+        else item
+        for item in found
+    ]
 
 
 def _apart_by(naming: Naming, known: Sequence[KnownEffect]) -> frozenset[str]:

@@ -1,0 +1,114 @@
+"""After an effect was added: what its unknown start leaves, and what a healthy glove slips by, is no more."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.diagnosis.diagnosis import Diagnosis
+from glovecal_models.diagnosis.known_effect import KnownEffect
+from glovecal_models.diagnosis.text import diagnosis_sentences, residual_sentence
+from glovecal_models.effects.catalogue import effect
+from glovecal_models.layout import Layout
+from glovecal_models.simulation.causes.form import Cause
+from glovecal_models.simulation.session import record_session
+from glovecal_models.simulation.session_plan import SessionPlan
+from glovecal_models.takes.take import Take
+
+SENSORS = ("I_MCP", "I_PIP")
+LAYOUT = Layout.from_columns("two", SENSORS, SENSORS)
+CREEP = KnownEffect(effect("creep"), SENSORS, (np.array([0.75, 3.0, 12.0]),) * 2)
+PULL = KnownEffect(effect("cross_coupling"), ("I_MCP",), (np.zeros(0),))
+
+
+@pytest.fixture(scope="module")
+def healthy() -> tuple[Take, ...]:
+    plan = SessionPlan(seed=21, sensors=SENSORS, wearings=3, takes_per_wearing=3, take_s=20.0)
+    return record_session(plan, ()).takes
+
+
+def read_as(takes: Sequence[Take], counts: Sequence[np.ndarray]) -> list[Take]:
+    """The takes with so many counts more on I_PIP."""
+    more = np.array([0.0, 1.0])
+    pairs = zip(takes, counts, strict=True)
+    return [replace(take, readings=take.readings + part[:, None] * more) for take, part in pairs]
+
+
+def from_before(takes: Sequence[Take]) -> list[np.ndarray]:
+    """What a glove that creeps over most of a minute keeps of whatever its hand did before each take."""
+    starts = np.random.default_rng(4).normal(size=len(takes))
+    pairs = zip(takes, starts, strict=True)
+    return [4.0 * start * np.exp(-(take.time_s - take.time_s[0]) / 45.0) for take, start in pairs]
+
+
+def left_of(takes: Sequence[Take], *known: KnownEffect) -> Diagnosis:
+    return diagnose(takes, LAYOUT, known=known, effects=[], signatures=False)
+
+
+def test_what_the_unknown_start_of_a_memory_leaves_is_the_memorys(healthy):
+    takes = read_as(healthy, from_before(healthy))
+    assert left_of(takes).residual.is_significant, "without creep nothing explains it"
+    found = left_of(takes, CREEP).residual
+    assert not found.is_significant
+    assert found.obstacle is None
+    sentence = residual_sentence(found)
+    assert sentence.startswith("What is left within takes after creep ")
+    assert "Offsets of whole takes are not judged: creep remembers longer than these takes last" in sentence
+
+
+def test_what_goes_on_within_takes_is_told_beside_a_memory(healthy):
+    random = np.random.default_rng(5)
+    pulls = [4.0 * wander(random, take) for take in healthy]
+    found = left_of(read_as(healthy, pulls), CREEP).residual
+    assert found.is_significant
+    assert residual_sentence(found).startswith("No known effect explains what is left within takes after creep")
+
+
+def wander(random: np.random.Generator, take: Take) -> np.ndarray:
+    """Standard deviation 1, forgotten in 2 s."""
+    keep = np.exp(-np.median(np.diff(take.time_s)) / 2.0)
+    return np.sqrt(1 - keep**2) * lfilter([1], [1, -keep], random.normal(size=len(take.time_s) + 999))[999:]
+
+
+def test_effects_that_forget_at_once_leave_all_to_be_judged(healthy):
+    takes = read_as(healthy, from_before(healthy))
+    found = left_of(takes, PULL).residual
+    assert found.is_significant
+    assert residual_sentence(found).startswith("No known effect explains what is left after cross_coupling: ")
+
+
+def warmed(takes: Sequence[Take], counts: float) -> list[Take]:
+    """I_PIP reads so many counts more for a standard deviation of the recorded temperature."""
+    columns = [take.context["temperature_c"] for take in takes]
+    every = np.concatenate(columns)
+    return read_as(takes, [counts * (part - every.mean()) / every.std() for part in columns])
+
+
+@pytest.mark.parametrize(("counts", "is_named"), [(0.5, False), (6.0, True)])
+def test_beside_an_effect_what_a_healthy_glove_slips_by_gets_no_name(healthy, counts, is_named):
+    """A column that goes along with the slip of cloth by chance, and one that measures a cause."""
+    takes = warmed(healthy, counts)
+    found = diagnose(takes, LAYOUT, known=[PULL], effects=[effect("temperature")], signatures=False)
+    assert [item.effect for item in found.naming.ranked] == ["temperature"] * is_named
+    alone = diagnose(takes, LAYOUT, effects=[effect("temperature")], signatures=False)
+    assert alone.naming.ranked, "a first effect may be as small"
+    if not is_named:
+        assert "temperature is not named: the slow error of I_PIP is" in " ".join(diagnosis_sentences(found))
+
+
+def test_takes_that_a_sagging_supply_moves_apart_contradict_no_reference():
+    plan = SessionPlan(seed=6, sensors=SENSORS, wearings=3, takes_per_wearing=3, take_s=12.0)
+    cause = Cause("supply_sag", strength_deg=9.0, form="gain_power")
+    takes = record_session(plan, (cause,)).takes
+    untold = diagnose(takes, LAYOUT, effects=[], signatures=False, judge_residual=False)
+    assert any("contradict each other" in problem for problem in untold.reference_problems)
+    found = diagnose(
+        takes, LAYOUT, effects=[effect("supply_sag")], signatures=False, judge_residual=False
+    )
+    assert found.naming.ranked
+    assert found.reference_problems == ()
