@@ -1,8 +1,8 @@
 """``python3 do.py study demos``: is anything told in the demo that is not so?
 
-The second act of ``do.py demo`` for many seeds and effects, by the demo's own calls on a service in this
-process, without its gloves and its page; every saying is held against what was hidden. Finished demos are
-kept: an interrupted table goes on.
+The second act of ``do.py demo`` for many seeds and effects: the demo's own requests, answered by library calls
+in this process; every saying is held against what was hidden. Finished demos are kept: an interrupted table
+goes on.
 """
 
 from __future__ import annotations
@@ -10,21 +10,21 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import time
 from collections.abc import Mapping, Sequence
 from datetime import date
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, cast
 
 from finished_gloves import FinishedGloves, software_hash
+from library_service import LibraryService
 
 from glovecal_client.rest import RestClient
 from glovecal_models.threads import pin_blas_to_one_thread
 from glovecal_service.demo.error_fall import hidden_contract, is_right, told_wrongly
 from glovecal_service.demo.hidden_session import RANDOM_EFFECTS, TAKE_S, hidden_session
 from glovecal_service.demo.second_act import prepare, second_act
-from glovecal_service.rest.in_process import in_process_client
-from glovecal_service.settings import Settings
 
 SEEDS = range(1, 41)
 NAMED = ("none", "unknown", "unknown:posture_locked", *RANDOM_EFFECTS)
@@ -75,22 +75,21 @@ def answers(
     keys = [json.dumps({"effect": effect, "seed": seed}, sort_keys=True) for effect, seed in demos]
     waiting = [demo for demo, key in zip(demos, keys, strict=True) if kept.get(key) is None]
     if waiting and not is_all_known:
-        with TemporaryDirectory(prefix="glovecal-demos-") as place:
-            settings = Settings(data=Path(place) / "data", workers=1)
-            with in_process_client(settings) as service:
-                for effect, seed in waiting:
-                    key = json.dumps({"effect": effect, "seed": seed}, sort_keys=True)
-                    kept.keep(key, demo_answer(service, Path(place), effect, seed, take_s))
-                    print(f"{effect} {seed}", file=sys.stderr, flush=True)
+        for effect, seed in waiting:
+            key, begin = json.dumps({"effect": effect, "seed": seed}, sort_keys=True), time.process_time()
+            answer = demo_answer(effect, seed, take_s)
+            took_s = time.process_time() - begin
+            kept.keep(key, answer, took_s)
+            print(f"{effect} {seed}: {took_s:.0f} s", file=sys.stderr, flush=True)
     return [answer for key in keys if (answer := kept.get(key)) is not None]
 
 
-def demo_answer(service: RestClient, place: Path, effect: str, seed: int, take_s: float) -> dict[str, Any]:
+def demo_answer(effect: str, seed: int, take_s: float) -> dict[str, Any]:
     """One demo: what was hidden, all that was told, and what of it is wrong."""
     hidden = hidden_session(effect, seed, take_s=take_s)
-    subject = f"{effect.replace(':', '-')}-{seed}"
-    told: list[str] = []
-    found = prepare(service, hidden, place / subject, subject=subject)
+    service, told = cast(RestClient, LibraryService()), []
+    with TemporaryDirectory(prefix="glovecal-demos-") as place:
+        found = prepare(service, hidden, Path(place))
     second_act(service, found, told.append, lambda _: None)
     figures = hidden_contract(hidden, found)
     wrong = told_wrongly(hidden, found)

@@ -70,15 +70,16 @@ class KnownEffect:
         self.kept.append((takes, columns))
         return columns
 
-    def settles_after_s(self, takes: Sequence[Signals], lane: int, joint: str) -> float:
-        """How long a take's unknown start shows in the columns of ``joint``, a lane of ``takes``; 0 where it
-        remembers nothing of the joint's motion."""
+    def unsettled(self, takes: Sequence[Signals], lane: int, joint: str) -> list[np.ndarray] | None:
+        """For each take (N,): where its unknown start shows in the columns of ``joint``, a lane of ``takes``.
+        None where nothing of the joint's motion is remembered."""
         if joint not in self.joints or not isinstance(self.effect, HistoryEffect):
-            return 0.0
+            return None
         single = [one_lane(take, lane) for take in takes]
         settings = self.effect.fit_repair_constants(single)
         settings = self.effect.settings_as_stored(single, settings, self.stored)
-        return self.effect.transient_s(self.shapes[self.joints.index(joint)][None, :], settings)
+        shape = self.shapes[self.joints.index(joint)][None, :]
+        return [self.effect.unsettled(take, settings, shape)[:, 0] for take in single]
 
     def columns(
         self,

@@ -1,7 +1,7 @@
 """What may be judged of a residual beside effects that remember: not what their unknown start left.
 
 Nobody recorded what a joint did before a take, so the state of a memory starts as a guess, and the error of
-that guess stays until the effect has settled (``Effect.transient_s``): an offset of the take that slowly
+that guess stays until the effect has settled (``HistoryEffect.unsettled``): an offset of the take that slowly
 changes. It is the effect's own, neither noise nor another cause. Until then the mean and the straight line of
 the error are not judged, and stretches too short for a line not at all.
 """
@@ -25,38 +25,43 @@ SHORTEST_LINE_S = 4.0
 
 def without_unsettled(design: ForwardDesign, known: Sequence[KnownEffect]) -> ForwardDesign:
     """The design with those rows and residuals that can be judged; the same where nothing remembers."""
-    settles_s = [
-        max((item.settles_after_s(design.signals, joint, name) for item in known), default=0.0)
-        for joint, name in enumerate(design.rotations)
-    ]
-    if not any(settles_s):
+    masks = [_unsettled(design, known, joint) for joint in range(len(design.rotations))]
+    if not any(masks):
         return design
-    judged = [_judged(design, joint, seconds) for joint, seconds in enumerate(settles_s)]
+    judged = [_judged(design, joint, mask) for joint, mask in enumerate(masks)]
     used, products = zip(*judged, strict=True)
     return replace(design, used=used, products=products, kept={})
 
 
 def unsettled_effects(design: ForwardDesign, known: Sequence[KnownEffect]) -> tuple[str, ...]:
     """Names of those that settle in none of the takes: nothing is known of offsets of whole takes."""
-    longest = max((float(np.ptp(take.time_s)) for take in design.signals if len(take)), default=0.0)
     found = [
         item.effect.name
         for item in known
-        for joint, name in enumerate(design.rotations)
-        if item.settles_after_s(design.signals, joint, name) >= longest
+        for joint in range(len(design.rotations))
+        if (masks := _unsettled(design, [item], joint)) and all(mask.all() for mask in masks)
     ]
     return tuple(dict.fromkeys(found))
 
 
+def _unsettled(design: ForwardDesign, known: Sequence[KnownEffect], joint: int) -> list[np.ndarray]:
+    """For each take (N,) where an effect on a joint has not settled; empty where none remembers."""
+    name = design.rotations[joint]
+    every = [item.unsettled(design.signals, joint, name) for item in known]
+    return [np.any(masks, axis=0) for masks in zip(*(each for each in every if each), strict=True)]
+
+
 def _judged(
-    design: ForwardDesign, joint: int, settles_s: float
+    design: ForwardDesign, joint: int, masks: Sequence[np.ndarray]
 ) -> tuple[tuple[np.ndarray, ...], BaseProducts]:
-    """The rows of each unit and what the base leaves there, of one joint."""
+    """The rows of each unit and what the base leaves there, of one joint; ``masks`` of its takes, or none."""
     products = copy.copy(design.products[joint])
+    if not masks:
+        return design.used[joint], products
     used, units, residuals = [], [], []
     parts = zip(design.units(joint), products.units, products.residual, strict=True)
     for (take, rows), unit, residual in parts:
-        left = _left(design.signals[take].time_s, rows, residual, settles_s)
+        left = _left(design.signals[take].time_s, rows, residual, masks[take])
         kept = np.isfinite(left)
         used.append(rows[kept])
         weight = None if unit.weight is None else unit.weight[kept]
@@ -66,18 +71,17 @@ def _judged(
     return tuple(used), products
 
 
-def _left(time_s: np.ndarray, rows: np.ndarray, residual: np.ndarray, settles_s: float) -> np.ndarray:
-    """(N,) at the ``rows`` of a take of ``time_s``, NaN where nothing can be judged; a gap starts the memory
-    anew."""
+def _left(time_s: np.ndarray, rows: np.ndarray, residual: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """(M,) at the ``rows`` of a take of ``time_s`` (N,), NaN where nothing can be judged; ``mask`` (N,) is
+    True where effects have not settled, which they begin anew after a gap."""
     result = residual.copy()
-    for part in unbroken(time_s) if settles_s > 0.0 else ():
-        since = time_s[rows] - time_s[part.start]
-        early = (rows >= part.start) & (rows < part.stop) & (since < settles_s)
-        at = since[early]
+    for part in unbroken(time_s):
+        early = (rows >= part.start) & (rows < part.stop) & mask[rows]
+        at = time_s[rows[early]]
         if not len(at):
             continue
         if np.ptp(at) < SHORTEST_LINE_S:
             result[early] = np.nan
         else:
-            result[early] -= np.polyval(np.polyfit(at, result[early], 1), at)
+            result[early] -= np.polyval(np.polyfit(at - at[0], result[early], 1), at - at[0])
     return result

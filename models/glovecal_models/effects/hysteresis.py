@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 from glovecal_models.effects.base.facts import Parameter, Rival, Settings
-from glovecal_models.effects.base.history_effect import ArrayStateEffect
+from glovecal_models.effects.base.history_effect import ArrayStateEffect, unbroken
 from glovecal_models.effects.base.joint_units import fit_joint_units, in_joint_units
 from glovecal_models.effects.base.motions import RAMPS
 from glovecal_models.effects.base.signals import Signals
@@ -106,6 +106,15 @@ class Hysteresis(ArrayStateEffect):
         state[...] = before.reshape(state.shape)
         loops = np.subtract(plays, joint, out=plays).reshape(len(own), *state.shape)
         return _beside_products(loops, own, settings)
+
+    def unsettled(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        """A play forgets nothing with time: it is known once the joint has moved through all of it."""
+        result = np.empty(take.own.shape, dtype=bool)
+        for part in unbroken(take.time_s):
+            own = take.own[part]
+            moved = np.maximum.accumulate(own) - np.minimum.accumulate(own)
+            result[part] = moved < 2.0 * shape[:, 0]
+        return result
 
     def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
         widths = list(enumerate(_widths(settings)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS
 from glovecal_service.demo.hidden_session import HiddenSession
 from glovecal_service.demo.second_act import Findings
 
@@ -91,7 +92,8 @@ def verdict(hidden: HiddenSession, found: Findings) -> list[str]:
 def told_wrongly(hidden: HiddenSession, found: Findings) -> list[str]:
     """What was told beside the first name and is not so; each as the end of a sentence.
 
-    The references are right, and whatever a catalogue's effect leaves once it was added is its own.
+    The references are right, and no second effect is hidden. That something is left is right where the error
+    is more than a healthy glove's.
     """
     truth, wrong = hidden.truth, []
     for when, diagnosis in (("", found.diagnosis), (" afterwards", found.diagnosis_after or {})):
@@ -105,10 +107,11 @@ def told_wrongly(hidden: HiddenSession, found: Findings) -> list[str]:
     if truth is None and found.diagnosis["unexplained_residual"]["is_significant"]:
         wrong.append("an unexplained residual was reported of a healthy glove")
     is_catalogued = truth is not None and not truth.name.startswith("unknown:")
-    again = found.diagnosis_after
+    again, floor, errors = found.diagnosis_after, floor_deg(found), errors_deg(found)
     if again is not None and is_catalogued and again["unexplained_residual"]["is_significant"]:
-        wrong.append("an unexplained residual was reported afterwards")
-    floor, errors = floor_deg(found), errors_deg(found)
+        most = DIAGNOSIS_LIMITS.healthy_floors * (floor or 0.0)
+        if errors.get("with_effect", 0.0) <= most:
+            wrong.append("an unexplained residual was reported afterwards, of an error as in healthy gloves")
     if floor is not None and min(errors.values()) < floor:
         wrong.append("an error was told that lies below its noise floor")
     return list(dict.fromkeys(wrong))

@@ -15,6 +15,7 @@ import pytest
 from glovecal_models.effects.base.control import control_columns
 from glovecal_models.effects.base.effect import ColumnlessEffect, Effect
 from glovecal_models.effects.base.facts import Control, Kind, Settings, Stage
+from glovecal_models.effects.base.history_effect import HistoryEffect
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.catalogue import catalogue, declared_effect, known_by_name, stored_effect
 from glovecal_models.effects.declared.expression_effect import ExpressionEffect
@@ -381,3 +382,16 @@ def test_an_effect_that_is_known_by_name_is_known_to_its_own_thread_alone() -> N
         assert catalogue()["strap"] is own
         assert "strap" not in elsewhere.submit(catalogue).result()
     assert "strap" not in catalogue()
+
+
+def test_a_play_is_known_once_the_joint_has_moved_through_it_and_after_a_gap_anew() -> None:
+    time = np.concatenate([np.arange(0, 4, 0.1), np.arange(9, 11, 0.1)])
+    own = np.where(time < 1, 20.0, np.where(time < 9, 31.0, 40.0))[:, None]
+    play, creep = catalogue()["hysteresis"], catalogue()["creep"]
+    assert isinstance(play, HistoryEffect)
+    assert isinstance(creep, HistoryEffect)
+    take = Signals(time, own)
+    assert play.unsettled(take, {}, np.array([[5.0]]))[:, 0].tolist() == ((time < 1) | (time >= 9)).tolist()
+    assert play.unsettled(take, {}, np.array([[6.0]])).all(), "twelve degrees wide, and eleven were moved"
+    slow = creep.unsettled(take, {}, np.array([[0.1, 0.5, 2.0]]))[:, 0]
+    assert slow.tolist() == ((time < 2) | ((time >= 9) & (time < 10.95))).tolist()

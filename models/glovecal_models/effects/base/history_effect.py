@@ -54,6 +54,13 @@ class HistoryEffect(Effect):
         sign = generator.choice([-1.0, 1.0])
         return sign * np.abs(super().forward_weights(settings, generator))
 
+    def unsettled(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
+        """(N, L) where what came before a start still shows: with time it is forgotten."""
+        settles_s, result = self.transient_s(shape, settings), np.empty(take.own.shape, dtype=bool)
+        for part in unbroken(take.time_s):
+            result[part] = (take.time_s[part] - take.time_s[part][:1] < settles_s)[:, None]
+        return result
+
     def stream(self, settings: Settings, shape: np.ndarray) -> Stream:
         return _HistoryStream(self, settings, shape)
 

@@ -1,0 +1,97 @@
+"""The requests of the demo's second act, answered by library calls in this process: no server, no workers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.model_recipe import repaired_takes, requested_effects
+from glovecal_models.calibration.training import train
+from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.comparison.compare import compare
+from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.diagnosis.known_effect import known_effects
+from glovecal_models.improvement.add_effect import add_effect
+from glovecal_models.layout import Layout
+from glovecal_models.takes.table import read_takes
+from glovecal_models.takes.take import Take
+from glovecal_service.jobs.diagnose import floors_of
+from glovecal_service.views.addition import AdditionView
+from glovecal_service.views.comparison import comparison_view
+from glovecal_service.views.diagnosis import DiagnosisView
+
+
+class LibraryService:
+    """Stands for a ``RestClient`` of one subject. What the demo asks where a model fails is left out: it takes
+    a third of the time, and says nothing of causes."""
+
+    def __init__(self) -> None:
+        self._takes: dict[str, Take] = {}
+        self._models: dict[str, CalibrationModel] = {}
+        self._settings: dict[str, TrainingSettings] = {}
+        self._taught: list[Take] = []
+        self._layout: Layout | None = None
+        self._results: list[dict[str, Any]] = []
+
+    def upload_takes(self, table: Path, *, subject: str, layout: str = "") -> dict[str, Any]:
+        """As the import of a file: its columns make the layout."""
+        takes = read_takes(table)
+        self._layout = self._layout or Layout.from_columns("auto", takes[0].sensors, takes[0].rotations)
+        self._takes |= {take.name: take for take in takes}
+        return {"layout": self._layout.name, "takes": [{"id": take.name} for take in takes]}
+
+    def post(self, path: str, body: Mapping[str, Any] | None = None) -> Any:
+        _, *place = path.split("/")
+        asked = body or {}
+        if place == ["subjects"]:
+            return {}
+        if place == ["models", "train"]:
+            return self._job(self._train(asked))
+        name, verb = place[1:]
+        if verb == "compare":
+            found = compare(self._models[name], self._some(asked["takes"]))
+            return comparison_view(found, name, ()).model_dump()
+        if verb == "where":
+            return {"rotations": [{"sentence": "(not asked)"}]}
+        return self._job(self._diagnosed(name) if verb == "diagnose" else self._added(name, asked))
+
+    def wait_for_job(self, id: str, **_: Any) -> dict[str, Any]:
+        """Nothing is waited for: a job is finished when its request returns."""
+        return {"result": self._results[int(id)]}
+
+    def _job(self, result: dict[str, Any]) -> dict[str, Any]:
+        self._results.append(result)
+        return {"id": str(len(self._results) - 1)}
+
+    def _some(self, names: Sequence[str]) -> list[Take]:
+        return [self._takes[name] for name in names]
+
+    def _train(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+        assert self._layout is not None
+        self._taught = self._some(asked["takes"])
+        settings = TrainingSettings(**{name: asked[name] for name in ("method", "samples", "folds")})
+        model = train(self._taught, self._layout, asked["subject"], settings)
+        return {"model": self._kept(model, settings)}
+
+    def _kept(self, model: CalibrationModel, settings: TrainingSettings) -> str:
+        name = f"{len(self._models)}"
+        self._models[name], self._settings[name] = model, settings
+        return name
+
+    def _diagnosed(self, name: str) -> dict[str, Any]:
+        model = self._models[name]
+        takes = repaired_takes(self._taught, requested_effects(model))
+        floors = floors_of(model, self._taught)
+        found = diagnose(takes, model.layout, known=known_effects(model), noise_floors=floors)
+        return DiagnosisView.of(found).document()
+
+    def _added(self, name: str, asked: Mapping[str, Any]) -> dict[str, Any]:
+        settings = self._settings[name]
+        found = add_effect(
+            self._models[name], self._taught, asked["effect"], rotations=asked.get("rotations"),
+            settings=settings,
+        )  # fmt: skip
+        child = self._kept(found.model, settings) if found.added else None
+        return AdditionView.of(found).document() | {"model": child}
