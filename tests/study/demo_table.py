@@ -1,8 +1,8 @@
 """``python3 do.py study demos``: is anything told in the demo that is not so?
 
-The second act of ``do.py demo`` for many seeds and effects: the demo's own requests, answered by library calls
-in this process; every saying is held against what was hidden. Finished demos are kept: an interrupted table
-goes on.
+The second act of ``do.py demo`` for many seeds and effects: the demo's own requests, answered by library
+calls in this process; every saying is held against what was hidden. Finished demos are kept: an interrupted
+table goes on.
 """
 
 from __future__ import annotations
@@ -37,9 +37,7 @@ Demo = tuple[str, int]
 
 
 def main(arguments: Sequence[str]) -> int:
-    parser = argparse.ArgumentParser(
-        prog="do.py study demos", description=(__doc__ or "").partition("\n")[0]
-    )
+    parser = argparse.ArgumentParser(prog="do.py study demos", description=(__doc__ or "").partition("\n")[0])
     parser.add_argument(
         "demos", nargs="*", metavar="DEMO",
         help="a seed, two of them as 1-40, or EFFECT:SEED; default: 1-40, and each effect by name at seed 1",

@@ -24,8 +24,8 @@ from glovecal_service.views.diagnosis import DiagnosisView
 
 
 class LibraryService:
-    """Stands for a ``RestClient`` of one subject. What the demo asks where a model fails is left out: it takes
-    a third of the time, and says nothing of causes."""
+    """Stands for a ``RestClient`` of one subject. Where a model fails is not worked out: it says nothing of
+    causes, and takes time."""
 
     def __init__(self) -> None:
         self._takes: dict[str, Take] = {}

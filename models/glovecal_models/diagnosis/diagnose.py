@@ -154,6 +154,7 @@ def diagnose(
             wholes=wholes,
         )  # fmt: skip
     progress("done", 1.0)
+    problems = reference_problems(takes, layout, limits, apart_by=_apart_by(naming, known))
     diagnosis = Diagnosis(
         joints=problem.joints,
         rmse_deg=_held_out_errors(design),
@@ -161,7 +162,7 @@ def diagnose(
         naming=naming,
         assessments=tuple(found),
         not_identifiable=tuple(impossible),
-        reference_problems=reference_problems(takes, layout, limits, apart_by=_apart_by(naming, known)),
+        reference_problems=problems,
         findings=findings,
         residual=residual,
         next_take=None,

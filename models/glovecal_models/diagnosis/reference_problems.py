@@ -155,9 +155,7 @@ def reference_problems(
             problems.extend(_of_rotation(rotation, measured, inputs, has_own, limits))
             if has_own:
                 may_be_apart = rotation in apart_by
-                problems.extend(
-                    contradictions(rotation, measured, inputs, limits, may_be_apart=may_be_apart)
-                )
+                problems.extend(contradictions(rotation, measured, inputs, limits, may_be_apart=may_be_apart))
     radians = radians_problem(takes)
     return tuple(problems) if radians is None else (radians[0].upper() + radians[1:], *problems)
 

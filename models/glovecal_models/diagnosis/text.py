@@ -103,7 +103,8 @@ def by_column_sentence(actions: Sequence[Action]) -> str:
     where = ", ".join(item.rotation for item in actions)
     return (
         f"{actions[0].effect} on {where} explains {explained(together(actions))} in a form that these takes"
-        f" tell; no usual form of it does. The error goes along with {actions[0].association.phrase}, which measures it."
+        " tell; no usual form of it does. The error goes along with"
+        f" {actions[0].association.phrase}, which measures it."
     )
 
 
@@ -143,8 +144,8 @@ def within_slip_sentence(item: Assessment) -> str:
     """Of an effect that changes from take to take no more than a healthy glove slips."""
     where = ", ".join(item.joints[i] for i in item.within_slip)
     return (
-        f"{item.effect} is not named: the slow error of {where} is no larger than a healthy glove's, which slips"
-        " a little."
+        f"{item.effect} is not named: the slow error of {where} is no larger than a healthy glove's, which"
+        " slips a little."
     )
 
 
@@ -216,7 +217,8 @@ def _not_significant(residual: UnexplainedResidual, is_noise: bool | None) -> st
     times = (
         f"; errors of at most {max(item.times for item in known):.1f} times the noise floor" if known else ""
     )
-    return f"{_capital(_rest(residual))} is no larger than in healthy gloves: {slow}{times}.{_unsettled(residual)}"
+    rest = _capital(_rest(residual))
+    return f"{rest} is no larger than in healthy gloves: {slow}{times}.{_unsettled(residual)}"
 
 
 def _rest(residual: UnexplainedResidual) -> str:
@@ -234,16 +236,17 @@ def _unsettled(residual: UnexplainedResidual) -> str:
     names = residual.unsettled
     if not names:
         return ""
+    remembers = f"{' and '.join(names)} {'remember' if names[1:] else 'remembers'}"
     return (
-        f" Offsets of whole takes are not judged: {' and '.join(names)} {'remember' if names[1:] else 'remembers'}"
-        " longer than these takes last, and what came before them was not recorded."
+        f" Offsets of whole takes are not judged: {remembers} longer than these takes last, and what came"
+        " before them was not recorded."
     )
 
 
 def _above_floor(name: str, item: FloorRatio) -> str:
     return (
-        f"the error of {name}'s readings is {item.rmse_deg:.2f} degrees, {item.times:.1f} times its noise floor"
-        f" of {item.floor.floor_deg:.2f} (lower 95 % bound {item.lower_times:.1f}; healthy gloves: at most"
+        f"the error of {name}'s readings is {item.rmse_deg:.2f} degrees, {item.times:.1f} times its noise"
+        f" floor of {item.floor.floor_deg:.2f} (lower 95 % bound {item.lower_times:.1f}; healthy gloves: at most"
         f" {item.limits.healthy_floors:g})"
     )
 

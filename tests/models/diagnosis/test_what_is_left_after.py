@@ -66,7 +66,9 @@ def test_what_goes_on_within_takes_is_told_beside_a_memory(healthy):
     pulls = [4.0 * wander(random, take) for take in healthy]
     found = left_of(read_as(healthy, pulls), CREEP).residual
     assert found.is_significant
-    assert residual_sentence(found).startswith("No known effect explains what is left within takes after creep")
+    assert residual_sentence(found).startswith(
+        "No known effect explains what is left within takes after creep"
+    )
 
 
 def wander(random: np.random.Generator, take: Take) -> np.ndarray:
@@ -107,8 +109,6 @@ def test_takes_that_a_sagging_supply_moves_apart_contradict_no_reference():
     takes = record_session(plan, (cause,)).takes
     untold = diagnose(takes, LAYOUT, effects=[], signatures=False, judge_residual=False)
     assert any("contradict each other" in problem for problem in untold.reference_problems)
-    found = diagnose(
-        takes, LAYOUT, effects=[effect("supply_sag")], signatures=False, judge_residual=False
-    )
+    found = diagnose(takes, LAYOUT, effects=[effect("supply_sag")], signatures=False, judge_residual=False)
     assert found.naming.ranked
     assert found.reference_problems == ()

@@ -12,7 +12,7 @@ from cli_running import glovecal
 from glovecal_client.rest import RestClient
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.table import read_takes
-from glovecal_service.demo.error_fall import chart, hidden_contract, verdict
+from glovecal_service.demo.error_fall import chart, hidden_contract, told_wrongly, verdict
 from glovecal_service.demo.hidden_session import RANDOM_EFFECTS, check_effect, hidden_session
 from glovecal_service.demo.second_act import Findings, prepare, second_act
 from glovecal_service.rest.in_process import in_process_client
@@ -63,7 +63,10 @@ def test_a_hidden_effect_is_compared_placed_named_added_and_revealed(service, tm
     ):
         assert part in text
     assert "so far" in text, "the held-out error is reported while it is measured"
-    assert "Added: cross_coupling" in text
+    before, after = (f"{fall[name]:.2f}" for name in ("lmc_gpr", "with_effect"))
+    assert f"Held-out error, all rotations: from {before} to {after} degrees." in text
+    assert sum(line.count("held-out error from") for line in said) == 0, "one error for one step"
+    assert "% of the squared error of these sensors on held-out takes (control: " in text
     assert "Right: cross_coupling was named." in ending
     assert any(line.strip().startswith("+ cross_coupling") for line in ending)
 
@@ -95,6 +98,37 @@ def test_a_wrong_name_is_called_wrong():
     assert verdict(healthy, found)[-1] == "Right: nothing was named."
     assert hidden_contract(healthy, found)["hidden"]["truth"] == "none"
     assert hidden_contract(hidden, found)["noise_floor_deg"] is None
+
+
+def test_what_is_told_beside_the_first_name_and_is_not_so_is_called_wrong():
+    hidden, healthy = (hidden_session(name, 1, take_s=6.0) for name in ("lag", "none"))
+    quiet = {"named": None, "findings": [], "reference_problems": []}
+    quiet["unexplained_residual"] = {"is_significant": False}
+    loud = quiet | {"unexplained_residual": {"is_significant": True}}
+
+    def errors(rmse_deg: float) -> dict:
+        return {"overall": {"rmse_deg": rmse_deg, "floor": {"floor_deg": 0.6, "is_lower_bound": False}}}
+
+    named = {"effect": "lag", "confidence_set": ["lag"]}
+    found = Findings(
+        comparisons={"lmc_gpr": errors(3.0), "with_effect": errors(0.8)},
+        diagnosis=quiet | {"named": named}, diagnosis_after=quiet,
+    )  # fmt: skip
+    assert told_wrongly(hidden, found) == []
+    problem = "t1 and t2 contradict each other."
+    found.diagnosis["reference_problems"] = [problem]
+    found.diagnosis["findings"] = [{"effect": "sensor_fault"}]
+    found.diagnosis_after = loud | {"named": {"effect": "creep"}}
+    wrong = told_wrongly(hidden, found)
+    assert wrong[:3] == [f"{problem!r} was told", "sensor_fault was found", "creep was named afterwards"]
+    assert "of an error as in healthy gloves" in wrong[3]
+    assert verdict(hidden, found)[-4:] == [f"Wrong: {said}." for said in wrong]
+    found.comparisons["with_effect"] = errors(1.5)
+    assert len(told_wrongly(hidden, found)) == 3, "an error of 2.5 noise floors: something is left"
+    found.comparisons["with_effect"] = errors(0.5)
+    assert "lies below its noise floor" in told_wrongly(hidden, found)[-1]
+    clean = Findings(comparisons={"lmc_gpr": errors(0.7)}, diagnosis=loud)
+    assert told_wrongly(healthy, clean) == ["an unexplained residual was reported of a healthy glove"]
 
 
 def test_every_effect_that_may_be_drawn_can_be_hidden():

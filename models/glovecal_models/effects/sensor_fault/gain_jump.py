@@ -2,9 +2,9 @@
 
 The reading is fitted by a line in the reference. One line for the whole take, one line on each side of the
 best moment, and one line that changes steadily with time: a jump is named only when two lines leave far less
-than both others, and when the error steps right there from one frame to the next, as it does nowhere else, and
-stays where it stepped to: noise comes back with the next frame. Postures that are held one after another also
-look like two lines, but no hand changes posture in a frame.
+than both others, and when the error steps right there from one frame to the next, as it does nowhere else,
+and stays where it stepped to: noise comes back with the next frame. Postures that are held one after another
+also look like two lines, but no hand changes posture in a frame.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ BETTER_THAN_ONE = 0.5
 """Share of the squared error of one line that two may leave."""
 BETTER_THAN_DRIFT = 0.7
 STEP_SHARE = 0.5
-"""Of the change between the two lines at that angle, which the step must reach, and the error after it keep."""
+"""Of the change between the two lines at that angle: so much the step must reach, and the error keep."""
 TYPICAL_SHARE = 0.7
 """Of the RMS of that change over the take, which the change at the step must reach."""
 STEP_OVER_OTHERS = 1.3
