@@ -10,7 +10,7 @@ import pytest
 from demo_table import BEGIN, END, HEADS, answers, main, summary, table
 from finished_gloves import FinishedGloves, software_hash
 
-PAGE = f"# As measured\n\n{BEGIN}\nold\n{END}\n\nAfter it.\n"
+PAGE = f"# As measured\n\n{BEGIN}\nlast year\n{END}\n\nAfter it.\n"
 
 
 def answer(demo: str, truth: str, named: list[str], *wrong: str) -> dict[str, Any]:
@@ -44,7 +44,7 @@ def test_finished_demos_are_put_into_their_page(tmp_path: Path):
     assert main(["lag:3", "none:1", "--known", "--folder", str(tmp_path), "--page", str(page)]) == 0
     text = page.read_text()
     assert "| lag 3 | lag (play) | lag |" in text
-    assert "old" not in text
+    assert "last year" not in text
     assert text.endswith(f"{END}\n\nAfter it.\n")
 
 

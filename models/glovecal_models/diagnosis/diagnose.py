@@ -137,7 +137,8 @@ def diagnose(
         residual = UnexplainedResidual(obstacle="single poses")
     else:
         after = problem.with_first(naming, by_name, design)
-        rest = without_unsettled(after.design(), after.known)
+        whole = after.design()
+        rest = without_unsettled(whole, after.known)
         likely = [item.effect for item in impossible if item.saves_much]
         residual = unexplained_residual(
             rest, problem.even, layout, seed, floors=noise_floors, undecided=likely,
@@ -150,7 +151,7 @@ def diagnose(
         )
         there = {(item.effect.name, joint) for item in after.known for joint in item.joints}
         actions = actions_for(
-            residual.associations, after.design(), layout, there, linear=linear, seed=seed, saved_by_known=saved,
+            residual.associations, whole, layout, there, linear=linear, seed=seed, saved_by_known=saved,
             wholes=wholes,
         )  # fmt: skip
     progress("done", 1.0)

@@ -246,8 +246,8 @@ def _unsettled(residual: UnexplainedResidual) -> str:
 def _above_floor(name: str, item: FloorRatio) -> str:
     return (
         f"the error of {name}'s readings is {item.rmse_deg:.2f} degrees, {item.times:.1f} times its noise"
-        f" floor of {item.floor.floor_deg:.2f} (lower 95 % bound {item.lower_times:.1f}; healthy gloves: at most"
-        f" {item.limits.healthy_floors:g})"
+        f" floor of {item.floor.floor_deg:.2f} (lower 95 % bound {item.lower_times:.1f}; healthy gloves: at"
+        f" most {item.limits.healthy_floors:g})"
     )
 
 

@@ -125,8 +125,8 @@ def _add(service: RestClient, found: Findings, named: dict[str, Any], progress: 
 
 
 def _added(found: Findings) -> str:
-    """The error before and after, as all else here has it: on the test takes, over all rotations. The service's
-    own sentence has those of the rotations that were learned anew, on takes left out of training."""
+    """The error before and after, as all else here has it: on the test takes, over all rotations. The
+    service's own sentence is of the rotations that were learned anew, on takes left out of training."""
     addition = found.addition or {}
     before, after = (found.comparisons[name]["overall"]["rmse_deg"] for name in (DIAGNOSED, "with_effect"))
     return (
