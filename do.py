@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Glovecal's verbs. Needs python3 and pip, nothing else:
+"""Glovecal's verbs. Needs Python 3.11 to 3.14 and pip, nothing else:
 
     python3 do.py demo      calibrate a simulated glove over real zenoh, in under two minutes
     python3 do.py serve     run the service (real time, REST) on this machine
@@ -20,7 +20,8 @@
                             fresh trixie -- tests/client: these tests only)
     python3 do.py picture   README's picture of the studio, from the running page (needs Chromium)
 
-uv is installed into .tools and the locked packages into .venv; nothing outside this folder is touched.
+uv is installed into .tools and the locked packages into .venv; nothing outside this folder is touched
+but the caches of pip and uv. Where only another Python is found, uv brings one into .tools.
 Any verb with --smoke tries itself in seconds, with what is installed: nothing is fetched.
 """
 
@@ -38,36 +39,70 @@ SMOKE = "--smoke"
 SIMULATED = ("tests/simulated",)
 STUDIO = ("tests/service/studio", "tests/service")
 SMOKE_TESTS = ("tests/models/test_training_choices.py", "tests/models/test_layout.py")
+BROUGHT = "3.13"
+"""The Python that uv brings where there is none of these."""
+OWN_PYTHON = {
+    "UV_PYTHON_PREFERENCE": "system",
+    "UV_PYTHON_DOWNLOADS": "manual",
+    "UV_PYTHON_INSTALL_DIR": str(TOOLS / "python"),
+}
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
+OTHER_PYTHON = f"Glovecal needs Python 3.11 to 3.14; here is {sys.version.split()[0]}"
+
+
+class Unavailable(Exception):
+    """Nothing can be run on this computer as it is; the sentence says what to install."""
+
+
 def uv() -> list[str]:
-    """The uv command, installed into .tools when it is not there yet."""
+    """The uv command, installed into .tools when it is not there yet. Raises Unavailable."""
     if not (TOOLS / "uv").is_dir():
         print("installing uv into .tools ...", file=sys.stderr)
-        pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-        subprocess.run([*pip, "--target", str(TOOLS), "uv"], cwd=ROOT, check=True)
+        if sys.version_info < (3, 8):  # there is no uv for it
+            raise Unavailable(f"{OTHER_PYTHON}: install one of them and try again")
+        pip = [sys.executable, "-m", "pip"]
+        if subprocess.run([*pip, "--version"], cwd=ROOT, stdout=subprocess.DEVNULL).returncode:
+            raise Unavailable(
+                f"{sys.executable} has no pip: install it (Debian, Ubuntu: apt install python3-pip)"
+            )
+        install = [*pip, "install", "--quiet", "--disable-pip-version-check", "--target", str(TOOLS), "uv"]
+        if subprocess.run(install, cwd=ROOT).returncode:
+            raise Unavailable(
+                "pip could not install uv into .tools, for the reason above: does pip reach its index?"
+            )
     return [str(TOOLS / "bin" / "uv")]
+
+
+def find_python(environment: dict[str, str]) -> None:
+    """One that pyproject.toml allows; uv brings one where this computer has none. Raises Unavailable."""
+    silent = {"cwd": ROOT, "env": environment, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    if (ROOT / ".venv").is_dir() or subprocess.run([*uv(), "python", "find"], **silent).returncode == 0:
+        return
+    print(f"no Python 3.11 to 3.14 is here: bringing {BROUGHT} into .tools ...", file=sys.stderr)
+    if subprocess.run([*uv(), "python", "install", "--no-bin", BROUGHT], **silent).returncode:
+        raise Unavailable(f"{OTHER_PYTHON}, and uv could not bring one: install one of them and try again")
 
 
 def run(*command: str, groups: tuple[str, ...] = (), dev: bool = False, beside: tuple[str, ...] = ()) -> int:
     """Run a command in the locked environment; with --smoke in the one that is there, as it is.
 
-    ``beside``: folders whose modules a script may import beside its own.
+    ``beside``: folders whose modules a script may import beside its own. Raises Unavailable.
     """
     options = ["run", "--frozen", "--all-packages", "--all-extras", "--no-default-groups"]
     for group in (*groups, *(("dev",) if dev else ())):
         options += ["--group", group]
     if SMOKE in sys.argv:
         if not (TOOLS / "uv").is_dir() or not (ROOT / ".venv").is_dir():
-            print("--smoke installs nothing, and .venv is not there yet: python3 do.py test", file=sys.stderr)
-            return 2
+            raise Unavailable("--smoke installs nothing, and .venv is not there yet: python3 do.py test")
         options = ["run", "--no-sync", "--offline"]
     quiet = ["--quiet"] if (ROOT / ".venv").is_dir() else []
-    environment = {**os.environ, **ONE_THREAD, "UV_PYTHON_PREFERENCE": "only-system"}
+    environment = {**os.environ, **ONE_THREAD, **OWN_PYTHON}
     if beside:
         environment["PYTHONPATH"] = os.pathsep.join(str(ROOT / folder) for folder in beside)
     environment.pop("PYTHONDONTWRITEBYTECODE", None)  # every process would compile all packages anew
+    find_python(environment)
     return subprocess.run([*uv(), *quiet, *options, *command], cwd=ROOT, env=environment).returncode
 
 
@@ -186,7 +221,11 @@ def main(arguments: list[str]) -> int:
     if not arguments or arguments[0] not in VERBS:
         print(__doc__)
         return 0 if not arguments or arguments[0] in ("help", "-h", "--help") else 2
-    return VERBS[arguments[0]](arguments[1:])
+    try:
+        return VERBS[arguments[0]](arguments[1:])
+    except Unavailable as error:
+        print(error, file=sys.stderr)
+        return 2
 
 
 if __name__ == "__main__":
