@@ -171,11 +171,16 @@ class BareSystem:
 def in_own_namespaces(
     command: Sequence[str], log: IO[bytes] | None, limit_s: float | None = None
 ) -> int | None:
-    """Run with mounts and processes of its own, all of which end when it ends."""
-    apart = ["unshare", "--mount", "--pid", "--fork", "--kill-child", "--mount-proc", "--", *command]
+    """Run with mounts and processes of its own, all of which end when it ends, or this process does."""
+    ended = ("setpriv", "--pdeathsig", "KILL")
+    apart = ("unshare", "--mount", "--pid", "--fork", "--kill-child", "--mount-proc", "--")
     try:
         return subprocess.run(
-            apart, stdin=subprocess.DEVNULL, stdout=log, stderr=log and subprocess.STDOUT, timeout=limit_s
+            [*ended, *apart, *command],
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log and subprocess.STDOUT,
+            timeout=limit_s,
         ).returncode
     except subprocess.TimeoutExpired:
         return None
