@@ -25,6 +25,8 @@ from threading import Event, Thread
 from typing import Any
 
 from glovecal_client.private_files import keep_private
+from glovecal_client.signals import HANG_UP, handle_signals
+from glovecal_client.standard_streams import say
 from glovecal_models.errors import GlovecalError
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
@@ -91,8 +93,7 @@ def serve(settings: Settings) -> int:
         print(f"glovecal serve: {problem}", file=sys.stderr)
         return 1
     stopped = Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stopped.set())
+    handle_signals(lambda *_: stopped.set(), signal.SIGTERM, signal.SIGINT, *HANG_UP)
     import glovecal_service.realtime.process  # noqa: F401  # for the processes, also those after a crash
 
     try:
@@ -113,7 +114,7 @@ def _supervise(parts: list[Part], settings: Settings, stopped: Event) -> None:
         waiting = [part.name for part in parts if not part.ready.is_set()]
         if not said and (not waiting or time.monotonic() > late):
             said = True
-            print(_banner(settings), flush=True)
+            say(_banner(settings))
             if waiting:
                 _log.warning("not ready yet: %s", ", ".join(waiting))
 
@@ -228,8 +229,8 @@ def run_part(work: Work, settings: Settings, ready: Any, parent: int) -> None:
     _log_to_stderr()
     keep_private()
     stopped = Event()
-    signal.signal(signal.SIGTERM, lambda *_: stopped.set())
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    handle_signals(lambda *_: stopped.set(), signal.SIGTERM)
+    handle_signals(signal.SIG_IGN, signal.SIGINT, *HANG_UP)  # they come to the parent too
     Thread(target=_follow_parent, args=(parent, stopped), daemon=True).start()
     try:
         work(settings, stopped, ready.set)

@@ -14,6 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import httpx
+import psutil
 import pytest
 from realtime_support import WireGlove, eventually, free_endpoint
 
@@ -23,8 +24,6 @@ from glovecal_client.pose_subscriber import PoseSubscriber
 from glovecal_client.queries import ask_json
 from glovecal_client.session import open_client
 from glovecal_service.settings import Settings
-
-SERVE = "import sys; from glovecal_service.cli.command import main; sys.argv = ['glovecal', 'serve']; main()"
 
 
 def free_port() -> int:
@@ -38,7 +37,7 @@ def start(data: Path, endpoint: str, port: int) -> subprocess.Popen[str]:
         "GLOVECAL_PORT": str(port),
     }
     return subprocess.Popen(
-        [sys.executable, "-c", SERVE],
+        [sys.executable, "-m", "glovecal_service.cli.command", "serve"],
         env=environment,
         text=True,
         stdout=subprocess.PIPE,
@@ -59,7 +58,7 @@ def serving(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], str, int]]:
 
 
 def children(process: subprocess.Popen[str]) -> list[int]:
-    return [int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
+    return [child.pid for child in psutil.Process(process.pid).children()]
 
 
 def answers(endpoint: str) -> int:
@@ -80,21 +79,14 @@ def is_ready(port: int) -> bool:
 
 def listener(process: subprocess.Popen[str], port: int) -> int:
     """The child that listens on ``port``, 0 if there is none."""
-    wanted = f"{port:04X}"
-    inodes = {
-        line.split()[9]
-        for line in Path("/proc/net/tcp").read_text().splitlines()[1:]
-        if line.split()[1].endswith(wanted) and line.split()[3] == "0A"
-    }
     for child in children(process):
-        with suppress(FileNotFoundError):  # it ends while it is looked at
-            links = [os.readlink(entry) for entry in Path(f"/proc/{child}/fd").iterdir()]
-            if any(f"socket:[{inode}]" in links for inode in inodes):
+        with suppress(psutil.Error):  # it ends while it is looked at
+            connections = psutil.Process(child).net_connections("tcp")
+            if any(item.laddr.port == port and item.status == psutil.CONN_LISTEN for item in connections):
                 return child
     return 0
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 def test_each_part_survives_the_death_of_the_others(serving: tuple[subprocess.Popen[str], str, int]) -> None:
     process, endpoint, port = serving
     assert process.stdout is not None
@@ -118,10 +110,9 @@ def test_each_part_survives_the_death_of_the_others(serving: tuple[subprocess.Po
     all_children = children(process)
     process.send_signal(signal.SIGTERM)
     assert process.wait(120) == 0
-    eventually(lambda: not any(Path(f"/proc/{child}").exists() for child in all_children), "nothing is left")
+    eventually(lambda: not any(map(psutil.pid_exists, all_children)), "nothing is left")
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 def test_poses_are_back_within_3_s_of_each_of_ten_crashes(
     serving: tuple[subprocess.Popen[str], str, int],
 ) -> None:
@@ -158,7 +149,6 @@ def taken(port: int) -> socket.socket | None:
         return None
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 def test_what_cannot_start_is_tried_more_and_more_rarely_and_says_why(
     serving: tuple[subprocess.Popen[str], str, int],
 ) -> None:
@@ -179,6 +169,9 @@ def test_what_cannot_start_is_tried_more_and_more_rarely_and_says_why(
     assert f"zenoh cannot listen on 127.0.0.1:{router_port} (Address already in use)" in ends[-1][0]
     assert [wait for _, wait in ends] == ["0.1", "0.2", "0.4", "0.8"]
     eventually(lambda: answers(endpoint), "it starts once the port is free")
+    for one in (*children(process), process.pid):  # as a terminal does that is closed
+        os.kill(one, signal.SIGHUP)
+    assert process.wait(120) == 0
 
 
 @pytest.mark.parametrize("taken", ["REST", "zenoh"])

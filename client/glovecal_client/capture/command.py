@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import argparse
 import os
-import signal
 import sys
 import textwrap
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
+from typing import NoReturn
 
 from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings, CaptureSummary
 from glovecal_client.capture.device import build_device, device_names, device_options
@@ -20,6 +20,8 @@ from glovecal_client.keys import GloveKeys
 from glovecal_client.names import check_identifier, subject_name
 from glovecal_client.private_files import keep_private
 from glovecal_client.session import DEFAULT_ENDPOINT
+from glovecal_client.signals import stopped_by_signals
+from glovecal_client.standard_streams import run_command, say
 
 
 def run_capture(
@@ -65,25 +67,18 @@ def parse_options(pairs: Sequence[str]) -> dict[str, str]:
     return options
 
 
-@contextmanager
-def stopped_by_signals(stop: threading.Event) -> Iterator[None]:
-    """SIGINT and SIGTERM set ``stop``; only from the main thread."""
-    signals = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.signal(number, lambda *_: stop.set()) for number in signals]
-    try:
-        yield
-    finally:
-        for number, handler in zip(signals, before, strict=True):
-            signal.signal(number, handler)
+def script() -> NoReturn:
+    """Entry point of the ``glovecal-capture`` script."""
+    run_command(main)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The script's entry point; 0 when stopped cleanly, 1 with a sentence when it could not capture."""
+    """0 when stopped cleanly, 1 with a sentence when it could not capture."""
     asked = _parser().parse_args(arguments)
     stop = threading.Event()
     keep_private()
     try:
-        with stopped_by_signals(stop):
+        with stopped_by_signals(stop, outlives_terminal=True):
             summary = run_capture(
                 asked.device,
                 asked.glove,
@@ -99,12 +94,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ClientError as error:
         print(f"glovecal-capture: {error}", file=sys.stderr)
         return 1
-    print(summary)
+    say(str(summary))
     return 0
 
 
 def tell(sentence: str) -> None:
-    """To standard error, if there still is one: a closed terminal must not end a recording."""
+    """To standard error, if somebody reads it: a closed terminal must not end a recording."""
     with suppress(OSError, ValueError):
         print(sentence, file=sys.stderr, flush=True)
 
@@ -142,4 +137,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script()

@@ -12,6 +12,7 @@ from pathlib import Path
 from glovecal_client.errors import ClientError
 from glovecal_client.pictures.recording import VideoRecording
 from glovecal_client.pictures.source import build_source
+from glovecal_client.standard_streams import run_command
 
 
 def main(source: str, file: str) -> int:
@@ -27,4 +28,4 @@ def main(source: str, file: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:]))
+    run_command(lambda: main(*sys.argv[1:]))

@@ -11,9 +11,11 @@ import sys
 import threading
 from typing import TYPE_CHECKING
 
-from glovecal_client.capture.command import stopped_by_signals, tell
+from glovecal_client.capture.command import tell
 from glovecal_client.errors import ClientError, DeviceError
 from glovecal_client.private_files import keep_private
+from glovecal_client.signals import stopped_by_signals
+from glovecal_client.standard_streams import guard_streams, leave_at_once
 from glovecal_models.errors import GlovecalError
 from glovecal_models.threads import pin_blas_to_one_thread
 from glovecal_service.camera.camera_settings import CameraSettings
@@ -49,7 +51,7 @@ def main(text: str) -> int:
 
     threading.Thread(target=wait_for_the_end, daemon=True).start()
     try:
-        with stopped_by_signals(stop):
+        with stopped_by_signals(stop, outlives_terminal=True):
             tell(str(run_camera(CameraSettings.from_text(text), stop)))
     except (GlovecalError, ClientError, OSError) as error:
         tell(str(error))
@@ -58,6 +60,5 @@ def main(text: str) -> int:
 
 
 if __name__ == "__main__":
-    code = main(*sys.argv[1:])
-    sys.stderr.flush()
-    os._exit(code)  # all is closed; a driver's thread that hangs must not turn this into a crash
+    guard_streams()
+    leave_at_once(main(*sys.argv[1:]))  # all is closed; a driver's thread may hang

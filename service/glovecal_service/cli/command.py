@@ -1,7 +1,7 @@
 """The ``glovecal`` command: collects the verbs and turns refusals into one sentence and an exit code.
 
-Exit codes: 0 done, 1 refused (the sentence says why), 2 wrong use of the command, 3 no service reached,
-130 interrupted.
+Exit codes: 0 done, 1 refused (the sentence says why) or done but nobody read the answer (a closed pipe, a
+full disk), 2 wrong use of the command, 3 no service reached, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from glovecal_client.signals import HANG_UP, handle_signals
+from glovecal_client.standard_streams import run_command
 from glovecal_service.cli import demo, serve
 from glovecal_service.cli.camera import cameras
 from glovecal_service.cli.effect import catalogue, changes, detectability, diagnosis, improvement
@@ -95,10 +97,15 @@ def options(
     pass
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Entry point of the ``glovecal`` script, on the process's arguments by default; ends in SystemExit."""
+def script() -> NoReturn:
+    """Entry point of the ``glovecal`` script."""
     _leave_start_folder()
-    signal.signal(signal.SIGTERM, _stop)
+    handle_signals(_stop, signal.SIGTERM, *HANG_UP)
+    run_command(main)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the verb of ``arguments``, the process's own by default; ends in SystemExit where it is refused."""
     try:
         app(arguments, prog_name="glovecal")
     except KeyboardInterrupt:
@@ -125,4 +132,4 @@ def _stop(number: int, _frame: object) -> NoReturn:
 
 
 if __name__ == "__main__":
-    main()
+    script()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import os
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -64,13 +63,10 @@ def glovecal(settings: Mapping[str, str], *arguments: object) -> Answer:
     out, err = io.StringIO(), io.StringIO()
     code: Any = None
     with _environment(environment(settings)), redirect_stdout(out), redirect_stderr(err):
-        before = signal.getsignal(signal.SIGTERM)
         try:
             main([str(argument) for argument in arguments])
         except SystemExit as end:
             code = end.code
-        finally:
-            signal.signal(signal.SIGTERM, before)
     return Answer(code or 0, out.getvalue(), err.getvalue())
 
 

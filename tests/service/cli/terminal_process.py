@@ -36,6 +36,12 @@ class OnTerminal:
             assert time.monotonic() < end, f"{text!r} was not said in {deadline_s} s: {self.said}"
             assert self._read(0.2) or self.process.poll() is None, f"{text!r} was never said: {self.said}"
 
+    def hang_up(self) -> None:
+        """Close the terminal, as when its window or its connection is closed."""
+        if self._terminal >= 0:
+            os.close(self._terminal)
+        self._terminal = -1
+
     def end(self, deadline_s: float = 60.0) -> int:
         """The exit code, once the process has ended."""
         end = time.monotonic() + deadline_s
@@ -47,6 +53,9 @@ class OnTerminal:
         return self.process.returncode
 
     def _read(self, timeout_s: float) -> bool:
+        if self._terminal < 0:
+            time.sleep(min(timeout_s, 0.02))
+            return False
         if not select.select([self._terminal], [], [], timeout_s)[0]:
             return False
         try:
@@ -61,20 +70,19 @@ class OnTerminal:
 def on_terminal(command: Sequence[str], environment: Mapping[str, str]) -> Iterator[OnTerminal]:
     """The command leads a session whose terminal is ours to type on; it is ended with the block."""
     ours, theirs = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-c", BECOME, *command],
+        stdin=theirs,
+        stdout=theirs,
+        stderr=theirs,
+        env=dict(environment),
+        start_new_session=True,
+    )
+    os.close(theirs)
+    terminal = OnTerminal(process, ours)
     try:
-        process = subprocess.Popen(
-            [sys.executable, "-c", BECOME, *command],
-            stdin=theirs,
-            stdout=theirs,
-            stderr=theirs,
-            env=dict(environment),
-            start_new_session=True,
-        )
-        os.close(theirs)
-        try:
-            yield OnTerminal(process, ours)
-        finally:
-            process.kill()
-            process.wait()
+        yield terminal
     finally:
-        os.close(ours)
+        process.kill()
+        process.wait()
+        terminal.hang_up()

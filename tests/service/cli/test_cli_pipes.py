@@ -1,10 +1,12 @@
-"""``glovecal ... | head``: whoever stops reading loses no page, and no traceback is left behind."""
+"""``glovecal ... | head``, ``2>&-``: no page is lost, no traceback left behind, exit codes as documented."""
 
 from __future__ import annotations
 
 import io
+import json
 import os
 import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from functools import partial
@@ -93,3 +95,57 @@ def test_sentences_that_nobody_reads_end_no_work(trained: tuple[Settings, str], 
         )
     assert done.returncode == 1
     assert len(glovecal(settings, "take", "list", "-s", "ben", "--json").json) == 2
+
+
+FORKS = """
+import json, os, sys
+from glovecal_client.capture.command import script as capture
+from glovecal_service.cli.command import script as glovecal
+
+def redirect(stream, to):
+    number = {"stdout": 1, "stderr": 2}[stream]
+    if to == "closed":
+        setattr(sys, stream, None)
+        os.close(number)
+    elif to == "unread":
+        reading, writing = os.pipe()
+        os.close(reading)
+        os.dup2(writing, number)
+        os.close(writing)
+    else:
+        os.dup2(os.open(to, os.O_WRONLY), number)
+
+for arguments, streams in json.load(sys.stdin):
+    child = os.fork()
+    if child == 0:
+        for stream, to in streams.items():
+            redirect(stream, to)
+        sys.argv = arguments
+        capture() if arguments[0] == "glovecal-capture" else glovecal()
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+"""
+"""Commands in children of one process, which has imported all; each child ends as any Python does."""
+
+ANSWERS = (["glovecal", "--version"], ["glovecal", "take", "--help"], ["glovecal-capture", "--help"])
+COMPLAINTS = (
+    (["glovecal", "take", "--nonsense"], 2),
+    (["glovecal", "emulate", "nothing"], 1),
+    (["glovecal-capture", "--device", "replay:/nowhere.csv", "--glove", "g1"], 1),
+)
+ENDINGS = [
+    *((verb, {"stdout": to}, 1) for verb in ANSWERS for to in ("unread", "/dev/full")),
+    *((verb, {"stdout": "closed", "stderr": "closed"}, 0) for verb in ANSWERS),
+    *((verb, {"stderr": to}, code) for verb, code in COMPLAINTS for to in ("unread", "closed")),
+]
+
+
+def test_exit_codes_are_the_documented_ones_wherever_the_streams_lead(tmp_path: Path) -> None:
+    mine = environment({"GLOVECAL_DATA": str(tmp_path)})
+    cases = json.dumps([(verb, streams) for verb, streams, _ in ENDINGS])
+    done = subprocess.run(
+        [sys.executable, "-c", FORKS], env=mine, input=cases, capture_output=True, text=True, timeout=300
+    )
+    codes = [int(line) for line in done.stdout.splitlines() if line.isdecimal()]
+    assert list(zip(ENDINGS, codes, strict=True)) == [(ending, ending[2]) for ending in ENDINGS], done.stderr
+    assert "Traceback" not in done.stderr
+    assert "Standard output cannot be written: No space left on device." in done.stderr

@@ -63,7 +63,7 @@ def estimates(
     Frames of two cameras are matched by their times; --calibration then holds both. Ctrl-C writes nothing.
     """
     with camera_extra():
-        from glovecal_client.capture.command import stopped_by_signals
+        from glovecal_client.signals import stopped_by_signals
         from glovecal_models.takes.camera_reference.estimates import write_estimates
         from glovecal_service.camera.camera_settings import TrackingSettings
         from glovecal_service.camera.recorded_estimates import Recordings

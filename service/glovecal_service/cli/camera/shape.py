@@ -55,7 +55,7 @@ def shape(
     two calibrated cameras.
     """
     with camera_extra():
-        from glovecal_client.capture.command import stopped_by_signals
+        from glovecal_client.signals import stopped_by_signals
         from glovecal_models.colour_glove.pose.hand_shape_fit import (
             MEASURED_SIZE_SD,
             SIZE_SD,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
 import threading
 from enum import Enum
 from pathlib import Path
@@ -26,7 +24,7 @@ from glovecal_service.cli.camera.tracking_options import (
 )
 from glovecal_service.cli.glove.capture import GloveOption
 from glovecal_service.cli.terminal.options import DEFAULT_ZENOH, Site, Zenoh
-from glovecal_service.cli.terminal.printing import err, out
+from glovecal_service.cli.terminal.printing import err
 from glovecal_service.cli.terminal.refusal import EXPECTED, exit_code_of, sentence_of
 
 
@@ -68,7 +66,8 @@ def track(
 
     The first start builds the pose database and takes a minute or two.
     """
-    from glovecal_client.capture.command import stopped_by_signals
+    from glovecal_client.signals import stopped_by_signals
+    from glovecal_client.standard_streams import leave_at_once, say
     from glovecal_service.camera.camera_settings import CameraSettings
     from glovecal_service.camera.process import run_camera
 
@@ -80,12 +79,10 @@ def track(
     )  # fmt: skip
     stop = threading.Event()
     try:
-        with stopped_by_signals(stop):
-            out.print(str(run_camera(settings, stop)))
+        with stopped_by_signals(stop, outlives_terminal=True):
+            say(str(run_camera(settings, stop)))
         code = 0
     except EXPECTED as error:
         err.print(sentence_of(error), style="red")
         code = exit_code_of(error)
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(code)  # all is closed; a driver's thread that hangs must not turn this into a crash
+    leave_at_once(code)  # all is closed; a driver's thread may hang

@@ -11,7 +11,6 @@ from typer.core import TyperCommand
 
 from glovecal_client.private_files import keep_private
 from glovecal_service.cli.terminal.options import DEFAULT_ZENOH, Site, Zenoh, identifier, subject_named
-from glovecal_service.cli.terminal.printing import out
 
 GloveOption = Annotated[
     str,
@@ -51,11 +50,13 @@ def capture(
     ),
 ) -> None:
     """Record a glove to the local log and publish it. Ctrl-C stops it."""
-    from glovecal_client.capture.command import parse_options, run_capture, stopped_by_signals, tell
+    from glovecal_client.capture.command import parse_options, run_capture, tell
+    from glovecal_client.signals import stopped_by_signals
+    from glovecal_client.standard_streams import say
 
     keep_private()
     stop = threading.Event()
-    with stopped_by_signals(stop):
+    with stopped_by_signals(stop, outlives_terminal=True):
         summary = run_capture(
             device,
             glove,
@@ -68,4 +69,4 @@ def capture(
             stop=stop,
             report=tell,  # not the console: it ends the program where nobody reads
         )
-    out.print(str(summary))
+    say(str(summary))

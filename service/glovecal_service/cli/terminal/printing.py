@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
@@ -18,18 +17,8 @@ WIDTH_OF_A_FILE = 400
 LINE = 79
 """Characters of a line of a sentence beside a table."""
 
-
-class Sentences(Console):
-    """Standard error. Where nobody reads it any more (``2>&1 | head``), the work goes on in silence."""
-
-    def on_broken_pipe(self) -> None:
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, sys.stderr.fileno())
-        os.close(nowhere)
-
-
 out = Console(highlight=False, markup=False, emoji=False, soft_wrap=True)
-err = Sentences(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
+err = Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
 
 
 def print_json(document: Any) -> None:

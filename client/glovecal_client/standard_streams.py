@@ -1,0 +1,125 @@
+"""A command's standard streams and exit code, wherever the streams lead.
+
+Left to itself, Python ends with exit code 120 where a stream was closed, its disk is full, or its reader or
+terminal is gone.
+"""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any, NoReturn, TextIO
+
+READER_GONE = (errno.EPIPE, errno.EIO)
+"""A closed pipe, a terminal that hung up: nobody is left to be told."""
+ANSWER_LOST = 1
+
+
+class AnswerLost(BrokenPipeError):
+    """Standard output did not take what a command answers. Told already, if there is somebody to tell."""
+
+
+def run_command(command: Callable[[], int | None]) -> NoReturn:
+    """Run ``command`` as all of this process's work; ends in SystemExit with its exit code.
+
+    The code is 1 where the command went well and its answer was lost.
+    """
+    guard_streams()
+    code: Any = ANSWER_LOST
+    try:
+        code = command()
+    except SystemExit as end:
+        code = end.code
+    except AnswerLost:
+        pass
+    finally:
+        delivered = _flush()
+    sys.exit(code or (0 if delivered else ANSWER_LOST))
+
+
+def leave_at_once(code: int) -> NoReturn:
+    """End this process, waiting for no thread: one that hangs must not turn a clean end into a crash."""
+    delivered = _flush()
+    os._exit(code or (0 if delivered else ANSWER_LOST))
+
+
+def guard_streams() -> None:
+    """Standard error never fails. Standard output fails once, by AnswerLost, and is silent from then on.
+
+    A stream that was closed before the start never fails either, and no file of ours gets its number.
+    """
+    for number in (0, 1, 2):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
+    sys.stdin = sys.stdin or open(0, closefd=False)  # noqa: SIM115
+    sys.stdout = _guarded(sys.stdout or open(1, "w", closefd=False), _lose_answer)  # noqa: SIM115
+    sys.stderr = _guarded(sys.stderr or open(2, "w", closefd=False), _ignore)  # noqa: SIM115
+
+
+def say(sentence: str) -> None:
+    """Print a sentence on standard output that the command's success does not depend on."""
+    with suppress(AnswerLost):
+        print(sentence, flush=True)
+
+
+def _flush() -> bool:
+    try:
+        sys.stdout.flush()
+    except AnswerLost:
+        return False
+    return True
+
+
+def _ignore(error: OSError) -> None:
+    pass
+
+
+def _lose_answer(error: OSError) -> NoReturn:
+    if error.errno not in READER_GONE:
+        print(f"Standard output cannot be written: {error.strerror}.", file=sys.stderr)
+    raise AnswerLost(errno.EPIPE, os.strerror(errno.EPIPE)) from error
+
+
+class _Guard(io.RawIOBase):
+    """The raw end of a standard stream. Its first failed write calls ``failed``; later ones are dropped."""
+
+    def __init__(self, stream: TextIO, failed: Callable[[OSError], None]) -> None:
+        self._stream = stream  # which would close the raw one
+        self._raw = getattr(stream.buffer, "raw", stream.buffer)  # python -u: there is no buffer
+        self._failed, self._lost = failed, False
+
+    def write(self, data: Any, /) -> int | None:
+        if not self._lost:
+            try:
+                return self._raw.write(data)
+            except OSError as error:
+                self._lost = True
+                self._failed(error)
+        return len(data)
+
+    def writable(self) -> bool:
+        return True
+
+    def fileno(self) -> int:
+        return self._raw.fileno()
+
+    def isatty(self) -> bool:
+        return self._raw.isatty()
+
+
+def _guarded(stream: TextIO, failed: Callable[[OSError], None]) -> TextIO:
+    """The stream as it is set up, with a guard at its end."""
+    assert isinstance(stream, io.TextIOWrapper)
+    return io.TextIOWrapper(
+        io.BufferedWriter(_Guard(stream, failed)),
+        encoding=stream.encoding,
+        errors=stream.errors,
+        line_buffering=stream.line_buffering,
+        write_through=stream.write_through,
+    )
