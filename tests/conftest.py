@@ -1,28 +1,69 @@
-"""What tests need beside the repository: without it they skip with a sentence, or fail where CI has it."""
+"""What tests need beside the repository: without it they skip with a sentence, or fail where CI has it.
+
+And what they must not see: how this computer and the shell that began them are set up.
+"""
 
 from __future__ import annotations
 
 import os
 import re
-import sys
+import signal
 import sysconfig
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import pytest
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
-
-# tests start some 150 processes: each would compile all packages anew where compiled files are not kept
-os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-sys.dont_write_bytecode = False
-
-MASK = os.umask(0o022)
-os.umask(MASK)
-SAFE_PATH = "PYTHONSAFEPATH"
+REQUIRE_EVERYTHING = "GLOVECAL_REQUIRE_EVERYTHING"
+OF_TESTS = (REQUIRE_EVERYTHING, "GLOVECAL_CAPTURE_MINUTES", "GLOVECAL_PICTURES", "GLOVECAL_SCREENSHOTS")
+OF_WINDOWS = ("SYSTEMROOT", "SYSTEMDRIVE", "WINDIR", "COMSPEC", "PATHEXT", "TEMP", "TMP", "USERPROFILE")
+KEPT = ("PATH", "LD_LIBRARY_PATH", "TMPDIR", *OF_WINDOWS, *OF_TESTS)
+KEPT_BEGINNINGS = ("PYTEST_",)
+SET = {
+    "TZ": "NPT-5:45",  # an hour of no computer, so that local time and UTC are never mixed up unseen
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+}
+MASK = 0o022
 OURS = {"tests", "docs", "pytest", "_pytest"}
 """pytest warns of what tests leave behind."""
+OUTSIDE = pytest.StashKey[dict[str, str]]()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Before any test is imported and any worker process started; in each of these too."""
+    config.stash[OUTSIDE] = getattr(config, "workerinput", {}).get("outside") or dict(os.environ)
+    kept = {
+        name: value for name, value in os.environ.items() if name in KEPT or name.startswith(KEPT_BEGINNINGS)
+    }
+    os.environ.clear()
+    os.environ.update(kept | SET)
+    if config.cache is not None:
+        os.environ["HOME"] = str(config.cache.mkdir("home"))
+    if hasattr(time, "tzset"):
+        time.tzset()
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in a script's background jobs
+    if hasattr(signal, "SIGHUP"):
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)  # ignored after nohup
+    os.umask(MASK)
+    _tell_warnings_of_others(config)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    """Of pytest-xdist: what its worker processes are told."""
+    node.workerinput["outside"] = node.config.stash[OUTSIDE]
+
+
+@pytest.fixture(scope="session")
+def outside(request: pytest.FixtureRequest) -> Mapping[str, str]:
+    """The environment that the tests were begun in, with caches, proxies and certificates of installers."""
+    return request.config.stash[OUTSIDE]
+
 
 COMPUTING = ("models", "paper", "study", "architecture")
 
@@ -42,7 +83,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items[:] = [item for path in sorted(files, key=place.__getitem__) for item in files[path]]
 
 
-def pytest_configure(config: pytest.Config) -> None:
+def _tell_warnings_of_others(config: pytest.Config) -> None:
     """A warning in our lines is an error; one in the lines of what is installed is told and fails nothing.
 
     What was not closed is noticed anywhere: that stays an error.
@@ -56,7 +97,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.fixture(autouse=True)
 def process_as_it_was() -> Iterator[None]:
-    """A command sets its process's umask and import path; here many commands and tests share one process."""
+    """A command sets its process's umask; here many commands and tests share one process."""
     _reset_process()
     yield
     _reset_process()
@@ -64,7 +105,6 @@ def process_as_it_was() -> Iterator[None]:
 
 def _reset_process() -> None:
     os.umask(MASK)
-    os.environ.pop(SAFE_PATH, None)
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
@@ -80,6 +120,6 @@ def not_here() -> Callable[[str], NoReturn]:
 
 def missing(sentence: str) -> NoReturn:
     """Skip; in CI, where everything must be there, fail."""
-    if os.environ.get("GLOVECAL_REQUIRE_EVERYTHING") == "1":
+    if os.environ.get(REQUIRE_EVERYTHING) == "1":
         pytest.fail(sentence)
     pytest.skip(sentence)

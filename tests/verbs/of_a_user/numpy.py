@@ -1,0 +1,3 @@
+"""What lies in a user's PYTHONPATH: not the locked package of this name."""
+
+raise ImportError(__doc__)
