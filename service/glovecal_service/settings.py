@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from glovecal_models.names import check_identifier
+
+if TYPE_CHECKING:
+    from sqlalchemy import URL
 
 
 class Settings(BaseSettings):
@@ -64,8 +67,13 @@ class Settings(BaseSettings):
         return scheduler
 
     @property
-    def database_url(self) -> str:
-        return self.database or f"sqlite:///{self.data.resolve() / 'glovecal.sqlite3'}"
+    def database_url(self) -> str | URL:
+        if self.database:
+            return self.database
+        from sqlalchemy import URL
+
+        # no text: "?" and "%" of a folder's name mean something else in a URL
+        return URL.create("sqlite", database=str(self.data.resolve() / "glovecal.sqlite3"))
 
     @property
     def artifacts_folder(self) -> Path:

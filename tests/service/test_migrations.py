@@ -97,6 +97,14 @@ def test_an_upgrade_that_fails_leaves_everything_as_it_was(store_settings, secon
         assert compare_metadata(context, metadata) == [], "no column and no temporary table is left"
 
 
+def test_the_data_folder_may_have_any_name(sqlite_settings: Settings) -> None:
+    folder = sqlite_settings.data / "what? #1 100%25 Geräte"
+    with Store.open(sqlite_settings.model_copy(update={"data": folder})) as store:
+        assert store.database.files[0] == folder / "glovecal.sqlite3"
+    assert [file.name for file in sqlite_settings.data.iterdir()] == [folder.name]
+    assert (folder / "glovecal.sqlite3").stat().st_size
+
+
 def test_a_newer_schema_is_refused_with_a_sentence(store_settings):
     with Store.open(store_settings) as store, store.database.write() as connection:
         connection.execute(text("UPDATE alembic_version SET version_num = '9999'"))
