@@ -103,6 +103,8 @@ def run(*command: str, groups: tuple[str, ...] = (), dev: bool = False, beside: 
     if beside:
         environment["PYTHONPATH"] = os.pathsep.join(str(ROOT / folder) for folder in beside)
     environment.pop("PYTHONDONTWRITEBYTECODE", None)  # every process would compile all packages anew
+    if not os.access(Path.home(), os.W_OK):
+        environment.setdefault("UV_CACHE_DIR", str(TOOLS / "cache"))
     find_python(environment)
     return subprocess.run([*uv(), *quiet, *options, *command], cwd=ROOT, env=environment).returncode
 
