@@ -1,5 +1,6 @@
-"""What tests, and the processes they start, see of this computer's user. ``do.py test --smoke`` is tried with a
-user who has set everything otherwise (tests/verbs).
+"""What tests, and the processes they start, see of their user's settings: nothing.
+
+tests/verbs tries ``do.py test --smoke`` with a user who has set everything otherwise, and this file in it.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ LEFT = {"PATH", "HOME", "TMPDIR", "LD_LIBRARY_PATH"}
 OF_LIBRARIES = {"COLUMNS", "LINES", "LC_CTYPE"}
 """Set by readline, which pytest loads, and by Python where there is no locale."""
 THREADS = {"OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"}
-OF_TESTS = {f"GLOVECAL_{name}" for name in ("REQUIRE_EVERYTHING", "CAPTURE_MINUTES", "PICTURES", "SCREENSHOTS")}
+OF_TESTS = {
+    f"GLOVECAL_{name}" for name in ("REQUIRE_EVERYTHING", "CAPTURE_MINUTES", "PICTURES", "SCREENSHOTS")
+}
 
 
 def test_nothing_that_a_user_has_set_reaches_a_test() -> None:

@@ -44,7 +44,7 @@ class Page(HTMLParser):
 def site(tmp_path_factory: pytest.TempPathFactory, not_here: Callable[[str], NoReturn]) -> Path:
     """As ``do.py docs`` builds it: a warning, such as a link that leads nowhere, is an error."""
     if not (ROOT / ".venv").is_dir() or not (ROOT / ".tools" / "uv").is_dir():
-        not_here("needs the environment that do.py makes")
+        not_here("there is no .venv (python3 do.py test makes it)")
     folder = tmp_path_factory.mktemp("documentation") / "site"
     command = [sys.executable, str(ROOT / "do.py"), "docs", str(folder), "--smoke"]
     done = subprocess.run(

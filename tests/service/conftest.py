@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import NoReturn
 
@@ -20,13 +23,26 @@ from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 
 
+@pytest.fixture
+def mount_small_disk(not_here: Callable[[str], NoReturn]) -> Iterator[Callable[[Path, str], None]]:
+    """Mounts a tmpfs of a size such as ``3m`` on a folder, until the end of the test."""
+    with ExitStack() as mounted:
+
+        def mount(folder: Path, size: str) -> None:
+            command = ["mount", "-t", "tmpfs", "-o", f"size={size}", "glovecal-test", str(folder)]
+            if shutil.which("mount") is None or subprocess.run(command, capture_output=True).returncode:
+                not_here("a small disk cannot be mounted here (run the tests as root on Linux)")
+            mounted.callback(subprocess.run, ["umount", "-l", str(folder)], check=True)
+
+        yield mount
+
+
 @pytest.fixture(scope="session")
 def postgres(not_here: Callable[[str], NoReturn]) -> Iterator[PostgresServer]:
     """A running PostgreSQL; without one the test is skipped, or fails if everything is required."""
     programs = find_programs()
     if programs is None:
-        sentence = "PostgreSQL's initdb and pg_ctl are not installed (Debian: apt-get install postgresql)"
-        not_here(sentence)
+        not_here("PostgreSQL's initdb and pg_ctl are not installed (Debian: apt-get install postgresql)")
     server = PostgresServer(programs)
     yield server
     server.remove()

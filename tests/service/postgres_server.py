@@ -26,7 +26,8 @@ class PostgresServer:
 
     def __init__(self, programs: Path) -> None:
         self._programs = programs
-        self.folder = Path(tempfile.mkdtemp(prefix="glovecal-pg-"))
+        # not TMPDIR: user postgres must be able to go there, and a socket's path has at most 107 bytes
+        self.folder = Path(tempfile.mkdtemp(prefix="glovecal-pg-", dir="/tmp"))
         self._as_postgres = ["runuser", "-u", "postgres", "--"] if os.geteuid() == 0 else []
         if self._as_postgres:
             shutil.chown(self.folder, "postgres", "postgres")

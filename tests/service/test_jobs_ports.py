@@ -38,7 +38,7 @@ def create(store, ledger, numbers):
 @pytest.fixture
 def another_user(not_here):
     if os.getuid() != 0:
-        not_here("becoming another user needs root")
+        not_here("becoming another user needs root (run the tests as root)")
     return NOBODY
 
 

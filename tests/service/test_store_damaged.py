@@ -1,8 +1,6 @@
 """Full disks and damaged databases: said by name, nothing half written, reading goes on."""
 
-import shutil
 import sqlite3
-import subprocess
 from contextlib import closing, suppress
 from pathlib import Path
 
@@ -15,16 +13,11 @@ from glovecal_service.store.errors import StorageFull, StoreDamaged, StoreError
 
 
 @pytest.fixture
-def small_disk(tmp_path, not_here):
-    """A disk of 3 MB: a tmpfs mount, for which one must be root on Linux."""
+def small_disk(tmp_path, mount_small_disk):
     folder = tmp_path / "small"
     folder.mkdir()
-    mount = shutil.which("mount")
-    command = [mount or "mount", "-t", "tmpfs", "-o", "size=3m", "glovecal-test", str(folder)]
-    if mount is None or subprocess.run(command, capture_output=True, check=False).returncode:
-        not_here("a small tmpfs cannot be mounted here; run as root on Linux")
-    yield folder
-    subprocess.run(["umount", str(folder)], check=True)
+    mount_small_disk(folder, "3m")
+    return folder
 
 
 def fill(file: Path) -> None:

@@ -65,7 +65,7 @@ class Said:
 def smoke(not_here: Callable[[str], NoReturn]) -> Iterator[dict[str, Future[Said]]]:
     """All verbs, begun at once; nothing may be installed on the way."""
     if not (ROOT / ".venv").is_dir() or not (ROOT / ".tools" / "uv").is_dir():
-        not_here("needs the environment that do.py makes")
+        not_here("there is no .venv (python3 do.py test makes it)")
     before = _installed()
     with ThreadPoolExecutor(2) as pool:
         yield {verb: pool.submit(_run, verb, OF_A_USER if verb == "test" else {}) for verb in VERBS}

@@ -6,7 +6,7 @@ import itertools
 import re
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -196,14 +196,10 @@ def test_stopping_without_a_single_frame_fails_with_a_sentence(settings: Setting
 
 
 @pytest.fixture
-def small_disk(settings: Settings, store: Store) -> Iterator[Path]:
+def small_disk(settings: Settings, store: Store, mount_small_disk: Callable[..., None]) -> Path:
     """The recordings folder on a disk of 40 kB."""
-    folder = str(settings.recordings_folder)
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=40k", "tmpfs", folder], capture_output=True)
-    if mounted.returncode:
-        pytest.skip("only root can mount a small disk to fill it")
-    yield settings.recordings_folder
-    subprocess.run(["umount", "-l", folder], check=True)
+    mount_small_disk(settings.recordings_folder, "40k")
+    return settings.recordings_folder
 
 
 def test_a_full_disk_is_said_and_what_was_recorded_stays(
