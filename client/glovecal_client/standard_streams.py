@@ -114,12 +114,12 @@ class _Guard(io.RawIOBase):
 
 
 def _guarded(stream: TextIO, failed: Callable[[OSError], None]) -> TextIO:
-    """The stream as it is set up, with a guard at its end."""
+    """The stream with a guard at its end; a sign that its encoding lacks becomes a question mark."""
     assert isinstance(stream, io.TextIOWrapper)
     return io.TextIOWrapper(
         io.BufferedWriter(_Guard(stream, failed)),
         encoding=stream.encoding,
-        errors=stream.errors,
+        errors="replace" if stream.errors == "strict" else stream.errors,
         line_buffering=stream.line_buffering,
         write_through=stream.write_through,
     )
