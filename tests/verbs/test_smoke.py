@@ -28,6 +28,7 @@ OF_A_USER = {
     "LC_ALL": "C",
     "TZ": "UTC",
     "MPLBACKEND": "nonsense",
+    "ANYTHING_ELSE": "1",
     "OMP_NUM_THREADS": "7",
 }
 """Settings that would change what tests do, and a folder with another numpy in it."""
