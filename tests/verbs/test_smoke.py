@@ -10,7 +10,7 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -73,7 +73,7 @@ def smoke(not_here: Callable[[str], NoReturn]) -> Iterator[dict[str, Future[Said
     assert _installed() == before
 
 
-def _run(verb: str, settings: Mapping[str, str]) -> Said:
+def _run(verb: str, settings: dict[str, str]) -> Said:
     command = [sys.executable, str(ROOT / "do.py"), *verb.split(), "--smoke"]
     if "GLOVECAL_DATA" in settings:  # as a script begins what it does not wait for
         command = ["sh", "-c", 'trap "" INT HUP; umask 077; exec "$@"', "sh", *command]
