@@ -28,6 +28,8 @@ SET = {
     "OPENBLAS_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
 }
+HOME = Path(__file__).resolve().parents[1] / ".pytest_cache" / "home"
+"""Kept, for caches of fonts and compiled code; what a user keeps at home is not seen."""
 MASK = 0o022
 OURS = {"tests", "docs", "pytest", "_pytest"}
 """pytest warns of what tests leave behind."""
@@ -41,9 +43,8 @@ def pytest_configure(config: pytest.Config) -> None:
         name: value for name, value in os.environ.items() if name in KEPT or name.startswith(KEPT_BEGINNINGS)
     }
     os.environ.clear()
-    os.environ.update(kept | SET)
-    if config.cache is not None:
-        os.environ["HOME"] = str(config.cache.mkdir("home"))
+    HOME.mkdir(parents=True, exist_ok=True)
+    os.environ.update(kept | SET | {"HOME": str(HOME)})
     if hasattr(time, "tzset"):
         time.tzset()
     signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in a script's background jobs
