@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
+
+from glovecal_client import Frame
 
 Value = TypeVar("Value")
 
@@ -15,6 +17,12 @@ def free_endpoint() -> str:
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{listener.getsockname()[1]}"
+
+
+def heard_of(published: Sequence[Frame], heard: Sequence[Frame]) -> list[Frame]:
+    """Those of ``published`` that were heard: zenoh drops a put where the computer is busy."""
+    numbers = {frame.sequence for frame in heard}
+    return [frame for frame in published if frame.sequence in numbers]
 
 
 def eventually(condition: Callable[[], Value | None], what: str, deadline_s: float = 120.0) -> Value:
