@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import os
 import pickle
-import signal
 import subprocess
 import sys
 import threading
@@ -168,9 +167,9 @@ class _Worker:
         if self._process is None:
             return f"{self._what}: no worker process can be started here; use one worker"
         code = self._process.wait()
-        how = f"exit code {code}"
-        if code < 0:
-            how = signal.Signals(-code).name + (" (out of memory?)" if code == -9 else "")
+        how = (
+            f"signal {-code}{' (out of memory?)' if code == -9 else ''}" if code < 0 else f"exit code {code}"
+        )
         return f"{self._what}: a worker process was ended by {how}; use fewer workers"
 
 
@@ -247,10 +246,11 @@ def _serve(requests: BinaryIO) -> None:
 
 def _receive(requests: BinaryIO, received: SimpleQueue[bytes]) -> None:
     """Reads all the time, also while a task runs: the end of the pipe is the end of the caller."""
-    with suppress(OSError, EOFError):
+    try:
         while True:
             received.put(_received(requests))
-    os._exit(1)
+    finally:
+        os._exit(1)
 
 
 def _send_prints_to_stderr() -> None:

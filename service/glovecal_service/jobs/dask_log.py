@@ -2,7 +2,9 @@
 
 Its ``silence_logs`` is not enough: that changes Dask's own handlers, of which there are none in a program
 that has made some, and takes the change back when a cluster closes, which is when connections break and are
-logged with tracebacks. The import of Dask sets levels anew, so this is called after it.
+logged with tracebacks. A task that ends just after its client was closed is "critical" to the scheduler
+(CommClosedError in ``send_all``): that is how a service stops whose workers are busy. The import of Dask sets
+levels anew, so this is called after it.
 """
 
 from __future__ import annotations
