@@ -40,7 +40,7 @@ def test_a_hand_that_cannot_be_is_refused_with_a_sentence(run, tmp_path: Path) -
     for content, sentence in [
         ("hand_length = 'long'", "anna.toml: hand_length is 'long'; give a number of mm"),
         ("I_distal = 20", "anna.toml: hand_length is missing"),
-        ("hand_length", "anna.toml: Expected '=' after a key"),
+        ("hand_length", "anna.toml: not valid TOML: "),
         (
             "hand_length = 190\nI_distal = 90",
             "I_distal is 90 mm; with a hand of 190 mm it lies between 9 and 37",

@@ -203,6 +203,8 @@ def measured_dimensions(length_mm: float | None, file: Path | None) -> dict[str,
         if length_mm is not None:
             measured["hand_length"] = length_mm
         HandDimensions.from_measured(measured)
-    except (BadInput, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise Refusal(f"{file}: not valid TOML: {error}") from error
+    except BadInput as error:
         raise Refusal(f"{file}: {error}" if file is not None else str(error)) from error
     return {name: float(value) for name, value in measured.items()}
