@@ -12,7 +12,7 @@ import pickle
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 NOBODY = 65534
@@ -60,10 +60,7 @@ async def _raw(address: str, booty: str, security: object) -> None:
     await comm.read()
 
 
-async def _attack_all(booty: Path, ports: Sequence[int]) -> None:
-    from distributed import Security
-
-    securities = {"tcp": Security(), "tls": Security.temporary()}
+async def _attack_all(booty: Path, ports: Sequence[int], securities: Mapping[str, object]) -> None:
     tries = [
         asyncio.wait_for(
             way(f"{protocol}://127.0.0.1:{port}", str(booty / f"{port}-{name}-{protocol}"), security),
@@ -79,12 +76,15 @@ async def _attack_all(booty: Path, ports: Sequence[int]) -> None:
 if __name__ == "__main__":
     import logging
 
-    import distributed.client  # noqa: F401  # before the rights are gone that may be needed to read packages
+    from distributed import Security
+    from distributed.client import Client  # noqa: F401
 
+    # before the rights are gone that may be needed to read packages, cryptography among them
+    securities = {"tcp": Security(), "tls": Security.temporary()}
     if os.getuid() == 0:
         os.setgroups([])
         os.setgid(NOBODY)
         os.setuid(NOBODY)
     logging.disable()
-    asyncio.run(_attack_all(Path(sys.argv[1]), [int(port) for port in sys.argv[2:]]))
+    asyncio.run(_attack_all(Path(sys.argv[1]), [int(port) for port in sys.argv[2:]], securities))
     os._exit(0)  # whatever still tries to connect is of no interest

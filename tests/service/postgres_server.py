@@ -28,9 +28,9 @@ class PostgresServer:
         self._programs = programs
         # not TMPDIR: user postgres must be able to go there, and a socket's path has at most 107 bytes
         self.folder = Path(tempfile.mkdtemp(prefix="glovecal-pg-", dir="/tmp"))
-        self._as_postgres = ["runuser", "-u", "postgres", "--"] if os.geteuid() == 0 else []
-        if self._as_postgres:
-            shutil.chown(self.folder, "postgres", "postgres")
+        self._user = "postgres" if os.geteuid() == 0 else None
+        if self._user is not None:
+            shutil.chown(self.folder, self._user, self._user)
         self._run("initdb", "-k", "-A", "trust", "-U", "postgres", "-E", "UTF8", "--no-sync")
         self.start()
 
@@ -63,7 +63,8 @@ class PostgresServer:
         return f"postgresql+psycopg://postgres@/{name}?host={self.folder}"
 
     def _run(self, program: str, *arguments: str) -> None:
-        command = [*self._as_postgres, str(self._programs / program), "-D", str(self.folder / "data")]
-        done = subprocess.run([*command, *arguments], capture_output=True, text=True, cwd="/", check=False)
+        command = [str(self._programs / program), "-D", str(self.folder / "data"), *arguments]
+        other = {"user": self._user, "group": self._user, "extra_groups": []} if self._user else {}
+        done = subprocess.run(command, capture_output=True, text=True, cwd="/", check=False, **other)
         if done.returncode:
             raise RuntimeError(f"{program} failed: {done.stderr or done.stdout}")

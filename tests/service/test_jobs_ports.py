@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
+import distributed
 import psutil
 import pytest
 from distributed import LocalCluster, Security
@@ -39,6 +41,9 @@ def create(store, ledger, numbers):
 def another_user(not_here):
     if os.getuid() != 0:
         not_here("becoming another user needs root (run the tests as root)")
+    packages = Path(distributed.__file__).parent
+    if not all(folder.stat().st_mode & 0o001 for folder in (packages, *packages.parents)):
+        not_here(f"another user cannot read {packages} (clone to a folder that others can read)")
     return NOBODY
 
 
