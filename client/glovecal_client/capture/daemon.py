@@ -45,6 +45,8 @@ class CaptureSettings:
     wearing: str | None = None
     endpoints: tuple[str, ...] = (DEFAULT_ENDPOINT,)
     data: Path = Path("glovecal-data")
+    log_limit: int | None = None
+    """Bytes that all logs of the glove may have: half for earlier runs, half for this one. None: no limit."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,8 @@ class CaptureSummary:
     reconnects: int
     frames_not_logged: int
     log: Path
+    log_is_full: bool = False
+    """The run ended because its log has reached its share of the limit."""
 
     def __str__(self) -> str:
         return (
@@ -87,8 +91,11 @@ class CaptureDaemon:
     def run(self, stop: threading.Event) -> CaptureSummary:
         """Capture until told to stop. Raises CaptureRefused, DeviceError (it cannot work at all)."""
         folder = LogFolder(self._settings.data, self._settings.keys)
+        limit = self._settings.log_limit
         try:
             folder.repair(self._report)
+            if limit is not None:
+                folder.forget(limit // 2, self._report)
             self._earlier_runs = folder.runs()
             self._log = folder.create(self._run_id, self._meta())
             return self._run_with_log(folder, stop)
@@ -118,7 +125,7 @@ class CaptureDaemon:
 
     def _capture(self, device: ReopeningDevice, stop: threading.Event) -> None:
         next_status = 0.0
-        while not stop.is_set():
+        while not stop.is_set() and not self._log_is_full:
             if self._link.refusal:
                 raise CaptureRefused(self._link.refusal)
             if time.monotonic() >= next_status:
@@ -139,6 +146,11 @@ class CaptureDaemon:
             self._note_opening(device)
             if reading is not None:
                 self._take(reading)
+
+    @property
+    def _log_is_full(self) -> bool:
+        limit = self._settings.log_limit
+        return limit is not None and self._log.good_bytes >= limit // 2
 
     def _beat(self) -> None:
         """Once a second: the status, with the last refused reading if there was one since."""
@@ -235,4 +247,5 @@ class CaptureDaemon:
             reconnects=status.reconnects,
             frames_not_logged=status.frames_not_logged,
             log=self._log.path,
+            log_is_full=self._log_is_full,
         )

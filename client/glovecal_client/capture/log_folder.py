@@ -63,6 +63,23 @@ class LogFolder:
             if cut:
                 report(f"earlier recording {path.name}: {cut} damaged bytes moved to {path.name}.cut")
 
+    def forget(self, at_most: int, report: Callable[[str], None]) -> None:
+        """Delete logs of earlier runs, oldest first, until those left have ``at_most`` bytes together."""
+        kept = 0
+        logs = [(log.stat(), log) for log in self.path.glob(f"*{SUFFIX}*")]
+        for about, log in sorted(logs, key=lambda log: log[0].st_mtime_ns, reverse=True):
+            kept += about.st_size
+            if kept <= at_most:
+                continue
+            try:
+                log.unlink()
+            except OSError as error:
+                report(
+                    f"earlier recording {log.name} cannot be deleted, which the limit asks: {error.strerror}"
+                )
+            else:
+                report(f"earlier recording {log.name} deleted: the limit is reached")
+
     def create(self, run_id: int, meta: Mapping[str, Any]) -> FrameLog:
         """The log of a new run. Raises CaptureRefused if it cannot be written."""
         start = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
