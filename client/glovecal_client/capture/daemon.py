@@ -86,7 +86,7 @@ class CaptureDaemon:
         self._refusal: str | None = None
         self._commands = GloveCommands(device)
         self._earlier_runs: list[dict[str, Any]] = []
-        self._flags = FrameFlag.SIMULATED if device.simulated else FrameFlag(0)
+        self._flags = int(FrameFlag.SIMULATED) if device.simulated else 0
 
     def run(self, stop: threading.Event) -> CaptureSummary:
         """Capture until told to stop. Raises CaptureRefused, DeviceError (it cannot work at all)."""
@@ -194,7 +194,7 @@ class CaptureDaemon:
             wall_ns=reading.wall_ns,
             readings=reading.readings,
             context=reading.context,
-            flags=self._flags | (FrameFlag.BUTTON if reading.button else 0),
+            flags=self._flags | (int(FrameFlag.BUTTON) if reading.button else 0),
         )
 
     def _watch_disk(self) -> None:

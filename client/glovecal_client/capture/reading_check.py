@@ -40,13 +40,23 @@ class ReadingCheck:
             return f"{_size(readings)} sensor values instead of {len(self._sensors)}"
         if context.shape != (len(self._context),):
             return f"{_size(context)} context values instead of {len(self._context)}"
-        if np.isinf(context).any():
+        if len(context) and np.isinf(context).any():
             return f"context {self._context[int(np.argmax(np.isinf(context)))]} is infinite"
+        if self._is_within_counts(readings):
+            return None
         bad = ~np.isfinite(readings)
         if bad.any():
             column = int(np.argmax(bad))
             return f"sensor {self._sensors[column]} reads {readings[column]}"
         return self._counts_fault(readings)
+
+    def _is_within_counts(self, readings: np.ndarray) -> bool:
+        """The usual case, told by two numbers: NaN and infinity are in no range."""
+        if self._counts is None or not len(readings):
+            return False
+        return bool(self._counts[0] <= np.minimum.reduce(readings)) and bool(
+            np.maximum.reduce(readings) <= self._counts[1]
+        )
 
     def _counts_fault(self, readings: np.ndarray) -> str | None:
         if self._counts is None:
@@ -72,6 +82,8 @@ class ReadingCheck:
 
 def _as_sent(values: np.ndarray) -> np.ndarray:
     """As float32, which is what a frame holds; what is too large for it becomes infinite."""
+    if isinstance(values, np.ndarray) and values.dtype == np.float32:
+        return values
     with np.errstate(over="ignore"):
         return np.asarray(values, dtype=np.float32)
 
