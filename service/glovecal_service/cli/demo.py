@@ -107,7 +107,7 @@ def _run(seed: int, effect: str, drawn: int, *, as_json: bool, stay: bool | None
                 f"\nDone with glovecal serve, capture and REST in {seconds:.0f} s. Gloves and hands are "
                 "simulated, so the true angles are known."
             )
-            out.print(NEXT)
+            out.print(NEXT + (PAGES if (CHECKOUT / "docs" / "tutorial.md").is_file() else ""))
             if as_json:
                 sys.stdout.write(json.dumps(contract(found) | hidden_contract(hidden, second)) + "\n")
                 sys.stdout.flush()
@@ -162,11 +162,14 @@ def _write(hidden: HiddenSession, folder: Path, effect: str) -> None:
     )
 
 
+CHECKOUT = Path(__file__).parents[3]
 NEXT = """
 Next:
-  docs/tutorial.md          the second part step by step, command by command
   glovecal demo --effect hysteresis | none | unknown   another effect, none, or one outside the catalogue
   glovecal demo --stay      opens the studio at the end and keeps its glove moving
   glovecal serve            your own service; then glovecal capture --device cyberglove --glove right
-  glovecal take import      calibrate from recordings you have (CSV, Parquet)
+  glovecal take import      calibrate from recordings you have (CSV, Parquet)"""
+PAGES = """
+  docs/tutorial.md          the second part step by step, command by command
   README.md                 connect your glove, improve its model, deploy"""
+"""Of a checkout: a wheel brings none."""
