@@ -185,7 +185,7 @@ def _parser() -> argparse.ArgumentParser:
         "--log-limit",
         type=_gigabytes,
         metavar="GB",
-        help="delete the oldest frame logs above this (120 Hz with 22 sensors take 1.6 GB a day)",
+        help="delete the oldest frame logs above this (120 Hz with 22 sensors take 1.5 GB a day)",
     )
     parser.add_argument(
         "--install-unit",
