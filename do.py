@@ -39,6 +39,7 @@ SMOKE = "--smoke"
 SIMULATED = ("tests/simulated",)
 STUDIO = ("tests/service/studio", "tests/service")
 SMOKE_TESTS = ("tests/models/test_layout.py", "tests/architecture/test_surroundings.py")
+PUBLIC = ("glovecal", "glovecal_client")
 PYTEST = ("python", "-I", "-m", "pytest")  # -I: packages of the user's PYTHONPATH are not those of the lock
 BROUGHT = "3.13"
 """The Python that uv brings where there is none of these."""
@@ -136,7 +137,7 @@ def check(arguments: list[str]) -> int:
     ruff = (["ruff", "format", "--no-cache", "--check", where], ["ruff", "check", "--no-cache", where])
     if SMOKE in arguments:
         return max(run(*step, dev=True) for step in (*ruff, ["pyright", "do.py"]))
-    public = (["pyright", "--ignoreexternal", "--verifytypes", name] for name in ("glovecal", "glovecal_client"))
+    public = [["pyright", "--ignoreexternal", "--verifytypes", name] for name in PUBLIC]
     return max(run(*step, dev=True) for step in (*ruff, ["pyright", "--threads", "2", *arguments], *public))
 
 
