@@ -8,20 +8,25 @@ from __future__ import annotations
 
 import sys
 from importlib.util import find_spec
+from typing import NoReturn
 
 from glovecal_client.installation import install_command
+from glovecal_client.standard_streams import run_command
 
 
-def main() -> int | None:
-    """Run the service's command on the process's arguments; 1 with a sentence where there is no service."""
+def script() -> NoReturn:
+    """Entry point of the ``glovecal`` script: the service's own, or the sentence and exit code 1."""
     if find_spec("glovecal_service") is None:
-        print(
-            "glovecal needs the service, which is not installed here: "
-            f"{install_command('glovecal[service]')}. "
-            "To capture a glove without it, use glovecal-capture.",
-            file=sys.stderr,
-        )
-        return 1
-    from glovecal_service.cli.command import main as run_command
+        run_command(_without_service)
+    from glovecal_service.cli.command import script as run_service_command
 
-    return run_command()
+    run_service_command()
+
+
+def _without_service() -> int:
+    print(
+        f"glovecal needs the service, which is not installed here: {install_command('glovecal[service]')}. "
+        "To capture a glove without it, use glovecal-capture.",
+        file=sys.stderr,
+    )
+    return 1

@@ -30,7 +30,6 @@ LABEL="glovecal_end"
 _UNIT = """\
 [Unit]
 Description=Glovecal: capture of glove {glove}
-Documentation=man:systemd.exec(5)
 After=network.target
 StartLimitIntervalSec=0
 
@@ -51,9 +50,12 @@ ProtectSystem=strict
 ProtectHome=yes
 ProtectKernelTunables=yes
 ProtectKernelModules=yes
+ProtectKernelLogs=yes
 ProtectControlGroups=yes
+ProtectHostname=yes
 PrivateTmp=yes
 NoNewPrivileges=yes
+CapabilityBoundingSet=
 LockPersonality=yes
 RestrictRealtime=yes
 RestrictSUIDSGID=yes
