@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from importlib.metadata import version
@@ -68,6 +69,9 @@ from glovecal_service.store.store import Store
 
 JSON_LIMIT_BYTES = 8_000_000
 """Enough for 20,000 frames of 18 sensors to predict."""
+STUDIO_UPLOAD = re.compile(r"/studio/_nicegui/client/[^/]+/upload/\d+")
+MULTIPART_BYTES = 10_000
+"""What a browser's form puts around the file."""
 BODY_PATIENCE_S = 30.0
 ROUTERS = (
     *(subjects, usual_hand, layouts, live, commands, recordings, films, cameras, camera_files, samplings),
@@ -173,6 +177,8 @@ def _guard(app: FastAPI, settings: Settings, metrics: Metrics, body_patience_s: 
     """The last added is the outermost: every refusal below is seen, counted and given an id."""
 
     def limit(path: str) -> int:
+        if STUDIO_UPLOAD.fullmatch(path):
+            return settings.upload_limit_bytes + MULTIPART_BYTES
         return settings.upload_limit_bytes if _takes_files(path) else JSON_LIMIT_BYTES
 
     app.add_middleware(BodyGuard, limit=limit, patience_s=body_patience_s)

@@ -39,7 +39,7 @@ PAGES = (live, capture, cameras, compare, diagnose, fall, models, effects)
 def mount_studio(app: FastAPI, settings: Settings) -> None:
     """Add the studio to ``app``, which serves REST; call it once in a process."""
     feeds = LiveFeeds(settings)
-    studio = Studio(Service(app), feeds)
+    studio = Studio(Service(app), feeds, settings.upload_limit_bytes)
     app.add_api_websocket_route(f"{PATH}/feed/{{glove}}", partial(_feed, feeds))
     pages.add_static_files("/static", str(files("glovecal_service.studio") / "static"))
     pages.add_middleware(PagePolicy)

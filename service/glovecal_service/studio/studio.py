@@ -14,3 +14,5 @@ class Studio:
 
     service: Service
     feeds: LiveFeeds
+    largest_file: int
+    """Bytes that a page's upload takes, as any upload over REST."""

@@ -97,6 +97,12 @@ def test_limits_differ_by_route(http: httpx.Client) -> None:
         assert answer.status_code == 413, path
 
 
+def test_a_page_of_the_studio_sends_files_as_large_as_rest_takes(http: httpx.Client) -> None:
+    page = "http://localhost/studio/_nicegui/client/0f9c/upload/17"
+    assert http.post(page, files={"model": b"x" * 1_000_000}).status_code == 404  # there is no such page
+    assert http.post(page, files={"model": b"x" * 1_100_000}).status_code == 413
+
+
 @pytest.mark.parametrize("declared", ["-1", "abc", "1e9", "9" * 50])
 def test_lying_lengths(serve: Callable[..., str], tmp_path: Path, declared: str) -> None:
     url = serve(Settings(data=tmp_path / "data"))

@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import httpx
+import numpy as np
 import pytest
+import safetensors.numpy
 from effect_models import CREEP, HYSTERESIS, model_with
 from playwright.sync_api import expect
 from realtime_support import LAYOUT
 from studio_support import Open, serious
 
-from glovecal_models.calibration.artifact import dump, model_id
+from glovecal_models.calibration.artifact import dump, model_id, read_manifest
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 
 pytestmark = pytest.mark.needs_chromium
 PATIENCE_MS = 30_000
-ARTIFACT = dump(replace(model_with(HYSTERESIS, CREEP), layout=replace(LAYOUT, name="three-bends-elsewhere")))
+SMALL = dump(replace(model_with(HYSTERESIS, CREEP), layout=replace(LAYOUT, name="three-bends-elsewhere")))
+ARTIFACT = safetensors.numpy.save(
+    safetensors.numpy.load(SMALL) | {"spare": np.zeros(1_150_000)},
+    metadata={"manifest": json.dumps(read_manifest(SMALL))},
+)
+"""9 MB, more than REST takes of anything but files."""
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +66,8 @@ def test_a_model_is_imported_and_a_file_that_is_none_refused(
     page, notice = seen.page, seen.page.locator(".studio-notice").first
     before = httpx.get(f"{address}/v1/models").json()
     for name, content, said in (
-        ("broken.safetensors", ARTIFACT[:-100], "no model was imported"),
+        ("notes.txt", b"no model", "A file here is .safetensors, of at most 256 MB"),
+        ("broken.safetensors", SMALL[:-100], "no model was imported"),
         ("good.safetensors", ARTIFACT, f"Model {model_id(ARTIFACT)[:12]} of anna was imported"),
         ("good.safetensors", ARTIFACT, "was here already"),
     ):

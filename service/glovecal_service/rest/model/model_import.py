@@ -28,7 +28,6 @@ from glovecal_service.store.records import ModelRecord, TakeRecord
 router = APIRouter(prefix="/models", tags=["models"])
 
 MEDIA_TYPE = "application/octet-stream"
-LARGEST_BYTES = 256 << 20
 
 
 class ImportedModel(BaseModel):
@@ -83,8 +82,6 @@ async def import_model(
 
 
 def _import(parts: Parts, path: Path, options: ModelImport) -> dict[str, Any]:
-    if (size := path.stat().st_size) > LARGEST_BYTES:
-        raise BadInput(f"{size >> 20} MB are no model: {LARGEST_BYTES >> 20} MB at most")
     return import_artifact(parts, path.read_bytes(), options)
 
 

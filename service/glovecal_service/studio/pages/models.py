@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from nicegui import events, ui
+from nicegui import ui
 
 from glovecal_service.studio.amounts import degrees, made_of
+from glovecal_service.studio.file_button import FileButton
 from glovecal_service.studio.hand.dimensions_form import DimensionsForm
 from glovecal_service.studio.heading import heading
 from glovecal_service.studio.pages.gloves_table import gloves_table
@@ -18,8 +19,6 @@ from glovecal_service.studio.shell import shell
 from glovecal_service.studio.studio import Studio
 
 EVERY_S = 2.0
-LARGEST_MODEL = 256 * 2**20
-"""Bytes."""
 
 
 def add(studio: Studio) -> None:
@@ -46,14 +45,10 @@ class ModelsPage:
     async def build(self) -> None:
         self._notice = ui.label("").classes("studio-notice").props('role="status"')
         self._trees = ui.element("div").classes("trees")
-        with ui.element("div").classes("capture-upload"):
-            # The library's own field has no name for those who hear the page; a button opens it.
-            self._upload = ui.upload(
-                on_upload=self._import, auto_upload=True, max_file_size=LARGEST_MODEL
-            ).props('accept=".safetensors"')
-        ui.button("Import a model").props("outline no-caps").classes("studio-target page-acts").on(
-            "click", js_handler=f"() => runMethod({self._upload.id}, 'pickFiles', [])"
-        )
+        FileButton(
+            "Import a model", suffixes=".safetensors", largest=self._studio.largest_file,
+            take=self._import, tell=self._notice.set_text,
+        ).button.props("outline no-caps").classes("studio-target page-acts")  # fmt: skip
         await self._look()
         ui.timer(EVERY_S, self._look)
 
@@ -117,11 +112,10 @@ class ModelsPage:
     async def _activate(self, model: str) -> None:
         await self._do(f"/models/{model}/activate", {}, "Live poses come from this model now.")
 
-    async def _import(self, event: events.UploadEventArguments) -> None:
-        self._upload.reset()
+    async def _import(self, _name: str, content: bytes) -> None:
         try:
             found = await self._studio.service.post_file(
-                "/models/import", await event.file.read(), "application/octet-stream", create_subject=True
+                "/models/import", content, "application/octet-stream", create_subject=True
             )
         except Refusal as refusal:
             self._notice.set_text(str(refusal))

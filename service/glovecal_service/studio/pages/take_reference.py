@@ -7,14 +7,13 @@ from functools import partial
 from pathlib import PurePosixPath
 from typing import Any
 
-from nicegui import events, ui
+from nicegui import ui
 
+from glovecal_service.studio.file_button import FileButton
 from glovecal_service.studio.heading import heading
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.studio import Studio
 
-LARGEST_FILE = 512 * 2**20
-"""Bytes."""
 SHOWN_TAKES = 100
 MEDIA_TYPES = {".parquet": "application/vnd.apache.parquet"}
 
@@ -35,15 +34,11 @@ class TakeReference:
                     {"take": "seconds as in the take", "wall": "Unix seconds"}, value="take",
                     label="Its time_s counts",
                 ).classes("choice")  # fmt: skip
-            # The library's own field has no name for those who hear the page; a button opens it.
-            with ui.element("div").classes("capture-upload"):
-                self._upload = ui.upload(
-                    on_upload=self._attach, auto_upload=True, max_file_size=LARGEST_FILE
-                ).props('accept=".csv,.parquet"')
             with ui.element("div").classes("capture-acts"):
-                ui.button("Attach a file").props("unelevated no-caps color=indigo-8").classes(
-                    "studio-main-act"
-                ).on("click", js_handler=f"() => runMethod({self._upload.id}, 'pickFiles', [])")
+                FileButton(
+                    "Attach a file", suffixes=".csv,.parquet", largest=self._studio.largest_file,
+                    take=self._attach, tell=lambda sentence: self._told.set_text(sentence),
+                ).button.props("unelevated no-caps color=indigo-8").classes("studio-main-act")  # fmt: skip
                 for name, repair in (("Check its clock", False), ("Check and move the reference", True)):
                     ui.button(name, on_click=partial(self._check, repair)).props("outline no-caps").classes(
                         "studio-target"
@@ -65,16 +60,15 @@ class TakeReference:
         }
         self._take.set_options(names, value=self._take.value if self._take.value in names else None)
 
-    async def _attach(self, event: events.UploadEventArguments) -> None:
-        name = PurePosixPath(event.file.name).name
+    async def _attach(self, name: str, content: bytes) -> None:
+        name = PurePosixPath(name).name
         kind = MEDIA_TYPES.get(PurePosixPath(name).suffix.lower(), "text/csv")
-        self._upload.reset()
         if not self._take.value:
             self._told.set_text("Choose a take first.")
             return
         try:
             take = await self._studio.service.put_file(
-                f"/takes/{self._take.value}/reference", await event.file.read(), kind,
+                f"/takes/{self._take.value}/reference", content, kind,
                 clock=self._clock.value, filename=name,
             )  # fmt: skip
         except Refusal as refusal:
