@@ -18,6 +18,8 @@
                             study camera-errors: what the colour glove's tracker errs by (quarter of an hour)
     python3 do.py fresh     demo and test on bare Debian systems, as a table (hours; needs root, debootstrap;
                             fresh trixie -- tests/client: these tests only)
+    python3 do.py containers  both container images built, run, killed and upgraded (needs podman;
+                            --debootstrap where no image registry is reached; half an hour)
     python3 do.py picture   README's picture of the studio, from the running page (needs Chromium)
 
 uv is installed into .tools and the locked packages into .venv; nothing outside this folder is touched
@@ -176,6 +178,10 @@ def fresh(arguments: list[str]) -> int:
     return subprocess.run([sys.executable, "tests/fresh/fresh.py", *arguments], cwd=ROOT).returncode
 
 
+def containers(arguments: list[str]) -> int:
+    return run("python", "tests/containers/containers.py", *arguments, dev=True)
+
+
 def docs(arguments: list[str]) -> int:
     """A warning is an error: a link that leads nowhere must not get into the site. docs FOLDER: elsewhere."""
     with tempfile.TemporaryDirectory() as temporary:
@@ -216,6 +222,7 @@ VERBS = {
     "paper": paper,
     "study": study,
     "fresh": fresh,
+    "containers": containers,
     "picture": picture,
     "docs": docs,
 }

@@ -2,20 +2,25 @@
 #   docker build -f docker/capture.Dockerfile -t glovecal-capture .
 #   docker run --device /dev/ttyUSB0 -v glove-log:/data glovecal-capture \
 #       --device cyberglove:/dev/ttyUSB0 --glove right --connect tcp/SERVICE:7447
-FROM python:3.11-slim-bookworm AS build
+ARG BASE=python:3.11-slim-bookworm
+
+FROM $BASE AS build
 RUN pip install --no-cache-dir uv
 WORKDIR /src
+ENV UV_PROJECT_ENVIRONMENT=/opt/glovecal UV_LINK_MODE=copy UV_COMPILE_BYTECODE=1
 COPY pyproject.toml uv.lock ./
 COPY models/pyproject.toml models/
 COPY service/pyproject.toml service/
 COPY client client
-ENV UV_PROJECT_ENVIRONMENT=/opt/glovecal UV_LINK_MODE=copy UV_COMPILE_BYTECODE=1
-RUN uv sync --frozen --no-default-groups --no-editable --package glovecal-client --extra capture
+# Wheels of uv.lock, by their hashes: nobody else's source is compiled.
+RUN uv sync --frozen --no-default-groups --no-install-workspace --no-build \
+        --package glovecal-client --extra capture && \
+    uv sync --frozen --no-default-groups --no-editable --package glovecal-client --extra capture
 
-FROM python:3.11-slim-bookworm
-RUN useradd --create-home --uid 10001 --groups dialout glovecal && install -d -o glovecal /data
+FROM $BASE
+RUN useradd --no-create-home --uid 10001 --groups dialout glovecal && install -d -o glovecal -m 700 /data
 COPY --from=build /opt/glovecal /opt/glovecal
-ENV PATH=/opt/glovecal/bin:$PATH
+ENV PATH=/opt/glovecal/bin:$PATH HOME=/tmp GLOVECAL_INSTALLED_BY=image
 USER glovecal
 VOLUME /data
 STOPSIGNAL SIGTERM

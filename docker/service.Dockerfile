@@ -1,25 +1,38 @@
-# The Glovecal service: zenoh router, real-time prediction, REST, training workers.
+# The Glovecal service: zenoh router, real-time prediction, REST, studio, cameras, training workers.
 #   docker build -f docker/service.Dockerfile -t glovecal-service .
-FROM python:3.11-slim-bookworm AS build
+#   docker build -f docker/service.Dockerfile --build-arg EXTRAS=postgres -t glovecal-service .   (without cameras)
+ARG BASE=python:3.11-slim-bookworm
+
+FROM $BASE AS build
+ARG EXTRAS="camera postgres"
 RUN pip install --no-cache-dir uv
 WORKDIR /src
+ENV UV_PROJECT_ENVIRONMENT=/opt/glovecal UV_LINK_MODE=copy UV_COMPILE_BYTECODE=1
 COPY pyproject.toml uv.lock ./
+COPY models/pyproject.toml models/
+COPY client/pyproject.toml client/
+COPY service/pyproject.toml service/
+# Other people's packages as the wheels of uv.lock, by their hashes: nothing is compiled from source.
+RUN uv sync --frozen --no-default-groups --no-install-workspace --no-build \
+    --package glovecal-service $(printf -- '--extra %s ' $EXTRAS)
 COPY models models
 COPY client client
 COPY service service
-ENV UV_PROJECT_ENVIRONMENT=/opt/glovecal UV_LINK_MODE=copy UV_COMPILE_BYTECODE=1
-RUN uv sync --frozen --no-default-groups --no-editable --package glovecal-service --extra postgres
+RUN uv sync --frozen --no-default-groups --no-editable \
+    --package glovecal-service $(printf -- '--extra %s ' $EXTRAS)
 
-FROM python:3.11-slim-bookworm
-RUN useradd --create-home --uid 10001 glovecal && install -d -o glovecal /data
+FROM $BASE
+RUN useradd --no-create-home --uid 10001 glovecal && install -d -o glovecal -m 700 /data
 COPY --from=build /opt/glovecal /opt/glovecal
-ENV PATH=/opt/glovecal/bin:$PATH \
-    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 \
+# HOME: what numba and matplotlib keep for the next start. Beside /data, /tmp is all that has to be writable.
+ENV PATH=/opt/glovecal/bin:$PATH HOME=/tmp \
+    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 GLOVECAL_INSTALLED_BY=image \
     GLOVECAL_DATA=/data GLOVECAL_HOST=0.0.0.0 GLOVECAL_PORT=8600 GLOVECAL_ZENOH=tcp/0.0.0.0:7447
-USER glovecal
+USER 10001
 VOLUME /data
 EXPOSE 8600 7447
 STOPSIGNAL SIGTERM
-HEALTHCHECK --interval=10s --timeout=3s --start-period=30s CMD \
-    ["python", "-c", "import urllib.request as r; r.urlopen('http://127.0.0.1:8600/v1/health/ready', timeout=2)"]
+# Docker images keep this; images in the OCI format have no health check, and compose.yaml and Kubernetes name it.
+HEALTHCHECK --interval=10s --timeout=5s --start-period=60s CMD \
+    ["python", "-P", "-m", "glovecal_service.health_check"]
 CMD ["glovecal", "serve"]

@@ -77,6 +77,14 @@ def is_ready(port: int) -> bool:
         return False
 
 
+def health(port: int) -> tuple[int, str]:
+    """As a container engine asks: exit code, and what was said."""
+    command = [sys.executable, "-P", "-m", "glovecal_service.health_check"]
+    environment = os.environ | {"GLOVECAL_HOST": "0.0.0.0", "GLOVECAL_PORT": str(port)}
+    asked = subprocess.run(command, env=environment, capture_output=True, text=True)
+    return asked.returncode, asked.stdout
+
+
 def listener(process: subprocess.Popen[str], port: int) -> int:
     """The child that listens on ``port``, 0 if there is none."""
     for child in children(process):
@@ -87,6 +95,29 @@ def listener(process: subprocess.Popen[str], port: int) -> int:
     return 0
 
 
+<<<<<<< HEAD
+=======
+@pytest.mark.skipif(sys.platform == "win32", reason="no process is halted there")
+def test_it_is_healthy_only_while_gloves_are_served(
+    serving: tuple[subprocess.Popen[str], str, int], tmp_path: Path
+) -> None:
+    process, endpoint, port = serving
+    assert health(port) == (1, f"Nothing answers as Glovecal on 127.0.0.1, port {port}, within 4 s.\n")
+    assert process.stdout is not None
+    assert process.stdout.readline().startswith("Glovecal is running")
+    code, said = health(port)
+    assert (code, said[:15]) == (0, "Ready: sqlite, ")
+    halted = answers(endpoint)
+    os.kill(halted, signal.SIGSTOP)
+    os.utime(tmp_path / "data" / "realtime.alive", (0, 0))
+    code, said = health(port)
+    os.kill(halted, signal.SIGCONT)
+    assert code == 1
+    assert said.startswith("Not ready: no glove is served: the real-time process was last seen ")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+>>>>>>> 6acf20a (Service is ready only while gloves are served; a health check that every engine asks alike; containers verb)
 def test_each_part_survives_the_death_of_the_others(serving: tuple[subprocess.Popen[str], str, int]) -> None:
     process, endpoint, port = serving
     assert process.stdout is not None

@@ -44,6 +44,7 @@ VERBS = (
     "study",
     "study active",
     "fresh",
+    "containers",
 )
 
 
@@ -156,6 +157,10 @@ def test_fresh_asks_a_new_clone(smoke, not_here: Callable[[str], NoReturn]) -> N
     if shutil.which("git") is None or not (ROOT / ".git").exists():
         not_here("needs git and a checkout that can be cloned")
     assert smoke["fresh"].result().number(r"\| ended with code (\d+), \d+ s \|") == 0
+
+
+def test_container_files_are_looked_at(smoke) -> None:
+    assert smoke["containers"].result().number(r"Container files: (\d+) problems") == 0
 
 
 def test_smoke_refuses_where_nothing_is_installed(tmp_path: Path) -> None:

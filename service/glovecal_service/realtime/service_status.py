@@ -56,13 +56,17 @@ class ServiceStatus:
         self._reports = CaptureReports(session, site)
         self._publisher = session.declare_publisher(self._key, encoding=JSON_ENCODING)
         self._queryable = session.declare_queryable(self._key, self._answer)
+        self._be_seen()
 
     def run(self, stopped: Event) -> None:
         """Publish until ``stopped``."""
         while not stopped.wait(PERIOD_S):
             self._publisher.put(json.dumps(self.document()))
-            with suppress(OSError):
-                self._alive_file.touch()
+            self._be_seen()
+
+    def _be_seen(self) -> None:
+        with suppress(OSError):
+            self._alive_file.touch()
 
     def document(self) -> dict[str, Any]:
         """As the wire README says; ``database`` is "" while the store answers, else why it does not."""

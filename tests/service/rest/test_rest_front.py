@@ -69,7 +69,7 @@ def test_the_front_page_says_what_this_is(address: str) -> None:
     assert "default-src 'none'" in answer.headers["content-security-policy"]
     assert '<a href="docs">API reference</a>' in answer.text
     assert re.search(r"<p>Glovecal 0\.\d", answer.text)
-    assert re.search(r'>state</td><td class="text">ready<', answer.text)
+    assert re.search(r'>state</td><td class="text">gloves are not served<', answer.text)
     assert re.search(r'>subjects</td><td class="text">1<', answer.text)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import sqlite3
 import threading
 from collections.abc import Callable
@@ -20,6 +21,7 @@ from glovecal_client.errors import ServiceError
 from glovecal_client.rest import NoService, Refused, RestClient
 from glovecal_models.calibration import artifact
 from glovecal_models.calibration.predictor import GlovePredictor
+from glovecal_service.rest.http.health import REALTIME_ALIVE
 from glovecal_service.rest.in_process import in_process_client
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
@@ -169,6 +171,9 @@ def test_a_damaged_active_model_is_told_with_what_to_do(client: RestClient, sett
     layout = client.get("/takes")[0]["layout"]
     path = settings.artifacts_folder / model
     content = path.read_bytes()
+    alive = settings.data / REALTIME_ALIVE  # real time is another process, which these tests do without
+    alive.touch()
+    os.utime(alive, (2e9, 2e9))
     assert client.get(f"/models/{model}")["damage"] is None
     assert client.get("/health/ready")["problems"] == []
     for change in (content[:-1] + bytes([content[-1] ^ 1]), content[:100], None):

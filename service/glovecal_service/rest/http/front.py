@@ -16,7 +16,7 @@ from fastapi.responses import FileResponse, HTMLResponse
 
 from glovecal_service.report.html import STYLE, render
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
-from glovecal_service.rest.http.health import ready
+from glovecal_service.rest.http.health import SEEN_WITHIN_S, realtime_seen_s_ago, working_storage
 from glovecal_service.rest.http.problem import Problem
 
 router = APIRouter(include_in_schema=False)
@@ -51,14 +51,15 @@ def front(parts: PartsNeeded) -> HTMLResponse:
 
 def _state(parts: Parts) -> list[tuple[str, str]]:
     try:
-        found = ready(parts, Response())
+        storage = working_storage(parts)
     except Problem as problem:
         return [("state", f"not ready: {problem.detail}")]
-    store = parts.store
+    store, seen_s_ago = parts.store, realtime_seen_s_ago(parts)
+    running = seen_s_ago is not None and seen_s_ago <= SEEN_WITHIN_S
     return [
-        ("state", found.status),
-        ("real-time process", "running" if found.realtime == "seen" else found.realtime),
-        ("database", f"{found.database}, {found.artifacts}"),
+        ("state", "ready" if running else "gloves are not served"),
+        ("real-time process", "running" if running else "not seen"),
+        ("database", f"{storage.database}, {storage.artifacts}"),
         ("subjects", str(len(store.subjects.list()))),
         ("takes", str(len(store.takes.list()))),
         ("models", str(len(store.models.list()))),

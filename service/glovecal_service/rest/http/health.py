@@ -12,7 +12,7 @@ from prometheus_client import CONTENT_TYPE_LATEST
 from pydantic import BaseModel, Field
 
 from glovecal_service.rest.http.answers import problems
-from glovecal_service.rest.http.dependencies import PartsNeeded
+from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.problem import Problem
 from glovecal_service.store.errors import StoreDamaged, StoreError
 from glovecal_service.store.store import Store
@@ -29,14 +29,14 @@ class Live(BaseModel):
     status: Literal["alive"] = "alive"
 
 
-class Ready(BaseModel):
-    status: Literal["ready"] = "ready"
+class Storage(BaseModel):
     database: str
     artifacts: str
-    realtime: Literal["seen", "not seen"] = Field(
-        description="The real-time process is restarted by itself; REST works without it."
-    )
-    realtime_seen_s_ago: float | None
+
+
+class Ready(Storage):
+    status: Literal["ready"] = "ready"
+    realtime_seen_s_ago: float
     problems: list[str] = Field(
         description="What does not keep the service from working, such as a damaged active model: what to do."
     )
@@ -47,19 +47,18 @@ def live() -> Live:
     return Live()
 
 
-@router.get("/health/ready", summary="Database and artifacts work", responses=problems(507))
+@router.get(
+    "/health/ready", summary="Gloves are served: database, artifacts and real time work",
+    responses=problems(507),
+)  # fmt: skip
 def ready(parts: PartsNeeded, response: Response) -> Ready:
-    """503 or 507 with a sentence when they do not."""
+    """503 or 507 with a sentence when they do not; the rest of REST answers without real time, too."""
     response.headers["Cache-Control"] = "no-store"
-    _check_database(parts.store)
-    seen = _seconds_since(parts.settings.data / REALTIME_ALIVE)
-    return Ready(
-        database=parts.store.database.engine.dialect.name,
-        artifacts=_check_artifacts(parts.store, parts.settings.data),
-        realtime="seen" if seen is not None and seen <= SEEN_WITHIN_S else "not seen",
-        realtime_seen_s_ago=seen,
-        problems=_problems(parts.store),
-    )
+    storage = working_storage(parts)
+    seen_s_ago = realtime_seen_s_ago(parts)
+    if seen_s_ago is None or seen_s_ago > SEEN_WITHIN_S:
+        raise Problem(503, "not-ready", _no_realtime(seen_s_ago))
+    return Ready(**storage.model_dump(), realtime_seen_s_ago=seen_s_ago, problems=_problems(parts.store))
 
 
 @router.get(
@@ -74,6 +73,29 @@ def metrics(parts: PartsNeeded) -> Response:
     for state in ("queued", "running"):
         parts.metrics.jobs.labels(state).set(counts.get(state, 0))
     return Response(parts.metrics.text(), media_type=CONTENT_TYPE_LATEST)
+
+
+def working_storage(parts: Parts) -> Storage:
+    """Raises Problem when database or artifacts do not work."""
+    _check_database(parts.store)
+    return Storage(
+        database=parts.store.database.engine.dialect.name,
+        artifacts=_check_artifacts(parts.store, parts.settings.data),
+    )
+
+
+def realtime_seen_s_ago(parts: Parts) -> float | None:
+    """Seconds; None: never."""
+    try:
+        seen = (parts.settings.data / REALTIME_ALIVE).stat().st_mtime
+    except OSError:
+        return None
+    return round(max(0.0, time.time() - seen), 1)
+
+
+def _no_realtime(seen_s_ago: float | None) -> str:
+    seen = "was never seen" if seen_s_ago is None else f"was last seen {seen_s_ago:.0f} s ago"
+    return f"no glove is served: the real-time process {seen}; glovecal serve's log says why"
 
 
 def _check_database(store: Store) -> None:
@@ -102,10 +124,3 @@ def _problems(store: Store) -> list[str]:
         return [damage for model in store.models.all_active() if (damage := store.models.damage(model))]
     except StoreDamaged as error:
         return [str(error)]
-
-
-def _seconds_since(path: Path) -> float | None:
-    try:
-        return round(max(0.0, time.time() - path.stat().st_mtime), 1)
-    except OSError:
-        return None

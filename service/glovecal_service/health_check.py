@@ -1,0 +1,46 @@
+"""Whether the service on this computer serves gloves: ``python -m glovecal_service.health_check``.
+
+For container images, whose engine asks every few seconds: it loads nothing but the standard library. Prints
+one sentence; exit code 0 when the service is ready, else 1.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from http.client import HTTPConnection, HTTPException
+
+PATIENCE_S = 4.0
+EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}
+
+
+def main() -> int:
+    host = os.environ.get("GLOVECAL_HOST", "127.0.0.1")
+    port = os.environ.get("GLOVECAL_PORT", "8600")
+    healthy, sentence = ask(EVERYWHERE.get(host, host), port)
+    print(sentence)
+    return 0 if healthy else 1
+
+
+def ask(host: str, port: str) -> tuple[bool, str]:
+    """Whether the service there is ready, and a sentence."""
+    connection = None
+    try:
+        connection = HTTPConnection(host, int(port), timeout=PATIENCE_S)
+        connection.request("GET", "/v1/health/ready", headers={"Host": f"localhost:{port}"})
+        answer = connection.getresponse()
+        found = json.loads(answer.read())
+    except (OSError, HTTPException, ValueError):
+        return False, f"Nothing answers as Glovecal on {host}, port {port}, within {PATIENCE_S:g} s."
+    finally:
+        if connection is not None:
+            connection.close()
+    if answer.status != 200:
+        return False, f"Not ready: {found.get('detail', answer.status)}."
+    told = [f"Ready: {found['database']}, {found['artifacts']}.", *found["problems"]]
+    return True, " ".join(told)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,139 @@
+"""Podman with images, containers and settings of its own in a folder, which goes with it.
+
+Podman, because it needs no engine that runs already: what builds (buildah's library) and what runs (runc or
+crun) are processes of this command. Containers use the network of this computer: no bridge has to be set up.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+import resource
+import shutil
+import subprocess
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+SETTINGS = """[containers]
+default_ulimits = [{limits}]
+cgroups = "no-conmon"
+netns = "host"
+log_driver = "k8s-file"
+[engine]
+cgroup_manager = "cgroupfs"
+events_logger = "file"
+runtime = "{runtime}"
+"""
+USED = {"nofile": resource.RLIMIT_NOFILE, "nproc": resource.RLIMIT_NPROC}
+FIT_IN = 1 << 12
+"""Limits of a container; where this computer allows less, what it allows."""
+
+
+class Failed(Exception):
+    """A command of the engine ended with an error; ``str()`` names it and quotes its last lines."""
+
+
+@dataclass(frozen=True)
+class Built:
+    """One image."""
+
+    seconds: float
+    disk_mb: float
+    """Unpacked, its base included."""
+    pull_mb: float
+    """Packed as a registry would send it, its base included."""
+
+
+class Engine:
+    def __init__(self, folder: Path) -> None:
+        runtime = next((name for name in ("runc", "crun") if shutil.which(name)), "runc")
+        limits = (f'"{name}={_allowed(number)}:{_allowed(number)}"' for name, number in USED.items())
+        (folder / "containers.conf").write_text(SETTINGS.format(limits=", ".join(limits), runtime=runtime))
+        self._folder = folder
+        self._podman = ["podman", "--root", str(folder / "images"), "--runroot", str(folder / "run")]
+
+    def __call__(self, *arguments: str, check: bool = True, timeout_s: float = 3600.0) -> str:
+        """What ``podman ARGUMENTS`` printed. Raises Failed unless ``check`` is off."""
+        done = subprocess.run(
+            [*self._podman, *arguments],
+            env={
+                "CONTAINERS_CONF": str(self._folder / "containers.conf"),
+                "PATH": "/usr/sbin:/usr/bin:/sbin:/bin",
+            },
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=timeout_s,
+        )
+        if check and done.returncode:
+            last = "\n".join(done.stdout.strip().splitlines()[-15:])
+            raise Failed(f"podman {' '.join(arguments)[:200]}: exit code {done.returncode}\n{last}")
+        return done.stdout
+
+    def build(self, image: str, context: Path, dockerfile: str, *options: str) -> Built:
+        started = time.monotonic()
+        file = str(context / dockerfile)
+        self(
+            "build",
+            "--network",
+            "host",
+            "--format",
+            "docker",
+            "-f",
+            file,
+            "-t",
+            image,
+            *options,
+            str(context),
+        )
+        seconds = time.monotonic() - started
+        [found] = json.loads(self("image", "inspect", image))
+        return Built(seconds, found["Size"] / 1e6, self._packed_mb(image))
+
+    def _packed_mb(self, image: str) -> float:
+        """Layers as gzip packs them, for a pull is what a user waits for."""
+        archive = self._folder / "saved.tar"
+        self("save", "--format", "docker-archive", "-o", str(archive), image)
+        try:
+            packed = _Counted()
+            with (
+                archive.open("rb") as plain,
+                gzip.GzipFile(fileobj=packed, mode="wb", compresslevel=6) as out,
+            ):
+                shutil.copyfileobj(plain, out, 1 << 20)
+        finally:
+            archive.unlink()
+        return packed.count / 1e6
+
+    @contextmanager
+    def running(self, image: str, name: str, *command: str, options: Sequence[str] = ()) -> Iterator[str]:
+        """A container in the background, its root read-only; gone at the end of the block."""
+        self("run", "--detach", "--name", name, "--read-only", *options, image, *command)
+        try:
+            yield name
+        finally:
+            self("rm", "--force", "--time", "10", name, check=False)
+
+    def log(self, name: str) -> str:
+        return "\n".join(self("logs", name, check=False).strip().splitlines()[-15:])
+
+
+class _Counted:
+    def __init__(self) -> None:
+        self.count = 0
+
+    def write(self, data: bytes) -> int:
+        self.count += len(data)
+        return len(data)
+
+    def flush(self) -> None:
+        pass
+
+
+def _allowed(number: int) -> int:
+    hard = resource.getrlimit(number)[1]
+    return FIT_IN if hard == resource.RLIM_INFINITY else min(FIT_IN, hard)
