@@ -7,7 +7,7 @@ ARG BASE=python:3.11-slim-bookworm
 FROM $BASE AS build
 RUN pip install --no-cache-dir uv
 WORKDIR /src
-ENV UV_PROJECT_ENVIRONMENT=/opt/glovecal UV_LINK_MODE=copy UV_COMPILE_BYTECODE=1
+ENV UV_PROJECT_ENVIRONMENT=/opt/glovecal UV_NO_CACHE=1
 COPY pyproject.toml uv.lock ./
 COPY models/pyproject.toml models/
 COPY service/pyproject.toml service/
@@ -15,7 +15,8 @@ COPY client client
 # Wheels of uv.lock, by their hashes: nobody else's source is compiled.
 RUN uv sync --frozen --no-default-groups --no-install-workspace --no-build \
         --package glovecal-client --extra capture && \
-    uv sync --frozen --no-default-groups --no-editable --package glovecal-client --extra capture
+    uv sync --frozen --no-default-groups --no-editable --compile-bytecode \
+        --package glovecal-client --extra capture
 
 FROM $BASE
 RUN useradd --no-create-home --uid 10001 --groups dialout glovecal && install -d -o glovecal -m 700 /data

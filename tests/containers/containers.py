@@ -278,8 +278,11 @@ class Trial:
 def _stored(client: RestClient, model: str) -> dict[str, Any]:
     """What both versions show alike."""
     takes = client.get("/takes")
-    poses = client.predict(model, [[60.0, 70.0], [120.0, 90.0]])
-    return {"takes": sorted((take["id"], take["name"]) for take in takes), "degrees": poses["degrees"]}
+    angles = client.predict(model, [[60.0, 70.0], [120.0, 90.0]])["mean_deg"]
+    return {
+        "takes": sorted((take["id"], take["name"]) for take in takes),
+        "degrees": [[round(degrees, 6) for degrees in frame] for frame in angles],
+    }
 
 
 def _before_newest_migration() -> str:
