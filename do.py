@@ -179,7 +179,7 @@ def fresh(arguments: list[str]) -> int:
 
 
 def containers(arguments: list[str]) -> int:
-    return run("python", "tests/containers/containers.py", *arguments, dev=True)
+    return run("python", "tests/containers/containers.py", *arguments, dev=True, beside=("tests/fresh",))
 
 
 def docs(arguments: list[str]) -> int:

@@ -6,38 +6,32 @@ import shutil
 import subprocess
 from pathlib import Path
 
+from bare_system import CERTIFICATES, BareSystem, debian_mirror
 from engine import Engine
 
-PACKAGES = "python3,python3-venv,python3-pip,python-is-python3,ca-certificates"
-NOT_NEEDED = ("var/cache/apt", "var/lib/apt/lists", "usr/share/doc", "usr/share/man", "var/log")
-CERTIFICATES = "etc/ssl/certs/ca-certificates.crt"
-
-
-def suite_of(base: str) -> str:
-    """The Debian that a name such as ``python:3.11-slim-bookworm`` ends with."""
-    return base.rpartition("-")[2]
+NOT_NEEDED = ("/var/cache/apt", "/var/lib/apt/lists", "/usr/share/doc", "/usr/share/man", "/var/log")
 
 
 def make_base(engine: Engine, base: str, folder: Path) -> None:
-    """An image called ``base``. Needs root and debootstrap.
+    """An image called ``base``, a name that ends with a Debian, such as ``python:3.11-slim-bookworm``.
 
-    Its Python is Debian's. It trusts whom this computer trusts: its packages come the same way.
+    Its Python is Debian's. It trusts whom this computer trusts: its packages come the same way. Raises
+    Unavailable without root or debootstrap.
     """
-    root = folder / "base"
-    suite = suite_of(base)
-    subprocess.run(
-        ["debootstrap", "--variant=minbase", f"--include={PACKAGES}", suite, str(root)],
-        check=True, stdout=subprocess.DEVNULL,
-    )  # fmt: skip
-    for file in root.glob("usr/lib/python3*/EXTERNALLY-MANAGED"):  # as in the image that it stands for
+    system = BareSystem(folder, base.rpartition("-")[2])
+    system.make(debian_mirror(Path("/etc/apt")))
+    system.take_network_settings()
+    system.inside("/usr/bin/python").symlink_to("python3")
+    for file in system.inside("/usr/lib").glob(
+        "python3*/EXTERNALLY-MANAGED"
+    ):  # pip installs, as in the image
         file.unlink()
     for place in NOT_NEEDED:
-        shutil.rmtree(root / place)
-        (root / place).mkdir()
-    shutil.copyfile(f"/{CERTIFICATES}", root / CERTIFICATES)
+        shutil.rmtree(system.inside(place))
+        system.inside(place).mkdir()
     archive = folder / "base.tar"
-    subprocess.run(["tar", "-C", str(root), "-cf", str(archive), "."], check=True)
-    trust = [f"--change=ENV {name}=/{CERTIFICATES}" for name in ("SSL_CERT_FILE", "PIP_CERT")]
+    subprocess.run(["tar", "-C", str(system.root), "-cf", str(archive), "."], check=True)
+    trust = [f"--change=ENV {name}={CERTIFICATES}" for name in ("SSL_CERT_FILE", "PIP_CERT")]
     engine("import", *trust, str(archive), f"localhost/{base}")
     archive.unlink()
-    shutil.rmtree(root)
+    shutil.rmtree(system.root)

@@ -22,6 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from bare_system import Unavailable, refuse_where_impossible
 from base_image import make_base
 from container_files import BASE, problems
 from engine import Engine, Failed
@@ -73,15 +74,14 @@ def main() -> int:
     if given.smoke or found:
         print(f"Container files: {len(found)} problems.")
         return 1 if found else 0
-    for program in ("podman", *(["debootstrap"] if given.debootstrap else [])):
-        if shutil.which(program, path="/usr/sbin:/usr/bin:/sbin:/bin") is None:
-            print(f"{program} is not installed (Debian: apt-get install {program})", file=sys.stderr)
-            return 2
+    if shutil.which("podman") is None:
+        print("podman is not installed (Debian: apt-get install podman runc)", file=sys.stderr)
+        return 2
     table = Table()
     with _folder(given.folder) as folder:
         try:
             Trial(folder, table, given).run()
-        except (Failed, ServiceError, subprocess.CalledProcessError) as error:
+        except (Failed, Unavailable, ServiceError, subprocess.CalledProcessError) as error:
             print(f"containers: {error}", file=sys.stderr)
             return 1
     print(f"{len(table.wrong)} wrong." if table.wrong else "All as it should be.")
@@ -112,24 +112,24 @@ class Trial:
     def run(self) -> None:
         try:
             if self.given.debootstrap and not self.engine("images", "--quiet", BASE).strip():
+                refuse_where_impossible()
                 seconds = _timed(lambda: make_base(self.engine, BASE, self.folder))
                 self.table.row("base image from Debian's packages", f"{seconds:.0f} s")
             for image in (SERVICE, CAPTURE):
                 self.build(image, ROOT)
             self.look_inside()
-            self.demo()
             self.kill_while_recording()
             self.upgrade()
+            self.demo()
         finally:
             self.engine("rm", "--all", "--force", check=False)
 
     def build(self, image: str, context: Path, name: str = "") -> None:
-        built = self.engine.build(
-            name or image, context, f"docker/{image.removeprefix('glovecal-')}.Dockerfile"
-        )
+        dockerfile = f"docker/{image.removeprefix('glovecal-')}.Dockerfile"
+        built = self.engine.build(name or image, context, dockerfile, BASE)
         self.table.row(
             f"{name or image} built",
-            f"{built.seconds:.0f} s, {built.disk_mb:.0f} MB on disk, {built.pull_mb:.0f} MB to pull",
+            f"{built.seconds:.0f} s, {built.disk_mb:.0f} MB, of which its base {built.base_mb:.0f} MB",
         )
 
     def look_inside(self) -> None:

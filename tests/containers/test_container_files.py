@@ -19,7 +19,6 @@ CHANGES = (
     (SERVICE, '"glovecal_service.health_check"', '"glovecal_service.healthy"', "is no module of ours"),
     (SERVICE, "FROM $BASE\n", "FROM debian\n", f"start from {BASE}"),
     (SERVICE, "camera postgres", "camera-pictures postgres", "camera-pictures"),
-    ("uv.lock", "aarch64.whl", "riscv64.whl", "cannot be built for aarch64"),
 )
 
 
