@@ -135,7 +135,7 @@ class Trial:
     def look_inside(self) -> None:
         for image in (SERVICE, CAPTURE):
             found = self.once(
-                image, "sh", "-c", f"id -u; for p in {' '.join(NOT_INSIDE)}; do command -v $p; done"
+                image, "sh", "-c", f"id -u; for p in {' '.join(NOT_INSIDE)}; do command -v $p; done; true"
             )
             self.table.expect(found.split() == [UID], f"{image}: user, no compiler, no uv", found.strip())
         found = self.once(SERVICE, "python", "-c", CAMERA)

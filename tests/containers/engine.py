@@ -61,14 +61,12 @@ class Engine:
             [*self._podman, *arguments],
             env=os.environ | {"CONTAINERS_CONF": str(self._folder / "containers.conf")},
             stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
+            capture_output=True,
             text=True,
             timeout=timeout_s,
         )
         if check and done.returncode:
-            last = "\n".join(done.stdout.strip().splitlines()[-15:])
-            raise Failed(f"podman {' '.join(arguments)[:200]}: exit code {done.returncode}\n{last}")
+            raise Failed(f"podman {' '.join(arguments)[:200]}: exit code {done.returncode}\n{_last(done)}")
         return done.stdout
 
     def build(self, image: str, context: Path, dockerfile: str, base: str) -> Built:
@@ -81,6 +79,11 @@ class Engine:
         [found] = json.loads(self("image", "inspect", image))
         return found["Size"] / 1e6
 
+    def log(self, name: str) -> str:
+        """The last lines of a container."""
+        logs = [*self._podman, "logs", "--tail", "15", name]
+        return _last(subprocess.run(logs, capture_output=True, text=True))
+
     @contextmanager
     def running(self, image: str, name: str, *command: str, options: Sequence[str] = ()) -> Iterator[str]:
         """A container in the background, its root read-only; gone at the end of the block."""
@@ -90,8 +93,9 @@ class Engine:
         finally:
             self("rm", "--force", "--time", "10", name, check=False)
 
-    def log(self, name: str) -> str:
-        return "\n".join(self("logs", name, check=False).strip().splitlines()[-15:])
+
+def _last(done: subprocess.CompletedProcess[str]) -> str:
+    return "\n".join((done.stdout + done.stderr).strip().splitlines()[-15:])
 
 
 def _allowed(number: int) -> int:
