@@ -43,7 +43,7 @@ RECORDED_S = 4.0
 CAMERA = """
 import cv2, numba, skimage.measure
 import glovecal_models.colour_glove.rasterise, glovecal_service.camera.process
-print(numba.njit(cache=True)(lambda x: x + 1)(1))
+print(numba.njit(lambda x: x + 1)(1))
 """
 
 
