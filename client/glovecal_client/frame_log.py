@@ -7,7 +7,6 @@ again at once and kept in memory, in order, until there is room.
 
 from __future__ import annotations
 
-import os
 import threading
 from collections import deque
 from collections.abc import Mapping
@@ -16,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from glovecal_client.log_records import cut_damaged_tail, good_end, header_bytes, record_bytes
+from glovecal_client.operating_system import sync_file
 from glovecal_client.private_files import open_private
 
 MAX_WAITING = 7200
@@ -49,7 +49,7 @@ class FrameLog:
         try:
             if file.write(head) != len(head):
                 raise OSError(f"{path}: no room for the header")
-            os.fsync(file.fileno())
+            sync_file(file)
         except OSError:
             file.close()
             path.unlink()
@@ -116,7 +116,7 @@ class FrameLog:
         if end == self._synced_bytes and self._sync_problem is None:
             return
         try:
-            os.fsync(self._file.fileno())
+            sync_file(self._file)
         except OSError as error:
             self._sync_problem = f"{self.path}: {error.strerror or error}"
         else:

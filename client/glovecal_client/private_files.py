@@ -1,6 +1,7 @@
 """Files for their owner only: what a glove records tells about a person.
 
-On Windows, whose files have no such permissions, nothing here has an effect.
+On Windows, whose files have no such modes, nothing here has an effect: there a user's own folder closes what
+lies in it to others.
 """
 
 from __future__ import annotations
@@ -9,6 +10,8 @@ import os
 import stat
 from contextlib import suppress
 from pathlib import Path
+
+from glovecal_client.operating_system import HAS_FILE_MODES
 
 OTHERS = stat.S_IRWXG | stat.S_IRWXO
 PRIVATE_FOLDER = 0o700
@@ -56,7 +59,7 @@ def _is_open(path: Path) -> bool:
         mode = path.lstat().st_mode
     except FileNotFoundError:
         return False
-    return os.name == "posix" and bool(mode & OTHERS) and not stat.S_ISLNK(mode)
+    return HAS_FILE_MODES and bool(mode & OTHERS) and not stat.S_ISLNK(mode)
 
 
 def _close(path: Path) -> bool:

@@ -8,6 +8,8 @@ from glovecal_models.errors import BadInput
 
 CHANNEL = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}\Z")
 IDENTIFIER = re.compile(r"[a-z0-9][a-z0-9_-]{0,63}\Z")
+DEVICES = {"con", "prn", "aux", "nul"} | {f"{port}{n}" for port in ("com", "lpt") for n in range(10)}
+"""Identifiers that no file can have on Windows; a data folder may be moved there."""
 
 
 def check_channel_name(name: str, what: str) -> str:
@@ -25,6 +27,8 @@ def check_identifier(name: str, what: str) -> str:
         raise BadInput(
             f"{what}: {name!r} is not allowed; use a-z, 0-9, _ and -, at most 64, not starting with _ or -"
         )
+    if name in DEVICES:
+        raise BadInput(f"{what}: {name!r} is not allowed: Windows keeps it for a device; add a word to it")
     return name
 
 

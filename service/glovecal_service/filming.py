@@ -10,6 +10,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from glovecal_client.clock import clock_ns
 from glovecal_client.errors import ClientError
 from glovecal_client.pictures.preview import write_preview
 from glovecal_client.pictures.video_file import times_path
@@ -47,7 +48,7 @@ class Filming:
             if self._process is not None and self._process.poll() is None:
                 raise Conflict(f"{self._source} films already; end that video first")
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            name = time.strftime("%Y%m%d-%H%M%S") + f"-{time.monotonic_ns() % 1000:03d}"
+            name = time.strftime("%Y%m%d-%H%M%S") + f"-{clock_ns() % 1000:03d}"
             self._source, self._file = source, self._folder / f"{name}.mkv"
             command = [sys.executable, "-P", "-m", "glovecal_client.pictures.film", source, str(self._file)]
             self._process = subprocess.Popen(

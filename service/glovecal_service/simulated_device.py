@@ -18,6 +18,7 @@ from typing import TextIO, TypeVar
 import numpy as np
 
 from glovecal_client.capture.device import Reading, check_options
+from glovecal_client.clock import clock_ns, wall_ns
 from glovecal_client.errors import BadOption, DeviceFinished, DeviceLost
 from glovecal_models.simulation.protocol import MOTIONS, Segment, free_segment, segments
 from glovecal_models.simulation.simulated_glove import LAYOUTS, SimulatedGlove
@@ -135,7 +136,7 @@ class SimulatedDevice:
         self._glove = self._new_glove()
         self._frames = self._simulate()
         self._waiting = next(self._frames)
-        self._started_ns = time.monotonic_ns()
+        self._started_ns = clock_ns()
 
     def close(self) -> None:
         """Stop; ``open`` starts from the beginning again."""
@@ -149,14 +150,14 @@ class SimulatedDevice:
             raise DeviceLost(f"{self.name}: not open")
         if self._waiting is None:
             self._waiting = self._next_in_time(self._frames)
-        remaining = self._due_ns(self._waiting) - time.monotonic_ns()
+        remaining = self._due_ns(self._waiting) - clock_ns()
         if remaining > timeout_s * _NS:
             time.sleep(timeout_s)
             return None
         if remaining > 0:
             time.sleep(remaining / _NS)
         frame, self._waiting = self._waiting, None
-        reading = Reading(frame.readings, time.monotonic_ns(), time.time_ns())
+        reading = Reading(frame.readings, clock_ns(), wall_ns())
         if self._reference is not None:
             self._reference.write(reading.monotonic_ns, frame)
         return reading
@@ -170,7 +171,7 @@ class SimulatedDevice:
     def _next_in_time(self, frames: Iterator[_SimulatedFrame]) -> _SimulatedFrame:
         """The next frame that is not too late to be worth sending."""
         for frame in frames:
-            if time.monotonic_ns() - self._due_ns(frame) < LATE_S * _NS:
+            if clock_ns() - self._due_ns(frame) < LATE_S * _NS:
                 return frame
         raise DeviceFinished(f"{self.name}: the motion is over")
 

@@ -21,7 +21,11 @@ identifiers = st.from_regex(r"[a-z0-9][a-z0-9_-]{0,63}\Z", fullmatch=True)
 def test_client_and_models_have_the_same_rule_for_names() -> None:
     assert glovecal_client.names.IDENTIFIER.pattern == glovecal_models.names.IDENTIFIER.pattern
     assert glovecal_client.names.CHANNEL.pattern == glovecal_models.names.CHANNEL.pattern
+    assert glovecal_client.names.DEVICES == glovecal_models.names.DEVICES
     for names in (glovecal_client.names, glovecal_models.names):
+        with pytest.raises((BadName, BadInput), match="glove: 'com3' is not allowed: Windows keeps it"):
+            names.check_identifier("com3", "glove")
+        assert names.check_identifier("com3-right", "glove") == "com3-right"
         assert names.subject_name("Anna-2") == "anna-2"
         for name in ("Änna", "\u212aai", "_A", ""):  # the Kelvin sign has an ASCII lower case
             with pytest.raises((BadName, BadInput), match="use a-z"):

@@ -26,6 +26,7 @@ from glovecal_client.capture.log_queries import LogQueries
 from glovecal_client.capture.reading_check import ReadingCheck
 from glovecal_client.capture.reopening_device import ReopeningDevice
 from glovecal_client.capture.status import CaptureState, CaptureStatus
+from glovecal_client.clock import wall_ns
 from glovecal_client.errors import CaptureRefused, DeviceError, DeviceFinished, DeviceLost
 from glovecal_client.frame_log import BackgroundSync
 from glovecal_client.keys import GloveKeys
@@ -81,7 +82,7 @@ class CaptureDaemon:
         self._settings = settings
         self._report = report
         self._run_id = secrets.randbits(64)
-        self._status = CaptureStatus(self._run_id, time.time_ns())
+        self._status = CaptureStatus(self._run_id, wall_ns())
         self._check = ReadingCheck(device)
         self._refusal: str | None = None
         self._commands = GloveCommands(device)

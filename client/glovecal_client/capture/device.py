@@ -30,9 +30,9 @@ class Reading:
     readings: np.ndarray
     """Raw sensor values, float32, shape (S,)."""
     monotonic_ns: int
-    """``time.monotonic_ns()`` when the reading was complete."""
+    """``clock_ns()`` of ``glovecal_client.clock`` when the reading was complete."""
     wall_ns: int
-    """``time.time_ns()`` at the same instant."""
+    """``wall_ns()`` at the same instant."""
     context: np.ndarray = field(default_factory=_no_values)
     """Context values, float32, shape (C,); NaN where not measured."""
     button: bool = False

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from glovecal_client.errors import CaptureRefused, DamagedLog
 from glovecal_client.frame_log import FrameLog
 from glovecal_client.keys import GloveKeys
 from glovecal_client.log_records import Recording, cut_damaged_tail
+from glovecal_client.operating_system import lock_file
 from glovecal_client.private_files import make_private
 
 SUFFIX = ".glvlog"
@@ -35,7 +35,7 @@ class LogFolder:
                 f"capture of glove {keys.glove!r}: cannot write in {self.path}: {error}"
             ) from error
         try:
-            _lock(self._lock)
+            lock_file(self._lock)
         except OSError as error:
             self._lock.close()
             raise CaptureRefused(
@@ -101,14 +101,3 @@ class LogFolder:
     def find(self, run_id: int) -> Path | None:
         """The log of a run, None if there is none."""
         return next(iter(self.path.glob(f"*-{run_id:016x}{SUFFIX}")), None)
-
-
-def _lock(file: BinaryIO) -> None:
-    if sys.platform == "win32":
-        import msvcrt
-
-        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-    else:
-        import fcntl
-
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 
 from glovecal_client.capture.device import Device, Reading
+from glovecal_client.clock import clock_ns
 
 _MAX_AHEAD_NS = 1_000_000_000
 
@@ -74,7 +73,7 @@ class ReadingCheck:
                 return f"its time {stamp!r} is not a whole number of nanoseconds"
         if self._last_ns is not None and reading.monotonic_ns < self._last_ns:
             return f"its time is {(self._last_ns - reading.monotonic_ns) / 1e6:g} ms before the one before it"
-        ahead_ns = reading.monotonic_ns - time.monotonic_ns()
+        ahead_ns = reading.monotonic_ns - clock_ns()
         if ahead_ns > _MAX_AHEAD_NS:
             return f"its time is {ahead_ns / 1e9:g} s in the future"
         return None

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 from glovecal_client.capture.device import Reading, check_options
 from glovecal_client.capture.replayed_frames import ReplayedFrame, nominal_rate_hz, open_recording
+from glovecal_client.clock import clock_ns, clock_s, wall_ns
 from glovecal_client.errors import BadOption, DeviceFinished
 from glovecal_client.names import check_identifier
 
@@ -66,7 +67,7 @@ class ReplayDevice:
     def open(self) -> None:
         """Start from the beginning."""
         self._frames = self._recording.frames()
-        self._due_s = time.monotonic()
+        self._due_s = clock_s()
         self._before: ReplayedFrame | None = None
         self._next: ReplayedFrame | None = None
         self._given = 0
@@ -80,7 +81,7 @@ class ReplayDevice:
         if self._next is None:
             self._next = self._advance()
             self._due_s += self._step_s(self._before, self._next)
-        waiting = self._due_s - time.monotonic()
+        waiting = self._due_s - clock_s()
         if waiting > timeout_s:
             time.sleep(timeout_s)
             return None
@@ -89,9 +90,7 @@ class ReplayDevice:
         frame, self._next = self._next, None
         self._before = frame
         self._given += 1
-        return Reading(
-            frame.readings, time.monotonic_ns(), time.time_ns(), context=frame.context, button=frame.button
-        )
+        return Reading(frame.readings, clock_ns(), wall_ns(), context=frame.context, button=frame.button)
 
     def _advance(self) -> ReplayedFrame:
         if self._frames is None:

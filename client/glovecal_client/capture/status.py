@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import threading
-import time
 from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, Literal
+
+from glovecal_client.clock import clock_ns, wall_ns
 
 CaptureState = Literal["opening", "streaming", "lost", "stopped"]
 _SILENT_NS = 2_000_000_000
@@ -51,7 +52,7 @@ class CaptureStatus:
 
     def document(self) -> dict[str, Any]:
         """The status as JSON-able data; ``sequence`` is the last one given, null before the first."""
-        now_ns = time.monotonic_ns()
+        now_ns = clock_ns()
         with self._lock:
             age = round((now_ns - self._times[-1]) / 1e9, 3) if self._times else None
             return {
@@ -70,7 +71,7 @@ class CaptureStatus:
                 "run_id": f"{self.run_id:016x}",
                 "own_clock": self.own_clock,
                 "started_wall_ns": self.started_wall_ns,
-                "wall_ns": time.time_ns(),
+                "wall_ns": wall_ns(),
             }
 
     def _silence(self, age_s: float | None) -> str | None:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from glovecal_client.clock import clock_s
 from glovecal_client.errors import DeviceLost
 from glovecal_client.pictures.source import Picture
 
@@ -27,14 +28,14 @@ class RenderedPictures:
         self._number = 0
 
     def open(self) -> None:
-        self._began_s, self._number = time.monotonic(), 0
+        self._began_s, self._number = clock_s(), 0
 
     def read(self) -> Picture:
         if self._began_s is None:
             raise DeviceLost(f"{self.name} is not open")
         at_s = self._number / self.rate_hz
         self._number += 1
-        time.sleep(max(0.0, self._began_s + at_s - time.monotonic()))
+        time.sleep(max(0.0, self._began_s + at_s - clock_s()))
         return Picture.now(np.ascontiguousarray(self._draw(at_s), dtype=np.uint8))
 
     def close(self) -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
+from glovecal_client.clock import clock_ns, wall_ns
 from glovecal_client.errors import BadOption, DeviceError
 from glovecal_client.installation import not_installed
 
@@ -22,12 +22,12 @@ class Picture:
     pixels: np.ndarray
     """uint8, (H, W, 3), blue, green, red, rows from the top."""
     monotonic_ns: int
-    """``time.monotonic_ns()`` as soon as the picture was there: exposure and transfer came before."""
+    """``clock_ns()`` as soon as the picture was there: exposure and transfer came before."""
     wall_ns: int
 
     @classmethod
     def now(cls, pixels: np.ndarray) -> Picture:
-        return cls(pixels, time.monotonic_ns(), time.time_ns())
+        return cls(pixels, clock_ns(), wall_ns())
 
 
 class PictureSource(Protocol):

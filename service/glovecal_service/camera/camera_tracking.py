@@ -19,6 +19,7 @@ import numpy as np
 
 from glovecal_client.capture.computer import computer_id
 from glovecal_client.capture.status import CaptureStatus
+from glovecal_client.clock import clock_ns, wall_ns
 from glovecal_client.errors import CaptureRefused
 from glovecal_client.pictures.source import PictureSource
 from glovecal_client.wire.pose import Pose, PoseFlag, RotationFlag, encode_pose
@@ -79,7 +80,7 @@ class CameraTracking:
         self.health = CameraHealth()
         self._settings, self._report = settings, report
         self._run_id = secrets.randbits(64)
-        self._status = CaptureStatus(self._run_id, time.time_ns())
+        self._status = CaptureStatus(self._run_id, wall_ns())
         self._newest = NewestPicture()
         self._kept = KeptPictures(settings.keep, settings.folder / "kept", settings.glove)
         self._stop = threading.Event()
@@ -205,7 +206,7 @@ class CameraTracking:
         flags = PoseFlag.SIMULATED if self._source.simulated else PoseFlag(0)
         if not estimate.accepted.all():
             flags |= PoseFlag.TOO_UNCERTAIN
-        age_ns = max(0, time.monotonic_ns() - taken.monotonic_ns)
+        age_ns = max(0, clock_ns() - taken.monotonic_ns)
         pose = Pose(
             taken.number, self._run_id, taken.monotonic_ns, taken.wall_ns,
             degrees=estimate.state.angles_deg.astype(np.float32),
@@ -218,7 +219,7 @@ class CameraTracking:
         )  # fmt: skip
         self._link.publish_pose(encode_pose(pose))
         self._last, self._last_s = pose, time.monotonic()
-        return (time.monotonic_ns() - taken.monotonic_ns) / 1e6
+        return (clock_ns() - taken.monotonic_ns) / 1e6
 
     def _repeat_stale(self, now: float) -> None:
         """Half a second after the last pose, and once a second from then on: that pose, marked."""

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from glovecal_client.capture.computer import computer_id
+from glovecal_client.clock import clock_ns
 from glovecal_client.errors import ClientError
 from glovecal_client.pictures.label_file import LabelWriter
 from glovecal_client.pictures.recording import NOT_ENDED, describe_video
@@ -95,7 +96,7 @@ class KeptPictures:
 
     def _new_file(self, suffix: str) -> Path:
         self._folder.mkdir(mode=PRIVATE_FOLDER, parents=True, exist_ok=True)
-        at = f"{time.strftime('%Y%m%d-%H%M%S')}-{time.monotonic_ns() // 1_000_000 % 1000:03d}"
+        at = f"{time.strftime('%Y%m%d-%H%M%S')}-{clock_ns() // 1_000_000 % 1000:03d}"
         return self._folder / f"{self._glove}-{at}{suffix}"
 
     def _close(self) -> None:

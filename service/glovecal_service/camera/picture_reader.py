@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import statistics
 import threading
-import time
 from collections import deque
 from collections.abc import Callable
 
 from glovecal_client.capture.status import CaptureStatus
+from glovecal_client.clock import clock_ns, wall_ns
 from glovecal_client.errors import DeviceError, DeviceFinished
 from glovecal_client.pictures.source import Picture, PictureSource
 from glovecal_service.camera.kept_pictures import KeptPictures
@@ -135,7 +135,7 @@ class PictureReader:
         self.missing.note(picture.monotonic_ns)
         monotonic_ns, wall_ns = self._now(picture)
         number = self._status.frames
-        self._status.frame_sent(time.monotonic_ns())
+        self._status.frame_sent(clock_ns())
         self._newest.put(NumberedPicture(number, picture, monotonic_ns, wall_ns))
 
     def _now(self, picture: Picture) -> tuple[int, int]:
@@ -143,10 +143,10 @@ class PictureReader:
         if not self.is_recorded:
             return picture.monotonic_ns, picture.wall_ns
         if self._shift_ns is None:
-            began = time.monotonic_ns() - picture.monotonic_ns, time.time_ns() - picture.monotonic_ns
+            began = clock_ns() - picture.monotonic_ns, wall_ns() - picture.monotonic_ns
             self._shift_ns = began
         due_ns = picture.monotonic_ns + self._shift_ns[0]
-        self._stop.wait(max(0.0, (due_ns - time.monotonic_ns()) / 1e9))
+        self._stop.wait(max(0.0, (due_ns - clock_ns()) / 1e9))
         return due_ns, picture.monotonic_ns + self._shift_ns[1]
 
     def _say(self, state: str, sentence: str) -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
 import zenoh
 
+from glovecal_client.clock import clock_ns
 from glovecal_client.errors import WireError
 from glovecal_client.keys import GloveKeys
 from glovecal_client.pose_order import PoseCounts, PoseOrder
@@ -32,7 +32,7 @@ class PoseMeter:
         """All that came, each frame's once."""
 
     def hear(self, sample: zenoh.Sample) -> None:
-        now = time.monotonic_ns()
+        now = clock_ns()
         try:
             pose: Pose = decode_pose(sample.payload.to_bytes())
         except WireError:

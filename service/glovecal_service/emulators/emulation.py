@@ -5,8 +5,8 @@ from __future__ import annotations
 import contextlib
 import os
 import threading
-import time
 
+from glovecal_client.clock import clock_s
 from glovecal_service.emulators.faults import Faults
 from glovecal_service.emulators.glove import EmulatedGlove
 from glovecal_service.emulators.ports import Port, wait
@@ -31,7 +31,7 @@ class Emulation:
         self._thread = threading.Thread(target=self._serve, name="emulated-glove", daemon=True)
 
     def __enter__(self) -> Emulation:
-        self._began_s = time.monotonic()
+        self._began_s = clock_s()
         self._settle()
         self._thread.start()
         return self
@@ -59,7 +59,7 @@ class Emulation:
     def _settle(self) -> None:
         """Plug in or pull out, as it should be now."""
         with self._lock:
-            plugged = not (self._pulled or self._faults.unplugged(time.monotonic() - self._began_s))
+            plugged = not (self._pulled or self._faults.unplugged(clock_s() - self._began_s))
             if plugged and not self._plugged:
                 self.glove.power_up()
                 self.port.plug()
@@ -72,7 +72,7 @@ class Emulation:
             self._settle()
             with self._lock:
                 handle = self.port.handle() if self._plugged else None
-                wait_s = _LONGEST_WAIT_S if handle is None else self.glove.next_due_s() - time.monotonic()
+                wait_s = _LONGEST_WAIT_S if handle is None else self.glove.next_due_s() - clock_s()
             watched = [self._wake_read] if handle is None else [self._wake_read, handle]
             ready = wait(watched, min(_LONGEST_WAIT_S, max(0.0, wait_s)))
             if self._wake_read in ready:
@@ -84,7 +84,7 @@ class Emulation:
 
     def _exchange(self, something_came: bool) -> None:
         heard = self.port.read() if something_came else b""
-        now_s = time.monotonic()
+        now_s = clock_s()
         for part in (self.glove.feed(heard, now_s), self.glove.due(now_s)):
             if part:
                 self.sendings += self.port.write(part)

@@ -9,11 +9,12 @@ stands still for so long that the ring overflows, the oldest go: they are missin
 from __future__ import annotations
 
 import secrets
-import time
 from threading import Event, Thread
 from typing import NamedTuple
 
 import zenoh
+
+from glovecal_client.clock import clock_ns, wall_ns
 
 ARRIVALS_LIMIT = 8192
 """Messages waiting at most; at 64 gloves and 120 Hz that is one second of a reader that stands still."""
@@ -26,7 +27,7 @@ class Arrival(NamedTuple):
     key: str
     payload: bytes
     received_ns: int
-    """``time.monotonic_ns()`` of this process when zenoh received the message."""
+    """``clock_ns()`` when zenoh received the message."""
 
 
 class Arrivals:
@@ -36,7 +37,7 @@ class Arrivals:
         self._session = session
         self._limit = limit
         self._clock_id = str(session.zid())
-        self._looked_ns = time.monotonic_ns()
+        self._looked_ns = clock_ns()
         self._closed = Event()
         self._left: list[Arrival] = []
         self._alarm: Thread | None = None
@@ -50,7 +51,7 @@ class Arrivals:
             self._alarm = Thread(target=self._sound_alarms, name="alarm", daemon=True)
             self._alarm.start()
         sample = self._subscriber.recv()
-        self._looked_ns = time.monotonic_ns()
+        self._looked_ns = clock_ns()
         payload = sample.payload.to_bytes()
         if payload == self._alarm_payload:
             return None
@@ -68,11 +69,11 @@ class Arrivals:
         receive = self._subscriber.try_recv
         while len(samples) < self._limit and (sample := receive()) is not None:
             samples.append(sample)
-        looked_ns, now_ns = self._looked_ns, time.monotonic_ns()
+        looked_ns, now_ns = self._looked_ns, clock_ns()
         self._looked_ns = now_ns
         if not samples:
             return []
-        wall_less_monotonic_ns = time.time_ns() - now_ns
+        wall_less_monotonic_ns = wall_ns() - now_ns
         taken: list[Arrival] = []
         for sample in samples:
             payload = sample.payload.to_bytes()

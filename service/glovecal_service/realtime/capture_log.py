@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import zenoh
 
+from glovecal_client.clock import wall_ns
 from glovecal_client.errors import NoAnswer
 from glovecal_client.gap_repair import fetch_block
 from glovecal_client.keys import GloveKeys
@@ -49,7 +49,7 @@ class CaptureLog:
     def standing(self) -> CaptureStanding:
         """Raises NoAnswer if nobody answers, or not with a status and a meta."""
         meta = ask_json(self._session, self._keys.meta, timeout_s=ANSWER_WITHIN_S)
-        asked_ns = time.time_ns()
+        asked_ns = wall_ns()
         status = ask_json(self._session, self._keys.status, timeout_s=ANSWER_WITHIN_S)
         try:
             runs = [*meta.get("earlier_runs", ()), status]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from dataclasses import dataclass, field
 from threading import Lock
@@ -10,6 +9,7 @@ from typing import NamedTuple
 
 import zenoh
 
+from glovecal_client.clock import clock_ns
 from glovecal_client.errors import BadName
 from glovecal_client.keys import all_gloves, parse_glove_key
 from glovecal_client.plausible_loss import PlausibleLoss
@@ -57,7 +57,7 @@ class CaptureReports:
             known = self._gloves.get(glove)
             if known is None:
                 return 0
-            before_ns = time.monotonic_ns() - SETTLED_AFTER_NS
+            before_ns = clock_ns() - SETTLED_AFTER_NS
             settled = next((report for report in reversed(known.newest) if report.heard_ns < before_ns), None)
             if standing is None:
                 return 0 if settled is None else _possible(settled.sequence, known.first, settled) - received

@@ -16,6 +16,7 @@ from threading import Event
 
 import numpy as np
 
+from glovecal_client.clock import clock_ns
 from glovecal_client.wire.frame import Frame, FrameFlag
 from glovecal_client.wire.pose import (
     Pose,
@@ -74,7 +75,7 @@ class PoseLoop:
         self.gloves = GloveLanes()
         self._pending: dict[GloveLane, None] = {}
         self._looked_for_stale_ns = 0
-        self._collected_ns = time.monotonic_ns()
+        self._collected_ns = clock_ns()
 
     @property
     def lanes(self) -> list[GloveLane]:
@@ -203,14 +204,14 @@ class PoseLoop:
     def _open(self, lane: GloveLane, limit: int) -> list[tuple[Frame, int]]:
         self._pending.pop(lane)
         opened = []
-        for waiting in lane.newest(limit, time.monotonic_ns() - self._oldest_ns):
+        for waiting in lane.newest(limit, clock_ns() - self._oldest_ns):
             frame = lane.open(waiting)
             if frame is not None:
                 opened.append((frame, waiting.received_ns))
         return opened
 
     def _look_around(self) -> None:
-        now = time.monotonic_ns()
+        now = clock_ns()
         if now - self._looked_for_stale_ns < 100_000_000:
             return
         self._looked_for_stale_ns = now
@@ -245,4 +246,4 @@ def _simulated(frame: Frame) -> int:
 
 
 def _age_us(received_ns: int) -> int:
-    return min(max((time.monotonic_ns() - received_ns) // 1000, 0), 0xFFFFFFFF)
+    return min(max((clock_ns() - received_ns) // 1000, 0), 0xFFFFFFFF)

@@ -14,6 +14,7 @@ from typing import Any
 import zenoh
 from sqlalchemy.exc import SQLAlchemyError
 
+from glovecal_client.clock import wall_ns
 from glovecal_client.errors import ClientError, NoAnswer
 from glovecal_client.keys import GloveKeys
 from glovecal_client.queries import ask_json
@@ -202,14 +203,14 @@ class Recorder:
     def _create(self, store: Store, record: RecordingRecord, path: Path) -> RunLedger:
         keys = self._keys(record)
         meta: dict[str, Any] = {"recording": record.id, "name": record.name, "glove": record.glove}
-        meta[CREATED] = time.time_ns()
+        meta[CREATED] = wall_ns()
         try:
             meta["capture"] = ask_json(self._session, keys.meta, timeout_s=5.0)
             standing = CaptureLog(self._session, keys).standing()
             meta[BEGIN] = {
                 "run_id": f"{standing.runs[-1].run_id:016x}",
                 "sequence": standing.sequence,
-                "wall_ns": time.time_ns() + standing.clock_ahead_ns,
+                "wall_ns": wall_ns() + standing.clock_ahead_ns,
             }
         except NoAnswer:
             meta.setdefault("capture", _stored_meta(store, record.glove))

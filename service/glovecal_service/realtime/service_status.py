@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 
 import zenoh
 
+from glovecal_client.clock import wall_ns
 from glovecal_client.keys import JSON_ENCODING, all_services, service_alive_key
 from glovecal_service.realtime.capture_reports import CaptureReports
 from glovecal_service.realtime.glove_lanes import GloveLanes
@@ -52,7 +52,7 @@ class ServiceStatus:
         self._pose_metas = pose_metas
         self._problem = problem
         self._alive_file = data / ALIVE_FILE
-        self._started_wall_ns = time.time_ns()
+        self._started_wall_ns = wall_ns()
         self._reports = CaptureReports(session, site)
         self._publisher = session.declare_publisher(self._key, encoding=JSON_ENCODING)
         self._queryable = session.declare_queryable(self._key, self._answer)

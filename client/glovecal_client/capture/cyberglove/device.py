@@ -27,6 +27,7 @@ from glovecal_client.capture.cyberglove.watch import StreamWatch
 from glovecal_client.capture.device import Reading
 from glovecal_client.capture.device_clock import DeviceClock
 from glovecal_client.capture.serial_link import SerialLink
+from glovecal_client.clock import clock_ns, wall_ns
 from glovecal_client.errors import DeviceError, DeviceLost
 
 _WAIT_S = 0.05
@@ -193,7 +194,7 @@ class CyberGlove:
 
     def _readings(self, records: list[Record]) -> list[Reading]:
         """Give records that came together the times at which they were taken."""
-        now_ns, offset_ns = time.monotonic_ns(), time.time_ns() - time.monotonic_ns()
+        now_ns, offset_ns = clock_ns(), wall_ns() - clock_ns()
         readings = []
         for behind, record in zip(range(len(records) - 1, -1, -1), records, strict=True):
             values = np.frombuffer(record.values, np.uint8)[self._index].astype(np.float32)

@@ -14,6 +14,7 @@ from datetime import datetime
 
 from glovecal_client.capture.cyberglove3.conversation import command, question
 from glovecal_client.capture.stream.links import Link
+from glovecal_client.clock import wall_ns
 from glovecal_client.errors import DeviceLost
 
 WANTED_S = 0.004
@@ -95,7 +96,7 @@ def set_clock(link: Link, frame_rate: float, wanted_s: float | None = None) -> t
 
 def wall_of_day_s() -> float:
     """Seconds since local midnight by the computer's wall clock."""
-    now = datetime.now()
+    now = datetime.fromtimestamp(wall_ns() / 1e9)
     return 3600 * now.hour + 60 * now.minute + now.second + now.microsecond / 1e6
 
 

@@ -16,6 +16,7 @@ from typing import Protocol
 
 from glovecal_client.capture.serial_link import SerialLink
 from glovecal_client.errors import BadOption, DeviceLost
+from glovecal_client.operating_system import listen_alone
 
 LOOPBACK = "127.0.0.1"
 _AT_MOST = 65536
@@ -185,6 +186,8 @@ class _UdpLink:
             if not select.select([self._port], [], [], timeout_s)[0]:
                 return b""
             data, peer = self._port.recvfrom(_AT_MOST)
+        except ConnectionResetError:  # Windows: what was sent to the glove before met a closed port
+            return b""
         except (OSError, ValueError) as error:
             raise DeviceLost(f"nothing can be received any more ({error})") from error
         if self._peer not in (None, peer):
@@ -212,7 +215,7 @@ def _bound(name: str, address: tuple[str, int], kind: socket.SocketKind) -> sock
     opened = socket.socket(socket.AF_INET, kind)
     try:
         if kind == socket.SOCK_STREAM:
-            opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listen_alone(opened)
         opened.bind(address)
     except OSError as error:
         opened.close()

@@ -21,6 +21,7 @@ from glovecal_client.capture.own_clock import OwnClock
 from glovecal_client.capture.stream.links import Link, Place, place_of
 from glovecal_client.capture.stream.option_values import COMMON_HELP, OptionValues
 from glovecal_client.capture.stream.parser import Counters, Sample, StreamParser
+from glovecal_client.clock import clock_ns, wall_ns
 from glovecal_client.errors import DeviceError, DeviceLost
 
 if TYPE_CHECKING:
@@ -198,7 +199,7 @@ class StreamedGlove:
 
     def _readings(self, samples: Sequence[Sample]) -> list[Reading]:
         """Give records that came together the times at which they were taken."""
-        now_ns, offset_ns = time.monotonic_ns(), time.time_ns() - time.monotonic_ns()
+        now_ns, offset_ns = clock_ns(), wall_ns() - clock_ns()
         readings = []
         for behind, sample in zip(range(len(samples) - 1, -1, -1), samples, strict=True):
             if self._own_clock is not None and sample.ticks is not None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
+from glovecal_client.clock import clock_ns, clock_s
 from glovecal_client.errors import NoAnswer
 from glovecal_service.cli.glove.heard_frames import heard_frames, times_and_readings
 from glovecal_service.cli.terminal.connection import connect
@@ -143,7 +144,7 @@ def _require_here(glove: str, heard: list) -> None:
         time.sleep(0.05)
     if not heard:
         raise Refusal(f"glove {glove} sends no frames; start it: glovecal capture")
-    apart_s = abs(time.monotonic_ns() - heard[-1].monotonic_ns) / 1e9
+    apart_s = abs(clock_ns() - heard[-1].monotonic_ns) / 1e9
     if apart_s > OTHER_COMPUTER_S:
         raise Refusal(
             f"glove {glove} is captured on another computer, whose clock does not stamp these keys; run this"
@@ -158,7 +159,7 @@ def _pressed(taps: int) -> list[float]:
     with single_keys() as key:
         while len(found) < taps:
             pressed = key(PATIENCE_S)
-            at = time.monotonic()
+            at = clock_s()
             if pressed in QUITS:
                 break
             found.append(at)

@@ -1,0 +1,132 @@
+"""What the operating system gives to the client, on Linux, macOS and Windows; the service uses it too.
+
+No other module here asks which system it runs on. The ways of Windows and macOS follow their documentation:
+
+* Locks: ``flock(2)`` goes with the process. ``msvcrt.locking`` (LockFile) does too, though "the time it takes
+  depends upon available system resources", and nobody else can read the byte: a lock file holds nothing.
+* Disk: ``fsync(2)`` of macOS hands data to the drive, ``F_FULLFSYNC`` has the drive write it. Windows opens
+  no folder to sync it; MoveFileEx with MOVEFILE_WRITE_THROUGH "does not return until the file is actually
+  moved on the disk". It is denied while anybody, such as a virus scanner, has either file open.
+* Stop: nothing sends SIGTERM on Windows (``Popen.terminate`` is TerminateProcess: no handler runs, nothing is
+  flushed). CTRL_BREAK_EVENT comes as SIGBREAK to all processes of a group that share the sender's console.
+* Ports: on Windows SO_REUSEADDR lets two programs listen at one port, SO_EXCLUSIVEADDRUSE keeps it to one;
+  elsewhere SO_REUSEADDR only skips the wait for old connections.
+* Boot: Linux names each boot in ``boot_id``, macOS in ``kern.bootsessionuuid``; Windows counts them in its
+  registry (``BootId``, undocumented).
+* Files: only the owner's on Linux and macOS by their mode; Windows has lists that a folder passes on.
+* Names: Windows keeps CON, COM1 and others for devices, also before a dot, forbids some characters and drops
+  a dot or blank at the end.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import IO, Any
+
+STOP_SIGNALS: tuple[signal.Signals, ...] = (signal.SIGINT, signal.SIGTERM)
+"""Signals that ask a program to stop in order."""
+if sys.platform == "win32":
+    STOP_SIGNALS += (signal.SIGBREAK,)
+
+HAS_FILE_MODES = sys.platform != "win32"
+_DENIED_FOR_S = 2.0
+"""How long a file may be held by a virus scanner or a reader before it counts as denied."""
+_FORBIDDEN = re.compile(r'[<>:"/\\|?*\x00-\x1f]')
+_RESERVED = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³]) *(\.|\Z)", re.IGNORECASE)
+
+
+def lock_file(file: IO[Any]) -> None:
+    """Lock an open, empty file until it is closed or its process ends. Raises OSError when it is locked."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+    else:
+        import fcntl
+
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def sync_file(file: IO[Any]) -> None:
+    """Bring an open file to the disk, so that a power cut leaves it whole. Raises OSError."""
+    os.fsync(file.fileno())
+    if sys.platform == "darwin":
+        import fcntl
+
+        with suppress(OSError):  # not every file system can
+            fcntl.fcntl(file, fcntl.F_FULLFSYNC)
+
+
+def move_over(source: Path, target: Path, *, durably: bool = False) -> None:
+    """Rename ``source`` to ``target``, in place of what is there; ``durably``: on the disk when it returns.
+
+    Raises OSError.
+    """
+    until = time.monotonic() + _DENIED_FOR_S
+    while True:
+        try:
+            _move(source, target, durably)
+            return
+        except PermissionError:
+            if sys.platform != "win32" or time.monotonic() > until:
+                raise
+            time.sleep(0.02)
+
+
+def _move(source: Path, target: Path, durably: bool) -> None:
+    if not durably:
+        source.replace(target)
+    elif sys.platform == "win32":
+        import ctypes
+
+        kernel, replace_existing, write_through = ctypes.WinDLL("kernel32", use_last_error=True), 1, 8
+        if not kernel.MoveFileExW(str(source), str(target), replace_existing | write_through):
+            raise ctypes.WinError(ctypes.get_last_error())
+    else:
+        source.replace(target)
+        handle = os.open(target.parent, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def boot() -> str:
+    """What is the same for all programs of this computer until it starts again."""
+    with suppress(OSError, subprocess.SubprocessError):
+        if sys.platform == "linux":
+            return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii")
+        if sys.platform == "darwin":
+            command = ["/usr/sbin/sysctl", "-n", "kern.bootsessionuuid"]
+            return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout
+        if sys.platform == "win32":
+            import winreg
+
+            key = r"SYSTEM\CurrentControlSet\Control\Session Manager\Memory Management\PrefetchParameters"
+            with winreg.OpenKey(winreg.HKEY_LOCAL_MACHINE, key) as opened:
+                return f"{socket.gethostname()} {winreg.QueryValueEx(opened, 'BootId')[0]}"
+    return f"{socket.gethostname()} {round((time.time() - time.monotonic()) / 60)}"
+
+
+def listen_alone(opened: socket.socket) -> None:
+    """Before ``bind``: no other program can listen there too, and a port just left is free again."""
+    if sys.platform == "win32":
+        opened.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
+    else:
+        opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+
+
+def name_for_a_file(name: str) -> str:
+    """``name``, changed where the system could not give it to a file."""
+    if sys.platform != "win32":
+        return name
+    name = _FORBIDDEN.sub("_", name).rstrip(". ") or "_"
+    return f"_{name}" if _RESERVED.match(name) else name
