@@ -31,10 +31,16 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
 
-STOP_SIGNALS: tuple[signal.Signals, ...] = (signal.SIGINT, signal.SIGTERM)
-"""Signals that ask a program to stop in order."""
+CONSOLE_SIGNALS: tuple[signal.Signals, ...] = (signal.SIGINT,)
+"""Sent by a terminal to all processes that were started in it."""
 if sys.platform == "win32":
-    STOP_SIGNALS += (signal.SIGBREAK,)
+    CONSOLE_SIGNALS += (signal.SIGBREAK,)
+HANG_UP: tuple[signal.Signals, ...] = ()
+"""Of a terminal that was closed; a console that is closed ends its processes on Windows."""
+if sys.platform != "win32":
+    HANG_UP = (signal.SIGHUP,)
+STOP_SIGNALS = (signal.SIGTERM, *CONSOLE_SIGNALS)
+"""They ask a program to stop in order."""
 
 HAS_FILE_MODES = sys.platform != "win32"
 _DENIED_FOR_S = 2.0

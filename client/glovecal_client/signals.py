@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from glovecal_client.operating_system import HANG_UP, STOP_SIGNALS
+
 Handler = Callable[[int, Any], Any]
-HANG_UP: tuple[int, ...] = (signal.SIGHUP,) if hasattr(signal, "SIGHUP") else ()
-"""Not on Windows, where a console that is closed ends its processes."""
 
 
 def handle_signals(handler: Handler | signal.Handlers, *numbers: int) -> dict[int, Any]:
@@ -27,8 +27,8 @@ def handle_signals(handler: Handler | signal.Handlers, *numbers: int) -> dict[in
 
 @contextmanager
 def stopped_by_signals(stop: threading.Event, *, outlives_terminal: bool = False) -> Iterator[None]:
-    """SIGINT and SIGTERM set ``stop``; with ``outlives_terminal`` closing the terminal ends nothing."""
-    before = handle_signals(lambda *_: stop.set(), signal.SIGINT, signal.SIGTERM)
+    """Signals that ask to stop set ``stop``; with ``outlives_terminal`` closing the terminal ends nothing."""
+    before = handle_signals(lambda *_: stop.set(), *STOP_SIGNALS)
     if outlives_terminal:
         before |= handle_signals(signal.SIG_IGN, *HANG_UP)
     try:

@@ -12,22 +12,24 @@ from __future__ import annotations
 
 import logging
 import multiprocessing
-import os
 import signal
 import socket
 import sys
 import time
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from threading import Event, Thread
 from typing import Any
 
+from glovecal_client.operating_system import CONSOLE_SIGNALS, HANG_UP, STOP_SIGNALS, listen_alone
 from glovecal_client.private_files import keep_private
-from glovecal_client.signals import HANG_UP, handle_signals
+from glovecal_client.signals import handle_signals
 from glovecal_client.standard_streams import say
 from glovecal_models.errors import GlovecalError
+from glovecal_service.operating_system import FORKS
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
 
@@ -44,7 +46,7 @@ READY_WITHIN_S = 60.0
 Work = Callable[[Settings, Event, Callable[[], None]], None]
 """Runs until the event is set; calls the last argument when it is there for its users."""
 
-_CONTEXT = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
+_CONTEXT = multiprocessing.get_context("fork" if FORKS else "spawn")
 _log = logging.getLogger("glovecal.serve")
 
 
@@ -59,6 +61,33 @@ class Ready:
 
     def is_set(self) -> bool:
         return bool(self._flag.value)
+
+
+class Lifeline:
+    """A pipe from this process to all its children, on which nothing is ever sent.
+
+    It breaks when this process wants them to stop and when it is gone: a killed supervisor must not leave
+    processes that hold its ports. No signal is needed, which Windows has not.
+    """
+
+    def __init__(self, end: Connection, held: Connection | None) -> None:
+        """``held`` is the parent's end; a forked child has a copy of it, which would keep the pipe whole."""
+        self._end = end
+        self._held = held
+
+    def of_a_child(self) -> Lifeline:
+        return self if FORKS else Lifeline(self._end, None)
+
+    def hold(self, stopped: Event) -> None:
+        """In a child: set ``stopped`` when it breaks."""
+        self.cut()
+        with suppress(EOFError, OSError):
+            self._end.recv_bytes()
+        stopped.set()
+
+    def cut(self) -> None:
+        if self._held is not None:
+            self._held.close()
 
 
 @dataclass
@@ -81,7 +110,7 @@ class Part:
 
 
 def serve(settings: Settings) -> int:
-    """Run until SIGTERM or Ctrl-C; the exit code. Problems that no restart can cure are one sentence."""
+    """Run until asked to stop, as by Ctrl-C; the exit code. What no restart cures is told in one sentence."""
     _log_to_stderr()
     parts = [
         Part("real time", real_time, ("zenoh", *_zenoh_address(settings))),
@@ -93,24 +122,25 @@ def serve(settings: Settings) -> int:
         print(f"glovecal serve: {problem}", file=sys.stderr)
         return 1
     stopped = Event()
-    handle_signals(lambda *_: stopped.set(), signal.SIGTERM, signal.SIGINT, *HANG_UP)
+    handle_signals(lambda *_: stopped.set(), *STOP_SIGNALS, *HANG_UP)
     import glovecal_service.realtime.process  # noqa: F401  # for the processes, also those after a crash
 
+    lifeline = Lifeline(*_CONTEXT.Pipe(duplex=False))
     try:
         for part in parts:
-            _start(part, settings)
-        _supervise(parts, settings, stopped)
+            _start(part, settings, lifeline)
+        _supervise(parts, settings, lifeline, stopped)
     finally:
-        _stop(parts)
+        _stop(parts, lifeline)
     return 0
 
 
-def _supervise(parts: list[Part], settings: Settings, stopped: Event) -> None:
+def _supervise(parts: list[Part], settings: Settings, lifeline: Lifeline, stopped: Event) -> None:
     """Keep them alive; say where the service is as soon as all are ready (or one takes very long)."""
     said, late = False, time.monotonic() + READY_WITHIN_S
     while not stopped.wait(0.1):
         for part in parts:
-            _keep_alive(part, settings)
+            _keep_alive(part, settings, lifeline)
         waiting = [part.name for part in parts if not part.ready.is_set()]
         if not said and (not waiting or time.monotonic() > late):
             said = True
@@ -147,7 +177,7 @@ def _port_problem(part: Part) -> str:
     try:
         family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         with socket.socket(family, socket.SOCK_STREAM) as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listen_alone(probe)
             probe.bind(address)
     except OSError as error:
         variable = "GLOVECAL_PORT" if what == "REST" else "GLOVECAL_ZENOH"
@@ -170,20 +200,22 @@ def _banner(settings: Settings) -> str:
     )
 
 
-def _start(part: Part, settings: Settings) -> None:
+def _start(part: Part, settings: Settings, lifeline: Lifeline) -> None:
     part.ready = Ready()
     part.process = _CONTEXT.Process(
-        target=run_part, args=(part.work, settings, part.ready, os.getpid()), name=f"glovecal {part.name}"
+        target=run_part,
+        args=(part.work, settings, part.ready, lifeline.of_a_child()),
+        name=f"glovecal {part.name}",
     )
     part.process.start()
     part.started_at = time.monotonic()
 
 
-def _keep_alive(part: Part, settings: Settings) -> None:
+def _keep_alive(part: Part, settings: Settings, lifeline: Lifeline) -> None:
     now = time.monotonic()
     if part.process is None:
         if now >= part.start_at:
-            _start(part, settings)
+            _start(part, settings, lifeline)
         return
     if part.process.is_alive():
         return
@@ -209,12 +241,10 @@ def _delay_s(part: Part, code: int | None, lived_s: float) -> float:
     return min(FIRST_DELAY_S * 2.0**doublings, LONGEST_DELAY_S)
 
 
-def _stop(parts: list[Part]) -> None:
+def _stop(parts: list[Part], lifeline: Lifeline) -> None:
     """Ask all at once; kill what does not stop in time."""
     running = [part.process for part in parts if part.process is not None]
-    for process in running:
-        if process.is_alive():
-            process.terminate()
+    lifeline.cut()
     deadline = time.monotonic() + STOP_WITHIN_S
     for process in running:
         process.join(max(0.1, deadline - time.monotonic()))
@@ -224,26 +254,19 @@ def _stop(parts: list[Part]) -> None:
             process.join()
 
 
-def run_part(work: Work, settings: Settings, ready: Any, parent: int) -> None:
-    """What a child does first: stop on signals, and when the parent is gone."""
+def run_part(work: Work, settings: Settings, ready: Any, lifeline: Lifeline) -> None:
+    """What a child does first: see to it that it stops when asked, and when the parent is gone."""
     _log_to_stderr()
     keep_private()
     stopped = Event()
     handle_signals(lambda *_: stopped.set(), signal.SIGTERM)
-    handle_signals(signal.SIG_IGN, signal.SIGINT, *HANG_UP)  # they come to the parent too
-    Thread(target=_follow_parent, args=(parent, stopped), daemon=True).start()
+    handle_signals(signal.SIG_IGN, *CONSOLE_SIGNALS, *HANG_UP)  # they come to the parent too
+    Thread(target=lifeline.hold, args=(stopped,), daemon=True).start()
     try:
         work(settings, stopped, ready.set)
     except Exception as error:
         _log.error("%s: %s", multiprocessing.current_process().name, error)
         sys.exit(1)
-
-
-def _follow_parent(parent: int, stopped: Event) -> None:
-    """A killed supervisor must not leave processes that hold its ports."""
-    while not stopped.wait(1.0):
-        if os.getppid() != parent:
-            stopped.set()
 
 
 def real_time(settings: Settings, stopped: Event, started: Callable[[], None]) -> None:

@@ -38,7 +38,7 @@ from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.threads import pin_blas_to_one_thread
-from glovecal_service.serve import real_time, run_part
+from glovecal_service.serve import Lifeline, real_time, run_part
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
 
@@ -285,14 +285,15 @@ def _random_rotation(
 def _service(settings: Settings) -> Iterator[int]:
     """The id of the real-time process."""
     ready = SPAWN.Event()
-    process = SPAWN.Process(target=run_part, args=(real_time, settings, ready, os.getpid()))
+    end, held = SPAWN.Pipe(duplex=False)
+    process = SPAWN.Process(target=run_part, args=(real_time, settings, ready, Lifeline(end, None)))
     process.start()
     try:
         if not ready.wait(60) or process.pid is None:
             raise RuntimeError("the real-time process did not start")
         yield process.pid
     finally:
-        process.terminate()
+        held.close()
         process.join(15)
 
 

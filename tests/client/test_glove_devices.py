@@ -24,7 +24,8 @@ from glovecal_service.emulators.emulation import Emulation
 from glovecal_service.emulators.glove import EmulatedGlove
 from glovecal_service.emulators.hand import MovingHand
 from glovecal_service.emulators.line_glove import DESCRIPTION
-from glovecal_service.emulators.ports import Port, PseudoTerminal, TcpDialer, UdpSender
+from glovecal_service.emulators.ports import Port, TcpDialer, UdpSender
+from glovecal_service.emulators.pseudo_terminal import PseudoTerminal
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are a POSIX thing")
 NEW = [name for name in PROTOCOLS if name != "cyberglove"]

@@ -15,7 +15,7 @@ from glovecal_client.capture.stream.parser import Counters
 from glovecal_service.emulators.cyberglove3 import EmulatedCyberGlove3
 from glovecal_service.emulators.emulation import Emulation
 from glovecal_service.emulators.faults import Faults
-from glovecal_service.emulators.ports import PseudoTerminal
+from glovecal_service.emulators.pseudo_terminal import PseudoTerminal
 
 HOUR_S = 3600.0
 FRAME_S = 1 / 30

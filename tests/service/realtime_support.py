@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import multiprocessing
-import os
 import secrets
 import socket
 import time
@@ -26,7 +25,7 @@ from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
-from glovecal_service.serve import Work, run_part
+from glovecal_service.serve import Lifeline, Work, run_part
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 
@@ -63,13 +62,14 @@ def eventually(condition: Callable[[], Value | None], what: str, deadline_s: flo
 def part_of_service(work: Work, settings: Settings) -> Iterator[SpawnProcess]:
     """One of the service's processes, ready, as ``glovecal serve`` starts it."""
     ready = _SPAWN.Event()
-    process = _SPAWN.Process(target=run_part, args=(work, settings, ready, os.getpid()))
+    end, held = _SPAWN.Pipe(duplex=False)
+    process = _SPAWN.Process(target=run_part, args=(work, settings, ready, Lifeline(end, None)))
     process.start()
     try:
         assert ready.wait(120), "the process did not get ready"
         yield process
     finally:
-        process.terminate()
+        held.close()
         process.join(60)
         if process.is_alive():
             process.kill()

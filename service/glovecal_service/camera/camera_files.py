@@ -7,6 +7,7 @@ import shutil
 from pathlib import Path
 from typing import Literal, get_args
 
+from glovecal_client.operating_system import move_over
 from glovecal_client.private_files import PRIVATE_FOLDER
 from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier
@@ -50,7 +51,7 @@ class CameraFiles:
         unfinished = place.with_name(f".{place.name}.{os.getpid()}")
         try:
             shutil.copyfile(file, unfinished)
-            unfinished.replace(place)
+            move_over(unfinished, place)
         finally:
             unfinished.unlink(missing_ok=True)
         return place

@@ -11,6 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
+from glovecal_client.operating_system import move_over
 from glovecal_client.pictures.source import PictureSource
 from glovecal_models.colour_glove.camera_file import read_cameras
 from glovecal_models.colour_glove.camera_model import Camera
@@ -166,5 +167,5 @@ def glove_colours(folder: Path, hand: PrintedHand) -> ColourTable:
     table = drawn_table(hand.skin, hand.pattern)
     unfinished = file.with_suffix(f".{os.getpid()}")
     table.save(unfinished)
-    unfinished.replace(file)
+    move_over(unfinished, file)
     return table

@@ -15,7 +15,8 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from glovecal_client.signals import HANG_UP, handle_signals
+from glovecal_client.operating_system import HANG_UP, STOP_SIGNALS
+from glovecal_client.signals import handle_signals
 from glovecal_client.standard_streams import run_command
 from glovecal_service.cli import demo, serve
 from glovecal_service.cli.camera import cameras
@@ -100,7 +101,7 @@ def options(
 def script() -> NoReturn:
     """Entry point of the ``glovecal`` script."""
     _leave_start_folder()
-    handle_signals(_stop, signal.SIGTERM, *HANG_UP)
+    handle_signals(_stop, *(number for number in STOP_SIGNALS if number != signal.SIGINT), *HANG_UP)
     run_command(main)
 
 

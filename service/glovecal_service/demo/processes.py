@@ -14,6 +14,7 @@ from pathlib import Path
 
 from glovecal_client.errors import ServiceError
 from glovecal_client.rest import RestClient
+from glovecal_service.operating_system import ask_to_stop, start_process
 
 START_PATIENCE_S = 90.0
 STOP_PATIENCE_S = 15.0
@@ -53,9 +54,7 @@ def running_service(place: DemoPlace) -> Iterator[RestClient]:
     """``glovecal serve`` as a process, ready, and a client of it; stopped at the end of the block."""
     log = place.folder / "service.log"
     with log.open("wb") as stream:
-        process = subprocess.Popen(
-            [*_glovecal(), "serve"], env=place.environment, stdout=stream, stderr=subprocess.STDOUT
-        )
+        process = start_process([*_glovecal(), "serve"], place.environment, stream)
     try:
         with RestClient(place.url) as service:
             _wait_until_ready(service, process, log)
@@ -80,7 +79,7 @@ def running_capture(
     for key, value in options.items():
         command += ["--option", f"{key}={value}"]
     with (place.folder / "capture.log").open("ab") as stream:
-        process = subprocess.Popen(command, env=place.environment, stdout=stream, stderr=subprocess.STDOUT)
+        process = start_process(command, place.environment, stream)
     try:
         yield process
     finally:
@@ -90,7 +89,7 @@ def running_capture(
 def stop(process: subprocess.Popen[bytes]) -> None:
     """Ask a process to stop, and insist when it does not."""
     if process.poll() is None:
-        process.terminate()
+        ask_to_stop(process)
         try:
             process.wait(STOP_PATIENCE_S)
         except subprocess.TimeoutExpired:
@@ -106,7 +105,7 @@ def _wait_until_ready(service: RestClient, process: subprocess.Popen[bytes], log
             return
         except ServiceError as error:
             if process.poll() is not None or time.monotonic() > until:
-                last = log.read_text(errors="replace").strip().splitlines()[-3:]
+                last = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()[-3:]
                 raise ServiceError(
                     503, "Service did not start", " / ".join(last) or "it said nothing"
                 ) from error

@@ -14,10 +14,12 @@ from glovecal_service.demo.hidden_session import HiddenSession
 from glovecal_service.demo.live_child import GLOVE
 from glovecal_service.demo.processes import DemoPlace, running_capture
 from glovecal_service.demo.second_act import DIAGNOSED, Findings
+from glovecal_service.operating_system import has_display
 
 MOTION_S = 40.0
 """Replayed again and again."""
 CAPTURE_AGAIN_S = 2.0
+LOOK_S = 0.2
 QUESTION = "Stay, and walk through the second part in the studio? Ctrl-C ends it. [Y/n] "
 
 
@@ -51,7 +53,7 @@ def stay(
     take = hidden.live(motion_s).take
     table = place.folder / "stay.csv"
     write_takes([take], table)
-    if _has_display():
+    if has_display():
         webbrowser.open(page)
     try:
         while True:
@@ -63,15 +65,9 @@ def stay(
                 wearing=take.wearing,
                 options={"layout": found.layout, "loop": "yes"},
             ) as capture:
-                code = capture.wait()
+                while (code := capture.poll()) is None:  # a wait without end hears no Ctrl-C on Windows
+                    time.sleep(LOOK_S)
             say(f"The glove's capture ended (code {code}) and is started again.")
             time.sleep(CAPTURE_AGAIN_S)
     except KeyboardInterrupt:
         say("Stopping.")
-
-
-def _has_display() -> bool:
-    """Without one, ``webbrowser`` would put a text browser over the terminal."""
-    if sys.platform in ("darwin", "win32"):
-        return True
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

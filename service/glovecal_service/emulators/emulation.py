@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import os
+import socket
 import threading
+import time
 
-from glovecal_client.clock import clock_s
 from glovecal_service.emulators.faults import Faults
 from glovecal_service.emulators.glove import EmulatedGlove
 from glovecal_service.emulators.ports import Port, wait
@@ -27,23 +27,23 @@ class Emulation:
         self._pulled = False
         self._plugged = False
         self._running = True
-        self._wake_read, self._wake_write = os.pipe()
+        self._woken, self._wake = socket.socketpair()  # a pipe cannot be waited for on Windows
         self._thread = threading.Thread(target=self._serve, name="emulated-glove", daemon=True)
 
     def __enter__(self) -> Emulation:
-        self._began_s = clock_s()
+        self._began_s = time.perf_counter()
         self._settle()
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._running = False
-        os.write(self._wake_write, b"x")
+        self._wake.send(b"x")
         self._thread.join(timeout=10)
         self._pulled = True
         self._settle()
-        os.close(self._wake_read)
-        os.close(self._wake_write)
+        self._woken.close()
+        self._wake.close()
 
     def unplug(self) -> None:
         """Pull the cable; the glove is without power until ``replug``."""
@@ -54,12 +54,12 @@ class Emulation:
         """Plug it in again: a new start of the glove at a port of the same name."""
         self._pulled = False
         self._settle()
-        os.write(self._wake_write, b"x")
+        self._wake.send(b"x")
 
     def _settle(self) -> None:
         """Plug in or pull out, as it should be now."""
         with self._lock:
-            plugged = not (self._pulled or self._faults.unplugged(clock_s() - self._began_s))
+            plugged = not (self._pulled or self._faults.unplugged(time.perf_counter() - self._began_s))
             if plugged and not self._plugged:
                 self.glove.power_up()
                 self.port.plug()
@@ -72,19 +72,20 @@ class Emulation:
             self._settle()
             with self._lock:
                 handle = self.port.handle() if self._plugged else None
-                wait_s = _LONGEST_WAIT_S if handle is None else self.glove.next_due_s() - clock_s()
-            watched = [self._wake_read] if handle is None else [self._wake_read, handle]
+                wait_s = _LONGEST_WAIT_S if handle is None else self.glove.next_due_s() - time.perf_counter()
+            woken = self._woken.fileno()
+            watched = [woken] if handle is None else [woken, handle]
             ready = wait(watched, min(_LONGEST_WAIT_S, max(0.0, wait_s)))
-            if self._wake_read in ready:
+            if woken in ready:
                 with contextlib.suppress(OSError):
-                    os.read(self._wake_read, 64)
+                    self._woken.recv(64)
             with self._lock:
                 if self._plugged and handle is not None and self.port.handle() == handle:
                     self._exchange(handle in ready)
 
     def _exchange(self, something_came: bool) -> None:
         heard = self.port.read() if something_came else b""
-        now_s = clock_s()
+        now_s = time.perf_counter()
         for part in (self.glove.feed(heard, now_s), self.glove.due(now_s)):
             if part:
                 self.sendings += self.port.write(part)

@@ -1,15 +1,11 @@
-"""Where an emulated glove is reached: a pseudo-terminal, or a computer in the network."""
+"""Where an emulated glove is reached: a computer in the network; for a pseudo-terminal see its module."""
 
 from __future__ import annotations
 
 import contextlib
-import os
 import select
 import socket
-from pathlib import Path
 from typing import Protocol
-
-from glovecal_models.errors import BadInput
 
 
 class Port(Protocol):
@@ -30,54 +26,6 @@ class Port(Protocol):
     def write(self, data: bytes) -> bool:
         """False when it could not leave."""
         ...
-
-
-class PseudoTerminal:
-    """A serial port under the name ``link``, a symbolic link that outlives re-plugging. POSIX only."""
-
-    def __init__(self, link: Path) -> None:
-        """Raises BadInput where the name is taken, or where there are no pseudo-terminals."""
-        if not hasattr(os, "openpty"):
-            raise BadInput("this computer has no pseudo-terminals; use --tcp or --udp")
-        if link.exists() or link.is_symlink():
-            raise BadInput(f"{link} exists already: another emulator, or name a new port with --port")
-        self.name = str(link)
-        self._link = link
-        self._ends: tuple[int, int] | None = None
-
-    def plug(self) -> None:
-        if self._ends is None:
-            import tty
-
-            ours, theirs = os.openpty()
-            tty.setraw(theirs)
-            os.set_blocking(ours, False)
-            self._ends = ours, theirs
-            self._link.symlink_to(os.ttyname(theirs))
-
-    def unplug(self) -> None:
-        """The port vanishes: whoever has it open gets an error."""
-        if self._ends is not None:
-            self._link.unlink(missing_ok=True)
-            for end in self._ends:
-                os.close(end)
-            self._ends = None
-
-    def handle(self) -> int | None:
-        return self._ends[0] if self._ends else None
-
-    def read(self) -> bytes:
-        with contextlib.suppress(OSError):
-            return os.read(self._ends[0], 4096) if self._ends else b""
-        return b""
-
-    def write(self, data: bytes) -> bool:
-        """What does not fit is lost, as in a serial port that nobody reads."""
-        if self._ends is None:
-            return False
-        with contextlib.suppress(OSError):
-            return os.write(self._ends[0], data) == len(data)
-        return False
 
 
 class TcpDialer:

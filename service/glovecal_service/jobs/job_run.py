@@ -14,11 +14,11 @@ import structlog
 from glovecal_models.errors import Cancelled, GlovecalError
 from glovecal_service.jobs.finished_tasks import FinishedTasks
 from glovecal_service.jobs.job_kind import JobKind, JobPlan, Task, TaskResult
-from glovecal_service.jobs.niceness import step_back
 from glovecal_service.jobs.progress_file import ProgressFile, TaskProgress
 from glovecal_service.jobs.task_run import TaskOutcome, run_task
 from glovecal_service.jobs.time_left import TimeLeft
 from glovecal_service.jobs.workers import Workers, WorkersLost, finished, outcome
+from glovecal_service.operating_system import step_back_in_this_thread
 from glovecal_service.store import Store
 from glovecal_service.store.errors import Conflict, StoreUnavailable
 from glovecal_service.store.records import JobRecord
@@ -117,7 +117,7 @@ class JobRun:
         results = self._known(plan)
         is_single = self._runs_single_tasks and len(plan.tasks) - len(results) <= 1
         if is_single and not plan.in_this_process:
-            step_back()  # this thread ends with the job
+            step_back_in_this_thread()  # this thread ends with the job
         if plan.in_this_process or is_single:
             self._fit_here(plan, results)
         else:

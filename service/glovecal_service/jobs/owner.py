@@ -11,12 +11,8 @@ import socket
 from pathlib import Path
 from typing import IO
 
+from glovecal_client.operating_system import lock_file
 from glovecal_service.store import Store
-
-try:
-    import fcntl
-except ImportError:  # not POSIX: leases alone decide
-    fcntl = None
 
 
 class Owner:
@@ -25,8 +21,7 @@ class Owner:
         self._folder = folder
         self.name = f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(4)}"
         self._file: IO[bytes] | None = self._path(self.name).open("wb")
-        if fcntl is not None:
-            fcntl.flock(self._file, fcntl.LOCK_EX)
+        lock_file(self._file)
 
     def take_back_from_dead(self, store: Store) -> int:
         """Queue the jobs of owners whose lock is free; how many there were."""
@@ -43,14 +38,14 @@ class Owner:
             self._path(self.name).unlink(missing_ok=True)
 
     def _is_dead(self, name: str) -> bool:
-        if fcntl is None or "/" in name or not self._path(name).is_file():
+        if self._path(name).parent != self._folder or not self._path(name).is_file():
             return False  # another computer's, or unknown: its lease will tell
-        with self._path(name).open("rb") as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                return False
-            return True
+        try:
+            with self._path(name).open("rb") as file:
+                lock_file(file)
+        except OSError:
+            return False
+        return True
 
     def _path(self, name: str) -> Path:
         return self._folder / f"{name}.lock"

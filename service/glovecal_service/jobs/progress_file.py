@@ -11,6 +11,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from glovecal_client.operating_system import move_over
+
 
 @dataclass(frozen=True)
 class TaskProgress:
@@ -31,7 +33,7 @@ class ProgressFile:
         unfinished = self._path.with_suffix(f".{os.getpid()}.part")
         with suppress(OSError):
             unfinished.write_text(json.dumps([sentence, float(share)]))
-            unfinished.replace(self._path)
+            move_over(unfinished, self._path)
 
     def read(self) -> TaskProgress | None:
         """None before the first word and after the task's end."""

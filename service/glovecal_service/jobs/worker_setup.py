@@ -3,21 +3,18 @@ close a port."""
 
 from __future__ import annotations
 
-import os
-
 from distributed import Worker
 
 from glovecal_client.private_files import keep_private
 from glovecal_models.threads import pin_blas_to_one_thread
 from glovecal_service.jobs.dask_log import silence_dask
-from glovecal_service.jobs.niceness import NICENESS
+from glovecal_service.operating_system import step_back
 
 
 def dask_setup(worker: Worker) -> None:
     """Called by Dask in each worker (``preload``)."""
     silence_dask()
-    if hasattr(os, "nice"):
-        os.nice(NICENESS - os.nice(0))
+    step_back()
     pin_blas_to_one_thread()
     keep_private()
     worker.http_server.stop()  # it has nothing to show

@@ -29,6 +29,7 @@ from glovecal_models.errors import GlovecalError
 from glovecal_service.jobs.dask_log import silence_dask
 from glovecal_service.jobs.job_kind import Task
 from glovecal_service.jobs.task_run import TaskOutcome, run_task
+from glovecal_service.operating_system import FORKS
 from glovecal_service.settings import Settings
 
 if TYPE_CHECKING:
@@ -159,7 +160,7 @@ class Workers:
                 raise WorkersLost("the service is stopping")
             if self._client is None:
                 configure(_CONFIG)
-                if sys.platform == "linux" and len(os.fsencode(tempfile.gettempdir())) <= _LONGEST_FOLDER:
+                if FORKS and len(os.fsencode(tempfile.gettempdir())) <= _LONGEST_FOLDER:
                     _import_once()
                 try:
                     security = _security(self._settings)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import gc
 import logging
-import os
 import secrets
 import sys
 from collections.abc import Callable
-from contextlib import suppress
 from threading import Event, Thread
 
 import zenoh
@@ -16,6 +14,7 @@ import zenoh
 from glovecal_client.keys import all_gloves, service_alive_key
 from glovecal_client.session import open_router
 from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_service.operating_system import go_first
 from glovecal_service.realtime.arrivals import Arrivals
 from glovecal_service.realtime.glove_metas import GloveMetas
 from glovecal_service.realtime.live_explanations import LiveExplanations
@@ -32,8 +31,6 @@ from glovecal_service.store.store import Store
 GIL_SWITCH_S = 0.0005
 """Longest time another thread of this process keeps a frame waiting (Python's default is ten times that)."""
 
-NICENESS = -10
-
 _log = logging.getLogger("glovecal.realtime")
 
 
@@ -45,7 +42,7 @@ def run_real_time(settings: Settings, stopped: Event, started: Callable[[], None
     """Serve until ``stopped``. Raises zenoh.ZError if the endpoint cannot be used, RealTimeFailed."""
     pin_blas_to_one_thread()
     sys.setswitchinterval(GIL_SWITCH_S)
-    _go_first()
+    go_first()
     instance = f"realtime-{secrets.token_hex(4)}"
     with open_router([settings.zenoh]) as session:
         token = session.liveliness().declare_token(service_alive_key(settings.site, instance))
@@ -120,12 +117,6 @@ def _thread(name: str, work: Callable[[Event], None], stopped: Event, failures: 
     thread = Thread(target=guarded, name=name, daemon=True)
     thread.start()
     return thread
-
-
-def _go_first() -> None:
-    """Run before training and everything else, where the operating system lets us (root or CAP_SYS_NICE)."""
-    with suppress(OSError):
-        os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
 
 
 def _settle_garbage() -> None:

@@ -7,7 +7,6 @@ power cut could leave an empty file under the right name. So the folder is writt
 from __future__ import annotations
 
 import errno
-import os
 import secrets
 import time
 from collections.abc import Iterator
@@ -18,6 +17,7 @@ from typing import Protocol
 import obstore
 import obstore.store
 
+from glovecal_client.operating_system import move_over, sync_file
 from glovecal_models.errors import BadInput
 from glovecal_service.store.errors import StorageFull, StoreUnavailable
 
@@ -130,12 +130,11 @@ def write_durably(path: Path, content: bytes) -> None:
             with temporary.open("xb") as file:
                 file.write(content)
                 file.flush()
-                os.fsync(file.fileno())
-            temporary.replace(path)
+                sync_file(file)
+            move_over(temporary, path, durably=True)
         except BaseException:
             temporary.unlink(missing_ok=True)
             raise
-        _sync_folder(path.parent)
 
 
 @contextmanager
@@ -147,13 +146,3 @@ def full_disk_named(folder: Path) -> Iterator[None]:
         if error.errno not in _NO_ROOM:
             raise
         raise StorageFull(f"no room left in {folder}; nothing was changed: free some disk space") from error
-
-
-def _sync_folder(folder: Path) -> None:
-    if os.name != "posix":
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

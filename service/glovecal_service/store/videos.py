@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import zipfile
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
+from glovecal_client.operating_system import move_over
 from glovecal_client.pictures.preview import ABOUT, MOST_PICTURES, picture_name
 from glovecal_models.errors import BadInput
 from glovecal_service.store.errors import NotFound
@@ -47,7 +47,7 @@ class Videos:
         self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         partial = self._path(take).with_suffix(".partial")
         shutil.copyfile(preview, partial)
-        os.replace(partial, self._path(take))
+        move_over(partial, self._path(take))
         return facts
 
     def takes(self) -> list[str]:

@@ -22,7 +22,7 @@ from glovecal_service.emulators.cyberglove3 import EmulatedCyberGlove3
 from glovecal_service.emulators.emulation import Emulation
 from glovecal_service.emulators.faults import Faults
 from glovecal_service.emulators.hand import MovingHand
-from glovecal_service.emulators.ports import PseudoTerminal
+from glovecal_service.emulators.pseudo_terminal import PseudoTerminal
 from glovecal_service.rest.in_process import in_process_client
 from glovecal_service.rest.take.hands import hand_alignment
 from glovecal_service.settings import Settings

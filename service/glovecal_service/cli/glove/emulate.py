@@ -69,7 +69,8 @@ def emulate(
 def _place(
     name: str, chosen: Protocol, port: Path | None, tcp: str | None, udp: str | None, folder: Path
 ) -> Port:
-    from glovecal_service.emulators.ports import PseudoTerminal, TcpDialer, UdpSender
+    from glovecal_service.emulators.ports import TcpDialer, UdpSender
+    from glovecal_service.emulators.pseudo_terminal import PseudoTerminal
 
     if sum(each is not None for each in (port, tcp, udp)) > 1:
         raise typer.BadParameter("give one of --port, --tcp and --udp")

@@ -10,8 +10,8 @@ from rich.live import Live
 from rich.text import Text
 
 from glovecal_client.errors import ServiceError
-from glovecal_service.cli.terminal.keyboard import single_keys
 from glovecal_service.cli.terminal.printing import err, out
+from glovecal_service.operating_system import single_keys
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient

@@ -13,10 +13,10 @@ from glovecal_client.clock import clock_ns, clock_s
 from glovecal_client.errors import NoAnswer
 from glovecal_service.cli.glove.heard_frames import heard_frames, times_and_readings
 from glovecal_service.cli.terminal.connection import connect
-from glovecal_service.cli.terminal.keyboard import single_keys
 from glovecal_service.cli.terminal.options import DEFAULT_ZENOH, AsJson, Glove, Site, Zenoh
 from glovecal_service.cli.terminal.printing import err, out, print_json
 from glovecal_service.cli.terminal.refusal import NobodyThere, Refusal
+from glovecal_service.operating_system import single_keys
 
 if TYPE_CHECKING:
     from glovecal_models.takes.tap_latency import TapLatency

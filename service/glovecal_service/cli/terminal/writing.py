@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
+from glovecal_client.operating_system import move_over
 from glovecal_client.private_files import make_ordinary
 from glovecal_service.cli.terminal.printing import err, out
 from glovecal_service.cli.terminal.refusal import Refusal
@@ -45,7 +46,7 @@ def write_whole(contents: Mapping[Path, bytes], *, tell: Console = out) -> None:
         try:
             unfinished.write_bytes(content)
             make_ordinary(unfinished)
-            unfinished.replace(file)
+            move_over(unfinished, file)
         finally:
             unfinished.unlink(missing_ok=True)
     for file in contents:

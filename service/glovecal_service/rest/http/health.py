@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import time
 from pathlib import Path
 from typing import Literal
@@ -112,8 +113,7 @@ def _check_artifacts(store: Store, data: Path) -> str:
         raise Problem(503, "not-ready", f"the artifacts cannot be reached: {error}") from error
     if not os.access(data, os.W_OK):
         raise Problem(503, "not-ready", "the data folder cannot be written to")
-    disk = os.statvfs(data)
-    free = disk.f_bavail * disk.f_frsize
+    free = shutil.disk_usage(data).free
     if free < LEAST_FREE_BYTES:
         raise Problem(507, "storage-full", f"only {free / 1e6:.0f} MB are free; free some disk space")
     return f"{free / 1e9:.1f} GB free"

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from starlette.concurrency import run_in_threadpool
 
+from glovecal_client.operating_system import move_over, name_for_a_file, sync_file
 from glovecal_service.store.blobs import full_disk_named
 
 TEMPORARY = ".partial"
@@ -81,15 +82,14 @@ class UploadFolder:
             for number, (name, upload) in enumerate(files):
                 place = Path(folder) / str(number)
                 place.mkdir()
-                _link(upload, place / name)
-                named.append(place / name)
+                named.append(place / name_for_a_file(name))
+                _link(upload, named[-1])
             yield named
 
     def _keep(self, temporary: Path, digest: str, size: int) -> Upload:
         path = self.folder / digest
         is_new = not path.exists()
-        os.replace(temporary, path)  # also over an earlier one: that may have been damaged since
-        _sync_folder(self.folder)
+        move_over(temporary, path, durably=True)  # also over an earlier one: that may have been damaged since
         return Upload(path, digest, size, is_new)
 
 
@@ -104,7 +104,7 @@ async def _write(path: Path, chunks: AsyncIterator[bytes]) -> tuple[str, int]:
         def finish() -> None:
             write()
             file.flush()
-            os.fsync(file.fileno())
+            sync_file(file)
 
         async for chunk in chunks:
             waiting += chunk
@@ -121,11 +121,3 @@ def _link(source: Path, name: Path) -> None:
         os.link(source, name)
     except OSError:  # a file system without hard links
         shutil.copyfile(source, name)
-
-
-def _sync_folder(folder: Path) -> None:
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
