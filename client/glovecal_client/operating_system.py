@@ -13,6 +13,8 @@ No other module here asks which system it runs on. The ways of Windows and macOS
   elsewhere SO_REUSEADDR only skips the wait for old connections.
 * Boot: Linux names each boot in ``boot_id``, macOS in ``kern.bootsessionuuid``; Windows counts them in its
   registry (``BootId``, undocumented).
+* Serial: the driver of an FTDI adapter keeps bytes back for its latency timer, 16 ms at first. On Linux
+  pyserial sets it, on Windows an administrator does; everybody reads it in the registry, below FTDIBUS.
 * Files: only the owner's on Linux and macOS by their mode; Windows has lists that a folder passes on.
 * Names: Windows keeps CON, COM1 and others for devices, also before a dot, forbids some characters and drops
   a dot or blank at the end.
@@ -45,6 +47,7 @@ STOP_SIGNALS = (signal.SIGTERM, *CONSOLE_SIGNALS)
 HAS_FILE_MODES = sys.platform != "win32"
 _DENIED_FOR_S = 2.0
 """How long a file may be held by a virus scanner or a reader before it counts as denied."""
+_FTDI = r"SYSTEM\CurrentControlSet\Enum\FTDIBUS"
 _FORBIDDEN = re.compile(r'[<>:"/\\|?*\x00-\x1f]')
 _RESERVED = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³]) *(\.|\Z)", re.IGNORECASE)
 
@@ -120,6 +123,22 @@ def boot() -> str:
             with winreg.OpenKey(winreg.HKEY_LOCAL_MACHINE, key) as opened:
                 return f"{socket.gethostname()} {winreg.QueryValueEx(opened, 'BootId')[0]}"
     return f"{socket.gethostname()} {round((time.time() - time.monotonic()) / 60)}"
+
+
+def held_back_ms(port: str) -> int:
+    """How long the driver of an FTDI adapter at ``port`` keeps bytes back; 0 where that is not known."""
+    if sys.platform == "win32":
+        import winreg
+
+        with suppress(OSError):
+            with winreg.OpenKey(winreg.HKEY_LOCAL_MACHINE, _FTDI) as adapters:
+                names = [winreg.EnumKey(adapters, n) for n in range(winreg.QueryInfoKey(adapters)[0])]
+            for name in names:
+                place = rf"{_FTDI}\{name}\0000\Device Parameters"
+                with suppress(OSError), winreg.OpenKey(winreg.HKEY_LOCAL_MACHINE, place) as found:
+                    if winreg.QueryValueEx(found, "PortName")[0].lower() == port.lower():
+                        return int(winreg.QueryValueEx(found, "LatencyTimer")[0])
+    return 0
 
 
 def listen_alone(opened: socket.socket) -> None:

@@ -13,6 +13,7 @@ The rest is in ``glovecal_client.operating_system``, where the facts of locks, s
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import select
 import signal
@@ -32,6 +33,13 @@ FIRST, BEHIND = -10, 10
 """Nicenesses of real time and of training."""
 _ABOVE_NORMAL_CLASS, _BELOW_NORMAL_CLASS, _BELOW_NORMAL_THREAD = 0x8000, 0x4000, -1
 _LOOK_S = 0.02
+
+
+def children_context():
+    """Of ``multiprocessing``: forked children have what this process has imported, spawned ones nothing."""
+    if sys.platform == "linux":
+        return multiprocessing.get_context("fork")
+    return multiprocessing.get_context("spawn")
 
 
 def go_first() -> None:

@@ -19,17 +19,16 @@ import time
 from collections.abc import Callable
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field
-from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from threading import Event, Thread
-from typing import Any
+from typing import Any, Protocol
 
 from glovecal_client.operating_system import CONSOLE_SIGNALS, HANG_UP, STOP_SIGNALS, listen_alone
 from glovecal_client.private_files import keep_private
 from glovecal_client.signals import handle_signals
 from glovecal_client.standard_streams import say
 from glovecal_models.errors import GlovecalError
-from glovecal_service.operating_system import FORKS
+from glovecal_service.operating_system import FORKS, children_context
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
 
@@ -46,7 +45,7 @@ READY_WITHIN_S = 60.0
 Work = Callable[[Settings, Event, Callable[[], None]], None]
 """Runs until the event is set; calls the last argument when it is there for its users."""
 
-_CONTEXT = multiprocessing.get_context("fork" if FORKS else "spawn")
+_CONTEXT = children_context()
 _log = logging.getLogger("glovecal.serve")
 
 
@@ -63,6 +62,14 @@ class Ready:
         return bool(self._flag.value)
 
 
+class PipeEnd(Protocol):
+    """Of two classes: Windows has one of its own."""
+
+    def recv_bytes(self) -> bytes: ...
+
+    def close(self) -> None: ...
+
+
 class Lifeline:
     """A pipe from this process to all its children, on which nothing is ever sent.
 
@@ -70,7 +77,7 @@ class Lifeline:
     processes that hold its ports. No signal is needed, which Windows has not.
     """
 
-    def __init__(self, end: Connection, held: Connection | None) -> None:
+    def __init__(self, end: PipeEnd, held: PipeEnd | None) -> None:
         """``held`` is the parent's end; a forked child has a copy of it, which would keep the pipe whole."""
         self._end = end
         self._held = held

@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import logging
 import time
+from functools import cache
 from typing import Any
 
 from glovecal_client.errors import DeviceError, DeviceLost
 from glovecal_client.installation import not_installed
+from glovecal_client.operating_system import held_back_ms
 
 _POLL_S = 0.02
 """Longest single wait for bytes; bounds how late a timeout is noticed."""
 _WRITE_TIMEOUT_S = 1.0
+HELD_BACK_MS = 2
+"""More makes frames of a glove of 120 Hz come in bursts."""
+_NO_ANSWER, _DOES_NOT_WORK = ", 121)", ", 31)"
+"""How pyserial tells two of Windows' errors: a Bluetooth port without a glove, an adapter in trouble."""
+_logger = logging.getLogger(__name__)
 
 
 def import_pyserial() -> Any:
@@ -47,10 +55,12 @@ class SerialLink:
         self._hurry()
 
     def _hurry(self) -> None:
-        """Ask a USB adapter's driver to hand bytes over at once (FTDI on Linux holds them up to 16 ms)."""
+        """Have a USB adapter's driver hand bytes over at once, or say how (FTDI's holds them up to 16 ms)."""
         if hasattr(self._port, "set_low_latency_mode"):
             with contextlib.suppress(ValueError, *self._failures):  # not every driver can
                 self._port.set_low_latency_mode(True)
+        else:
+            _tell_what_is_held_back(self.path)
 
     def close(self) -> None:
         """Let go of the port; harmless when it is gone already."""
@@ -116,6 +126,16 @@ class SerialLink:
         return DeviceLost(f"{self.path} is gone ({_short(error)}): check the cable or plug it in again")
 
 
+@cache
+def _tell_what_is_held_back(path: str) -> None:
+    if (held_ms := held_back_ms(path)) > HELD_BACK_MS:
+        _logger.warning(
+            "%s hands bytes over every %d ms: set its latency timer to 1 ms (device manager, the port's "
+            "properties, port settings, advanced)",
+            path, held_ms,
+        )  # fmt: skip
+
+
 def _why_not_open(path: str, error: BaseException) -> str:
     number = getattr(error, "errno", None)
     text = str(error)
@@ -129,6 +149,10 @@ def _why_not_open(path: str, error: BaseException) -> str:
         or "PermissionError" in text
     ):
         return f"{path} is in use by another program: stop that first"
+    if _NO_ANSWER in text:
+        return f"nothing answers at {path}: is the glove switched on and near?"
+    if _DOES_NOT_WORK in text:
+        return f"the adapter at {path} does not work: pull it out and plug it in again"
     return f"{path} cannot be opened as a serial port ({_short(error)})"
 
 

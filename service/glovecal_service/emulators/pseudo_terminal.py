@@ -12,13 +12,15 @@ from pathlib import Path
 
 from glovecal_models.errors import BadInput
 
+_HAS_TERMINALS = sys.platform != "win32"
+
 
 class PseudoTerminal:
     """A serial port under the name ``link``, a symbolic link that outlives re-plugging. POSIX only."""
 
     def __init__(self, link: Path) -> None:
         """Raises BadInput where the name is taken, or where there are no pseudo-terminals."""
-        if sys.platform == "win32":
+        if not _HAS_TERMINALS:
             raise BadInput("this computer has no pseudo-terminals; use --tcp or --udp")
         if link.exists() or link.is_symlink():
             raise BadInput(f"{link} exists already: another emulator, or name a new port with --port")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import glob
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -52,7 +53,7 @@ def find_ports(extra: Iterable[str] = ()) -> list[FoundPort]:
     """
     listed = _listed_ports()
     for pattern in extra:
-        for path in sorted(glob.glob(pattern)) or [pattern]:
+        for path in sorted(glob.glob(pattern)) or fnmatch.filter(listed, pattern) or [pattern]:
             listed.setdefault(path, ("", ""))
     if not listed:
         return []
