@@ -42,6 +42,7 @@ with Store.open(Settings()) as store:
     print(owner.take_back_from_dead(store))
     owner.close()
 """
+BRIEF = {"samples": 200, "iterations": 20, "folds": 0}
 LONGEST_PATH = 140
 """Of 260 characters, within the data folder."""
 
@@ -169,7 +170,7 @@ def test_two_hostile_restarts_and_a_backup(computer: Computer, service: RestClie
     take = write_takes([_take()], computer.folder / "takes.csv")[0]
     said = computer.run("take", "import", take, "--layout", "cyberglove18", "--subject", "anna")
     assert "poses" in said
-    job = service.post("/models/train", {"subject": "anna"})["id"]
+    job = service.post("/models/train", {"subject": "anna", **BRIEF})["id"]
     eventually(lambda: service.get(f"/jobs/{job}")["fraction"] > 0, "training has begun")
 
     os.killpg(serve.pid, signal.SIGKILL)  # its console is closed in the middle of a training

@@ -18,6 +18,7 @@ import numpy as np
 import zenoh
 
 from glovecal_client import GloveKeys, Pose, PoseFlag, encode_pose, open_client, open_router
+from glovecal_client.clock import wall_ns
 from glovecal_models.hand.rotations import HAND_ROTATIONS
 
 RATE_HZ = 60.0
@@ -61,7 +62,7 @@ class SimulatedHand:
         stated = max(sd_deg, 0.5) if stated_sd_deg is None else stated_sd_deg
         self._deviations = np.full(len(rotations), stated, np.float32)
         self._model = hashlib.sha256("\n".join(rotations).encode()).hexdigest()
-        self._run, self._sequence, self._rate_hz = time.time_ns(), 0, rate_hz
+        self._run, self._sequence, self._rate_hz = wall_ns(), 0, rate_hz
         self._queryable = session.declare_queryable(self._keys.pose_meta, self._answer)
 
     def publish(self) -> float:
