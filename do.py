@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Glovecal's verbs. Needs Python 3.11 to 3.14 and pip, nothing else:
+"""Glovecal's verbs. Needs Python 3.11 to 3.14 and pip, nothing else (Windows: ``py`` for ``python3``):
 
     python3 do.py demo      calibrate a simulated glove over real zenoh, in under two minutes
     python3 do.py serve     run the service (real time, REST) on this machine
     python3 do.py glovecal  the command line: python3 do.py glovecal take list
     python3 do.py test      the test suite; with -m slow what it leaves out because it takes minutes
-    python3 do.py check     format, lint, types
+    python3 do.py check     format, lint, types; those also as on Windows and macOS
     python3 do.py bench     speed against other libraries, as ratios, with a picture
     python3 do.py paper     Wang & Neff 2013 reproduced: every table and figure, as one page (5 minutes);
                             --part colour-glove: Wang & Popovic 2009's, as far as built (20 minutes)
@@ -30,6 +30,8 @@ Any verb with --smoke tries itself in seconds, with what is installed: nothing i
 from __future__ import annotations
 
 import os
+import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -50,6 +52,14 @@ OWN_PYTHON = {
     "UV_PYTHON_DOWNLOADS": "manual",
     "UV_PYTHON_INSTALL_DIR": str(TOOLS / "python"),
 }
+PRODUCT = ("models", "client", "service")
+OTHER_SYSTEMS = ("Windows", "Darwin")
+NOT_THE_SAME = """
+    asyncio concurrent ctypes errno faulthandler fcntl locale mmap msvcrt multiprocessing os pathlib pty
+    resource select selectors shutil signal socket socketserver ssl stat subprocess sys tempfile termios time
+    tty webbrowser winreg
+"""
+"""Modules whose types depend on the system (``sys.platform`` in typeshed)."""
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
@@ -76,7 +86,7 @@ def uv() -> list[str]:
             raise Unavailable(
                 "pip could not install uv into .tools, for the reason above: does pip reach its index?"
             )
-    return [str(TOOLS / "bin" / "uv")]
+    return [shutil.which("uv", path=str(TOOLS / "bin")) or "uv"]  # uv.exe on Windows
 
 
 def find_python(environment: dict[str, str]) -> None:
@@ -139,8 +149,24 @@ def check(arguments: list[str]) -> int:
     ruff = (["ruff", "format", "--no-cache", "--check", where], ["ruff", "check", "--no-cache", where])
     if SMOKE in arguments:
         return max(run(*step, dev=True) for step in (*ruff, ["pyright", "do.py"]))
+    # a text file's encoding is said: on Windows the usual one is not UTF-8
+    encoding = ["ruff", "check", "--no-cache", "--preview", "--select", "PLW1514", *PRODUCT]
+    elsewhere = [
+        ["pyright", "--threads", "2", "--pythonplatform", name, *near_the_system()] for name in OTHER_SYSTEMS
+    ]
     public = [["pyright", "--ignoreexternal", "--verifytypes", name] for name in PUBLIC]
-    return max(run(*step, dev=True) for step in (*ruff, ["pyright", "--threads", "2", *arguments], *public))
+    return max(
+        run(*step, dev=True)
+        for step in (*ruff, encoding, ["pyright", "--threads", "2", *arguments], *elsewhere, *public)
+    )
+
+
+def near_the_system() -> list[str]:
+    """Files of the product that import a module of Python which is not the same everywhere."""
+    modules = "|".join(NOT_THE_SAME.split())
+    imports = re.compile(rf"^\s*(import|from) ({modules})\b", re.MULTILINE)
+    found = (file for part in PRODUCT for file in sorted((ROOT / part).rglob("*.py")))
+    return [str(file) for file in found if imports.search(file.read_text(encoding="utf-8"))]
 
 
 def bench(arguments: list[str]) -> int:

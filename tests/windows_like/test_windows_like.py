@@ -99,8 +99,9 @@ class Computer:
             if Path("/proc", entry.name, "stat").exists() and not _is_zombie(entry.name)
         ]
 
-    def refused(self) -> str:
-        log = self.folder / "windows-like-denied.log"
+    def noted(self) -> str:
+        """What was refused, and what did not stop when it was asked to."""
+        log = self.folder / "windows-like.log"
         return log.read_text(encoding="utf-8") if log.exists() else ""
 
 
@@ -134,19 +135,11 @@ def computer(tmp_path: Path) -> Iterator[Computer]:
             os.kill(number, signal.SIGKILL)
 
 
-def ctrl_break(process: subprocess.Popen[str]) -> str:
-    """All that it said; it ends in order."""
-    os.killpg(process.pid, signal.SIGUSR1)
-    said = process.communicate(timeout=60)[0]
-    assert process.returncode == 0, said
-    return said
-
-
 def test_the_demo_in_small(computer: Computer) -> None:
     """Capture, recording, import of a reference, training and live poses."""
     said = computer.run("demo", "--smoke")
     assert re.search(r"error [\d.]+ degrees raw, [\d.]+ linear; 600 frames sent live, \d+ poses", said), said
-    assert computer.refused() == ""
+    assert computer.noted() == ""
 
 
 @pytest.mark.slow
@@ -154,7 +147,7 @@ def test_the_demo_in_small(computer: Computer) -> None:
 def test_the_whole_demo(computer: Computer) -> None:
     said = computer.run("demo", "--seed", "2", "--effect", "hysteresis")
     assert "hysteresis" in said
-    assert computer.refused() == ""
+    assert computer.noted() == ""
 
 
 @pytest.fixture
@@ -190,14 +183,10 @@ def test_two_hostile_restarts_and_a_backup(computer: Computer, service: RestClie
 
     backup = computer.folder / "backup"
     shutil.copytree(computer.folder / "glovecal-data", backup)
+    del computer.environment["GLOVECAL_URL"]
     computer.environment["GLOVECAL_DATA"] = str(backup)
-    serve = computer.glovecal("serve")
-    eventually(lambda: is_ready(service, serve), "the backup is served")
     assert model[:12] in computer.run("model", "list")
-    said = ctrl_break(serve)
-    assert "Traceback" not in said
-    assert "killing it" not in said
-    assert computer.refused() == ""
+    assert computer.noted() == ""
     for path in backup.rglob("*"):
         _check_name(path.relative_to(backup))
 

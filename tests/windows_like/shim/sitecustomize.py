@@ -14,8 +14,6 @@ import builtins
 import ctypes
 import errno
 import importlib.machinery
-import importlib.util
-import multiprocessing
 import multiprocessing.popen_fork
 import os
 import select
@@ -65,9 +63,13 @@ class Other(types.ModuleType):
         setattr(self._real, name, value)
 
 
+def note(sentence: str) -> None:
+    with open(Path(FOLDER, "windows-like.log"), "a", encoding="utf-8") as log:
+        log.write(f"{sentence}\n")
+
+
 def denied(path: object, why: str) -> PermissionError:
-    with open(Path(FOLDER, "windows-like-denied.log"), "a", encoding="utf-8") as log:
-        log.write(f"{why}: {path}\n")
+    note(f"{why}: {path}")
     return PermissionError(errno.EACCES, f"denied on Windows ({why})", str(path))
 
 
@@ -131,6 +133,11 @@ class Popen(subprocess.Popen):
     def __init__(self, *arguments, creationflags: int = 0, start_new_session: bool = False, **options):
         group = {"process_group": 0} if creationflags & CREATE_NEW_PROCESS_GROUP else {}
         super().__init__(*arguments, **options, **group)
+
+    def kill(self) -> None:
+        if self.poll() is None:
+            note(f"killed: {self.args}")
+        super().kill()
 
     def terminate(self) -> None:
         self.kill()
