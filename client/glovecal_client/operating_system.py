@@ -108,6 +108,15 @@ def _move(source: Path, target: Path, durably: bool) -> None:
             os.close(handle)
 
 
+def remove(path: Path) -> None:
+    """Remove a file if it is there; on Windows one that somebody has open stays. Raises OSError."""
+    try:
+        path.unlink(missing_ok=True)
+    except PermissionError:
+        if sys.platform != "win32":
+            raise
+
+
 def boot() -> str:
     """What is the same for all programs of this computer until it starts again."""
     with suppress(OSError, subprocess.SubprocessError):

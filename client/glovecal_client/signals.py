@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from glovecal_client.operating_system import HANG_UP, STOP_SIGNALS
+from glovecal_client.operating_system import CONSOLE_SIGNALS, HANG_UP, STOP_SIGNALS
 
 Handler = Callable[[int, Any], Any]
 
@@ -23,6 +23,11 @@ def handle_signals(handler: Handler | signal.Handlers, *numbers: int) -> dict[in
         if signal.getsignal(number) is not signal.SIG_IGN:
             before[number] = signal.signal(number, handler)
     return before
+
+
+def leave_signals_to_the_parent() -> None:
+    """A terminal sends them to every process in it; the one that began this one says when it ends."""
+    handle_signals(signal.SIG_IGN, *CONSOLE_SIGNALS, *HANG_UP)
 
 
 @contextmanager

@@ -23,9 +23,9 @@ from multiprocessing.process import BaseProcess
 from threading import Event, Thread
 from typing import Any, Protocol
 
-from glovecal_client.operating_system import CONSOLE_SIGNALS, HANG_UP, STOP_SIGNALS, listen_alone
+from glovecal_client.operating_system import HANG_UP, STOP_SIGNALS, listen_alone
 from glovecal_client.private_files import keep_private
-from glovecal_client.signals import handle_signals
+from glovecal_client.signals import handle_signals, leave_signals_to_the_parent
 from glovecal_client.standard_streams import say
 from glovecal_models.errors import GlovecalError
 from glovecal_service.operating_system import FORKS, children_context
@@ -266,8 +266,8 @@ def run_part(work: Work, settings: Settings, ready: Any, lifeline: Lifeline) -> 
     _log_to_stderr()
     keep_private()
     stopped = Event()
+    leave_signals_to_the_parent()
     handle_signals(lambda *_: stopped.set(), signal.SIGTERM)
-    handle_signals(signal.SIG_IGN, *CONSOLE_SIGNALS, *HANG_UP)  # they come to the parent too
     Thread(target=lifeline.hold, args=(stopped,), daemon=True).start()
     try:
         work(settings, stopped, ready.set)

@@ -12,11 +12,13 @@ from pathlib import Path
 from glovecal_client.errors import ClientError
 from glovecal_client.pictures.recording import VideoRecording
 from glovecal_client.pictures.source import build_source
+from glovecal_client.signals import leave_signals_to_the_parent
 from glovecal_client.standard_streams import run_command
 
 
 def main(source: str, file: str) -> int:
     """0, or 1 with a sentence on standard error when there is no camera or no place."""
+    leave_signals_to_the_parent()
     try:
         with VideoRecording(build_source(source), Path(file)) as video:
             sys.stdin.buffer.read()

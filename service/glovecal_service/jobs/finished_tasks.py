@@ -13,6 +13,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load as load_arrays
 from safetensors.numpy import save as save_arrays
 
+from glovecal_client.operating_system import remove
 from glovecal_models.errors import BadInput
 from glovecal_service.jobs.job_kind import TaskResult
 from glovecal_service.store.blobs import write_durably
@@ -35,7 +36,7 @@ class FinishedTasks:
                 if hashlib.sha256(content).hexdigest() == path.name.split(".")[1]:
                     os.utime(path)
                     return _load(content)
-            path.unlink(missing_ok=True)
+            remove(path)
         return None
 
     def put(self, key: str, result: TaskResult) -> None:
@@ -54,7 +55,7 @@ class FinishedTasks:
         for _, size, path in sorted(used, reverse=True):
             total += size
             if total > kept_bytes:
-                path.unlink(missing_ok=True)
+                remove(path)
 
 
 def _check(key: str) -> str:

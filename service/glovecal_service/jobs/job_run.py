@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import structlog
 
+from glovecal_client.operating_system import remove
 from glovecal_models.errors import Cancelled, GlovecalError
 from glovecal_service.jobs.finished_tasks import FinishedTasks
 from glovecal_service.jobs.job_kind import JobKind, JobPlan, Task, TaskResult
@@ -85,9 +86,9 @@ class JobRun:
         finally:
             self._ended.set()
             watch.join()
-            self._cancel_file.unlink(missing_ok=True)
+            remove(self._cancel_file)
             for number in range(len(self._tasks)):
-                self._progress_file(number).unlink(missing_ok=True)
+                remove(self._progress_file(number))
 
     def _end(self) -> Callable[[], object]:
         """Do the work; the write that ends it."""

@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from glovecal_client.operating_system import move_over
+from glovecal_client.operating_system import move_over, remove
 
 
 @dataclass(frozen=True)
@@ -43,4 +43,4 @@ class ProgressFile:
         return None
 
     def remove(self) -> None:
-        self._path.unlink(missing_ok=True)
+        remove(self._path)

@@ -234,7 +234,7 @@ def _reason(error: Exception) -> str:
         return str(error) or type(error).__name__
     cause = "" if error.__cause__ is None else str(error.__cause__)
     command = [sys.executable, "-P", "-c", "import " + ", ".join(_IMPORTED_ONCE)]
-    child = subprocess.run(command, capture_output=True, text=True, check=False)
+    child = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
     said = child.stderr.strip().splitlines()[-1:] if child.returncode else [cause]
     return ": ".join(part for part in (str(error).rstrip("."), *said) if part)
 
