@@ -43,6 +43,13 @@ with Store.open(Settings()) as store:
     owner.close()
 """
 BRIEF = {"samples": 200, "iterations": 20, "folds": 0}
+KEYS = """
+import sys, types
+from glovecal_service.operating_system import single_keys
+sys.stdin = types.SimpleNamespace(isatty=lambda: True)
+with single_keys() as key:
+    print(*(key(0.05) or "none" for _ in range(4)))
+"""
 LONGEST_PATH = 140
 """Of 260 characters, within the data folder."""
 
@@ -219,3 +226,9 @@ def real_time(endpoint: str) -> int:
             return int(ask_json(session, all_services("lab").removesuffix("alive") + "status")["process"])
     except NoAnswer:
         return 0
+
+
+def test_single_keys_from_a_console(computer: Computer) -> None:
+    """A special key, such as an arrow, is two characters and none of ours."""
+    computer.environment["WINDOWS_LIKE_KEYS"] = "a\xe0Hq"
+    assert computer.python(KEYS) == "a none q none\n"
