@@ -14,8 +14,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, NoReturn, TextIO
 
-READER_GONE = (errno.EPIPE, errno.EIO)
-"""A closed pipe, a terminal that hung up: nobody is left to be told."""
+READER_GONE = (errno.EPIPE, errno.EIO, errno.EINVAL)
+"""A closed pipe (EINVAL on Windows), a terminal that hung up: nobody is left to be told."""
 ANSWER_LOST = 1
 
 
@@ -57,9 +57,9 @@ def guard_streams() -> None:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
-    sys.stdin = sys.stdin or open(0, closefd=False)  # noqa: SIM115
-    sys.stdout = _guarded(sys.stdout or open(1, "w", closefd=False), _lose_answer)  # noqa: SIM115
-    sys.stderr = _guarded(sys.stderr or open(2, "w", closefd=False), _ignore)  # noqa: SIM115
+    sys.stdin = sys.stdin or open(0, closefd=False, encoding="locale")  # noqa: SIM115
+    sys.stdout = _guarded(sys.stdout or open(1, "w", closefd=False, encoding="locale"), _lose_answer)  # noqa: SIM115
+    sys.stderr = _guarded(sys.stderr or open(2, "w", closefd=False, encoding="locale"), _ignore)  # noqa: SIM115
 
 
 def say(sentence: str) -> None:
