@@ -63,9 +63,12 @@ def show(picture: RenderableType) -> None:
 
 
 def print_sentences(sentences: Iterable[str], about: str = "") -> None:
-    """Each on lines of its own that are no longer than those of a table; ``about`` begins each."""
+    """Each on lines of its own that are no longer than those of a table; ``about`` begins each.
+
+    In a file each is one line, as tables are.
+    """
     for sentence in sentences:
-        out.print(fill(f"{about}{sentence}", LINE))
+        out.print(fill(f"{about}{sentence}", LINE) if out.is_terminal else f"{about}{sentence}")
 
 
 def print_facts(document: Mapping[str, Any]) -> None:
