@@ -9,7 +9,9 @@
     python3 do.py bench     speed against other libraries, as ratios, with a picture
     python3 do.py paper     Wang & Neff 2013 reproduced: every table and figure, as one page (5 minutes);
                             --part colour-glove: Wang & Popovic 2009's, as far as built (20 minutes)
-    python3 do.py docs      the documentation as a site in site/, readable without a network
+    python3 do.py docs      the documentation as a site in site/, readable without a network;
+                            --compare: run the commands of README and docs/ and hold their outputs against
+                            the pages; --write: write the outputs into the pages (half an hour; [PAGE ...])
     python3 do.py study     the blind study of the diagnosis: figures, confusion matrix, a page (hours;
                             --quick, --minutes N; --page docs/study.md writes what was found);
                             study active: active sampling against the fixed protocol (half an hour);
@@ -210,6 +212,8 @@ def containers(arguments: list[str]) -> int:
 
 def docs(arguments: list[str]) -> int:
     """A warning is an error: a link that leads nowhere must not get into the site. docs FOLDER: elsewhere."""
+    if {"--compare", "--write"} & set(arguments):
+        return run("python", "-m", "transcripts", *arguments, groups=("docs",), beside=("docs",))
     with tempfile.TemporaryDirectory() as temporary:
         usual = Path(temporary, "site") if SMOKE in arguments else ROOT / "site"
         site = next((Path(folder).resolve() for folder in arguments if folder != SMOKE), usual)

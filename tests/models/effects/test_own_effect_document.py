@@ -21,7 +21,7 @@ from glovecal_models.errors import BadInput
 DOCUMENT = Path(__file__).resolve().parents[3] / "docs" / "own-effect.md"
 BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
 PYTHON = [text for language, text in BLOCKS if language == "python"]
-PLAIN = [text for language, text in BLOCKS if language == ""]
+ONE_LINE, PRINTED = (text for language, text in BLOCKS if language in ("", "text"))
 
 
 def announce(monkeypatch: pytest.MonkeyPatch, *points: metadata.EntryPoint) -> None:
@@ -54,7 +54,7 @@ def test_the_file_is_found_and_the_trial_prints_what_it_says(
     (tmp_path / "trial.py").write_text(PYTHON[1], encoding="utf-8")
     runpy.run_path(str(tmp_path / "trial.py"))
     said = re.findall(r"'(\w+)': (-?[\d.]+)", capsys.readouterr().out)
-    promised = re.findall(r"'(\w+)': (-?[\d.]+)", PLAIN[1])
+    promised = re.findall(r"'(\w+)': (-?[\d.]+)", PRINTED)
     assert [name for name, _ in said] == [name for name, _ in promised]
     for (_, value), (_, expected) in zip(said, promised, strict=True):
         assert float(value) == pytest.approx(float(expected), abs=0.02)
@@ -78,7 +78,7 @@ def test_it_is_an_effect_like_the_others(signals: list[Signals]) -> None:
 
 
 def test_the_one_line_can_be_read() -> None:
-    effect = ExpressionEffect.parse(PLAIN[0].strip())
+    effect = ExpressionEffect.parse(ONE_LINE.strip())
     assert (effect.name, effect.context) == ("strap", ("strap_n",))
 
 
