@@ -28,6 +28,7 @@ from glovecal_client import (
 )
 from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings, CaptureSummary
 from glovecal_client.capture.device import Reading
+from glovecal_client.capture.stream.parser import Counters
 from glovecal_client.queries import ask, ask_json
 
 KEYS = GloveKeys("lab", "g1")
@@ -189,6 +190,21 @@ def test_bad_readings_are_counted_and_never_published(wire: Wire, tmp_path: Path
     assert (np.diff(times) > 0).all()
     assert all(frame.readings.max() <= 127 for frame in frames)
     assert any("refused" in sentence for sentence in capture.sentences)
+
+
+def test_a_line_that_the_driver_refused_is_shown_and_not_too_often(wire: Wire, tmp_path: Path) -> None:
+    device = SignalGenerator()
+    device.counters = Counters()  # type: ignore[attr-defined]
+    with capturing(device, wire.endpoint, tmp_path) as running:
+        for _ in range(3):
+            device.counters.refuse(b"1,nan", "B is 'nan', not a number")  # type: ignore[attr-defined]
+        shown = "'1,nan': B is 'nan', not a number"
+        eventually(lambda: wire.statuses and wire.statuses[-1]["last_damaged"] == shown, "the line is shown")
+        assert wire.statuses[-1]["damaged_frames"] == 3
+        device.counters.refuse(b"1,nan", "B is 'nan', not a number")  # type: ignore[attr-defined]
+        eventually(lambda: wire.statuses[-1]["damaged_frames"] == 4, "one more is counted")
+        assert running.sentences.count(f"line refused: {shown} (3 refused so far)") == 1
+        assert not any("4 refused" in sentence for sentence in running.sentences)
 
 
 def test_device_unplugged_and_plugged_in_again(wire: Wire, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 import zlib
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -33,6 +34,8 @@ def samples(device, data: bytes) -> list[Sample]:
         (b"A1B2C3D4E5(ZV)12(ZH)1Z", (1, 2, 3, 4, 5)),  # keys that are not known here
         (b"A1B2C3D4", None),  # a finger is missing
         (b"A1B2C3D4E4096", None),  # above the converter's range
+        (b"A1000B4095C2000D2100E2200F2047G2047P4096I", (1000, 4095, 2000, 2100, 2200)),  # its trigger is not
+        (b"A1B2C3D4E5F99999999999999999999", None),  # no counter has twenty digits
         (b"A1B2C3D4E5A1", None),  # a key twice
         (b"A01B2C3D4E5", None),  # no firmware prints leading zeros
         (b"A-1B2C3D4E5", None),
@@ -62,6 +65,17 @@ def test_buttons_splay_and_joints() -> None:
         for m, joint in enumerate("ABCD")
     ]
     assert samples(joints, f"\nA1B2C3D4E5{''.join(fields)}\n".encode())[0].values[5:9] == (0, 1, 2, 3)
+
+
+def test_senseshift_leaves_out_first_joints_and_zeros() -> None:
+    """Its firmware sends each finger with its splay and its joints 2 to 4, none of them where it is 0."""
+    line = b"\nA10(AB)2047(AAB)11B20(BAC)21C30D40E50(EB)1\n"
+    splay = LucidGlove.from_options("nowhere", {"sensors": "splay", "layout": "my-splay"})
+    assert samples(splay, line)[0].values == (10, 20, 30, 40, 50, 2047, 0, 0, 0, 1)
+    joints = LucidGlove.from_options("nowhere", {"sensors": "joints", "layout": "my-joints"})
+    values = samples(joints, line)[0].values
+    assert values[5:13] == (10, 11, 0, 0, 20, 0, 21, 0)
+    assert samples(joints, b"\n(AAB)11B20C30D40E50\n") == []  # the finger itself is never left out
 
 
 @pytest.mark.parametrize(
@@ -186,13 +200,77 @@ def test_described_lines(tmp_path: Path) -> None:
         ('[line]\ncolumns = ["A", "B"]\n[values]\nlowest = 0\nhighest = 9\n', b"1,10", None),
         ('[line]\ncolumns = ["A", "B"]\n', b"1,2,3", None),
         ('[line]\ncolumns = ["A", "B"]\n', b"1,nan", None),
-        ('[line]\ncolumns = ["A", "B"]\n', b"1,1e3", None),
+        ('[line]\ncolumns = ["A", "B"]\n', b"1,1e3", (1, 1000)),
+        ('[line]\ncolumns = ["A", "B"]\n', b"2.4420024420024422,-1.2e-05", (2.4420024420024422, -1.2e-05)),
+        ('[line]\ncolumns = ["A", "B"]\n', b"12345678901234567890,.5", (12345678901234567890.0, 0.5)),
+        ('[line]\ncolumns = ["A", "B"]\n', b"1,1e400", None),
+        ('[line]\ncolumns = ["A", "B"]\n', b"1,0x10", None),
+        ('[line]\ncolumns = ["A", "B"]\n', b"1,1_0", None),
         ('[line]\ncolumns = ["A", "t"]\n[time]\ncolumn = "t"\n', b"1,-1", None),
     ],
 )
 def test_descriptions(tmp_path: Path, text: str, line: bytes, values: tuple[float, ...] | None) -> None:
     found = samples(line_device(tmp_path, text), b"\n" + line + b"\n")
     assert [sample.values for sample in found] == ([] if values is None else [values])
+
+
+def test_lines_that_end_with_a_carriage_return_alone(tmp_path: Path) -> None:
+    device = line_device(tmp_path, '[line]\nend = "\\r"\ncolumns = ["A", "B"]\n')
+    assert [sample.values for sample in samples(device, b"cut\r1,2\r3,4\r")] == [(1, 2), (3, 4)]
+    other = line_device(tmp_path, '[line]\ncolumns = ["A", "B"]\n')
+    assert samples(other, b"cut\n" + 200 * b"1,2\r") == []
+    assert "each ends with a carriage return alone?" in other.counters.last_refused
+
+
+def test_one_finger_a_line_finds_its_rhythm_again(tmp_path: Path) -> None:
+    device = line_device(tmp_path, "[line]\npattern = 'thumb=(?P<T>.)\\nindex=(?P<I>.)'\nlines = 2\n")
+    found = samples(device, b"cut\nindex=9\nthumb=1\nindex=2\nthumb=3\nthumb=4\nindex=5\n")
+    assert [sample.values for sample in found] == [(1, 2), (4, 5)]
+    assert device.counters.bad_frames == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "why"),
+    [
+        ('[line]\ncolumns = ["A", "B"]\n', b"1,nan", "'1,nan': B is 'nan', not a number"),
+        ('[line]\ncolumns = ["A", "B"]\n', b"1,2,3", "'1,2,3': 3 fields, not 2"),
+        ('[line]\ncolumns = ["A"]\n[values]\nhighest = 9\n', b"10", "'10': A is 10, above 9"),
+        ('[line]\nstart = "$"\ncolumns = ["A"]\n', b"10", "'10': it does not begin with '$'"),
+        ("[line]\npattern = 'x(?P<A>.)'\n", b"y1", "'y1': it does not match line.pattern"),
+        ('[line]\ncolumns = ["A"]\n[checksum]\nkind = "xor"\n', b"1*00", "'1*00': its checksum is wrong"),
+        ('[line]\ncolumns = ["A"]\n', b"\xff", "'\\\\xff': A is '\\\\xff', not a number"),
+    ],
+)
+def test_a_refused_line_tells_the_field_and_why(tmp_path: Path, text: str, line: bytes, why: str) -> None:
+    device = line_device(tmp_path, text)
+    assert samples(device, b"\n" + line + b"\n") == []
+    assert device.counters.last_refused == why
+
+
+@pytest.mark.parametrize(
+    ("unit", "stamps"),
+    [
+        ("us", (b"999960000", b"999980000", b"1000000000", b"1000020000")),
+        ("us", (b"4294940000", b"4294960000", b"12704", b"32704")),  # wraps at 2^32
+        ("s", (b"12.000", b"12.020", b"12.040", b"12.060")),
+        ("s", (b"1787654321.000", b"1787654321.020", b"1787654321.040", b"1787654321.060")),
+        ("ms", (b"1787654321000", b"1787654321020", b"1787654321040", b"1787654321060")),
+        ("ms", (b"1.5e3", b"1520.0", b"1540", b"1560")),
+    ],
+)
+def test_a_time_keeps_its_digits(tmp_path: Path, unit: str, stamps: tuple[bytes, ...]) -> None:
+    text = f'[line]\ncolumns = ["t", "A"]\n[time]\ncolumn = "t"\nunit = "{unit}"\n'
+    device = line_device(tmp_path, text)
+    found = samples(device, b"\n" + b"".join(stamp + b",7\r\n" for stamp in stamps))
+    clock = device.new_clock()
+    assert clock is not None
+    times, now_ns = [], 10**12
+    for sample in found:
+        assert sample.ticks is not None
+        times.append(clock.monotonic_ns(sample.ticks, now_ns + 5_000_000 * len(times)))
+        now_ns += 20_000_000
+    steps = [later - early for early, later in pairwise(times)]
+    assert steps == pytest.approx([20_000_000] * 3, abs=20_000)
 
 
 @pytest.mark.parametrize(
@@ -210,6 +288,14 @@ def test_descriptions(tmp_path: Path, text: str, line: bytes, values: tuple[floa
         ("line = 3", "line must be a table"),
         ('[line]\ncolumns = ["1st"]', "'1st' is not a channel name"),
         ("[line", "is not TOML"),
+        (
+            "[line]\npattern = '('",
+            "line.pattern is no regular expression: missing ), unterminated subpattern",
+        ),
+        ("[line]\npattern = '.*'", "names no column: write (?P<I_FLEX>[0-9]+)"),
+        ("[line]\npattern = '(?P<A>.)'\ncolumns = ['A']", "leave line.columns out"),
+        ('[line]\nlines = 2\ncolumns = ["A"]', "needs line.pattern"),
+        ('[line]\nend = ";"\ncolumns = ["A"]', "line.end = ';' must be one of '\\n', '\\r'"),
     ],
 )
 def test_a_description_that_cannot_be(tmp_path: Path, text: str, sentence: str) -> None:

@@ -26,7 +26,7 @@ def blocks(kind: str) -> list[str]:
 
 
 def test_the_description_is_the_one_that_the_emulated_glove_has(tmp_path: Path) -> None:
-    description, _ = blocks("toml")
+    description = blocks("toml")[0]
     assert description == DESCRIPTION
     (line,) = blocks("text")
     file = tmp_path / "my-glove.toml"
@@ -82,3 +82,18 @@ def test_options_and_their_defaults_on_the_page_are_those_of_the_device(name: st
     options = dict(re.findall(r"^\| `([a-z_]+)=([\w-]+)`", section, re.MULTILINE))
     assert options
     build_device(f"{name}:nowhere", options)
+
+
+def test_published_shapes_are_read_as_described(tmp_path: Path) -> None:
+    """Above each description stand the lines it reads, as comments; every number in them is a reading."""
+    shapes = [block for block in blocks("toml") if block.startswith("# ")]
+    assert len(shapes) == 5
+    for text in shapes:
+        lines = "".join(f"{line[2:]}\n" for line in text.splitlines() if line.startswith("# "))
+        file = tmp_path / "shape.toml"
+        file.write_text(text)
+        device = LineGlove.from_options(str(file), {"port": "nowhere"})
+        found = device.new_parser().feed(b"cut\n" + 2 * lines.encode())
+        numbers = tuple(float(number) for number in re.findall(r"(?<=[:=|~ ])-?[0-9.]+|^[0-9]+", lines))
+        assert [sample.values for sample in found] == [numbers] * 2, text
+        assert device.counters.bad_frames == 0

@@ -85,6 +85,7 @@ class CaptureDaemon:
         self._status = CaptureStatus(self._run_id, wall_ns())
         self._check = ReadingCheck(device)
         self._refusal: str | None = None
+        self._tell_damaged_at = 1
         self._commands = GloveCommands(device)
         self._earlier_runs: list[dict[str, Any]] = []
         self._flags = int(FrameFlag.SIMULATED) if device.simulated else 0
@@ -158,12 +159,21 @@ class CaptureDaemon:
         if self._refusal is not None:
             self._report(f"{self._refusal} ({self._status.bad_frames} refused so far)")
         self._status.refusal, self._refusal = self._refusal, None
-        damaged = getattr(self._device, "counters", None)
-        self._status.damaged_frames = damaged.bad_frames if damaged is not None else 0
+        self._note_damaged()
         self._status.own_clock = getattr(self._device, "own_clock", None)
         self._link.publish_status()
         with contextlib.suppress(OSError):  # a disk that fails shows in the log's own problem
             self._index.extend()
+
+    def _note_damaged(self) -> None:
+        """Records the driver threw away; told when their number has doubled, so that a log stays short."""
+        if (counters := getattr(self._device, "counters", None)) is None:
+            return
+        self._status.damaged_frames = counters.bad_frames
+        self._status.last_damaged = getattr(counters, "last_refused", "") or None
+        if counters.bad_frames >= self._tell_damaged_at and self._status.last_damaged:
+            self._report(f"line refused: {self._status.last_damaged} ({counters.bad_frames} refused so far)")
+            self._tell_damaged_at = 2 * counters.bad_frames
 
     def _note_opening(self, device: ReopeningDevice) -> None:
         if device.is_open and self._status.state != "streaming":

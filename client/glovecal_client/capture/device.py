@@ -44,7 +44,8 @@ class Device(Protocol):
 
     More attributes are looked at if the device has them: ``counts``, the pair of smallest and largest
     raw value its hardware can send; ``hand``, one of ``left``, ``right``, ``unknown``; ``counters`` with
-    ``bad_frames``, the records thrown away since they came damaged; ``notice``, a sentence for the user;
+    ``bad_frames``, the records thrown away since they came damaged, and perhaps ``last_refused``, the last of
+    them and why; ``notice``, a sentence for the user;
     ``option_help`` of the class, what each option may be, by the option's name; ``own_clock``, a document on
     how the glove's clock stands against the computer's; ``commands``, what it can be asked beside its stream,
     with an explanation each, and ``command(name, argument)``, which does it and returns a document.

@@ -17,17 +17,17 @@ _RESTARTED_S = 1.0
 class DeviceClock:
     """Maps tick counts to monotonic nanoseconds, strictly growing and never later than the arrival."""
 
-    def __init__(self, ticks_per_second: float, wrap: int = 1 << 32) -> None:
+    def __init__(self, ticks_per_second: float, wrap: float = 1 << 32) -> None:
         """``wrap``: the count after which the stamp begins at 0 again."""
         self._tick_ns = 1e9 / ticks_per_second
         self._wrap = wrap
-        self._last_ticks: int | None = None
-        self._elapsed_ticks = 0
+        self._last_ticks: float | None = None
+        self._elapsed_ticks = 0.0
         self._difference_ns = 0.0
         self._last_arrival_ns = 0
         self._last_given_ns = 0
 
-    def monotonic_ns(self, ticks: int, arrival_ns: int) -> int:
+    def monotonic_ns(self, ticks: float, arrival_ns: int) -> int:
         """The computer's monotonic time of a record stamped ``ticks`` that came at ``arrival_ns``."""
         if self._last_ticks is None:
             self._begin(ticks, arrival_ns)
@@ -48,6 +48,6 @@ class DeviceClock:
     def _device_ns(self) -> float:
         return self._elapsed_ticks * self._tick_ns
 
-    def _begin(self, ticks: int, arrival_ns: int) -> None:
-        self._elapsed_ticks = 0
+    def _begin(self, ticks: float, arrival_ns: int) -> None:
+        self._elapsed_ticks = 0.0
         self._difference_ns = float(arrival_ns)

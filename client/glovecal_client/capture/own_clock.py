@@ -62,11 +62,11 @@ class OwnClock:
         self._tick_s, self._wrap = 1.0 / ticks_per_second, wrap
         self.line: ClockLine | None = None
         """None before the first block is full."""
-        self._last_ticks: int | None = None
-        self._ticks = 0
+        self._last_ticks: float | None = None
+        self._ticks = 0.0
         self._begin()
 
-    def note(self, ticks: int, arrival_ns: int) -> None:
+    def note(self, ticks: float, arrival_ns: int) -> None:
         """A record stamped ``ticks`` arrived."""
         if self._last_ticks is None:
             self._ticks = ticks

@@ -27,6 +27,8 @@ class CaptureStatus:
     """Readings the daemon refused."""
     damaged_frames: int = 0
     """Records that the driver threw away because they came damaged from the glove."""
+    last_damaged: str | None = None
+    """The last of them and why it was thrown away; None before the first, or where the driver cannot tell."""
     duplicates: int = 0
     reconnects: int = 0
     refusal: str | None = None
@@ -62,6 +64,7 @@ class CaptureStatus:
                 "rate_hz": self._measured_rate(now_ns),
                 "bad_frames": self.bad_frames,
                 "damaged_frames": self.damaged_frames,
+                "last_damaged": self.last_damaged,
                 "duplicates": self.duplicates,
                 "last_frame_age_s": age,
                 "reconnects": self.reconnects,

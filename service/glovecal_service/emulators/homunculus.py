@@ -14,9 +14,9 @@ _LOW, _SPAN = 1450, 1700
 
 
 class EmulatedHomunculus(SendingGlove):
-    """At 60 lines a second; the real rate is not stated."""
+    """At 140 lines a second; real ones send 120 to 165."""
 
-    rate_hz = 60.0
+    rate_hz = 140.0
 
     def values(self, time_s: float) -> list[int]:
         bent = self.hand.bent(time_s)

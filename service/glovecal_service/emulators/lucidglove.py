@@ -76,7 +76,7 @@ class EmulatedLucidGlove(SendingGlove):
     def record(self, values: list[int], time_s: float) -> bytes:
         thumb, index, *others = values
         half = MAX // 2
-        trigger = 0 if index < half else min(MAX, 2 * (index - half))
+        trigger = 0 if index < half else 2 * (index - half)  # up to one more than MAX, as in the firmware
         pulls, pinches = index > half, (index + thumb) / 2 > half
         grabs = (index + sum(others)) / 4 > half
         if self._legacy:

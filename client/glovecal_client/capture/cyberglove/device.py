@@ -27,6 +27,7 @@ from glovecal_client.capture.cyberglove.watch import StreamWatch
 from glovecal_client.capture.device import Reading
 from glovecal_client.capture.device_clock import DeviceClock
 from glovecal_client.capture.serial_link import SerialLink
+from glovecal_client.capture.stream.arrival_times import ArrivalTimes
 from glovecal_client.clock import clock_ns, wall_ns
 from glovecal_client.errors import DeviceError, DeviceLost
 
@@ -155,6 +156,7 @@ class CyberGlove:
         self._index = np.array(layout_index(identity.sensors))
         self._reader = RecordReader(setup.record_format)
         self._clock = DeviceClock(TICKS_PER_SECOND) if setup.record_format.timestamp else None
+        self._arrivals = ArrivalTimes(self.rate_hz)
         self._watch = StreamWatch(1 / self.rate_hz)
         if len(self._bauds) > 1:  # begin with what worked when it is opened again
             self._bauds = (baud, *(rate for rate in BAUD_RATES if rate != baud))
@@ -196,12 +198,10 @@ class CyberGlove:
         """Give records that came together the times at which they were taken."""
         now_ns, offset_ns = clock_ns(), wall_ns() - clock_ns()
         readings = []
-        for behind, record in zip(range(len(records) - 1, -1, -1), records, strict=True):
+        for stamp, record in zip(self._arrivals.of(len(records), now_ns), records, strict=True):
             values = np.frombuffer(record.values, np.uint8)[self._index].astype(np.float32)
             if self._clock is not None and record.ticks is not None:
                 stamp = self._clock.monotonic_ns(record.ticks, now_ns)
-            else:
-                stamp = now_ns - int(behind * 1e9 / self.rate_hz)
             self._last_ns = max(stamp, self._last_ns + 1)
             readings.append(Reading(values, self._last_ns, self._last_ns + offset_ns, button=record.button))
         return readings

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,10 +14,11 @@ from glovecal_client.errors import BadName, BadOption
 from glovecal_client.names import check_channel_name, check_identifier
 
 UNUSED = "-"
+MOST_LINES = 64
 TICKS_PER_SECOND = {"s": 1, "ms": 1_000, "us": 1_000_000}
 _KEYS = {
     "": ("name", "layout", "rate_hz", "baud", "line", "values", "checksum", "time", "context"),
-    "line": ("separator", "start", "columns", "answer"),
+    "line": ("separator", "start", "columns", "pattern", "lines", "end", "answer"),
     "values": ("lowest", "highest", "unit"),
     "checksum": ("kind", "separator", "digits", "covers_start"),
     "time": ("column", "unit", "wraps_at"),
@@ -30,7 +32,12 @@ class LineDescription:
     layout: str
     sensors: tuple[str, ...]
     sensor_columns: tuple[int, ...]
-    columns: int
+    columns: tuple[str, ...]
+    pattern: re.Pattern[bytes] | None = None
+    """Finds the columns by its named groups, instead of a separator."""
+    lines: int = 1
+    """How many lines make a sample, for a pattern."""
+    end: bytes = b"\n"
     separator: str = ","
     start: str = ""
     answer: str = ""
@@ -46,9 +53,14 @@ class LineDescription:
     covers_start: bool = False
     time_column: int | None = None
     ticks_per_second: int = 1_000
-    wraps_at: int = 1 << 32
+    wraps_at: float = 1 << 32
     context: tuple[tuple[str, int, float], ...] = ()
     """Name, column and factor of each context value."""
+
+    @property
+    def used_columns(self) -> tuple[int, ...]:
+        """Columns whose fields must be numbers: sensors and time. Context may be missing in a line."""
+        return self.sensor_columns if self.time_column is None else (*self.sensor_columns, self.time_column)
 
 
 def read_description(file: Path) -> LineDescription:
@@ -67,6 +79,11 @@ def read_description(file: Path) -> LineDescription:
     return _Reader(file.name, document).description(file.stem.lower())
 
 
+def _quoted(choice: str) -> str:
+    """As it is, or as TOML writes it where it cannot be seen."""
+    return choice if choice.isprintable() else repr(choice)
+
+
 class _Reader:
     def __init__(self, file: str, document: Mapping[str, Any]) -> None:
         self._file = file
@@ -81,7 +98,13 @@ class _Reader:
                     self._refuse(f"unknown key {self._named(name, key)}; known are {', '.join(keys)}")
 
     def description(self, default_name: str) -> LineDescription:
-        columns = self._columns()
+        pattern = self._pattern()
+        columns = self._columns() if pattern is None else tuple(pattern.groupindex)
+        lines = self._positive("line", "lines", 1.0)
+        if lines != int(lines) or (lines > 1 and pattern is None) or lines > MOST_LINES:
+            self._refuse(
+                f"line.lines = {lines:g} must be a whole number up to {MOST_LINES}, and needs line.pattern"
+            )
         time_column = self._get("time", "column", str, "")
         context = tuple(self._context(columns))
         used = {UNUSED, time_column, *(columns[column] for _, column, _ in context)}
@@ -102,7 +125,10 @@ class _Reader:
             layout=layout,
             sensors=sensors,
             sensor_columns=tuple(columns.index(name) for name in sensors),
-            columns=len(columns),
+            columns=columns,
+            pattern=pattern,
+            lines=int(lines),
+            end=self._one_of("line", "end", ("\n", "\r")).encode(),
             separator=self._get("line", "separator", str, ","),
             start=self._get("line", "start", str, ""),
             answer=self._get("line", "answer", str, ""),
@@ -117,9 +143,24 @@ class _Reader:
             covers_start=self._get("checksum", "covers_start", bool, False),
             time_column=self._place(columns, time_column, "time.column") if time_column else None,
             ticks_per_second=TICKS_PER_SECOND[self._one_of("time", "unit", ("ms", "us", "s"))],
-            wraps_at=int(self._positive("time", "wraps_at", float(1 << 32))),
+            wraps_at=self._positive("time", "wraps_at", float(1 << 32)),
             context=context,
         )
+
+    def _pattern(self) -> re.Pattern[bytes] | None:
+        text = self._get("line", "pattern", str, "")
+        if not text:
+            return None
+        for key in ("columns", "separator"):
+            if key in self._tables["line"]:
+                self._refuse(f"line.pattern finds the columns itself: leave line.{key} out")
+        try:
+            pattern = re.compile(text.encode())
+        except re.error as error:
+            self._refuse(f"line.pattern is no regular expression: {error.msg} at character {error.pos}")
+        if not pattern.groupindex:
+            self._refuse("line.pattern names no column: write (?P<I_FLEX>[0-9]+) where a reading stands")
+        return pattern
 
     def _columns(self) -> tuple[str, ...]:
         columns = self._tables["line"].get("columns")
@@ -167,7 +208,9 @@ class _Reader:
     def _one_of(self, table: str, key: str, choices: tuple[str, ...]) -> str:
         value = self._get(table, key, str, choices[0])
         if value not in choices:
-            self._refuse(f"{self._named(table, key)} = {value!r} must be one of {', '.join(choices)}")
+            self._refuse(
+                f"{self._named(table, key)} = {value!r} must be one of {', '.join(map(_quoted, choices))}"
+            )
         return value
 
     @staticmethod

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar
 
@@ -17,11 +17,12 @@ from glovecal_client.capture.line_glove.description import LineDescription, read
 from glovecal_client.capture.stream.lines import LineReader
 from glovecal_client.capture.stream.links import Link
 from glovecal_client.capture.stream.option_values import COMMON_HELP, OptionValues
-from glovecal_client.capture.stream.parser import Sample, StreamParser
+from glovecal_client.capture.stream.parser import BadRecord, Sample, StreamParser, shown
 from glovecal_client.capture.stream.streamed_glove import StreamedGlove
 from glovecal_client.errors import BadOption
 
-_NUMBER = re.compile(rb"[+-]?[0-9]{1,9}(\.[0-9]{1,9})?")
+_NUMBER = re.compile(rb"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
+"""Whatever a program prints of a number: no bound on its digits."""
 _DIGITS = {10: re.compile(rb"[0-9]{1,10}"), 16: re.compile(rb"[0-9A-Fa-f]{1,8}")}
 
 
@@ -38,7 +39,6 @@ class LineGlove(StreamedGlove):
         """Raises BadOption."""
         self.baud: int = description.baud
         super().__init__(address, options)
-        self._parse = DescribedLine(description)
         self._description = description
         self.layout: str = description.layout
         self.sensors: tuple[str, ...] = description.sensors
@@ -59,68 +59,94 @@ class LineGlove(StreamedGlove):
         return cls(read_description(Path(argument)), port, values)
 
     def new_parser(self) -> StreamParser:
-        return LineReader(self._parse, self.counters)
+        return LineReader(DescribedLine(self._description), self.counters, end=self._description.end)
 
     def new_clock(self) -> DeviceClock | None:
         told = self._description
         return None if told.time_column is None else DeviceClock(told.ticks_per_second, told.wraps_at)
 
     def answer(self, link: Link, data: bytes) -> None:
-        if self._description.answer and (lines := data.count(b"\n")):
+        if self._description.answer and (lines := data.count(self._description.end)):
             link.write(self._description.answer.encode() * lines)
 
 
+def _measured(field: bytes) -> float:
+    """A context value, NaN where the glove says that there is none."""
+    text = field.strip()
+    value = float(text) if _NUMBER.fullmatch(text) else math.nan
+    return value if math.isfinite(value) else math.nan
+
+
 class DescribedLine:
-    """Parses one line; None for one whose form, checksum or range is not as described."""
+    """Parses one line, or the last of several that make a sample."""
 
     def __init__(self, description: LineDescription) -> None:
         self._told = description
         self._start = description.start.encode()
         self._separator = description.separator.encode()
+        self._lines: list[bytes] = []
+        """Those before, of a sample that is not complete."""
 
     def __call__(self, line: bytes) -> Sample | None:
-        body = self._body(line)
-        if body is None:
-            return None
+        """None while more lines follow. Raises BadRecord: form, checksum or range is not as described."""
         told = self._told
-        fields = body.split() if told.separator.isspace() else body.split(self._separator)
-        if len(fields) != told.columns:
+        fields = self._fields(self._body(line))
+        if fields is None:
             return None
-        values = tuple(_number(fields[column]) for column in told.sensor_columns)
-        if not all(self._in_range(value) for value in values):
-            return None
-        ticks = None
-        if told.time_column is not None:
-            ticks = _number(fields[told.time_column])
-            if not ticks >= 0:  # NaN too
-                return None
-        context = tuple(factor * _number(fields[column]) for _, column, factor in told.context)
-        return Sample(values, None if ticks is None else int(ticks), context)
+        numbers = {column: self._number(column, fields[column]) for column in told.used_columns}
+        values = tuple(numbers[column] for column in told.sensor_columns)
+        for name, value in zip(told.sensors, values, strict=True):
+            self._check_range(name, value)
+        ticks = None if told.time_column is None else numbers[told.time_column]
+        if ticks is not None and not (math.isfinite(ticks) and ticks >= 0):
+            raise BadRecord(f"the time {ticks:g} is negative or not finite")
+        context = tuple(factor * _measured(fields[column]) for _, column, factor in told.context)
+        return Sample(values, ticks, context)
 
-    def _body(self, line: bytes) -> bytes | None:
-        """The line without its start and checksum, None if either is wrong."""
+    def _fields(self, body: bytes) -> Sequence[bytes] | None:
+        """The columns' texts, None where lines are still to come."""
+        told = self._told
+        if told.pattern is None:
+            fields = body.split() if told.separator.isspace() else body.split(self._separator)
+            if len(fields) != len(told.columns):
+                raise BadRecord(f"{len(fields)} fields, not {len(told.columns)}")
+            return fields
+        self._lines = [*self._lines, body][-told.lines :]
+        found = told.pattern.fullmatch(b"\n".join(self._lines))
+        if found is None:
+            if len(self._lines) < told.lines:
+                return None
+            raise BadRecord("it does not match line.pattern")
+        self._lines = []
+        return [found[name] or b"" for name in told.columns]
+
+    def _body(self, line: bytes) -> bytes:
+        """The line without its start and checksum. Raises BadRecord if either is wrong."""
         told = self._told
         if not line.startswith(self._start):
-            return None
+            raise BadRecord(f"it does not begin with {told.start!r}")
         if told.checksum is None:
             return line[len(self._start) :]
         covered, found, check = line.rpartition(told.check_separator.encode())
         if not found or not _DIGITS[told.check_base].fullmatch(check.strip()):
-            return None
+            raise BadRecord(f"no checksum behind {told.check_separator!r}")
         body = covered[len(self._start) :]
         summed = covered if told.covers_start else body
-        return body if CHECKSUMS[told.checksum](summed) == int(check, told.check_base) else None
+        if CHECKSUMS[told.checksum](summed) != int(check, told.check_base):
+            raise BadRecord("its checksum is wrong")
+        return body
 
-    def _in_range(self, value: float) -> bool:
+    def _number(self, column: int, field: bytes) -> float:
+        text = field.strip()
+        if not _NUMBER.fullmatch(text):
+            raise BadRecord(f"{self._told.columns[column]} is {shown(text)}, not a number")
+        return float(text)
+
+    def _check_range(self, name: str, value: float) -> None:
         lowest, highest = self._told.lowest, self._told.highest
-        return (
-            math.isfinite(value)
-            and (lowest is None or value >= lowest)
-            and (highest is None or value <= highest)
-        )
-
-
-def _number(field: bytes) -> float:
-    """The number in a field, NaN for anything else."""
-    text = field.strip()
-    return float(text) if _NUMBER.fullmatch(text) else math.nan
+        if not math.isfinite(value):
+            raise BadRecord(f"{name} is not finite")
+        if lowest is not None and value < lowest:
+            raise BadRecord(f"{name} is {value:g}, below {lowest:g}")
+        if highest is not None and value > highest:
+            raise BadRecord(f"{name} is {value:g}, above {highest:g}")

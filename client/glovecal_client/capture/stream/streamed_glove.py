@@ -18,6 +18,7 @@ import numpy as np
 from glovecal_client.capture.device import Reading
 from glovecal_client.capture.device_clock import DeviceClock
 from glovecal_client.capture.own_clock import OwnClock
+from glovecal_client.capture.stream.arrival_times import ArrivalTimes
 from glovecal_client.capture.stream.links import Link, Place, place_of
 from glovecal_client.capture.stream.option_values import COMMON_HELP, OptionValues
 from glovecal_client.capture.stream.parser import Counters, Sample, StreamParser
@@ -46,6 +47,7 @@ class StreamedGlove:
     context: tuple[str, ...] = ()
     counts: tuple[float, float] | None = None
     rate_hz: float = 60.0
+    """Nominal; the rate is measured while it streams."""
     baud = 115200
     clock_kind = "own"
     """Or "ltc": its clock follows a time code that other devices follow too."""
@@ -104,6 +106,7 @@ class StreamedGlove:
             raise
         self._parser = self.new_parser()
         self._clock = self.new_clock()
+        self._arrivals = ArrivalTimes(self.rate_hz)
         self._own_clock = self._own_clock or self.new_own_clock()
         self._silent_s = self._useless_s = 0.0
         self._seen_one = False
@@ -183,7 +186,7 @@ class StreamedGlove:
         self._silent_s = 0.0 if bytes_came else self._silent_s + waited_s
         self._useless_s = 0.0 if samples_came else self._useless_s + waited_s
         self._seen_one = self._seen_one or samples_came
-        period_s = 1 / self.rate_hz
+        period_s = self._arrivals.period_ns / 1e9
         silent_s = max(self._place.silent_s, 5 * period_s)
         if self._silent_s >= (silent_s if self._seen_one else max(_FIRST_S, silent_s)):
             raise DeviceLost(
@@ -201,13 +204,11 @@ class StreamedGlove:
         """Give records that came together the times at which they were taken."""
         now_ns, offset_ns = clock_ns(), wall_ns() - clock_ns()
         readings = []
-        for behind, sample in zip(range(len(samples) - 1, -1, -1), samples, strict=True):
+        for stamp, sample in zip(self._arrivals.of(len(samples), now_ns), samples, strict=True):
             if self._own_clock is not None and sample.ticks is not None:
                 self._own_clock.note(sample.ticks, now_ns)
             if self._clock is not None and sample.ticks is not None:
                 stamp = self._clock.monotonic_ns(sample.ticks, now_ns)
-            else:
-                stamp = now_ns - int(behind * 1e9 / self.rate_hz)
             self._last_ns = max(stamp, self._last_ns + 1)
             readings.append(
                 Reading(

@@ -102,7 +102,14 @@ def _of_capture(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator
     damaged = sum(int(after.get(name) or 0) - int(before.get(name) or 0) for name in names)
     if damaged > 0:
         advice = "Exchange the cable, or take it away from motors and power supplies."
-        yield GloveFinding("cable", f"{damaged} records arrived damaged.", advice)
+        last = after.get("last_damaged")
+        if last:
+            advice = (
+                "If every line looks like this, the glove's description or options do not fit it. " + advice
+            )
+        yield GloveFinding(
+            "cable", f"{damaged} records refused{f', the last: {last}' if last else ''}.", advice
+        )
     if after.get("disk") == "full":
         advice = "Free some space: frames are not in the log."
         yield GloveFinding("capture", "The disk of the capture computer is full.", advice)
