@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glovecal_models.errors import BadInput
+from glovecal_models.errors import BadInput, BadTakeTable
 from glovecal_models.takes.frame_times import spread_equal_times
 from glovecal_models.takes.raw_table import LARGEST_ANGLE_DEG, LARGEST_VALUE, LONGEST_TAKE_S
 from glovecal_models.takes.reference_check import reference_warnings
@@ -89,17 +89,47 @@ def test_utf8_mark_crlf_blank_lines_and_blanks_around_numbers_are_accepted(tmp_p
 def test_frames_stamped_in_batches_are_spread_when_asked(tmp_path):
     path = write(tmp_path / "t.csv", "time_s,s.A\n0,1\n1,2\n1,3\n2,4\n2,5\n")
     (take,) = read_takes(path, equal_times="spread")
-    np.testing.assert_allclose(take.time_s, [0, 1, 1.5, 2, 2.5])
+    np.testing.assert_allclose(take.time_s, [0.75, 1.25, 1.75, 2.25, 2.75])
 
 
-@given(st.lists(st.integers(0, 20), min_size=1, max_size=50).map(sorted))
-def test_spread_times_increase_and_move_no_frame_past_the_next_stamp(stamps):
-    time = np.array(stamps, float)
+@given(st.lists(st.integers(0, 20), min_size=1, max_size=50).map(sorted), st.sampled_from([1.0, 0.1, 0.3]))
+def test_spread_times_increase_and_move_no_frame_past_the_next_batch(stamps, unit):
+    time = np.array(stamps, float) * unit
     spread = spread_equal_times(time)
-    assert (np.diff(spread) > 0).all()
-    later = np.array([min((t for t in stamps if t > stamp), default=np.inf) for stamp in stamps])
-    assert (spread >= time).all()
+    assert (np.diff(spread) > 0).all() or len(set(stamps)) == 1
+    later = np.array([min((t for t in time if t > stamp), default=np.inf) for stamp in time])
+    earlier = np.array([max((t for t in time if t < stamp), default=-np.inf) for stamp in time])
+    assert (spread > earlier).all()
     assert (spread < later).all()
+
+
+@pytest.mark.parametrize("rate_hz", [30.0, 60.0, 100.0, 90.7])
+@pytest.mark.parametrize("begun_s", [0.0, 0.25, 0.6, 0.99])
+def test_whole_seconds_are_spread_to_where_the_frames_were(rate_hz, begun_s):
+    true = 1_700_000_000 + begun_s + np.arange(int(12.3 * rate_hz)) / rate_hz
+    assert np.abs(spread_equal_times(np.floor(true)) - true).max() < 0.02
+
+
+@pytest.mark.parametrize("stamped", ["first", "last"])
+def test_a_pause_between_batches_moves_no_frame_by_more_than_half_a_batch(stamped):
+    """Batches of 8 at 100 Hz with the time of their first or last frame, a pause of 5 s in the middle."""
+    true = np.arange(800) / 100 + np.where(np.arange(800) < 400, 0.0, 5.0) + 0.003
+    batches = true.reshape(-1, 8)
+    stamps = np.repeat(batches[:, 0 if stamped == "first" else -1], 8)
+    spread = spread_equal_times(stamps)
+    assert (np.diff(spread) > 0).all()
+    assert np.abs(spread - true).max() <= 0.0401
+    assert np.abs(spread - stamps).max() <= 0.0401
+
+
+@pytest.mark.parametrize("equal_times", ["refuse", "spread"])
+def test_times_with_too_few_digits_are_refused_and_nothing_is_made_up(tmp_path, equal_times):
+    rows = "".join(f"1.73234e+09,{number}\n" for number in range(60))
+    path = write(tmp_path / "t.csv", "time_s,s.A\n" + rows)
+    with pytest.raises(BadTakeTable) as refused:
+        read_takes(path, equal_times=equal_times)
+    assert "60 frames have 1 different times: they are written with too few digits" in str(refused.value)
+    assert "spread" not in str(refused.value)
 
 
 names = st.text(st.characters(categories=("L", "N", "P", "S")), min_size=1, max_size=12)

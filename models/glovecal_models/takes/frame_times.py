@@ -8,6 +8,11 @@ SLOWEST_STEP_S = 1.5
 """Single poses set by hand come about once a second; a glove of 5 Hz or more in ms is above."""
 FASTEST_RATE_HZ = 10_000.0
 SLOWEST_RATE_HZ = 5.0
+COARSEST_STAMP_S = 1.5
+"""Whole seconds are still spread; a stamp for longer tells nothing of a hand."""
+FEWEST_STAMPS = 3
+LONGEST_PERIODS = 2.0
+"""A batch whose frames would lie further apart than that many of the usual period is followed by a pause."""
 _UNITS = (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9))
 
 
@@ -32,17 +37,58 @@ def unit_hint(typical_step: float) -> str:
     return ""
 
 
-def spread_equal_times(time: np.ndarray) -> np.ndarray:
-    """Times in which each run of equal values is spread over the interval to the next; the rest unchanged.
+def too_few_digits(time: np.ndarray) -> bool:
+    """Whether frames share their stamps so much that these cannot tell when a frame was taken.
 
-    Many gloves reach the computer through a buffer, so that a burst of frames gets one time stamp. The
-    last run has no next time and gets the median interval. Times that run backwards stay as they are.
+    One stamp for all, or one for so many that a glove of ``SLOWEST_RATE_HZ`` would not have filled the time.
+    """
+    stamps = np.unique(time)
+    if len(stamps) == len(time):
+        return False
+    return len(stamps) < FEWEST_STAMPS or float(np.median(np.diff(stamps))) > COARSEST_STAMP_S
+
+
+def spread_equal_times(time: np.ndarray) -> np.ndarray:
+    """Times in which each run of equal values is spread over its batch; times that run backwards stay.
+
+    Stamps cut down to a decimal place (whole seconds, say) stand for what follows up to the next: a batch
+    begins at its stamp, and the first one, which may have begun before the recording, ends at the next. Other
+    stamps are those of a buffer that was handed over, before or after its frames were taken: their frames lie
+    around the stamp, so that none moves by more than half a batch. A pause belongs to no batch.
     """
     starts = np.flatnonzero(np.concatenate([[True], np.diff(time) != 0]))
     lengths = np.diff(np.append(starts, len(time)))
     steps = np.diff(time[starts])
-    forward = steps[steps > 0]
-    last = float(np.median(forward)) if len(forward) else 1.0
-    until_next = np.append(steps, last)
+    if len(starts) in (1, len(time)) or not (steps > 0).all():
+        return time
+    whole = slice(1 if len(steps) > 1 else 0, None)  # the first batch may have begun before the recording
+    period = float(np.median((steps / lengths[:-1])[whole]))
+    own = np.append(steps / lengths[:-1], min(period, float(np.median(steps)) / lengths[-1]))
+    own = np.where(own > LONGEST_PERIODS * period, period, own)
     place = np.arange(len(time)) - np.repeat(starts, lengths)
-    return time + place * np.repeat(until_next / lengths, lengths)
+    if not _is_cut_down(time[starts]):
+        place = place - np.repeat((lengths - 1) / 2, lengths)
+        return np.repeat(time[starts], lengths) + place * np.repeat(
+            _apart(time[starts], lengths, own), lengths
+        )
+    spread = time + (place + 0.5) * np.repeat(own, lengths)
+    first = np.arange(lengths[0])
+    spread[: lengths[0]] = np.maximum(
+        time[starts[1]] - (lengths[0] - first - 0.5) * period, time[0] + (first + 0.5) * own[0]
+    )
+    return spread
+
+
+def _is_cut_down(stamps: np.ndarray) -> bool:
+    """Whether stamps are whole numbers of their usual step: 1, 0.1, 0.01 ... seconds."""
+    step = float(np.median(np.diff(stamps)))
+    decimal = 10.0 ** round(np.log10(step))
+    whole = stamps / decimal
+    return abs(step / decimal - 1) < 0.01 and bool((np.abs(whole - np.round(whole)) < 1e-3).all())
+
+
+def _apart(stamps: np.ndarray, lengths: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """How far the frames of each batch are apart: no batch reaches into its neighbours."""
+    free = np.diff(stamps)
+    room = 2 * free / (lengths[:-1] + lengths[1:])
+    return np.minimum(own, np.minimum(np.append(room, np.inf), np.insert(room, 0, np.inf)) * (1 - 1e-9))

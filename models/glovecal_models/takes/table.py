@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 
 from glovecal_models.errors import BadTakeTable
-from glovecal_models.takes.frame_times import spread_equal_times, unit_hint
+from glovecal_models.takes.frame_times import spread_equal_times, too_few_digits, unit_hint
 from glovecal_models.takes.raw_table import LONGEST_TAKE_S, YEAR_S, ColumnKind, RawTable
 from glovecal_models.takes.read_table import MAGIC, read_csv_table, read_parquet_table
 from glovecal_models.takes.take import Take, deviation_problem, poses_at_frames
@@ -109,7 +109,8 @@ def _read_table(path: Path, equal_times: EqualTimes = "refuse") -> RawTable:
 def _with_spread_times(table: RawTable) -> RawTable:
     time = table.time_s.copy()
     for rows in _rows_by_take(table).values():
-        time[rows] = spread_equal_times(time[rows])
+        if not too_few_digits(time[rows]):  # else refused below
+            time[rows] = spread_equal_times(time[rows])
     return replace(table, numbers=table.numbers | {"time_s": time})
 
 
@@ -144,6 +145,13 @@ def _require_increasing_time(table: RawTable) -> None:
         back = np.flatnonzero(np.diff(time) <= 0)
         if len(back):
             before, row = int(rows[back[0]]), int(rows[back[0] + 1])
+            if too_few_digits(time):
+                raise table.error(
+                    f"{len(time)} frames have {len(np.unique(time))} different times: they are written with "
+                    "too few digits to tell when a frame was taken. Export them again with milliseconds",
+                    row=row,
+                    column="time_s",
+                )
             raise table.error(
                 f"{table.time_s[row]} does not come after {table.time_s[before]}; time must increase "
                 f"within a take{_time_hint(table.time_s[row] == table.time_s[before], take)}",

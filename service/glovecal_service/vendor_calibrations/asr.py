@@ -2,7 +2,7 @@
 
 The lines begin at the wrist. Flexion is negative radians. The library's fingers have their zero of abduction
 where the file says, not where fingers are parallel. Both points of a line at one angle: not fitted.
-Uncertain: the directions of the wrist's yaw and of the abductions, taken from the two published files.
+Uncertain: the direction of the wrist's yaw, taken from the two published files.
 """
 
 from __future__ import annotations
@@ -26,8 +26,10 @@ ORDER = (
     "I_MCP", "IM_ABD", "I_PIP", "I_DIP", "M_MCP", "PALM_ARCH", "M_PIP", "M_DIP",
     "R_MCP", "MR_ABD", "R_PIP", "R_DIP", "P_MCP", "RP_ABD", "P_PIP", "P_DIP",
 )  # fmt: skip
-_POSITIVE = ("W_ABD", "IM_ABD", "RP_ABD", "TI_ABD")
-"""Of these positive radians are taken for positive degrees of ours; all else bends with negative ones."""
+_POSITIVE = ("W_ABD", "IM_ABD", "TI_ABD")
+"""Of these positive radians are taken for positive degrees of ours; all else bends with negative ones. The
+readings of abductions fall as fingers spread; in the published files RP_ABD does so with negative radians.
+"""
 
 
 def _sign(sensor: str) -> float:

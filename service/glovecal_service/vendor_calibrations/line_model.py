@@ -25,11 +25,14 @@ from glovecal_service.vendor_calibrations.calibration_format import (
     Counts,
     FoundLines,
     SensorLine,
+    require_lines,
 )
 from glovecal_service.vendor_calibrations.opengloves import JOINTS
 
 ASSUMED_SD_DEG = 5.0
 """Near the 4.45 degrees of gains that others were calibrated with (Gracia-Ibanez et al. 2017, precision)."""
+STEEPEST_DEG = 20.0
+"""Degrees for one of 256 counts: eight times the steepest sensor of three published gloves."""
 EIGHT_BITS = (1.0, 255.0)
 """What a glove is taken to send whose layout does not say."""
 
@@ -44,7 +47,7 @@ def read_model(
     """Raises BadInput for text that is none of the format, or of another glove."""
     if len(text) > MOST_CHARACTERS:
         raise BadInput(f"{len(text)} characters are no calibration: {MOST_CHARACTERS} at most")
-    found = form.read(text, counts_of(layout), hand)
+    found = _without_steep(form.read(text, counts_of(layout), hand), counts_of(layout))
     rotations = [_rotation(item, found.lines, layout) for item in layout.correspondences]
     known = [item for item in rotations if item is not None]
     if not known:
@@ -62,6 +65,18 @@ def read_model(
         error_estimate={"how": f"not estimated: imported from {form.name}", "folds": 0},
     )
     return model, found
+
+
+def _without_steep(found: FoundLines, counts: Counts) -> FoundLines:
+    """What no sensor can tell is left out: two points that are hardly apart give any number of degrees."""
+    most = STEEPEST_DEG / counts.per_8_bit
+    steep = {
+        name: f"its points are too close together: {abs(line.gain):.3g} degrees a count, {most:.3g} at most"
+        for name, line in found.lines.items()
+        if abs(line.gain) > most
+    }
+    flat = {name: line for name, line in found.lines.items() if name not in steep}
+    return require_lines(FoundLines(flat, {**found.left_out, **steep}), "the calibration")
 
 
 def _rotation(item: Correspondence, lines: Mapping[str, SensorLine], layout: Layout) -> RotationModel | None:

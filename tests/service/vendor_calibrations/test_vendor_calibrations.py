@@ -108,6 +108,27 @@ def test_asr_begins_at_the_wrist_and_bends_with_negative_radians() -> None:
     assert found.left_out["PALM_ARCH"] == "both points tell one angle or one reading"
 
 
+def test_asr_abductions_fall_as_fingers_spread() -> None:
+    """The signs of both published files, with numbers of our own."""
+    rows = ["0.0:60.0 0.0:144.0"] * 22
+    falling, rising = "-0.2:180.0 0.3:70.0", "0.4:140.0 -0.1:60.0"
+    for sensor, row in (("TI_ABD", falling), ("IM_ABD", falling), ("MR_ABD", rising), ("RP_ABD", rising)):
+        rows[asr.ORDER.index(sensor)] = row
+    found = asr.read("\n".join(rows), EIGHT, "right")
+    assert len(found.lines) == 4
+    assert all(line.gain < 0 for line in found.lines.values())
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_points_that_are_hardly_apart_tell_no_line(name: str) -> None:
+    form, layout = FORMATS[name], LAYOUT_OF[name]
+    good, steep = layout.sensors[0], layout.sensors[1]
+    text = form.write({good: SensorLine(0.7, 80.0), steep: SensorLine(1e4, 80.0)}, EIGHT, "right")
+    _, found = read_model(text, form, layout, "anna", "right")
+    assert steep not in found.lines
+    assert "too close together" in found.left_out[steep] or "one reading" in found.left_out[steep]
+
+
 def test_shadow_leaves_out_what_is_no_line_or_was_switched_off() -> None:
     points = {
         "G_IndexMPJ": [(0.25, 0.0), (0.75, 90.0)],

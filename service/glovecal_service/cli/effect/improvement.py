@@ -95,7 +95,7 @@ def improve(
     ] = True,
     spread_equal_times: Annotated[
         bool,
-        typer.Option("--spread-equal-times", help="Frames stamped in batches: spread each up to the next."),
+        typer.Option("--spread-equal-times", help="Frames stamped in batches: spread each over its batch."),
     ] = False,
     activate: Annotated[bool, typer.Option("--activate", help="Predict live with the last model.")] = False,
     report: Report = None,

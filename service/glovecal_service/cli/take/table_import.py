@@ -41,7 +41,7 @@ def import_takes(
     wearing: Annotated[str | None, typer.Option(help="The wearing, where the file does not say it.")] = None,
     spread_equal_times: Annotated[
         bool,
-        typer.Option("--spread-equal-times", help="Frames stamped in batches: spread each up to the next."),
+        typer.Option("--spread-equal-times", help="Frames stamped in batches: spread each over its batch."),
     ] = False,
     as_json: AsJson = False,
 ) -> None:
