@@ -7,13 +7,15 @@ from dataclasses import replace
 from typing import cast
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from loop_by_hand import ByHand
+from loop_by_hand import ByHand, LoopByHand, moving_frames
 from realtime_support import linear_model
 
 from glovecal_client.keys import GloveKeys
 from glovecal_client.wire.frame import Frame, encode_frame
+from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_service.realtime.arrivals import Arrival, Arrivals
 from glovecal_service.realtime.glove_lane import WAITING_LIMIT, GloveLane
 from glovecal_service.realtime.glove_lanes import VALID_WITHIN_NS, GloveLanes
@@ -188,6 +190,29 @@ def overloaded(gloves: int, models: int) -> tuple[list[CostlyPace], list[GloveLa
     )  # fmt: skip
     loop.step()
     return [cast(CostlyPace, model.pace) for model in served], loop.lanes
+
+
+class Fails:
+    """A predictor as a damaged model or a user's own regressor may have one."""
+
+    def predict(self, readings: np.ndarray) -> None:
+        raise RuntimeError("index 7 is out of bounds")
+
+
+def test_a_model_that_fails_takes_no_other_glove_its_poses(caplog: pytest.LogCaptureFixture) -> None:
+    by_hand = LoopByHand.serving(linear_model("anna", degrees_per_count=0.5))
+    by_hand.serve("g2", linear_model("bert", degrees_per_count=0.25), number=2)
+    served = by_hand.models.of("g2")
+    assert served is not None
+    by_hand.models.put("g2", replace(served, predictor=cast(GlovePredictor, Fails())))
+    frames = moving_frames(20)
+    by_hand.send((glove, frame) for frame in frames for glove in ("g1", "g2"))
+    assert len(by_hand.poses["g1"]) == 20
+    assert "g2" not in by_hand.poses
+    status = by_hand.status("g2")
+    assert status["refused"] == {"not_predictable": 20}
+    assert "out of bounds" not in str(status)
+    assert sum("fails on a frame" in record.message for record in caplog.records) == 1
 
 
 def test_under_overload_a_turn_has_a_frame_of_each_glove_of_its_model() -> None:

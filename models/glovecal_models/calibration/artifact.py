@@ -18,6 +18,7 @@ import safetensors.numpy
 
 from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.model import CalibrationModel, RotationModel, restore_regressor
+from glovecal_models.calibration.servable import check_servable
 from glovecal_models.calibration.unseen_wearing import UnseenWearing
 from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.layout import Layout
@@ -33,7 +34,11 @@ def model_id(artifact: bytes) -> str:
 
 
 def dump(model: CalibrationModel) -> bytes:
-    """The model as bytes. The same model always gives the same bytes."""
+    """The model as bytes. The same model always gives the same bytes.
+
+    Raises BadInput for a model that does not predict: what is kept can be served.
+    """
+    check_servable(model)
     tensors: dict[str, np.ndarray] = {}
     rotations = []
     for item in model.rotations:

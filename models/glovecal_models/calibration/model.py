@@ -56,6 +56,13 @@ class RotationModel:
     def rotation(self) -> str:
         return self.correspondence.rotation
 
+    @property
+    def trained_ranges(self) -> tuple[tuple[str, float, float], ...]:
+        """Name, smallest and largest training value of each input; none for a rule, which was not trained."""
+        if not len(self.input_low):
+            return ()
+        return tuple(zip(self.correspondence.inputs, self.input_low, self.input_high, strict=True))
+
 
 @dataclass(frozen=True)
 class CalibrationModel:

@@ -66,7 +66,7 @@ def trained_ranges(trained: Sequence[RotationModel], sensors: Sequence[str]) -> 
     """Lowest and highest reading (S,) of each sensor in training; NaN for one that nothing is read from."""
     ranges: Mapping[str, list[tuple[float, float]]] = {name: [] for name in sensors}
     for item in trained:
-        for name, low, high in zip(item.correspondence.inputs, item.input_low, item.input_high, strict=True):
+        for name, low, high in item.trained_ranges:
             if name in ranges:
                 ranges[name].append((float(low), float(high)))
     low = [min((low for low, _ in ranges[name]), default=np.nan) for name in sensors]

@@ -135,8 +135,11 @@ class ModelWatcher:
             serving = choose(store, glove, self._metas.of(glove), self._models.in_use())
         except (StoreUnavailable, SQLAlchemyError, OSError):
             raise
-        except (GlovecalError, ArithmeticError, ValueError, MemoryError) as error:
+        except GlovecalError as error:
             serving = self._keep(glove, str(error))
+        except Exception:  # whatever is wrong with one wearer's model, the other gloves keep theirs
+            _log.exception("glove %s: its model cannot be prepared", glove)
+            serving = self._keep(glove, "the newer one fails here, the log of real time says where")
         self._worn.put(glove, WornGlove.of(self._metas.of(glove), serving.wearing, serving.latency))
         self._serve(glove, serving)
         self._gloves.add(glove)

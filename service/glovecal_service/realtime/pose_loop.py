@@ -9,6 +9,7 @@ costs least in a full turn, so more load never means fewer poses, and every glov
 from __future__ import annotations
 
 import gc
+import logging
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -27,6 +28,7 @@ from glovecal_client.wire.pose import (
     encode_rotations,
 )
 from glovecal_models.calibration.predictor import GloveAngles
+from glovecal_models.calibration.servable import LARGEST_DEG
 from glovecal_service.realtime.arrivals import Arrival, Arrivals
 from glovecal_service.realtime.corrected_frames import corrected
 from glovecal_service.realtime.glove_lane import GloveLane
@@ -49,6 +51,8 @@ _EXTRAPOLATING = int(PoseFlag.EXTRAPOLATING)
 _TOO_UNCERTAIN = int(PoseFlag.TOO_UNCERTAIN)
 _POSE_FLAGS = (0, _EXTRAPOLATING, _TOO_UNCERTAIN, _EXTRAPOLATING | _TOO_UNCERTAIN)
 """A pose's flags by the union of its rotations' flags 1 (extrapolating) and 2 (too uncertain)."""
+
+_log = logging.getLogger("glovecal.realtime")
 
 PublishPose = Callable[[str, bytes], None]
 """Glove name and encoded pose."""
@@ -76,6 +80,7 @@ class PoseLoop:
         self._pending: dict[GloveLane, None] = {}
         self._looked_for_stale_ns = 0
         self._collected_ns = clock_ns()
+        self._failed: set[str] = set()
 
     @property
     def lanes(self) -> list[GloveLane]:
@@ -130,7 +135,14 @@ class PoseLoop:
                 else:
                     opened.append((lane, frame, received_ns))
         if opened:
-            self._predict_and_send(model, opened)
+            try:
+                self._predict_and_send(model, opened)
+            except Exception:  # a model may come from elsewhere: its fault must not end other gloves' poses
+                if model.model_id not in self._failed:
+                    self._failed.add(model.model_id)
+                    _log.exception("model %s fails on a frame", model.model_id[:12])
+                for lane, frame, _ in opened:
+                    lane.refusals.add(_not_predictable(frame, model, "it fails, the log says where"))
         return len(opened)
 
     def _predict_and_send(self, model: ServedModel, opened: list[tuple[GloveLane, Frame, int]]) -> None:
@@ -141,18 +153,14 @@ class PoseLoop:
                 opened[row][0].refusals.add(why)
             opened = [item for row, item in enumerate(opened) if row not in refused]
             readings = np.delete(readings, list(refused), axis=0)
-        try:
-            angles = model.predictor.predict(readings)
-        except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
-            for lane, frame, _ in opened:
-                lane.refusals.add(_not_predictable(frame, model, str(error)))
-            return
+        angles = model.predictor.predict(readings)
         angles, effect_flags = corrected(model, opened, readings, angles, self._worn)
-        usable: np.ndarray = np.logical_and.reduce(np.isfinite(angles.mean + angles.sd), axis=1)
+        size = np.maximum(np.abs(angles.mean), np.abs(angles.sd))
+        usable: np.ndarray = np.logical_and.reduce(size <= LARGEST_DEG, axis=1)  # NaN is not
         if not usable.all():
             for row in np.flatnonzero(~usable).tolist():
                 lane, frame, _ = opened[row]
-                lane.refusals.add(_not_predictable(frame, model, "an angle is not finite"))
+                lane.refusals.add(_not_predictable(frame, model, "an angle is absurd or not finite"))
             opened = [item for row, item in enumerate(opened) if usable[row]]
             effect_flags = [flags for row, flags in enumerate(effect_flags) if usable[row]]
             angles = GloveAngles(angles.mean[usable], angles.sd[usable], angles.flags[usable])

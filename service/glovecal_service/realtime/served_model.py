@@ -12,6 +12,7 @@ from glovecal_client.wire.pose import model_bytes
 from glovecal_models.calibration.effect_correction import EffectCorrection
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
+from glovecal_models.calibration.servable import check_servable
 from glovecal_models.calibration.wearer_fit import WearerFit
 from glovecal_service.realtime.pace import Pace
 from glovecal_service.realtime.refusal import Refusal, Refused
@@ -46,7 +47,11 @@ class ServedModel:
 
     @classmethod
     def prepare(cls, model_id: str, model: CalibrationModel) -> ServedModel:
-        """Build the predictor and run it a few times, so that the first frame finds it warm."""
+        """Build the predictor and run it a few times, so that the first frame finds it warm.
+
+        Raises BadInput for a model that does not predict.
+        """
+        check_servable(model)
         predictor = GlovePredictor(model)
         low, high = model.layout.counts or (0.0, 1.0)
         readings = np.full((1, len(model.layout.sensors)), 0.5 * (low + high))

@@ -274,7 +274,7 @@ def test_from_a_first_sampling_by_timer_to_a_checked_wearing_by_pedal(opened: Op
     in_phase(page, "waiting", "ready", "now")
     page.get_by_role("heading", name="Done").wait_for(timeout=600_000)
     page.get_by_role("button", name="Train a model").click()
-    page.get_by_text("Trained, and served from the next frame on.").wait_for(timeout=300_000)
+    page.get_by_text("Trained, and served: the poses of").wait_for(timeout=300_000)
     assert [each["active"] for each in asked(address, "models", subject=SUBJECT)] == [True]
 
     page = opened("capture?mode=wearing").page

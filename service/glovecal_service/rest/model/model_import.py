@@ -14,7 +14,7 @@ from pydantic import BaseModel, Field, ValidationError
 from glovecal_models.calibration.artifact import load, model_id
 from glovecal_models.calibration.explanation import FrameExplainer
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.predictor import GlovePredictor
+from glovecal_models.calibration.servable import check_servable
 from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
@@ -130,7 +130,7 @@ def _tried(artifact: bytes) -> CalibrationModel:
             _facts(model, ()), now(),
         )  # fmt: skip
         ModelInFull.model_validate(model_row(record, False) | model_details(model))
-        GlovePredictor(model).predict(readings[None])
+        check_servable(model)
         FrameExplainer(model).frame(0.0, readings, {}, "")
     except (DamagedArtifact, BadInput) as error:
         raise BadInput(f"no model was imported: {error}") from error
@@ -138,7 +138,7 @@ def _tried(artifact: bytes) -> CalibrationModel:
         place = ".".join(map(str, error.errors()[0]["loc"]))
         raise BadInput(f"no model was imported: {place} is not what it should be") from error
     except (ValueError, IndexError, KeyError, TypeError, AttributeError, np.linalg.LinAlgError) as error:
-        raise BadInput(f"no model was imported: it does not predict a frame ({error})") from error
+        raise BadInput("no model was imported: it does not predict a frame of its own layout") from error
     return model
 
 

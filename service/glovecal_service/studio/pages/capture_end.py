@@ -10,6 +10,7 @@ from nicegui import ui
 
 from glovecal_service.studio.heading import heading
 from glovecal_service.studio.job_watch import JobWatch
+from glovecal_service.studio.served_label import ServedLabel
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.studio import Studio
 
@@ -73,7 +74,7 @@ class SamplingEnd:
         if job["state"] != "done":
             return
         with self._after, ui.element("div"):
-            ui.label("Trained, and served from the next frame on.")
+            ServedLabel(self._studio, self._view["glove"], job["result"]["model"], "Trained")
             ui.link("See the hand live", "/live").classes("studio-link")
             ui.link("See its error", "/models").classes("studio-link")
 
@@ -114,11 +115,12 @@ class SamplingEnd:
             await service.post(f"/models/{found['model']}/activate")
         with self._after, ui.element("section").classes("finding"):
             heading(2, f"Wearing {found['wearing']} is checked")
-            ui.label(
-                "The checked model is served from the next frame on."
-                if is_better
-                else "The model stays as it was: its poses are not better after the check."
-            ).classes("finding-sentence")
+            if is_better:
+                ServedLabel(self._studio, view["glove"], found["model"], "The model is checked")
+            else:
+                ui.label("The model stays as it was: its poses are not better after the check.").classes(
+                    "finding-sentence"
+                )
             for sentence in found["sentences"]:
                 ui.label(sentence)
             if not is_better:
@@ -133,4 +135,5 @@ class SamplingEnd:
         except Refusal as refusal:
             ui.notify(str(refusal), type="warning")
             return
-        ui.notify("The checked model is served from the next frame on.")
+        with self._after:
+            ServedLabel(self._studio, self._view["glove"], model, "The checked model is active")
