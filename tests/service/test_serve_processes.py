@@ -95,8 +95,6 @@ def listener(process: subprocess.Popen[str], port: int) -> int:
     return 0
 
 
-<<<<<<< HEAD
-=======
 @pytest.mark.skipif(sys.platform == "win32", reason="no process is halted there")
 def test_it_is_healthy_only_while_gloves_are_served(
     serving: tuple[subprocess.Popen[str], str, int], tmp_path: Path
@@ -116,8 +114,6 @@ def test_it_is_healthy_only_while_gloves_are_served(
     assert said.startswith("Not ready: no glove is served: the real-time process was last seen ")
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
->>>>>>> 6acf20a (Service is ready only while gloves are served; a health check that every engine asks alike; containers verb)
 def test_each_part_survives_the_death_of_the_others(serving: tuple[subprocess.Popen[str], str, int]) -> None:
     process, endpoint, port = serving
     assert process.stdout is not None
