@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 from cli_running import COMMAND
+from realtime_support import eventually
 
 from glovecal_client import Recording, open_router
 from glovecal_client.capture.command import main as capture_alone
@@ -56,6 +57,18 @@ def test_what_cannot_be_emulated_is_refused(run, tmp_path: Path) -> None:
 
 
 @POSIX_ONLY
+def stop_after(count: int, data: Path, stop: threading.Event) -> None:
+    """Set ``stop`` once so many frames are in the log of the capture that writes to ``data``."""
+
+    def logs() -> list[Path]:
+        return list(data.rglob("*.glvlog"))
+
+    try:
+        eventually(lambda: any(len(list(Recording.open(log).frames())) > count for log in logs()), "frames")
+    finally:
+        stop.set()
+
+
 def test_capture_records_an_emulated_glove_as_simulated(tmp_path: Path) -> None:
     """The command as a process of its own, and the line it prints."""
     process = subprocess.Popen([*COMMAND, "emulate", "lucidglove"], stdout=subprocess.PIPE, text=True)
@@ -67,7 +80,7 @@ def test_capture_records_an_emulated_glove_as_simulated(tmp_path: Path) -> None:
         options = parse_options([word for before, word in pairwise(words) if before == "--option"])
         endpoint, stop = free_endpoint(), threading.Event()
         with open_router([endpoint]):
-            threading.Timer(2.0, stop.set).start()
+            threading.Thread(target=stop_after, args=(60, tmp_path, stop)).start()
             summary = run_capture(
                 device, "right", options=options, endpoints=[endpoint], data=tmp_path, stop=stop
             )
