@@ -22,6 +22,8 @@ OF_DO_PY |= dict.fromkeys(("--limits", "--minutes", "--page"), "tests/study/stud
 OF_DO_PY["--simulated"] = "client/examples/stream/hand_stream.py"
 OF_DO_PY["--confusion"] = "client/examples/spell.py"
 OF_DO_PY["--shapes"] = "tests/study/tracked_errors.py"
+CAPTURE = "client/glovecal_client/capture/command.py"
+OF_DO_PY |= dict.fromkeys(("--install-unit", "--log-limit"), CAPTURE)  # of glovecal-capture alone
 COMMAND = typer.main.get_command(app)
 
 
