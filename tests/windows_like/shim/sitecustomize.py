@@ -25,6 +25,7 @@ import sys
 import time
 import types
 from pathlib import Path
+from typing import Any
 
 FOLDER = os.environ.get("WINDOWS_LIKE_FOLDER", "")
 PROCESSES = Path(FOLDER, "windows-like-processes")
@@ -54,7 +55,7 @@ class Other(types.ModuleType):
         missing = set(NOT_THERE.get(real.__name__, "").split())
         self.__dict__.update(_real=real, _changed=changed, _missing=missing)
 
-    def __getattr__(self, name: str) -> object:
+    def __getattr__(self, name: str) -> Any:
         if name in self._missing:
             raise AttributeError(f"module {self._real.__name__!r} has no attribute {name!r} on Windows")
         return self._changed[name] if name in self._changed else getattr(self._real, name)
@@ -142,11 +143,11 @@ class Popen(subprocess.Popen):
     def terminate(self) -> None:
         self.kill()
 
-    def send_signal(self, number: int) -> None:
-        if number == CTRL_BREAK_EVENT and self.poll() is None:
+    def send_signal(self, sig: int) -> None:
+        if sig == CTRL_BREAK_EVENT and self.poll() is None:
             os.killpg(self.pid, SIGBREAK)
-        elif number != CTRL_BREAK_EVENT:
-            super().send_signal(number)
+        elif sig != CTRL_BREAK_EVENT:
+            super().send_signal(sig)
 
 
 def set_signal(number, handler):
