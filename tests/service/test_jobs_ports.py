@@ -29,7 +29,7 @@ def listening() -> set[int]:
 def _connections(process):
     try:
         return process.net_connections("tcp")
-    except psutil.NoSuchProcess:
+    except psutil.Error:  # it is gone or, as nobody's files, refused while it goes
         return []
 
 

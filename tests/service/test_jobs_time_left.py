@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import os
-import pty
 import re
-import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +16,7 @@ from cli_running import (  # pyright: ignore[reportMissingImports]
     environment,
     glovecal,
 )
+from terminal_process import on_terminal  # pyright: ignore[reportMissingImports]
 
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.write_table import write_takes
@@ -86,26 +83,7 @@ def test_a_terminal_and_the_job_tell_what_is_decided_and_how_long_it_takes(setti
 
 
 def _on_a_terminal(settings: dict[str, str], *arguments: str) -> str:
-    """All that is written to a terminal of 100 columns."""
-    outside, inside = pty.openpty()
-    told: list[bytes] = []
-
-    def listen() -> None:
-        while True:
-            try:
-                text = os.read(outside, 4096)
-            except OSError:  # the other end was closed
-                return
-            told.append(text)
-
-    listener = threading.Thread(target=listen)
-    listener.start()
-    with_terminal = environment(settings) | {"TERM": "xterm", "COLUMNS": "100"}
-    process = subprocess.Popen([*COMMAND, *arguments], env=with_terminal, stdout=inside, stderr=inside)
-    os.close(inside)
-    code = process.wait(120)
-    listener.join(10)
-    os.close(outside)
-    shown = b"".join(told).decode(errors="replace")
-    assert code == 0, shown
-    return shown
+    """All that is written to a terminal."""
+    with on_terminal([*COMMAND, *arguments], environment(settings) | {"TERM": "xterm"}) as process:
+        assert process.end(deadline_s=500.0) == 0, process.said
+    return process.said
