@@ -48,7 +48,7 @@ def locked(python: str, system: str) -> list[dict[str, Any]]:
         if key in reached or not Marker(wanted.get("marker", "os_name != ''")).evaluate(here):
             continue
         names = (each for each in LOCK["package"] if each["name"] == key[0])
-        reached[key] = package = next(each for each in names if version in (None, each["version"]))
+        reached[key] = package = next(each for each in names if version in (None, each.get("version")))
         groups = package.get("optional-dependencies", {}) | package.get("dev-dependencies", {})
         needed = (group for name, group in groups.items() if name not in OTHER_GROUPS)
         waiting += chain(package.get("dependencies", []), *needed)
