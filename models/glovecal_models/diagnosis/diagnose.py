@@ -38,7 +38,6 @@ from glovecal_models.diagnosis.unexplained_residual import (
     unexplained_residual,
     within_slip,
 )
-from glovecal_models.diagnosis.unsettled import unsettled_effects, without_unsettled
 from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Motion
@@ -137,21 +136,19 @@ def diagnose(
         residual = UnexplainedResidual(obstacle="single poses")
     else:
         after = problem.with_first(naming, by_name, design)
-        whole = after.design()
-        rest = without_unsettled(whole, after.known)
+        rest = after.design()
         likely = [item.effect for item in impossible if item.saves_much]
         residual = unexplained_residual(
-            rest, problem.even, layout, seed, floors=noise_floors, undecided=likely,
+            rest, problem.even, layout, seed, known=after.known, floors=noise_floors, undecided=likely,
             stated_deg={} if seen is None else seen.stated_deg,
         )  # fmt: skip
         residual = replace(
             residual,
             after=tuple(dict.fromkeys((*has_names, *(item.effect for item in naming.ranked[:1])))),
-            unsettled=unsettled_effects(rest, after.known),
         )
         there = {(item.effect.name, joint) for item in after.known for joint in item.joints}
         actions = actions_for(
-            residual.associations, whole, layout, there, linear=linear, seed=seed, saved_by_known=saved,
+            residual.associations, rest, layout, there, linear=linear, seed=seed, saved_by_known=saved,
             wholes=wholes,
         )  # fmt: skip
     progress("done", 1.0)

@@ -3,19 +3,28 @@
 Slow errors, errors that joints share, and errors far above the noise floor are no noise. A healthy glove has
 them too: it slips a little while it is worn, and its calibration is unsure where training data are few.
 Significant is what exceeds a healthy glove's.
+
+Beside effects that remember, what their unknown start leaves is not judged. Nobody recorded what a joint did
+before a take, so the state of a memory starts as a guess, and the error of that guess stays until the effect
+has settled (``HistoryEffect.unsettled``): an offset of the take that slowly changes. It is the effect's own,
+neither noise nor another cause. Until then the mean and the straight line of the error are not judged, and
+stretches too short for a line not at all.
 """
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
+from glovecal_models.calibration.held_out import BaseProducts
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.diagnosis.floor_ratio import FloorRatio, floor_ratios
 from glovecal_models.diagnosis.forward_design import ForwardDesign
+from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.resampled import ResampledTake
 from glovecal_models.diagnosis.residual_association import ResidualAssociation, residual_associations
@@ -29,8 +38,11 @@ from glovecal_models.diagnosis.slow_error import (
     slow_error,
     without_drift,
 )
+from glovecal_models.effects.base.history_effect import unbroken
 from glovecal_models.layout import Layout
 
+SHORTEST_LINE_S = 4.0
+"""As the shortest take of which a slow error is judged."""
 MOST_JOINTS = 6
 """So many of the worst are tested against every column."""
 Obstacle = Literal["single poses", "no measured angle", "few stretches", "wide interval"]
@@ -100,11 +112,12 @@ def unexplained_residual(
     layout: Layout,
     seed: int = 0,
     *,
+    known: Sequence[KnownEffect] = (),
     floors: Mapping[str, NoiseFloor] | None = None,
     undecided: Sequence[str] = (),
     stated_deg: Mapping[str, float] = NOTHING_STATED,
 ) -> UnexplainedResidual:
-    """Judge the held-out residuals of ``design``, known effects included in its base.
+    """Judge the held-out residuals of ``design``, whose base includes the ``known`` effects.
 
     ``stated_deg``: of each joint whose reference states deviations, degrees. What a camera gets wrong lasts:
     a slow error no larger than them is the camera's, and what joints share too, as it sees one hand.
@@ -112,6 +125,7 @@ def unexplained_residual(
     ``even``: its takes, for their readings; ``floors``: of each joint where it is known. ``undecided``:
     effects that save much and that these takes cannot decide; they are not in the base.
     """
+    design = _without_unsettled(design, known)
     generator, limits = np.random.default_rng(seed), design.limits
     means = [second_means(design, joint) for joint in range(len(design.rotations))]
     slow = _slow(design, means)
@@ -121,6 +135,7 @@ def unexplained_residual(
         within_takes=dict(zip(design.rotations, within, strict=True)),
         floor_ratios=floor_ratios(design, floors or {}),
         undecided=tuple(undecided),
+        unsettled=_unsettled_effects(design, known),
         limits=limits,
     )
     above = [name for name, item in found.floor_ratios.items() if item.exceeds > 1]
@@ -205,3 +220,67 @@ def _healthy(item: SlowError, limits: DiagnosisLimits) -> float:
 
 def _healthy_within(item: SlowError, limits: DiagnosisLimits) -> float:
     return max(limits.healthy_within_deg, limits.healthy_within_noises * item.noise_deg)
+
+
+def _without_unsettled(design: ForwardDesign, known: Sequence[KnownEffect]) -> ForwardDesign:
+    """The design with those rows and residuals that can be judged; the same where nothing remembers."""
+    masks = [_unsettled(design, known, joint) for joint in range(len(design.rotations))]
+    if not any(masks):
+        return design
+    judged = [_judged(design, joint, mask) for joint, mask in enumerate(masks)]
+    used, products = zip(*judged, strict=True)
+    return replace(design, used=used, products=products, kept={})
+
+
+def _unsettled_effects(design: ForwardDesign, known: Sequence[KnownEffect]) -> tuple[str, ...]:
+    """Names of those that settle in none of the takes: nothing is known of offsets of whole takes."""
+    found = [
+        item.effect.name
+        for item in known
+        for joint in range(len(design.rotations))
+        if (masks := _unsettled(design, [item], joint)) and all(mask.all() for mask in masks)
+    ]
+    return tuple(dict.fromkeys(found))
+
+
+def _unsettled(design: ForwardDesign, known: Sequence[KnownEffect], joint: int) -> list[np.ndarray]:
+    """For each take (N,) where an effect on a joint has not settled; empty where none remembers."""
+    name = design.rotations[joint]
+    every = [item.unsettled(design.signals, joint, name) for item in known]
+    return [np.any(masks, axis=0) for masks in zip(*(each for each in every if each), strict=True)]
+
+
+def _judged(
+    design: ForwardDesign, joint: int, masks: Sequence[np.ndarray]
+) -> tuple[tuple[np.ndarray, ...], BaseProducts]:
+    """The rows of each unit and what the base leaves there, of one joint; ``masks`` of its takes, or none."""
+    products = copy.copy(design.products[joint])
+    if not masks:
+        return design.used[joint], products
+    used, units, residuals = [], [], []
+    parts = zip(design.units(joint), products.units, products.residual, strict=True)
+    for (take, rows), unit, residual in parts:
+        left = _settled_part(design.signals[take].time_s, rows, residual, masks[take])
+        kept = np.isfinite(left)
+        used.append(rows[kept])
+        weight = None if unit.weight is None else unit.weight[kept]
+        units.append(replace(unit, base=unit.base[kept], target=unit.target[kept], weight=weight))
+        residuals.append(left[kept])
+    products.units, products.residual = units, tuple(residuals)
+    return tuple(used), products
+
+
+def _settled_part(time_s: np.ndarray, rows: np.ndarray, residual: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """(M,) at the ``rows`` of a take of ``time_s`` (N,), NaN where nothing can be judged; ``mask`` (N,) is
+    True where effects have not settled, which they begin anew after a gap."""
+    result = residual.copy()
+    for part in unbroken(time_s):
+        early = (rows >= part.start) & (rows < part.stop) & mask[rows]
+        at = time_s[rows[early]]
+        if not len(at):
+            continue
+        if np.ptp(at) < SHORTEST_LINE_S:
+            result[early] = np.nan
+        else:
+            result[early] -= np.polyval(np.polyfit(at - at[0], result[early], 1), at - at[0])
+    return result
