@@ -132,7 +132,7 @@ def test_a_process_that_cannot_start_is_told_in_its_own_words(
     job = create(sqlite_store, ledger, [1])
     program = Path(jobs_process.__file__)
     command = [sys.executable, str(program), str(sqlite_settings.data), "", str(broken)]
-    assert subprocess.run(command, capture_output=True, timeout=120).returncode == 0
+    assert subprocess.run(command, capture_output=True, timeout=500).returncode == 0
     assert error_of(sqlite_store, job.id).endswith(
         "Nanny failed to start: ValueError: the installation is damaged"
     )
