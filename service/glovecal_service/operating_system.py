@@ -56,7 +56,7 @@ def step_back() -> None:
     if sys.platform == "win32":
         _set_class(_BELOW_NORMAL_CLASS)
     else:
-        os.nice(BEHIND - os.nice(0))
+        os.nice(max(0, BEHIND - os.nice(0)))  # a command that was begun behind stays there
 
 
 def step_back_in_this_thread() -> None:
@@ -67,7 +67,8 @@ def step_back_in_this_thread() -> None:
         kernel = ctypes.WinDLL("kernel32")
         kernel.SetThreadPriority(ctypes.c_void_p(kernel.GetCurrentThread()), _BELOW_NORMAL_THREAD)
     elif sys.platform == "linux":
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), BEHIND)
+        thread = threading.get_native_id()
+        os.setpriority(os.PRIO_PROCESS, thread, max(BEHIND, os.getpriority(os.PRIO_PROCESS, thread)))
     else:
         step_back()
 
