@@ -119,10 +119,9 @@ def test_what_was_sent_is_read_value_by_value(name: str, tmp_path: Path) -> None
     with pair(name, tmp_path) as both:
         opened(both.device)
         found = readings(both.device, 40)
-        first = tuple(found[0].readings.tolist())
-        sent = both.sent()
-        begin = sent.index(first)
-        assert [tuple(reading.readings.tolist()) for reading in found] == sent[begin : begin + 40]
+        values, sent = [tuple(reading.readings.tolist()) for reading in found], both.sent()
+        # a hand that hardly moves sends the same values more than once
+        assert any(values == sent[begin : begin + 40] for begin in range(len(sent) - 39))
         assert both.device.simulated
         assert both.device.counters.bad_frames == 0  # type: ignore[attr-defined]
         stamps = [reading.monotonic_ns for reading in found]
@@ -257,8 +256,8 @@ def test_fragments_of_time_stamps_between_records_cost_no_record(tmp_path: Path)
     with pair("cyberglove3", tmp_path, "fragments") as both:
         opened(both.device)
         found = readings(both.device, 60)
-        first = both.sent().index(tuple(found[0].readings.tolist()))
-        assert [tuple(one.readings.tolist()) for one in found] == both.sent()[first : first + 60]
+        values, sent = [tuple(reading.readings.tolist()) for reading in found], both.sent()
+        assert any(values == sent[begin : begin + 60] for begin in range(len(sent) - 59))
 
 
 def test_a_cyberglove_with_the_simulated_hand_in_it(tmp_path: Path) -> None:
