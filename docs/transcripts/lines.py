@@ -1,6 +1,7 @@
 """What a page promises beside what was printed: the same words, figures within a tolerance, names by meaning.
 
-A page's output may be shortened: a line of ``...`` stands for any lines, ``...`` in a line for any text.
+A page's output may be shortened: a line of ``...`` stands for any lines, or none (which of a
+stream's lines is the page's is a matter of chance); ``...`` in a line stands for any text.
 """
 
 from __future__ import annotations
@@ -96,7 +97,7 @@ def rewritten(promised: Sequence[str], printed: Sequence[str], names: Names) -> 
                 raise NoLongerPrinted(number)
         first = min(at) if group.elision is not None else end
         last = max(at) if group.is_cut else len(printed) - 1
-        if group.elision is not None and first > end:
+        if group.elision is not None:
             written.append(group.elision)
         lines_here = {places[number]: number for number in group.numbers if number in places}
         for place in range(first, last + 1):
@@ -105,8 +106,8 @@ def rewritten(promised: Sequence[str], printed: Sequence[str], names: Names) -> 
                 line = _shortened(promised[lines_here[place]], line, names)
             written.append(names.in_page(line))
         end = last + 1
-    if end < len(printed):
-        written.append(next(line for line in reversed(promised) if is_elision(line)))
+    if promised and is_elision(promised[-1]):
+        written.append(promised[-1])
     return written
 
 
