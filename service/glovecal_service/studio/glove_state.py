@@ -41,7 +41,8 @@ class GloveState:
     refused: int
     """Frames that reached it and could not be used."""
     model: str | None
-    """Of the newest pose, 64 hexadecimal digits; None: uncalibrated."""
+    """Of the newest pose, 64 hexadecimal digits; None: uncalibrated. Of a glove that is not watched, as the
+    service says."""
 
 
 def glove_state(
@@ -73,7 +74,7 @@ def glove_state(
         skipped=0 if pose is None else pose.skipped,
         lost=None if (lost := _number(account.get("missing"))) is None else int(lost),
         refused=int(sum(_number(each) or 0 for each in refused.values())) if isinstance(refused, dict) else 0,
-        model=None if pose is None else pose.model_sha256,
+        model=_identity(account.get("model")) if pose is None else pose.model_sha256,
     )
 
 
@@ -91,6 +92,11 @@ def _number(value: Any) -> float | None:
     """What came over the network may be anything."""
     is_number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
     return float(value) if is_number else None
+
+
+def _identity(value: Any) -> str | None:
+    """What came over the network may be anything."""
+    return value if isinstance(value, str) else None
 
 
 def _as_sentence(text: str) -> str:

@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from functools import partial
 from pathlib import Path
 from typing import TextIO
@@ -47,8 +47,12 @@ def unread_pipe() -> Iterator[TextIO]:
     """A real pipe whose reader is gone."""
     reading, writing = os.pipe()
     os.close(reading)
-    with os.fdopen(writing, "w") as pipe:
+    pipe = os.fdopen(writing, "w")
+    try:
         yield pipe
+    finally:
+        with suppress(BrokenPipeError):  # what is still buffered has no reader either
+            pipe.close()
 
 
 @pytest.mark.parametrize(

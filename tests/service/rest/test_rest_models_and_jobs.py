@@ -386,7 +386,9 @@ def test_no_service_is_said_with_its_address() -> None:
 def test_an_answer_that_is_no_problem_document_is_still_an_error() -> None:
     class Proxy(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
-            self.send_error(502, explain="<html>proxy</html>")
+            self.send_response(502)
+            self.end_headers()
+            self.wfile.write(b"<html>proxy</html>")
 
         def log_message(self, format: str, *args: Any) -> None:
             pass
