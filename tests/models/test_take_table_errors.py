@@ -56,6 +56,7 @@ BROKEN = [
     ("time_s,s.A\n0,1\n2,1\n1,1\n", 4, "time_s", "1.0 does not come after 2.0"),
     ("time_s,s.A\n0,1\n0,1\n", 3, "time_s", "too few digits"),
     ("time_s,s.A\n0,1\n0,1\n1,1\n2,1\n", 3, "time_s", "batches"),
+    ("time_s,s.A\n0,1\n2,1\n2,1\n4,1\n", 4, "time_s", "batches"),
     ("time_s,s.A\n0,1\n\n\n-1,1\n", 5, "time_s", "does not come after"),
     ("time_s,take,s.A\n0,p,1\n1,,1\n", 3, "take", "name of its take"),
     ("time_s,wearing,s.A\n0,w1,1\n1,w2,1\n", 3, "wearing", "inside one wearing"),

@@ -1,4 +1,4 @@
-"""The capture device ``homunculus``: the exoskeleton glove of LeRobot, sixteen potentiometers.
+"""The capture device ``homunculus``: the exoskeleton glove of LeRobot, sixteen 12-bit Hall sensors.
 
 One line a sample, sixteen numbers with blanks between them, 120 to 165 a second. Source: huggingface/lerobot
 7427f3180, as collected in the project's fact sheet; no hardware was at hand. There is no checksum, header or
