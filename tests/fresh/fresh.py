@@ -26,6 +26,11 @@ from fresh_table import Outcome, Row, around_table, demo_outcome, put_into_page,
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = Path("/var/cache/glovecal-fresh")
 SUITES = ("bookworm", "trixie", "forky")
+HOSTILE, HOSTILE_SUITE = "hostile", "trixie"
+"""A place like any other computer, and the system it is made on."""
+HOSTILE_FOLDER = "Übungen für die Hände – größer und länger, als es irgendjemand erwartet hätte"
+HOSTILE_SHELL = "export LANG=C TZ=Asia/Kathmandu; umask 077; trap '' INT; "
+"""As from the background of a script: whatever is begun there has SIGINT ignored."""
 COMMANDS: dict[str, Callable[[int | None, str, float], Outcome]] = {
     "python3 do.py demo": demo_outcome,
     "python3 do.py test": suite_outcome,
@@ -43,8 +48,14 @@ def main() -> int:
         description="README's two commands on bare Debian systems (root and debootstrap needed)",
         epilog="fresh trixie -- tests/client -q: only these tests, in a clone that is kept",
     )
-    usual = ", ".join(SUITES)
-    parser.add_argument("suites", nargs="*", metavar="SUITE", help=f"Debian releases; default: {usual}")
+    usual = ", ".join((*SUITES, HOSTILE))
+    parser.add_argument(
+        "suites",
+        nargs="*",
+        metavar="SUITE",
+        help=f"Debian releases, and {HOSTILE}: {HOSTILE_SUITE} in a long path with blanks and umlauts that "
+        f"others cannot read, a home that cannot be written, LANG=C, SIGINT ignored; default: {usual}",
+    )
     parser.add_argument("--folder", type=Path, default=FOLDER, help=f"where they are kept; default: {FOLDER}")
     parser.add_argument("--mirror", help="Debian archive; default: the one that apt uses here")
     parser.add_argument("--page", type=Path, help="write the table into the marked part of a page, too")
@@ -66,14 +77,18 @@ def _fresh(options: argparse.Namespace, tests: Sequence[str]) -> int:
         around_table(options.page)
     refuse_where_impossible()
     with ExitStack() as ours:
-        systems = [
-            ours.enter_context(_system(options.folder, suite, options.mirror))
-            for suite in options.suites or SUITES
-        ]
+        places = options.suites or (*SUITES, HOSTILE)
+        suites = dict.fromkeys(HOSTILE_SUITE if place == HOSTILE else place for place in places)
+        systems = {
+            suite: ours.enter_context(_system(options.folder, suite, options.mirror)) for suite in suites
+        }
         _tell_uncommitted()
         if tests:
-            return max(_only(system, tests) for system in systems)
-        rows = [_try(system) for system in systems]
+            return max(_only(system, tests) for system in systems.values())
+        rows = [
+            _try(systems[HOSTILE_SUITE], hostile=True) if place == HOSTILE else _try(systems[place])
+            for place in places
+        ]
     written = table(rows, list(COMMANDS))
     print(written)
     if options.page:
@@ -99,24 +114,30 @@ def _system(folder: Path, suite: str, mirror: str | None) -> Iterator[BareSystem
         yield system
 
 
-def _try(system: BareSystem) -> Row:
+def _try(system: BareSystem, hostile: bool = False) -> Row:
     """Both commands in a new clone and a new home, which are removed afterwards."""
+    name = f"{system.suite}, {HOSTILE}" if hostile else system.suite
     place = Path(tempfile.mkdtemp(prefix="fresh-", dir=system.inside("/home")))
     home = Path("/home", place.name)
-    _clone(place / CLONE)
+    clone = home / (HOSTILE_FOLDER if hostile else "") / CLONE
+    _clone(system.inside(clone))
     system.give(home)
+    if hostile:
+        system.inside(clone).parent.chmod(0o700)
+        os.chown(place, 0, 0)
+        place.chmod(0o555)
     outcomes = []
     try:
         for command, outcome in COMMANDS.items():
-            log = system.root.with_name(f"{system.suite}-{command.split()[-1]}.log")
-            print(f"Debian {system.suite}: {command}, told in {log} ...", file=sys.stderr, flush=True)
+            log = system.root.with_name(f"{name.replace(', ', '-')}-{command.split()[-1]}.log")
+            print(f"Debian {name}: {command}, told in {log} ...", file=sys.stderr, flush=True)
             begun = time.monotonic()
-            code = system.run(command, home / CLONE, home, log, LIMIT_S)
+            code = system.run(HOSTILE_SHELL * hostile + command, clone, home, log, LIMIT_S)
             text = log.read_text(encoding="utf-8", errors="replace")
             outcomes.append(outcome(code, text, time.monotonic() - begun))
     finally:
         shutil.rmtree(place)
-    return Row(system.suite, system.version(), PACKAGES, outcomes)
+    return Row(name, system.version(), PACKAGES, outcomes)
 
 
 def _only(system: BareSystem, tests: Sequence[str]) -> int:
