@@ -19,7 +19,7 @@ def make_base(engine: Engine, base: str, folder: Path) -> None:
     Unavailable without root or debootstrap.
     """
     system = BareSystem(folder, base.rpartition("-")[2])
-    system.make(debian_mirror(Path("/etc/apt")))
+    system.make(debian_mirror(Path("/etc/apt")), engine.architecture)
     system.take_network_settings()
     system.inside("/usr/bin/python").symlink_to("python3")
     for file in system.inside("/usr/lib").glob(
@@ -32,6 +32,6 @@ def make_base(engine: Engine, base: str, folder: Path) -> None:
     archive = folder / "base.tar"
     subprocess.run(["tar", "-C", str(system.root), "-cf", str(archive), "."], check=True)
     trust = [f"--change=ENV {name}={CERTIFICATES}" for name in ("SSL_CERT_FILE", "PIP_CERT")]
-    engine("import", *trust, str(archive), f"localhost/{base}")
+    engine("import", *engine.platform, *trust, str(archive), f"localhost/{base}")
     archive.unlink()
     shutil.rmtree(system.root)

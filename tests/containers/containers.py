@@ -4,6 +4,10 @@ Demo, gloves served, a service killed while it records, and the data of the vers
 migration of the database taken over. Needs podman and, with --debootstrap, root and debootstrap (Debian:
 apt-get install podman runc debootstrap). Everything is made in a folder below the temporary one, and goes
 with it; in a --folder of yours images stay, and a second call builds what changed.
+
+--arch arm64 builds both for another processor, which is emulated (Debian: apt-get install qemu-user-static
+binfmt-support), looks into them, serves and kills while it records. Demo and upgrade, which would take
+hours, are left out.
 """
 
 from __future__ import annotations
@@ -39,7 +43,10 @@ SERVICE, CAPTURE, PREVIOUS = "glovecal-service", "glovecal-capture", "glovecal-s
 MIGRATIONS = "service/glovecal_service/store/migrations/versions"
 UID = "10001"
 NOT_INSIDE = ("uv", "cc", "gcc", "g++", "make", "ld")
+EMULATED = {"arm64": Path("/proc/sys/fs/binfmt_misc/qemu-aarch64")}
+"""Where Linux says that it runs another processor's programs."""
 READY_WITHIN_S = 180.0
+EMULATED_SLOWER = 10
 RECORDED_S = 4.0
 CAMERA = """
 import cv2, numba, skimage.measure
@@ -67,6 +74,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="do.py containers", description=__doc__)
     parser.add_argument("--debootstrap", action="store_true", help="make the base image, pull nothing")
     parser.add_argument("--folder", type=Path, help="keep images here for the next call")
+    parser.add_argument("--arch", choices=EMULATED, help="build for another processor, which is emulated")
     parser.add_argument("--previous", metavar="COMMIT", help="default: before the newest migration")
     parser.add_argument("--smoke", action="store_true", help="look at the files only, build nothing")
     given = parser.parse_args()
@@ -78,6 +86,10 @@ def main() -> int:
     os.environ["PATH"] += ":/usr/sbin:/sbin"  # not everywhere in root's, and debootstrap and runc are there
     if shutil.which("podman") is None:
         print("podman is not installed (Debian: apt-get install podman runc)", file=sys.stderr)
+        return 2
+    if given.arch and not EMULATED[given.arch].is_file():
+        remedy = "Debian: apt-get install qemu-user-static binfmt-support"
+        print(f"this computer does not emulate {given.arch} ({remedy})", file=sys.stderr)
         return 2
     table = Table()
     with _folder(given.folder) as folder:
@@ -106,7 +118,7 @@ def _folder(kept: Path | None) -> Iterator[Path]:
 class Trial:
     def __init__(self, folder: Path, table: Table, given: argparse.Namespace) -> None:
         self.folder, self.table, self.given = folder, table, given
-        self.engine = Engine(folder)
+        self.engine = Engine(folder, given.arch)
         self.takes = folder / "takes"
         self.takes.mkdir(exist_ok=True)
         self.port, self.zenoh = _free_port(), f"tcp/127.0.0.1:{_free_port()}"
@@ -121,8 +133,9 @@ class Trial:
                 self.build(image, ROOT)
             self.look_inside()
             self.kill_while_recording()
-            self.upgrade()
-            self.demo()
+            if not self.given.arch:
+                self.upgrade()
+                self.demo()
         finally:
             self.engine("rm", "--all", "--force", check=False)
 
@@ -170,7 +183,7 @@ class Trial:
                 self.table.row("ready after kill -9", f"{time.monotonic() - started:.1f} s")
                 time.sleep(RECORDED_S)
                 client.post(f"/recordings/{recording}/stop")
-                facts = client.finish_recording(recording, patience_s=120)["facts"]
+                facts = client.finish_recording(recording, patience_s=600)["facts"]
             kept = facts["recorded"] == facts["sent"] and facts["missing_frames"] == 0
             self.table.expect(
                 kept, "frames of a recording over a kill -9",
@@ -210,19 +223,28 @@ class Trial:
         client.upload_takes(self.takes / "takes.csv", subject="anna")
         layout = client.get("/takes")[0]["layout"]
         job = client.post("/models/train", {"subject": "anna", "layout": layout, "method": "linear"})
-        return client.wait_for_job(job["id"], patience_s=600)["result"]["model"]
+        return client.wait_for_job(job["id"], patience_s=1800)["result"]["model"]
 
     def record(self, client: RestClient) -> str:
         """The id of a recording that goes on."""
-        _until(lambda: any(glove["name"] == "right" for glove in client.get("/gloves")["seen"]), "a glove")
+        self.until(
+            lambda: any(glove["name"] == "right" for glove in client.get("/gloves")["seen"]), "a glove"
+        )
         id = client.post("/recordings", {"glove": "right", "name": "killed", "subject": "anna"})["id"]
-        _until(lambda: client.get(f"/recordings/{id}")["state"] == "recording", "the recorder")
+        self.until(lambda: client.get(f"/recordings/{id}")["state"] == "recording", "the recorder")
         return id
 
     def once(self, image: str, *command: str) -> str:
         entry = ["--entrypoint", command[0]] if image == CAPTURE else []
         return self.engine(
-            "run", "--rm", "--read-only", *entry, image, *(command[1:] if entry else command), timeout_s=1800
+            "run",
+            "--rm",
+            "--read-only",
+            *self.engine.platform,
+            *entry,
+            image,
+            *(command[1:] if entry else command),
+            timeout_s=1800,
         )
 
     @contextmanager
@@ -266,6 +288,9 @@ class Trial:
         state = self.engine("inspect", "--format", "{{.State.Health.Status}}", name, check=False)
         self.table.expect(state.split()[-1:] == ["healthy"], "health check of the image", state.strip())
 
+    def until(self, true: Callable[[], bool], what: str) -> None:
+        _until(true, what, READY_WITHIN_S * (EMULATED_SLOWER if self.given.arch else 1))
+
     def wait_ready(self, client: RestClient) -> None:
         def ready() -> bool:
             try:
@@ -275,7 +300,7 @@ class Trial:
             return True
 
         try:
-            _until(ready, "the service")
+            self.until(ready, "the service")
         except Failed as error:
             raise Failed(f"{error}\n{self.engine.log(SERVICE)}") from error
 
@@ -297,11 +322,11 @@ def _before_newest_migration() -> str:
     return found.stdout.strip() if re.fullmatch(r"[0-9a-f]{40}", found.stdout.strip()) else ""
 
 
-def _until(true: Callable[[], bool], what: str) -> None:
-    until = time.monotonic() + READY_WITHIN_S
+def _until(true: Callable[[], bool], what: str, within_s: float) -> None:
+    until = time.monotonic() + within_s
     while not true():
         if time.monotonic() > until:
-            raise Failed(f"{what} was not there within {READY_WITHIN_S:.0f} s")
+            raise Failed(f"{what} was not there within {within_s:.0f} s")
         time.sleep(0.2)
 
 

@@ -48,7 +48,10 @@ class Built:
 
 
 class Engine:
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, architecture: str | None = None) -> None:
+        """``architecture``: Debian's and Docker's name of one that this computer emulates, such as arm64."""
+        self.architecture = architecture
+        self.platform = [f"--platform=linux/{architecture}"] if architecture else []
         runtime = next((name for name in ("runc", "crun") if shutil.which(name)), "runc")
         limits = (f'"{name}={_allowed(number)}:{_allowed(number)}"' for name, number in USED.items())
         (folder / "containers.conf").write_text(SETTINGS.format(limits=", ".join(limits), runtime=runtime))
@@ -72,7 +75,7 @@ class Engine:
     def build(self, image: str, context: Path, dockerfile: str, base: str) -> Built:
         started = time.monotonic()
         options = ("--network", "host", "--format", "docker")
-        self("build", *options, "-f", str(context / dockerfile), "-t", image, str(context))
+        self("build", *options, *self.platform, "-f", str(context / dockerfile), "-t", image, str(context))
         return Built(time.monotonic() - started, self._size_mb(image), self._size_mb(base))
 
     def _size_mb(self, image: str) -> float:
@@ -87,7 +90,7 @@ class Engine:
     @contextmanager
     def running(self, image: str, name: str, *command: str, options: Sequence[str] = ()) -> Iterator[str]:
         """A container in the background, its root read-only; gone at the end of the block."""
-        self("run", "--detach", "--name", name, "--read-only", *options, image, *command)
+        self("run", "--detach", "--name", name, "--read-only", *self.platform, *options, image, *command)
         try:
             yield name
         finally:

@@ -109,14 +109,19 @@ class BareSystem:
     def made(self) -> bool:
         return self.root.is_dir()
 
-    def make(self, mirror: str) -> None:
-        """Raises Unavailable with the last line that debootstrap wrote."""
+    def make(self, mirror: str, architecture: str | None = None) -> None:
+        """Raises Unavailable with the last line that debootstrap wrote.
+
+        ``architecture``: Debian's name of one that this computer emulates; default: its own.
+        """
         begun = self.root.with_name(f"{self.suite}.begun")
         log = self.root.with_name(f"{self.suite}.log")
         if begun.exists():
             shutil.rmtree(begun)
         script = SCRIPTS / self.suite
-        command = ["debootstrap", "--variant=minbase", f"--include={','.join(PACKAGES)}", self.suite]
+        command = ["debootstrap", "--variant=minbase", f"--include={','.join(PACKAGES)}"]
+        command += [f"--arch={architecture}"] if architecture else []
+        command += [self.suite]
         command += [str(begun), mirror, str(script if script.exists() else SCRIPTS / ANY_DEBIAN)]
         with log.open("wb") as written:
             code = in_own_namespaces(command, written)
