@@ -32,6 +32,7 @@ def make_base(engine: Engine, base: str, folder: Path) -> None:
     archive = folder / "base.tar"
     subprocess.run(["tar", "-C", str(system.root), "-cf", str(archive), "."], check=True)
     trust = [f"--change=ENV {name}={CERTIFICATES}" for name in ("SSL_CERT_FILE", "PIP_CERT")]
-    engine("import", *engine.platform, *trust, str(archive), f"localhost/{base}")
+    processor = [f"--arch={engine.architecture}"] if engine.architecture else []
+    engine("import", *processor, *trust, str(archive), f"localhost/{base}")
     archive.unlink()
     shutil.rmtree(system.root)
