@@ -17,6 +17,7 @@ from cli_running import COMMAND
 from realtime_support import eventually
 
 from glovecal_client import Recording, open_router
+from glovecal_client.errors import DamagedLog
 from glovecal_client.capture.command import main as capture_alone
 from glovecal_client.capture.command import parse_options, run_capture
 from glovecal_service.emulators.catalogue import PROTOCOLS
@@ -60,11 +61,14 @@ def test_what_cannot_be_emulated_is_refused(run, tmp_path: Path) -> None:
 def stop_after(count: int, data: Path, stop: threading.Event) -> None:
     """Set ``stop`` once so many frames are in the log of the capture that writes to ``data``."""
 
-    def logs() -> list[Path]:
-        return list(data.rglob("*.glvlog"))
+    def frames(log: Path) -> int:
+        try:
+            return len(list(Recording.open(log).frames()))
+        except DamagedLog:  # created, and its header not written yet
+            return 0
 
     try:
-        eventually(lambda: any(len(list(Recording.open(log).frames())) > count for log in logs()), "frames")
+        eventually(lambda: any(frames(log) > count for log in data.rglob("*.glvlog")), "frames")
     finally:
         stop.set()
 
