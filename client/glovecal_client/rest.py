@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, urlsplit
 
-from glovecal_client.errors import BadName, ClientError, ServiceError
+from glovecal_client.errors import BadName, ClientError, ServiceError, reason_of
 from glovecal_client.frames_to_predict import frames_to_predict
 from glovecal_client.installation import not_installed
 from glovecal_client.layout_file import is_json, layout_name
@@ -255,7 +255,7 @@ class RestClient:
         except httpx.TimeoutException as error:
             raise NoService(504, "No answer", f"{self.url} did not answer {method} {path} in time") from error
         except httpx.TransportError as error:
-            sentence = f"the connection to {self.url} broke: {error}"
+            sentence = f"the connection to {self.url} broke: {reason_of(error)}"
             raise NoService(502, "Connection broken", sentence) from error
         if response.status_code >= 400:
             raise _refusal(response)

@@ -10,7 +10,6 @@ Wang & Neff 2013, section 3.3, calls the last part the sensor-rotation correspon
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
@@ -18,7 +17,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from glovecal_models.errors import BadLayout
+from glovecal_models.documents import read_toml
+from glovecal_models.errors import BadInput, BadLayout
 from glovecal_models.expression import SensorExpression
 from glovecal_models.names import check_channel_name
 
@@ -92,9 +92,9 @@ class Layout:
     def from_toml(cls, text: str, *, source: str = "layout") -> Layout:
         """Parse a layout file; ``source`` names it in errors. Raises BadLayout."""
         try:
-            document = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise BadLayout(f"{source}: not valid TOML: {error}") from error
+            document = read_toml(text, source)
+        except BadInput as error:
+            raise BadLayout(str(error)) from error
         return _from_document(document, source)
 
     @classmethod

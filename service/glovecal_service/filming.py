@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 import threading
@@ -14,6 +13,7 @@ from glovecal_client.clock import clock_ns
 from glovecal_client.errors import ClientError
 from glovecal_client.pictures.preview import write_preview
 from glovecal_client.pictures.video_file import times_path
+from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput
 from glovecal_service.store.errors import Conflict, NotFound
 
@@ -74,10 +74,12 @@ class Filming:
             said = self._end()
             described = self._file.with_suffix(".json")
             try:
-                about = json.loads(described.read_text(encoding="utf-8"))
+                about = read_json(described.read_bytes(), described.name)
                 preview = write_preview(self._file, about)
             except (OSError, ValueError, ClientError) as error:
-                raise BadInput(f"the video {self._file.name} cannot be shown: {said or error}") from error
+                raise BadInput(
+                    f"the video {self._file.name} cannot be shown: {said or 'it was not written to its end'}"
+                ) from error
             return self._state(about["problem"]), preview
 
     def close(self) -> None:

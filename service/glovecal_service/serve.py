@@ -29,6 +29,7 @@ from glovecal_client.signals import handle_signals, leave_signals_to_the_parent
 from glovecal_client.standard_streams import say
 from glovecal_models.errors import GlovecalError
 from glovecal_service.operating_system import FORKS, children_context
+from glovecal_service.plain import reason_of
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
 
@@ -164,7 +165,7 @@ def _why_not(settings: Settings, parts: list[Part]) -> str:
     try:
         Store.open(settings).close()
     except (GlovecalError, OSError) as error:
-        return f"the store cannot be opened: {error}"
+        return f"the store cannot be opened: {reason_of(error)}"
     return ""
 
 
@@ -189,7 +190,7 @@ def _port_problem(part: Part) -> str:
     except OSError as error:
         variable = "GLOVECAL_PORT" if what == "REST" else "GLOVECAL_ZENOH"
         return (
-            f"{what} cannot listen on {host}:{port} ({error.strerror or error}); is another service "
+            f"{what} cannot listen on {host}:{port} ({reason_of(error)}); is another service "
             f"running? Stop it or choose another address with {variable}"
         )
     return ""

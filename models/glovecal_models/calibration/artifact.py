@@ -20,6 +20,7 @@ from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.model import CalibrationModel, RotationModel, restore_regressor
 from glovecal_models.calibration.servable import check_servable
 from glovecal_models.calibration.unseen_wearing import UnseenWearing
+from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.layout import Layout
 from glovecal_models.regression.kernel_scores import choice_of
@@ -104,22 +105,32 @@ def load(artifact: bytes, *, expected_id: str | None = None) -> CalibrationModel
     try:
         tensors = safetensors.numpy.load(artifact)
         return _restore(manifest, tensors, name)
-    except (KeyError, TypeError, ValueError, BadInput, safetensors.SafetensorError) as error:
+    except BadInput as error:
         raise DamagedArtifact(f"model {name}: cannot be restored: {error}") from error
+    except (KeyError, TypeError, ValueError, AttributeError, safetensors.SafetensorError) as error:
+        raise DamagedArtifact(
+            f"model {name}: cannot be restored: something in it is missing, or is not what it should be; "
+            "export it again"
+        ) from error
 
 
 def read_manifest(artifact: bytes) -> dict[str, Any]:
     """The JSON manifest alone. Raises DamagedArtifact."""
     length = int.from_bytes(artifact[:8], "little")
     if len(artifact) < 8 or not 0 < length <= min(LARGEST_HEADER_BYTES, len(artifact) - 8):
-        raise DamagedArtifact(f"not a model artifact: header of {length} bytes in a file of {len(artifact)}")
+        raise DamagedArtifact(
+            f"not a model artifact: header of {length} bytes in a file of {len(artifact)}; send what "
+            "models/ID/export gave"
+        )
     try:
-        header = json.loads(artifact[8 : 8 + length])
-        manifest = json.loads(header["__metadata__"]["manifest"])
-    except (ValueError, KeyError, TypeError) as error:
-        raise DamagedArtifact("not a model artifact: its header holds no manifest") from error
+        header = read_json(artifact[8 : 8 + length], "its header")
+        manifest = read_json(header["__metadata__"]["manifest"], "its manifest")
+    except (BadInput, KeyError, TypeError, AttributeError) as error:
+        raise DamagedArtifact(
+            "not a model artifact: its header holds no manifest; send what models/ID/export gave"
+        ) from error
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
-        raise DamagedArtifact(f"not a {FORMAT} artifact")
+        raise DamagedArtifact(f"not a {FORMAT} artifact; send what models/ID/export gave")
     return manifest
 
 

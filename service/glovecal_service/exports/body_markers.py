@@ -109,7 +109,7 @@ def read_trc(path: Path, name: str) -> BodyMarkers:
         try:
             rows.append([float(cell) if cell.strip() else np.nan for cell in cells])
         except ValueError as error:
-            raise BadInput(f"{name}, line {number}: {error}") from error
+            raise BadInput(f"{name}, line {number}: a number is expected in each field") from error
     table = np.array(rows).reshape(-1, 1 + 3 * len(names))
     if len(table) < 2 or not (np.diff(table[:, 0]) > 0).all():
         raise BadInput(f"{name} needs two frames or more, whose times increase")

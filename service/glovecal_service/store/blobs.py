@@ -85,7 +85,9 @@ class ObjectBlobs:
         try:
             self._store = obstore.store.from_url(url)
         except (obstore.exceptions.BaseError, ValueError, TypeError) as error:
-            raise BadInput(f"GLOVECAL_ARTIFACTS: {url!r} is not an object store: {error}") from error
+            raise BadInput(
+                f"GLOVECAL_ARTIFACTS: {url!r} is not the address of an object store; write it like s3://bucket/prefix"
+            ) from error
         self._url = url
 
     @property
@@ -116,7 +118,10 @@ class ObjectBlobs:
         try:
             yield
         except obstore.exceptions.BaseError as error:
-            raise StoreUnavailable(f"the object store {self._url} does not answer: {error}") from error
+            raise StoreUnavailable(
+                f"the object store {self._url} does not answer; is its address right, and may this "
+                "service log in?"
+            ) from error
 
 
 def write_durably(path: Path, content: bytes) -> None:

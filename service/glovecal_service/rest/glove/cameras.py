@@ -150,7 +150,9 @@ def get_picture(
     except QueryRefused as refused:
         raise Conflict(str(refused).partition(": ")[2]) from refused
     except (NoAnswer, BadName) as error:
-        raise NotFound(f"no camera of glove {glove} answers") from error
+        raise NotFound(
+            f"no camera of glove {glove} answers; start it: glovecal camera track SOURCE"
+        ) from error
     return Response(sample.payload.to_bytes(), media_type="image/jpeg", headers={"Cache-Control": "no-store"})
 
 

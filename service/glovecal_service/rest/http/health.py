@@ -12,6 +12,7 @@ from fastapi import APIRouter, Response
 from prometheus_client import CONTENT_TYPE_LATEST
 from pydantic import BaseModel, Field
 
+from glovecal_service.plain import reason_of
 from glovecal_service.rest.http.answers import problems
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.problem import Problem
@@ -110,7 +111,7 @@ def _check_artifacts(store: Store, data: Path) -> str:
     try:
         store.artifacts.exists("0" * 64)
     except (StoreError, OSError) as error:
-        raise Problem(503, "not-ready", f"the artifacts cannot be reached: {error}") from error
+        raise Problem(503, "not-ready", f"the artifacts cannot be reached: {reason_of(error)}") from error
     if not os.access(data, os.W_OK):
         raise Problem(503, "not-ready", "the data folder cannot be written to")
     free = shutil.disk_usage(data).free
