@@ -22,11 +22,14 @@ from glovecal_models.calibration.servable import check_servable
 from glovecal_models.calibration.unseen_wearing import UnseenWearing
 from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput, DamagedArtifact
-from glovecal_models.layout import Layout
+from glovecal_models.layout import MOST_NAMES, Layout
 from glovecal_models.regression.kernel_scores import choice_of
 
 FORMAT = "glovecal.model.v1"
 LARGEST_HEADER_BYTES = 8 << 20
+LARGEST_NUMBER = 1e15
+"""Of an array: more than any trained weight or precision has come to, and far inside what float32 holds."""
+MOST_EFFECTS, MOST_TAKES = 1000, 100_000
 
 
 def model_id(artifact: bytes) -> str:
@@ -136,13 +139,28 @@ def read_manifest(artifact: bytes) -> dict[str, Any]:
 
 def _restore(manifest: Mapping[str, Any], tensors: Mapping[str, np.ndarray], name: str) -> CalibrationModel:
     for key, array in tensors.items():
-        if array.dtype != np.float64 or not np.isfinite(array).all():
-            raise DamagedArtifact(f"model {name}: array {key} must be finite float64")
+        if array.dtype != np.float64 or not (np.abs(array) <= LARGEST_NUMBER).all():  # NaN too
+            raise DamagedArtifact(
+                f"model {name}: array {key[:80]!r} must be finite float64, at most {LARGEST_NUMBER:g}"
+            )
+    for what, most in (("rotations", MOST_NAMES), ("effects", MOST_EFFECTS), ("takes", MOST_TAKES)):
+        if len(manifest.get(what, ())) > most:
+            raise DamagedArtifact(
+                f"model {name}: {len(manifest[what])} {what} are too many; a model has at most {most}"
+            )
+    by_rotation: dict[str, dict[str, np.ndarray]] = {}
+    for key, array in tensors.items():
+        rotation, dot, rest = key.partition(".")
+        if dot:
+            by_rotation.setdefault(rotation, {})[rest] = array
     return CalibrationModel(
         layout=Layout.from_document(manifest["layout"]),
         subject=str(manifest["subject"]),
         method=str(manifest["method"]),
-        rotations=tuple(_restore_rotation(item, tensors) for item in manifest["rotations"]),
+        rotations=tuple(
+            _restore_rotation(item, by_rotation.get(str(item["rotation"]), {}), tensors)
+            for item in manifest["rotations"]
+        ),
         effects=tuple(
             _restore_effect(number, item, tensors) for number, item in enumerate(manifest.get("effects", []))
         ),
@@ -156,9 +174,10 @@ def _restore(manifest: Mapping[str, Any], tensors: Mapping[str, np.ndarray], nam
     )
 
 
-def _restore_rotation(item: Mapping[str, Any], tensors: Mapping[str, np.ndarray]) -> RotationModel:
+def _restore_rotation(
+    item: Mapping[str, Any], own: dict[str, np.ndarray], tensors: Mapping[str, np.ndarray]
+) -> RotationModel:
     rotation = str(item["rotation"])
-    own = {key.split(".", 1)[1]: array for key, array in tensors.items() if key.split(".", 1)[0] == rotation}
     held_out = item["held_out_rmse_deg"]
     regressor = restore_regressor(own, item["regressor"])
     choice_of(regressor)  # what is told of the choice must be of this process

@@ -34,10 +34,10 @@ def read(text: str, counts: Counts, hand: Handedness) -> FoundLines:
     if root.tag != ROOT:
         raise BadInput(f"the root is {root.tag[:40]!r}, expected {ROOT!r}")
     points: dict[str, Points] = {}
-    for joint in root.iter("Joint"):
+    for joint in root.findall("Joint"):
         name = joint.get("name", "")
         words = [
-            (each.get("raw_value", ""), each.get("calibrated_value", "")) for each in joint.iter("calib")
+            (each.get("raw_value", ""), each.get("calibrated_value", "")) for each in joint.findall("calib")
         ]
         pairs = [numbers(pair, f"joint {name[:40]!r}") for pair in words]
         points[name] = [(raw, degrees) for raw, degrees in pairs]

@@ -12,7 +12,7 @@ from starlette.concurrency import run_in_threadpool
 
 from glovecal_models.documents import read_toml
 from glovecal_models.errors import BadInput, BadLayout
-from glovecal_models.layout import Layout
+from glovecal_models.layout import MOST_NAMES, Layout
 from glovecal_models.takes.tap_latency import FEWEST_TAPS
 from glovecal_service.rest.http.answers import change_problems, problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
@@ -33,7 +33,7 @@ from glovecal_service.store.records import GloveRecord, LayoutRecord
 
 router = APIRouter(prefix="/gloves", tags=["gloves"])
 
-MOST_CHANNELS = 512
+MOST_CHANNELS = MOST_NAMES
 Channels = Annotated[list[Channel], Field(max_length=MOST_CHANNELS)]
 Expression = Annotated[str, StringConstraints(max_length=2000, pattern=ONE_LINE)]
 
