@@ -157,10 +157,15 @@ class RestClient:
         return self._send_file("PUT", path, file, query, ARTIFACT)
 
     def import_model(
-        self, file: Path, *, subject: str | None = None, create_subject: bool = False
+        self, file: Path, *, subject: str | None = None, create_subject: bool = False, id: str | None = None
     ) -> dict[str, Any]:
-        """Give the service a model that ``models/{id}/export`` of another one wrote."""
+        """Give the service a model that ``models/{id}/export`` of another one wrote. ``id``: the model's
+        there, or its first digits, which the service compares; None: as the file's name ends, as exports
+        are named (``-0123456789ab.safetensors``)."""
         query: dict[str, str | bool] = {"create_subject": create_subject}
+        named = re.search(r"-([0-9a-f]{12,64})\.safetensors$", file.name)
+        if id is not None or named is not None:
+            query["id"] = str(id or (named and named[1]))
         if subject is not None:
             query["subject"] = subject
         return self._send_file("POST", "/models/import", file, query, ARTIFACT)

@@ -15,6 +15,7 @@ from glovecal_client.pictures.preview import write_preview
 from glovecal_client.pictures.video_file import times_path
 from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput
+from glovecal_service.store.blobs import require_room
 from glovecal_service.store.errors import Conflict, NotFound
 
 BEGINS_WITHIN_S = 10.0
@@ -43,11 +44,12 @@ class Filming:
         self._file = folder
 
     def start(self, source: str) -> FilmState:
-        """Raises Conflict while another goes on, BadInput with the camera's complaint."""
+        """Raises Conflict while another goes on, StorageFull, BadInput with the camera's complaint."""
         with self._lock:
             if self._process is not None and self._process.poll() is None:
                 raise Conflict(f"{self._source} films already; end that video first")
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            require_room(self._folder)
             name = time.strftime("%Y%m%d-%H%M%S") + f"-{clock_ns() % 1000:03d}"
             self._source, self._file = source, self._folder / f"{name}.mkv"
             command = [sys.executable, "-P", "-m", "glovecal_client.pictures.film", source, str(self._file)]

@@ -30,6 +30,7 @@ from glovecal_client.standard_streams import say
 from glovecal_models.errors import GlovecalError
 from glovecal_service.operating_system import FORKS, children_context
 from glovecal_service.plain import reason_of
+from glovecal_service.restarts import Restarts
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
 
@@ -133,6 +134,7 @@ def serve(settings: Settings) -> int:
     handle_signals(lambda *_: stopped.set(), *STOP_SIGNALS, *HANG_UP)
     import glovecal_service.realtime.process  # noqa: F401  # for the processes, also those after a crash
 
+    Restarts(settings.data).forget()
     lifeline = Lifeline(*_CONTEXT.Pipe(duplex=False))
     try:
         for part in parts:
@@ -233,6 +235,8 @@ def _keep_alive(part: Part, settings: Settings, lifeline: Lifeline) -> None:
     part.start_at = now + delay_s
     why = _port_problem(part) if part.failed_starts else ""
     ending = f"exit code {code}: {why}" if why else f"exit code {code}"
+    if part.work is real_time:
+        Restarts(settings.data).note()
     _log.warning("%s ended (%s); starting it again in %.2g s", part.name, ending, delay_s)
 
 

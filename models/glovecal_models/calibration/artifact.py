@@ -18,7 +18,7 @@ import safetensors.numpy
 
 from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.model import CalibrationModel, RotationModel, restore_regressor
-from glovecal_models.calibration.servable import check_servable
+from glovecal_models.calibration.servable import LARGEST_DEG, check_servable
 from glovecal_models.calibration.unseen_wearing import UnseenWearing
 from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput, DamagedArtifact
@@ -29,7 +29,7 @@ FORMAT = "glovecal.model.v1"
 LARGEST_HEADER_BYTES = 8 << 20
 LARGEST_NUMBER = 1e15
 """Of an array: more than any trained weight or precision has come to, and far inside what float32 holds."""
-MOST_EFFECTS, MOST_TAKES = 1000, 100_000
+MOST_EFFECTS, MOST_TAKES, MOST_SAMPLES = 1000, 100_000, 10_000_000
 
 
 def model_id(artifact: bytes) -> str:
@@ -169,7 +169,7 @@ def _restore(manifest: Mapping[str, Any], tensors: Mapping[str, np.ndarray], nam
         unseen_wearing=UnseenWearing.from_document(manifest.get("unseen_wearing")),
         takes=tuple(str(item) for item in manifest["takes"]),
         parent=manifest["parent"],
-        error_estimate=manifest["error_estimate"],
+        error_estimate=_error_estimate(manifest["error_estimate"]),
         simulated=bool(manifest["simulated"]),
     )
 
@@ -186,10 +186,29 @@ def _restore_rotation(
         regressor=regressor,
         input_low=tensors[f"{rotation}:input_low"],
         input_high=tensors[f"{rotation}:input_high"],
-        uncertain_above_deg=float(item["uncertain_above_deg"]),
-        held_out_rmse_deg=None if held_out is None else float(held_out),
-        samples=int(item["samples"]),
+        uncertain_above_deg=_within(
+            item["uncertain_above_deg"], LARGEST_DEG, f"{rotation}: uncertain_above_deg"
+        ),
+        held_out_rmse_deg=None
+        if held_out is None
+        else _within(held_out, LARGEST_DEG, f"{rotation}: held_out_rmse_deg"),
+        samples=int(_within(item["samples"], MOST_SAMPLES, f"{rotation}: samples")),
     )
+
+
+def _error_estimate(document: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Its errors are degrees."""
+    for name, value in document.items():
+        if name.endswith("rmse_deg") and value is not None:
+            _within(value, LARGEST_DEG, f"error_estimate: {name}")
+    return document
+
+
+def _within(value: Any, largest: float, what: str) -> float:
+    """A number from 0 on. Raises BadInput for any other, and for what is no number."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= largest:
+        raise BadInput(f"{what} is {repr(value)[:40]}; it lies between 0 and {largest:g}")
+    return float(value)
 
 
 def _restore_effect(number: int, item: Mapping[str, Any], tensors: Mapping[str, np.ndarray]) -> AddedEffect:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import secrets
+import shutil
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -24,6 +25,7 @@ from glovecal_service.store.errors import StorageFull, StoreUnavailable
 TEMPORARY = ".writing-"
 ABANDONED_AFTER_S = 600.0
 """A temporary file this old belongs to a process that was killed."""
+LEAST_FREE_BYTES = 50_000_000
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -140,6 +142,15 @@ def write_durably(path: Path, content: bytes) -> None:
         except BaseException:
             temporary.unlink(missing_ok=True)
             raise
+
+
+def require_room(folder: Path) -> None:
+    """Raises StorageFull where the disk is nearly full: what recordings and the database need is left."""
+    free = shutil.disk_usage(folder).free
+    if free < LEAST_FREE_BYTES:
+        raise StorageFull(
+            f"only {free / 1e6:.0f} MB are free in {folder}; nothing was changed: free some disk space"
+        )
 
 
 @contextmanager

@@ -53,9 +53,9 @@ FOREIGN = re.compile(
 """Words of Python and of libraries, which are for the log."""
 REMEDY = re.compile(
     r"\b(give|use|send|name|choose|ask|leave|needs?|needed|expected|must|at most|at least|there (is|are)|"
-    r"it has|they have|has no|have no|stop|start|record|train|import|makes?|remove|correct|save|try|free|is no|"
-    r"is a|is it|not found|does not answer|look|allowed|answers to|belongs|already|between|columns are|write|"
-    r"begin|says why|divide|only|first|cannot|nothing)\b"
+    r"it has|they have|has no|have no|stop|start|record|train|import|makes?|remove|correct|save|try|free|"
+    r"is no|is a|is it|not found|does not answer|look|allowed|answers to|belongs|already|between|columns are|"
+    r"write|begin|says why|divide|only|first|cannot|nothing)\b"
 )
 
 
