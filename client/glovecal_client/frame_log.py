@@ -14,6 +14,7 @@ from io import FileIO
 from pathlib import Path
 from typing import Any
 
+from glovecal_client.errors import reason_of
 from glovecal_client.log_records import cut_damaged_tail, good_end, header_bytes, record_bytes
 from glovecal_client.operating_system import sync_file
 from glovecal_client.private_files import open_private
@@ -91,7 +92,7 @@ class FrameLog:
                 self._write(self._waiting[0])
                 self._waiting.popleft()
         except OSError as error:
-            self._append_problem = f"{self.path}: {error.strerror or error}"
+            self._append_problem = f"{self.path}: {reason_of(error)}"
             return False
         self._append_problem = None
         return True
@@ -118,7 +119,7 @@ class FrameLog:
         try:
             sync_file(self._file)
         except OSError as error:
-            self._sync_problem = f"{self.path}: {error.strerror or error}"
+            self._sync_problem = f"{self.path}: {reason_of(error)}"
         else:
             self._sync_problem = None
             self._synced_bytes = end

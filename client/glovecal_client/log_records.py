@@ -47,7 +47,7 @@ def read_header(file: BinaryIO, name: str) -> tuple[dict[str, Any], int]:
     try:
         meta = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise DamagedLog(f"{name}: its header is not JSON: {error}") from error
+        raise DamagedLog(f"{name}: its header is not JSON: the file was damaged") from error
     if not isinstance(meta, dict):
         raise DamagedLog(f"{name}: its header holds {type(meta).__name__}, not a JSON object")
     return meta, len(start) + length

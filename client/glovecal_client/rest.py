@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, urlsplit
 
-from glovecal_client.errors import BadName, ClientError, ServiceError
+from glovecal_client.errors import BadName, ClientError, ServiceError, reason_of
 from glovecal_client.frames_to_predict import frames_to_predict
 from glovecal_client.installation import not_installed
 from glovecal_client.layout_file import is_json, layout_name
@@ -157,10 +157,15 @@ class RestClient:
         return self._send_file("PUT", path, file, query, ARTIFACT)
 
     def import_model(
-        self, file: Path, *, subject: str | None = None, create_subject: bool = False
+        self, file: Path, *, subject: str | None = None, create_subject: bool = False, id: str | None = None
     ) -> dict[str, Any]:
-        """Give the service a model that ``models/{id}/export`` of another one wrote."""
+        """Give the service a model that ``models/{id}/export`` of another one wrote. ``id``: the model's
+        there, or its first digits, which the service compares; None: as the file's name ends, as exports
+        are named (``-0123456789ab.safetensors``)."""
         query: dict[str, str | bool] = {"create_subject": create_subject}
+        named = re.search(r"-([0-9a-f]{12,64})\.safetensors$", file.name)
+        if id is not None or named is not None:
+            query["id"] = str(id or (named and named[1]))
         if subject is not None:
             query["subject"] = subject
         return self._send_file("POST", "/models/import", file, query, ARTIFACT)
@@ -255,7 +260,7 @@ class RestClient:
         except httpx.TimeoutException as error:
             raise NoService(504, "No answer", f"{self.url} did not answer {method} {path} in time") from error
         except httpx.TransportError as error:
-            sentence = f"the connection to {self.url} broke: {error}"
+            sentence = f"the connection to {self.url} broke: {reason_of(error)}"
             raise NoService(502, "Connection broken", sentence) from error
         if response.status_code >= 400:
             raise _refusal(response)

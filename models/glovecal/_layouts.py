@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
-from glovecal_models.errors import BadLayout
+from glovecal_models.errors import BadLayout, reason_of
 from glovecal_models.layout import BUILT_IN, Layout
 from glovecal_models.takes.take import Take
 
@@ -28,7 +28,7 @@ def read_layout(layout: str | PathLike[str]) -> Layout:
             f"no layout {str(layout)!r}: there is no such file, and built in are {', '.join(BUILT_IN)}"
         ) from None
     except (OSError, UnicodeDecodeError) as error:
-        raise BadLayout(f"layout {path}: cannot be read: {error}") from error
+        raise BadLayout(f"layout {path}: cannot be read: {reason_of(error)}") from error
     return Layout.from_toml(text, source=path.name)
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from glovecal._shown import Shown
 from glovecal._table import Column, Table
-from glovecal_models.errors import BadInput
+from glovecal_models.errors import BadInput, reason_of
 from glovecal_models.layout import Layout
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ def save_model(model: CalibrationModel, path: str | PathLike[str]) -> str:
         unfinished.replace(path)
     except OSError as error:
         unfinished.unlink(missing_ok=True)
-        raise BadInput(f"model file {path}: cannot be written: {error.strerror or error}") from error
+        raise BadInput(f"model file {path}: cannot be written: {reason_of(error)}") from error
     return model_id(content)
 
 
@@ -138,5 +138,5 @@ def load_model(path: str | PathLike[str], *, sha256: str | None = None) -> Calib
     try:
         content = Path(path).read_bytes()
     except OSError as error:
-        raise BadInput(f"model file {path}: cannot be read: {error.strerror or error}") from error
+        raise BadInput(f"model file {path}: cannot be read: {reason_of(error)}") from error
     return CalibrationModel(load(content, expected_id=sha256))

@@ -79,3 +79,13 @@ class WorkerDied(GlovecalError):
 
 class Cancelled(GlovecalError):
     """The user stopped a long computation."""
+
+
+def reason_of(error: BaseException) -> str:
+    """What a person can be told of an error: our own sentence, or the operating system's words for what it
+    refused. Of anything else only the kind; its text is for the log and for the traceback."""
+    if isinstance(error, GlovecalError):
+        return str(error)
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return f"an unforeseen {type(error).__name__}"

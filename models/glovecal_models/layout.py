@@ -10,7 +10,7 @@ Wang & Neff 2013, section 3.3, calls the last part the sensor-rotation correspon
 
 from __future__ import annotations
 
-import tomllib
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
@@ -18,7 +18,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from glovecal_models.errors import BadLayout
+from glovecal_models.documents import read_toml
+from glovecal_models.errors import BadInput, BadLayout
 from glovecal_models.expression import SensorExpression
 from glovecal_models.names import check_channel_name
 
@@ -92,9 +93,9 @@ class Layout:
     def from_toml(cls, text: str, *, source: str = "layout") -> Layout:
         """Parse a layout file; ``source`` names it in errors. Raises BadLayout."""
         try:
-            document = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise BadLayout(f"{source}: not valid TOML: {error}") from error
+            document = read_toml(text, source)
+        except BadInput as error:
+            raise BadLayout(str(error)) from error
         return _from_document(document, source)
 
     @classmethod
@@ -136,6 +137,8 @@ def built_in_toml(name: str) -> str:
     return (resources.files("glovecal_models") / "layouts" / f"{name}.toml").read_text(encoding="utf-8")
 
 
+MOST_NAMES = 512
+"""Sensors, or rotations: twenty times those of the largest glove known."""
 _KEYS = {
     "name", "title", "sensors", "rotations", "simulated", "palm", "context", "counts", "order", "also",
 }  # fmt: skip
@@ -187,17 +190,21 @@ def _table(document: Mapping[str, Any], key: str, source: str) -> Mapping[str, A
     value = document.get(key, {})
     if not isinstance(value, Mapping):
         raise BadLayout(f"{source}: {key} must be a table, not {type(value).__name__}")
+    if len(value) > MOST_NAMES:
+        raise BadLayout(f"{source}: {key} are {len(value)}, at most {MOST_NAMES} are possible")
     return value
 
 
 def _names(value: Any, what: str, source: str) -> tuple[str, ...]:
     if not isinstance(value, list | tuple) or not all(isinstance(item, str) for item in value):
-        raise BadLayout(f"{source}: {what} must be a list of names, not {value!r}")
+        raise BadLayout(f"{source}: {what} must be a list of names, not {repr(value)[:80]}")
+    if len(value) > MOST_NAMES:
+        raise BadLayout(f"{source}: {what} are {len(value)}, at most {MOST_NAMES} are possible")
     for name in value:
         check_channel_name(name, f"{source}: {what}")
-    repeated = [name for name in value if list(value).count(name) > 1]
-    if repeated:
-        raise BadLayout(f"{source}: {what} names {repeated[0]!r} more than once")
+    name, times = Counter(value).most_common(1)[0] if value else ("", 0)
+    if times > 1:
+        raise BadLayout(f"{source}: {what} names {name!r} more than once")
     return tuple(value)
 
 

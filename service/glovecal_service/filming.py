@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 import threading
@@ -14,7 +13,9 @@ from glovecal_client.clock import clock_ns
 from glovecal_client.errors import ClientError
 from glovecal_client.pictures.preview import write_preview
 from glovecal_client.pictures.video_file import times_path
+from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput
+from glovecal_service.store.blobs import require_room
 from glovecal_service.store.errors import Conflict, NotFound
 
 BEGINS_WITHIN_S = 10.0
@@ -43,11 +44,12 @@ class Filming:
         self._file = folder
 
     def start(self, source: str) -> FilmState:
-        """Raises Conflict while another goes on, BadInput with the camera's complaint."""
+        """Raises Conflict while another goes on, StorageFull, BadInput with the camera's complaint."""
         with self._lock:
             if self._process is not None and self._process.poll() is None:
                 raise Conflict(f"{self._source} films already; end that video first")
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            require_room(self._folder)
             name = time.strftime("%Y%m%d-%H%M%S") + f"-{clock_ns() % 1000:03d}"
             self._source, self._file = source, self._folder / f"{name}.mkv"
             command = [sys.executable, "-P", "-m", "glovecal_client.pictures.film", source, str(self._file)]
@@ -74,10 +76,12 @@ class Filming:
             said = self._end()
             described = self._file.with_suffix(".json")
             try:
-                about = json.loads(described.read_text(encoding="utf-8"))
+                about = read_json(described.read_bytes(), described.name)
                 preview = write_preview(self._file, about)
             except (OSError, ValueError, ClientError) as error:
-                raise BadInput(f"the video {self._file.name} cannot be shown: {said or error}") from error
+                raise BadInput(
+                    f"the video {self._file.name} cannot be shown: {said or 'it was not written to its end'}"
+                ) from error
             return self._state(about["problem"]), preview
 
     def close(self) -> None:

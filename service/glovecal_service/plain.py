@@ -1,4 +1,4 @@
-"""Values made safe for a JSON answer: no NaN or infinity, no lone surrogates, nothing of numpy."""
+"""Values made safe for an answer: no NaN, no lone surrogates, nothing of numpy, no library's words."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ from pathlib import PurePath
 from typing import Any
 
 import numpy as np
+
+from glovecal_client.errors import ClientError
+from glovecal_models.errors import reason_of as reason_of_models
 
 LONGEST_TEXT = 2000
 
@@ -38,3 +41,8 @@ def plain(value: Any) -> Any:
     if isinstance(value, PurePath):
         return value.name
     return plain_text(str(value))
+
+
+def reason_of(error: BaseException) -> str:
+    """What a person can be told of an error, whichever part of Glovecal or of its libraries raised it."""
+    return str(error) if isinstance(error, ClientError) else reason_of_models(error)

@@ -29,6 +29,8 @@ from glovecal_client.signals import handle_signals, leave_signals_to_the_parent
 from glovecal_client.standard_streams import say
 from glovecal_models.errors import GlovecalError
 from glovecal_service.operating_system import FORKS, children_context
+from glovecal_service.plain import reason_of
+from glovecal_service.restarts import Restarts
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
 
@@ -132,6 +134,7 @@ def serve(settings: Settings) -> int:
     handle_signals(lambda *_: stopped.set(), *STOP_SIGNALS, *HANG_UP)
     import glovecal_service.realtime.process  # noqa: F401  # for the processes, also those after a crash
 
+    Restarts(settings.data).forget()
     lifeline = Lifeline(*_CONTEXT.Pipe(duplex=False))
     try:
         for part in parts:
@@ -164,7 +167,7 @@ def _why_not(settings: Settings, parts: list[Part]) -> str:
     try:
         Store.open(settings).close()
     except (GlovecalError, OSError) as error:
-        return f"the store cannot be opened: {error}"
+        return f"the store cannot be opened: {reason_of(error)}"
     return ""
 
 
@@ -189,7 +192,7 @@ def _port_problem(part: Part) -> str:
     except OSError as error:
         variable = "GLOVECAL_PORT" if what == "REST" else "GLOVECAL_ZENOH"
         return (
-            f"{what} cannot listen on {host}:{port} ({error.strerror or error}); is another service "
+            f"{what} cannot listen on {host}:{port} ({reason_of(error)}); is another service "
             f"running? Stop it or choose another address with {variable}"
         )
     return ""
@@ -232,6 +235,8 @@ def _keep_alive(part: Part, settings: Settings, lifeline: Lifeline) -> None:
     part.start_at = now + delay_s
     why = _port_problem(part) if part.failed_starts else ""
     ending = f"exit code {code}: {why}" if why else f"exit code {code}"
+    if part.work is real_time:
+        Restarts(settings.data).note()
     _log.warning("%s ended (%s); starting it again in %.2g s", part.name, ending, delay_s)
 
 

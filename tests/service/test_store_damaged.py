@@ -64,6 +64,55 @@ def test_a_file_that_is_no_database_is_named(sqlite_settings):
         Store.open(sqlite_settings)
 
 
+def test_an_io_error_on_a_full_disk_is_a_full_disk(small_disk):
+    """SQLite says "disk I/O error" where its shared memory finds no room."""
+    fill(small_disk / "filler")
+    with pytest.raises(StorageFull, match="free some disk space"):
+        Store.open(Settings(data=small_disk / "data", database=None, artifacts=None))
+    for freed in range(4096, 60_000, 12_000):
+        with (small_disk / "filler").open("r+b") as filler:
+            filler.truncate(filler.seek(0, 2) - freed)
+        try:
+            Store.open(Settings(data=small_disk / "data", database=None, artifacts=None)).close()
+        except StorageFull:
+            continue
+
+
+def test_declarations_that_were_changed_are_damage(sqlite_settings):
+    """Flipped letters of CREATE TABLE: the schema as it was made, or StoreDamaged, whatever is asked for."""
+    with Store.open(sqlite_settings) as store:
+        store.subjects.create("anna")
+    file = sqlite_settings.data / "glovecal.sqlite3"
+    with closing(sqlite3.connect(file)) as connection:
+        connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        made = [row[0] for row in connection.execute("SELECT sql FROM sqlite_master WHERE sql IS NOT NULL")]
+    whole, sentences = file.read_bytes(), []
+    with Store.open(sqlite_settings) as store:
+        right = declared(store)
+    for text in made:
+        begin = whole.index(text.encode())
+        for place in range(begin, begin + len(text.encode()), 97):
+            for suffix in ("-wal", "-shm"):
+                file.with_name(file.name + suffix).unlink(missing_ok=True)
+            file.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+            try:
+                with Store.open(sqlite_settings) as store:
+                    store.subjects.create(f"s{place}")
+                    store.jobs.create("train", {})
+                    assert declared(store) == right, f"byte {place}"
+            except StoreDamaged as error:
+                sentences.append(str(error))
+    assert len(sentences) > 20
+    assert all("restore a backup" in sentence for sentence in sentences)
+
+
+def declared(store: Store) -> list[tuple[str, str]]:
+    with store.database.read() as connection:
+        tables = ("subjects", "layouts", "gloves", "takes", "models", "jobs", "recordings")
+        every = [connection.exec_driver_sql(f"PRAGMA table_info({table})").all() for table in tables]
+    return [(row.name, row.type) for rows in every for row in rows]
+
+
 def test_no_overwritten_bytes_make_another_model_active(sqlite_settings):
     """Every occurrence of the active model's id in the file is changed, one at a time."""
     with Store.open(sqlite_settings) as store:

@@ -13,7 +13,7 @@ from typing import Any
 import zenoh
 
 from glovecal_client.capture.device import Device
-from glovecal_client.errors import ClientError, DeviceLost
+from glovecal_client.errors import ClientError, DeviceLost, reason_of
 from glovecal_client.keys import JSON_ENCODING
 from glovecal_client.queries import REFUSAL_ENCODING
 
@@ -57,7 +57,7 @@ class GloveCommands:
             answer = do(str(query.parameters.get("do", "")), str(query.parameters.get("with", "")))
         except Exception as error:  # a device is foreign code, perhaps a user's own
             is_ours = isinstance(error, ClientError)
-            _refuse(query, str(error) if is_ours else f"{self._device.name}: {type(error).__name__}: {error}")
+            _refuse(query, reason_of(error) if is_ours else f"{self._device.name}: {reason_of(error)}")
             if isinstance(error, DeviceLost):
                 raise
             return

@@ -14,7 +14,7 @@ import zenoh
 
 from glovecal_client.capture.log_queries import LogQueries
 from glovecal_client.capture.other_publisher import describe_publisher, other_publisher
-from glovecal_client.errors import CaptureRefused, ClientError, NoAnswer
+from glovecal_client.errors import CaptureRefused, ClientError, NoAnswer, reason_of
 from glovecal_client.keys import JSON_ENCODING, GloveKeys
 from glovecal_client.queries import REFUSAL_ENCODING, json_object
 from glovecal_client.session import open_client
@@ -88,7 +88,7 @@ class CaptureLink:
                 self.refusal = str(error)
                 return
             except (ClientError, zenoh.ZError) as error:
-                self._report(f"recording without publishing: {error}")
+                self._report(f"recording without publishing: {reason_of(error)}")
                 self._stop.wait(_RETRY_S)
 
     def _connect(self, wait_s: float | None) -> None:
@@ -157,8 +157,8 @@ class CaptureLink:
         problem = None
         try:
             publisher.put(payload)
-        except zenoh.ZError as error:
-            problem = f"publishing fails: {error}"
+        except zenoh.ZError:
+            problem = "publishing fails: the router does not take frames"
         if problem != self._put_problem:
             self._put_problem = problem
             self._report(problem or "publishing works again")
@@ -185,7 +185,7 @@ class CaptureLink:
             try:
                 found = self._sources.log.answer(str(query.parameters))
             except (ClientError, OSError) as error:
-                query.reply_err(str(error), encoding=REFUSAL_ENCODING)
+                query.reply_err(reason_of(error), encoding=REFUSAL_ENCODING)
             else:
                 query.reply(self._keys.log, found)
 

@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from glovecal_client.errors import CaptureRefused, DamagedLog
+from glovecal_client.errors import CaptureRefused, DamagedLog, reason_of
 from glovecal_client.frame_log import FrameLog
 from glovecal_client.keys import GloveKeys
 from glovecal_client.log_records import Recording, cut_damaged_tail
@@ -32,7 +32,7 @@ class LogFolder:
             self._lock = (self.path / "lock").open("ab")
         except OSError as error:
             raise CaptureRefused(
-                f"capture of glove {keys.glove!r}: cannot write in {self.path}: {error}"
+                f"capture of glove {keys.glove!r}: cannot write in {self.path}: {reason_of(error)}"
             ) from error
         try:
             lock_file(self._lock)
@@ -58,7 +58,7 @@ class LogFolder:
         try:
             cut = cut_damaged_tail(path)
         except (DamagedLog, OSError) as error:
-            report(f"earlier recording left as it is: {error}")
+            report(f"earlier recording left as it is: {reason_of(error)}")
         else:
             if cut:
                 report(f"earlier recording {path.name}: {cut} damaged bytes moved to {path.name}.cut")
@@ -87,7 +87,9 @@ class LogFolder:
         try:
             return FrameLog.create(path, meta)
         except OSError as error:
-            raise CaptureRefused(f"capture does not start without its recording: {path}: {error}") from error
+            raise CaptureRefused(
+                f"capture does not start without its recording: {path}: {reason_of(error)}"
+            ) from error
 
     def runs(self) -> list[dict[str, Any]]:
         """``run_id`` and ``started_wall_ns`` of the newest logs, oldest first; damaged ones are left out."""

@@ -33,8 +33,8 @@ class ReadingCheck:
     def _values_fault(self, reading: Reading) -> str | None:
         try:
             readings, context = _as_sent(reading.readings), _as_sent(reading.context)
-        except (TypeError, ValueError) as error:
-            return f"its values are no numbers: {error}"
+        except (TypeError, ValueError):
+            return "its values are no numbers"
         if readings.shape != (len(self._sensors),):
             return f"{_size(readings)} sensor values instead of {len(self._sensors)}"
         if context.shape != (len(self._context),):

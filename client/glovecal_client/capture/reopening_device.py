@@ -6,7 +6,7 @@ import contextlib
 import time
 
 from glovecal_client.capture.device import Device, Reading
-from glovecal_client.errors import DeviceError, DeviceLost
+from glovecal_client.errors import DeviceError, DeviceLost, reason_of
 
 _FIRST_PAUSE_S = 0.1
 _LONGEST_PAUSE_S = 1.0
@@ -42,7 +42,7 @@ class ReopeningDevice:
             self._put_off()
             if isinstance(error, DeviceError):
                 raise
-            raise DeviceLost(f"{self._device.name}: {type(error).__name__}: {error}") from error
+            raise DeviceLost(f"{self._device.name}: {reason_of(error)}") from error
 
     def _open(self) -> None:
         self._device.open()

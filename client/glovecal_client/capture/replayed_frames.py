@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from glovecal_client.errors import BadName, BadOption, DamagedLog, WireError
+from glovecal_client.errors import BadName, BadOption, DamagedLog, WireError, reason_of
 from glovecal_client.log_records import MAGIC, Recording
 from glovecal_client.names import check_channel_name
 
@@ -53,7 +53,7 @@ def open_recording(path: Path) -> ReplayedFrames:
             is_log = file.read(len(MAGIC)) == MAGIC
         return _FrameLogRecording(path) if is_log else _TableRecording(path)
     except (OSError, DamagedLog, BadName, UnicodeDecodeError, csv.Error) as error:
-        raise BadOption(f"replay of {path}: {error}") from error
+        raise BadOption(f"replay of {path}: {reason_of(error)}") from error
 
 
 class _FrameLogRecording:
@@ -124,7 +124,9 @@ class _TableRecording:
                     if row:
                         yield self._frame(row, rows.line_num)
             except (csv.Error, UnicodeDecodeError) as error:
-                raise BadOption(f"replay of {self._path}: after line {rows.line_num}: {error}") from error
+                raise BadOption(
+                    f"replay of {self._path}: after line {rows.line_num}: {reason_of(error)}"
+                ) from error
 
     def _frame(self, row: list[str], line: int) -> ReplayedFrame:
         if len(row) != len(self._header):

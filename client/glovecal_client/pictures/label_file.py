@@ -22,7 +22,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from glovecal_client.errors import DeviceError, DeviceFinished, DeviceLost
+from glovecal_client.errors import DeviceError, DeviceFinished, DeviceLost, reason_of
 from glovecal_client.pictures.source import Picture
 from glovecal_client.private_files import open_private
 
@@ -91,7 +91,7 @@ class LabelFilePictures:
         try:
             file = self._path.open("rb")
         except OSError as error:
-            raise DeviceLost(f"{self._path} cannot be read: {error.strerror or error}") from error
+            raise DeviceLost(f"{self._path} cannot be read: {reason_of(error)}") from error
         try:
             self.about: dict[str, Any] = _header(file, self._path)
         except DeviceLost:

@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from glovecal_client.capture.computer import computer_id
-from glovecal_client.errors import ClientError
+from glovecal_client.errors import ClientError, reason_of
 from glovecal_client.pictures.source import PictureSource
 from glovecal_client.pictures.video_file import VideoWriter
 
@@ -71,7 +71,7 @@ class VideoRecording:
             while not self._stop.is_set():
                 self._writer.write(self._source.read())
         except (ClientError, OSError) as error:
-            self.problem: str = str(error)
+            self.problem: str = reason_of(error)
 
 
 def describe_video(video: Path, source: PictureSource, pictures: int, problem: str, **facts: Any) -> Path:

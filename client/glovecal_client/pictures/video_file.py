@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_client.errors import DeviceError, DeviceFinished, DeviceLost
+from glovecal_client.errors import DeviceError, DeviceFinished, DeviceLost, reason_of
 from glovecal_client.pictures.source import Picture, opencv
 
 SUFFIX = ".mkv"
@@ -130,11 +130,9 @@ def read_times(video: Path) -> list[tuple[int, int]]:
             rows = list(csv.DictReader(stream))
         return [(int(row[COLUMNS[1]]), int(row[COLUMNS[2]])) for row in rows]
     except OSError as error:
-        raise DeviceLost(f"{video} has no time stamps: {path} cannot be read ({error})") from error
+        raise DeviceLost(f"{video} has no time stamps: {path} cannot be read ({reason_of(error)})") from error
     except (KeyError, TypeError, ValueError) as error:
-        raise DeviceLost(
-            f"{path} must have the columns {', '.join(COLUMNS)}, whole nanoseconds ({error})"
-        ) from error
+        raise DeviceLost(f"{path} must have the columns {', '.join(COLUMNS)}, whole nanoseconds") from error
 
 
 def read_about(video: Path) -> dict[str, Any]:

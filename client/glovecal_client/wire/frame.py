@@ -83,7 +83,7 @@ def encode_frame(frame: Frame) -> bytes:
             frame.wall_ns, frame.run_id, len(context), 0,
         )  # fmt: skip
     except struct.error as error:
-        raise WireError(f"frame {frame.sequence}: a number does not fit its field: {error}") from error
+        raise WireError(f"frame {frame.sequence}: a number does not fit its field") from error
     return sealed(head + readings.tobytes() + context.tobytes())
 
 

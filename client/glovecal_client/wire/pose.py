@@ -160,7 +160,7 @@ def encode_around(
             skipped, age_us, 0, model,
         )  # fmt: skip
     except struct.error as error:
-        raise WireError(f"pose {sequence}: a number does not fit its field: {error}") from error
+        raise WireError(f"pose {sequence}: a number does not fit its field") from error
     return sealed(head + rotations)
 
 

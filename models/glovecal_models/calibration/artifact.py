@@ -18,14 +18,18 @@ import safetensors.numpy
 
 from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.model import CalibrationModel, RotationModel, restore_regressor
-from glovecal_models.calibration.servable import check_servable
+from glovecal_models.calibration.servable import LARGEST_DEG, check_servable
 from glovecal_models.calibration.unseen_wearing import UnseenWearing
+from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput, DamagedArtifact
-from glovecal_models.layout import Layout
+from glovecal_models.layout import MOST_NAMES, Layout
 from glovecal_models.regression.kernel_scores import choice_of
 
 FORMAT = "glovecal.model.v1"
 LARGEST_HEADER_BYTES = 8 << 20
+LARGEST_NUMBER = 1e15
+"""Of an array: more than any trained weight or precision has come to, and far inside what float32 holds."""
+MOST_EFFECTS, MOST_TAKES, MOST_SAMPLES = 1000, 100_000, 10_000_000
 
 
 def model_id(artifact: bytes) -> str:
@@ -104,34 +108,59 @@ def load(artifact: bytes, *, expected_id: str | None = None) -> CalibrationModel
     try:
         tensors = safetensors.numpy.load(artifact)
         return _restore(manifest, tensors, name)
-    except (KeyError, TypeError, ValueError, BadInput, safetensors.SafetensorError) as error:
+    except BadInput as error:
         raise DamagedArtifact(f"model {name}: cannot be restored: {error}") from error
+    except (KeyError, TypeError, ValueError, AttributeError, safetensors.SafetensorError) as error:
+        raise DamagedArtifact(
+            f"model {name}: cannot be restored: something in it is missing, or is not what it should be; "
+            "export it again"
+        ) from error
 
 
 def read_manifest(artifact: bytes) -> dict[str, Any]:
     """The JSON manifest alone. Raises DamagedArtifact."""
     length = int.from_bytes(artifact[:8], "little")
     if len(artifact) < 8 or not 0 < length <= min(LARGEST_HEADER_BYTES, len(artifact) - 8):
-        raise DamagedArtifact(f"not a model artifact: header of {length} bytes in a file of {len(artifact)}")
+        raise DamagedArtifact(
+            f"not a model artifact: header of {length} bytes in a file of {len(artifact)}; send what "
+            "models/ID/export gave"
+        )
     try:
-        header = json.loads(artifact[8 : 8 + length])
-        manifest = json.loads(header["__metadata__"]["manifest"])
-    except (ValueError, KeyError, TypeError) as error:
-        raise DamagedArtifact("not a model artifact: its header holds no manifest") from error
+        header = read_json(artifact[8 : 8 + length], "its header")
+        manifest = read_json(header["__metadata__"]["manifest"], "its manifest")
+    except (BadInput, KeyError, TypeError, AttributeError) as error:
+        raise DamagedArtifact(
+            "not a model artifact: its header holds no manifest; send what models/ID/export gave"
+        ) from error
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
-        raise DamagedArtifact(f"not a {FORMAT} artifact")
+        raise DamagedArtifact(f"not a {FORMAT} artifact; send what models/ID/export gave")
     return manifest
 
 
 def _restore(manifest: Mapping[str, Any], tensors: Mapping[str, np.ndarray], name: str) -> CalibrationModel:
     for key, array in tensors.items():
-        if array.dtype != np.float64 or not np.isfinite(array).all():
-            raise DamagedArtifact(f"model {name}: array {key} must be finite float64")
+        if array.dtype != np.float64 or not (np.abs(array) <= LARGEST_NUMBER).all():  # NaN too
+            raise DamagedArtifact(
+                f"model {name}: array {key[:80]!r} must be finite float64, at most {LARGEST_NUMBER:g}"
+            )
+    for what, most in (("rotations", MOST_NAMES), ("effects", MOST_EFFECTS), ("takes", MOST_TAKES)):
+        if len(manifest.get(what, ())) > most:
+            raise DamagedArtifact(
+                f"model {name}: {len(manifest[what])} {what} are too many; a model has at most {most}"
+            )
+    by_rotation: dict[str, dict[str, np.ndarray]] = {}
+    for key, array in tensors.items():
+        rotation, dot, rest = key.partition(".")
+        if dot:
+            by_rotation.setdefault(rotation, {})[rest] = array
     return CalibrationModel(
         layout=Layout.from_document(manifest["layout"]),
         subject=str(manifest["subject"]),
         method=str(manifest["method"]),
-        rotations=tuple(_restore_rotation(item, tensors) for item in manifest["rotations"]),
+        rotations=tuple(
+            _restore_rotation(item, by_rotation.get(str(item["rotation"]), {}), tensors)
+            for item in manifest["rotations"]
+        ),
         effects=tuple(
             _restore_effect(number, item, tensors) for number, item in enumerate(manifest.get("effects", []))
         ),
@@ -140,14 +169,15 @@ def _restore(manifest: Mapping[str, Any], tensors: Mapping[str, np.ndarray], nam
         unseen_wearing=UnseenWearing.from_document(manifest.get("unseen_wearing")),
         takes=tuple(str(item) for item in manifest["takes"]),
         parent=manifest["parent"],
-        error_estimate=manifest["error_estimate"],
+        error_estimate=_error_estimate(manifest["error_estimate"]),
         simulated=bool(manifest["simulated"]),
     )
 
 
-def _restore_rotation(item: Mapping[str, Any], tensors: Mapping[str, np.ndarray]) -> RotationModel:
+def _restore_rotation(
+    item: Mapping[str, Any], own: dict[str, np.ndarray], tensors: Mapping[str, np.ndarray]
+) -> RotationModel:
     rotation = str(item["rotation"])
-    own = {key.split(".", 1)[1]: array for key, array in tensors.items() if key.split(".", 1)[0] == rotation}
     held_out = item["held_out_rmse_deg"]
     regressor = restore_regressor(own, item["regressor"])
     choice_of(regressor)  # what is told of the choice must be of this process
@@ -156,10 +186,29 @@ def _restore_rotation(item: Mapping[str, Any], tensors: Mapping[str, np.ndarray]
         regressor=regressor,
         input_low=tensors[f"{rotation}:input_low"],
         input_high=tensors[f"{rotation}:input_high"],
-        uncertain_above_deg=float(item["uncertain_above_deg"]),
-        held_out_rmse_deg=None if held_out is None else float(held_out),
-        samples=int(item["samples"]),
+        uncertain_above_deg=_within(
+            item["uncertain_above_deg"], LARGEST_DEG, f"{rotation}: uncertain_above_deg"
+        ),
+        held_out_rmse_deg=None
+        if held_out is None
+        else _within(held_out, LARGEST_DEG, f"{rotation}: held_out_rmse_deg"),
+        samples=int(_within(item["samples"], MOST_SAMPLES, f"{rotation}: samples")),
     )
+
+
+def _error_estimate(document: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Its errors are degrees."""
+    for name, value in document.items():
+        if name.endswith("rmse_deg") and value is not None:
+            _within(value, LARGEST_DEG, f"error_estimate: {name}")
+    return document
+
+
+def _within(value: Any, largest: float, what: str) -> float:
+    """A number from 0 on. Raises BadInput for any other, and for what is no number."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= largest:
+        raise BadInput(f"{what} is {repr(value)[:40]}; it lies between 0 and {largest:g}")
+    return float(value)
 
 
 def _restore_effect(number: int, item: Mapping[str, Any], tensors: Mapping[str, np.ndarray]) -> AddedEffect:

@@ -14,7 +14,7 @@ from glovecal_models.calibration.unseen_wearing import UnseenWearing
 from glovecal_models.effects.base.effect import Effect, Stream, Uncertainty
 from glovecal_models.effects.base.signals import GloveFrames, Signals
 from glovecal_models.effects.base.signature_effect import Hold, SignatureEffect
-from glovecal_models.errors import BadInput
+from glovecal_models.errors import BadInput, reason_of
 
 LARGEST_CORRECTION_DEG = 360.0
 """No effect turns a joint by more than this; what is larger, or no number, is an effect gone wrong."""
@@ -331,7 +331,7 @@ def _columns(
         try:
             columns[row] = stream.columns(frame)[0]
         except Exception as error:
-            problems[row] = str(error) or type(error).__name__
+            problems[row] = reason_of(error)
     return columns
 
 

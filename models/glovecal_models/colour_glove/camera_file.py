@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from glovecal_models.colour_glove.camera_model import Camera
+from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput
 
 FORMAT = "glovecal cameras 1"
@@ -56,10 +57,7 @@ def read_cameras(file: Path) -> tuple[Camera, ...]:
     size = file.stat().st_size
     if size > LARGEST_CAMERA_FILE:
         raise BadInput(f"{file}: {size} bytes; cameras take at most {LARGEST_CAMERA_FILE}")
-    try:
-        document = json.loads(file.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise BadInput(f"{file} is no JSON: {error}") from error
+    document = read_json(file.read_bytes(), str(file))
     if not isinstance(document, dict) or set(document) != {"format", "cameras"}:
         raise BadInput(f'{file}: expected "format" and "cameras", nothing else')
     if document["format"] != FORMAT or not isinstance(document["cameras"], list):

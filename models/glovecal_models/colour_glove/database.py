@@ -13,6 +13,8 @@ import itertools
 import json
 import os
 import shutil
+import time
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -37,6 +39,12 @@ VIEW_PX, VIEW_FOCAL_PX, VIEW_DISTANCE_MM = 128, 230.0, 500.0
 """The virtual camera: a spread hand fills most of its picture."""
 FORMAT = 1
 """Of the folder; part of the hash."""
+ENTRY_BYTES = 18_000
+MOST_BYTES = 8_000_000_000
+"""Of all databases in a folder: four of 100,000 entries, twenty of the usual size."""
+SPARED_BYTES = 500_000_000
+"""Is left to recordings."""
+ABANDONED_AFTER_S = 86_400.0
 _AT_ONCE = 500
 _ARRAYS = ("angles_deg", "rotations", "tiny", "transforms", "centroids", "areas", "windows")
 
@@ -135,6 +143,7 @@ def pose_database(
     found = _mapped(place, skin)
     if found is None:
         folder.mkdir(parents=True, exist_ok=True)
+        _make_room(folder, ENTRY_BYTES * settings.entries)
         unfinished = Path(mkdtemp(prefix=f"{place.name}-", dir=folder))
         try:
             _build(unfinished, skin, pattern, poses, settings, workers, report, cancelled)
@@ -147,9 +156,39 @@ def pose_database(
         found = _mapped(place, skin)
         if found is None:
             raise BadInput(f"the database just written to {place} cannot be read; is the disk full?")
+    with suppress(OSError):
+        os.utime(place)  # used last: others go first when room is needed
     if report:
         report(f"{len(found)} entries", 1.0)
     return found
+
+
+def _make_room(folder: Path, needed: int) -> None:
+    """Remove databases, those used longest ago first, until all together keep below ``MOST_BYTES`` with the
+    one to come, and what killed builders left. Raises BadInput where the disk has no room for it then.
+
+    One that is removed is built again when it is asked for."""
+    kept = 0
+    places = [place for place in folder.glob("colour-glove-*") if place.is_dir()]
+    for place in sorted(places, key=_used_at, reverse=True):
+        kept += sum(file.stat().st_size for file in place.iterdir())
+        is_whole = (place / "database.json").exists()
+        abandoned = not is_whole and time.time() - _used_at(place) > ABANDONED_AFTER_S
+        if abandoned or (is_whole and kept + needed > MOST_BYTES):
+            shutil.rmtree(place, ignore_errors=True)
+    free = shutil.disk_usage(folder).free
+    if free < needed + SPARED_BYTES:
+        raise BadInput(
+            f"the pose database takes {needed / 1e9:.1f} GB, and {folder} has {free / 1e9:.1f} GB free: free "
+            "some disk space, or ask for fewer entries"
+        )
+
+
+def _used_at(place: Path) -> float:
+    try:
+        return place.stat().st_mtime
+    except OSError:
+        return 0.0
 
 
 def _digest(skin: HandSkin, pattern: Pattern, poses: np.ndarray, settings: DatabaseSettings) -> str:

@@ -7,7 +7,6 @@ open; how far the nearest of all lies is what no pattern could better. All patte
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +19,7 @@ from glovecal_models.colour_glove.palette import COLOUR_NAMES
 from glovecal_models.colour_glove.pattern import PATCHES, Pattern, glove_pattern, printed_pattern
 from glovecal_models.colour_glove.pose_set import generated_poses
 from glovecal_models.colour_glove.skin import HandSkin, hand_skin, posed
+from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput
 from glovecal_models.progress import Report
 
@@ -109,14 +109,9 @@ def common_patterns() -> dict[str, Pattern]:
 def read_pattern(file: Path) -> Pattern:
     """The printed patches in colours of one's own: JSON, ``{"colours": [4, 3, ...]}``, 20 numbers of 1 to 10
     for patch 1 and so on. Raises BadInput that names the file."""
-    try:
-        if file.stat().st_size > LARGEST_PATTERN:
-            raise BadInput(f"{file}: {file.stat().st_size} bytes; a pattern has at most {LARGEST_PATTERN}")
-        document = json.loads(file.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        if isinstance(error, BadInput):
-            raise
-        raise BadInput(f"{file} is no JSON: {error}") from error
+    if file.stat().st_size > LARGEST_PATTERN:
+        raise BadInput(f"{file}: {file.stat().st_size} bytes; a pattern has at most {LARGEST_PATTERN}")
+    document = read_json(file.read_bytes(), str(file))
     example = '{"colours": [4, 3, ...]}, 20 numbers of 1 to 10'
     if not isinstance(document, dict) or set(document) != {"colours"}:
         raise BadInput(f"{file}: expected {example}, nothing else")

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from glovecal_models.colour_glove.skin import RADII_MM, HandSkin, hand_skin
+from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import DIMENSIONS, HandDimensions
 from glovecal_models.hand.skeleton import Handedness, hand_skeleton
@@ -49,10 +50,7 @@ def read_shape(file: Path) -> ShapeOnFile:
     size = file.stat().st_size
     if size > LARGEST_SHAPE_FILE:
         raise BadInput(f"{file}: {size} bytes; a hand's shape takes at most {LARGEST_SHAPE_FILE}")
-    try:
-        document = json.loads(file.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise BadInput(f"{file} is no JSON: {error}") from error
+    document = read_json(file.read_bytes(), str(file))
     wanted = {"format", *ShapeOnFile.__dataclass_fields__}
     if not isinstance(document, dict) or set(document) != wanted or document.pop("format") != FORMAT:
         raise BadInput(f"{file} is no hand's shape: expected {FORMAT!r} and {', '.join(sorted(wanted))}")

@@ -74,8 +74,10 @@ class Polynomial(Covariance):
     def from_settings(cls, settings: Mapping[str, Any]) -> Covariance:
         try:
             return cls(settings.get("degree"))  # pyright: ignore[reportArgumentType]  checked inside
-        except ValueError as error:
-            raise DamagedArtifact(f"polynomial covariance: {error}") from None
+        except ValueError:
+            raise DamagedArtifact(
+                "polynomial covariance: its parameters are not what they should be"
+            ) from None
 
     def __repr__(self) -> str:
         return f"Polynomial({self.degree})"

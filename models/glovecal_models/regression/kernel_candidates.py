@@ -71,9 +71,10 @@ def fit_process(
             least_gain=1e-3,
             cancelled=cancelled,
         )
-    except np.linalg.LinAlgError as error:
+    except np.linalg.LinAlgError:
         raise NotTrainable(
-            f"{covariance!r} has no likelihood on these {len(target)} samples: {error}"
+            f"{covariance!r} has no likelihood on these {len(target)} samples: its covariance matrix "
+            "cannot be factorised"
         ) from None
     return _regressor(working, likelihood, optimum, method, sample_weight)
 

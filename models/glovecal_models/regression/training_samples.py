@@ -47,8 +47,8 @@ def check_samples(
 def _as_numbers(values: np.ndarray, what: str) -> np.ndarray:
     try:
         return np.asarray(values, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise NotTrainable(f"{what} are not numbers: {error}") from None
+    except (TypeError, ValueError):
+        raise NotTrainable(f"{what} are not numbers, or not one for each sample") from None
 
 
 def _names(sensor_names: Sequence[str] | None, dimensions: int) -> list[str]:

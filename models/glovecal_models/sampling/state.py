@@ -136,7 +136,8 @@ class SamplingState:
         """Raises BadInput for another version."""
         if document.get("version") != VERSION:
             raise BadInput(
-                f"sampling document of version {document.get('version')}; this software reads {VERSION}"
+                f"sampling document of version {document.get('version')}; this software reads "
+                f"{VERSION}; begin a new sampling"
             )
         values = {name: value for name, value in document.items() if name != "version"}
         return cls(

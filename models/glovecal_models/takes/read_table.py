@@ -68,7 +68,7 @@ def _read(reader, file: str) -> RawTable:  # csv.reader's type has no public nam
         if len(lines) * len(columns) > MOST_CELLS:
             raise BadTakeTable(f"more than {MOST_CELLS} cells; divide it into several files", file=file)
     if not lines:
-        raise BadTakeTable("only a header, no rows", file=file, line=1)
+        raise BadTakeTable("only a header, no rows; give at least one", file=file, line=1)
     joined = {header: np.concatenate(parts) for header, parts in numbers.items()}
     return RawTable(file, tuple(columns), joined, texts, np.array(lines))
 
@@ -83,7 +83,7 @@ def _numbered_rows(reader, file: str) -> Iterator[tuple[int, list[str]]]:
             return
         except csv.Error as error:
             raise BadTakeTable(
-                f"cannot be read as CSV: {error}; a quote may be unclosed", file=file, line=begins
+                "cannot be read as CSV from here on; a quote may be unclosed", file=file, line=begins
             ) from error
         if row:
             yield begins, row
@@ -200,7 +200,9 @@ def read_parquet_table(path: Path) -> RawTable:
     try:
         return _read_parquet(pyarrow, path)
     except (pyarrow.ArrowException, OSError, UnicodeDecodeError) as error:
-        raise BadTakeTable(f"not a readable Parquet file: {str(error)[:200]}", file=path.name) from error
+        raise BadTakeTable(
+            "not a readable Parquet file: it is damaged or cut off; write it again", file=path.name
+        ) from error
 
 
 def _read_parquet(pyarrow: Any, path: Path) -> RawTable:
@@ -211,7 +213,7 @@ def _read_parquet(pyarrow: Any, path: Path) -> RawTable:
             raise BadTakeTable(f"more than {MOST_CELLS} cells; divide it into several files", file=file)
         table = source.read(use_threads=False)
     if table.num_rows == 0:
-        raise BadTakeTable("no rows", file=file)
+        raise BadTakeTable("no rows; give at least one", file=file)
     numbers: dict[str, np.ndarray] = {}
     texts: dict[str, list[str]] = {}
     for column, values in zip(columns, table.columns, strict=True):

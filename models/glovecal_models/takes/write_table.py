@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,8 @@ SIMULATED_CONTEXT = "simulated"
 """The context column that marks simulated takes, so that no file of them passes for a recording."""
 
 TableColumn = np.ndarray | list[str]
+Write = Callable[[Iterable[Mapping[str, TableColumn]], Path], None]
+"""Writes blocks of rows."""
 
 
 def write_takes(takes: Sequence[Take], path: Path) -> list[Path]:
@@ -42,9 +45,10 @@ def write_takes(takes: Sequence[Take], path: Path) -> list[Path]:
     return [frames, reference]
 
 
-def write_columns(columns: dict[str, np.ndarray], path: Path) -> None:
-    """A table (.csv or .parquet) of columns of any name; NaN is empty. Replaced whole or not at all."""
-    _replaced(_writer(path), dict(columns), path)
+def write_columns(blocks: Iterable[dict[str, np.ndarray]], path: Path) -> None:
+    """A table (.csv or .parquet) of columns of any name, in blocks of rows, which all have the same columns;
+    NaN is empty. Replaced whole or not at all."""
+    _replaced(_writer(path), blocks, path)
 
 
 def _require_one_table(takes: Sequence[Take]) -> None:
@@ -142,7 +146,7 @@ def _union(lists) -> list[str]:  # an iterable of tuples of names
     return list(dict.fromkeys(name for names in lists for name in names))
 
 
-def _writer(path: Path) -> Callable[[dict[str, TableColumn], Path], None]:
+def _writer(path: Path) -> Write:
     suffix = path.suffix.lower()
     if suffix == ".csv":
         return _write_csv
@@ -154,19 +158,15 @@ def _writer(path: Path) -> Callable[[dict[str, TableColumn], Path], None]:
     )
 
 
-def _write_whole(
-    write: Callable[[dict[str, TableColumn], Path], None], columns: dict[str, TableColumn], path: Path
-) -> None:
+def _write_whole(write: Write, columns: dict[str, TableColumn], path: Path) -> None:
     _check_columns(columns, path)
-    _replaced(write, columns, path)
+    _replaced(write, [columns], path)
 
 
-def _replaced(
-    write: Callable[[dict[str, TableColumn], Path], None], columns: dict[str, TableColumn], path: Path
-) -> None:
+def _replaced(write: Write, blocks: Iterable[Mapping[str, TableColumn]], path: Path) -> None:
     part = path.with_name(f"{path.name}.part")
     try:
-        write(columns, part)
+        write(blocks, part)
         os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
@@ -183,12 +183,16 @@ def _check_columns(columns: dict[str, TableColumn], path: Path) -> None:
             raise BadInput(f"{path.name}: column {column.header!r} holds infinity; it must be finite or NaN")
 
 
-def _write_csv(columns: dict[str, TableColumn], path: Path) -> None:
-    cells = [values if isinstance(values, list) else _csv_numbers(values) for values in columns.values()]
+def _write_csv(blocks: Iterable[Mapping[str, TableColumn]], path: Path) -> None:
     with path.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows(zip(*cells, strict=True))
+        for number, columns in enumerate(blocks):
+            if number == 0:
+                writer.writerow(columns)
+            cells = [
+                values if isinstance(values, list) else _csv_numbers(values) for values in columns.values()
+            ]
+            writer.writerows(zip(*cells, strict=True))
 
 
 def _csv_numbers(values: np.ndarray) -> list[float | str]:
@@ -196,12 +200,18 @@ def _csv_numbers(values: np.ndarray) -> list[float | str]:
     return ["" if value != value else value for value in values.astype(float).tolist()]
 
 
-def _write_parquet(columns: dict[str, TableColumn], path: Path) -> None:
+def _write_parquet(blocks: Iterable[Mapping[str, TableColumn]], path: Path) -> None:
     pyarrow = load_pyarrow()
-    arrays = [
-        pyarrow.array(values, type=pyarrow.string())
-        if isinstance(values, list)
-        else pyarrow.array(values.astype(float), from_pandas=True)  # NaN becomes null: not measured
-        for values in columns.values()
-    ]
-    pyarrow.parquet.write_table(pyarrow.table(arrays, names=list(columns)), path)
+    with ExitStack() as opened:
+        writer = None
+        for columns in blocks:
+            arrays = [
+                pyarrow.array(values, type=pyarrow.string())
+                if isinstance(values, list)
+                else pyarrow.array(values.astype(float), from_pandas=True)  # NaN becomes null: not measured
+                for values in columns.values()
+            ]
+            table = pyarrow.table(arrays, names=list(columns))
+            if writer is None:
+                writer = opened.enter_context(pyarrow.parquet.ParquetWriter(path, table.schema))
+            writer.write_table(table)

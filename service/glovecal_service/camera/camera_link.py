@@ -21,6 +21,7 @@ from glovecal_client.queries import REFUSAL_ENCODING, json_object
 from glovecal_client.session import open_client
 from glovecal_client.wire.pose import POSE_ENCODING
 from glovecal_models.errors import GlovecalError
+from glovecal_service.plain import reason_of
 
 RETRY_S = 1.0
 PICTURE_ENCODING = "image/jpeg"
@@ -99,7 +100,7 @@ class CameraLink:
                 self.refusal = str(error)
             except (ClientError, zenoh.ZError) as error:
                 if not self._stop.is_set():
-                    self._report(f"poses reach nobody: {error}")
+                    self._report(f"poses reach nobody: {reason_of(error)}")
                 self._stop.wait(RETRY_S)
 
     def _connect(self) -> None:

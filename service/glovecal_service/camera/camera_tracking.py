@@ -35,6 +35,7 @@ from glovecal_service.camera.kept_pictures import KeptPictures
 from glovecal_service.camera.newest_picture import NewestPicture, NumberedPicture
 from glovecal_service.camera.picture_reader import PictureReader
 from glovecal_service.camera.tracking_setup import Tracker, TrackingSetup, tracking_setup
+from glovecal_service.plain import reason_of
 
 TURN_S = 0.1
 STATUS_EVERY_S = 1.0
@@ -112,7 +113,7 @@ class CameraTracking:
         except Cancelled:
             pass
         except Exception as error:
-            self._end(str(error))
+            self._end(reason_of(error))
             raise
         self._end("stopped" if stop.is_set() else self._status.sentence)
         return self._summary()
@@ -167,7 +168,7 @@ class CameraTracking:
             if estimate is not None and self.health.present:
                 estimate = replace(estimate, accepted=np.zeros_like(estimate.accepted))
         except (BadInput, ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
-            self.health.note_unusable(str(error))
+            self.health.note_unusable(reason_of(error))
             self._no_pose += 1
             return
         shown = None if pixels.ndim == 2 else pixels

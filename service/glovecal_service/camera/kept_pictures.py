@@ -23,6 +23,7 @@ from glovecal_client.pictures.source import Picture, PictureSource
 from glovecal_client.pictures.video_file import VideoWriter
 from glovecal_client.private_files import PRIVATE_FOLDER
 from glovecal_service.camera.camera_settings import Keep
+from glovecal_service.plain import reason_of
 
 TRY_AGAIN_AFTER_S = 5.0
 
@@ -72,7 +73,7 @@ class KeptPictures:
         try:
             write()
         except (ClientError, OSError) as error:
-            self.problem, self.failed = str(error), self.failed + 1
+            self.problem, self.failed = reason_of(error), self.failed + 1
             self._not_before_s = time.monotonic() + TRY_AGAIN_AFTER_S
             self._close()
         else:

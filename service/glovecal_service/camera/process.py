@@ -20,6 +20,7 @@ from glovecal_models.errors import GlovecalError
 from glovecal_models.threads import pin_blas_to_one_thread
 from glovecal_service.camera.camera_settings import CameraSettings
 from glovecal_service.camera.packages import camera_not_installed
+from glovecal_service.plain import reason_of
 
 if TYPE_CHECKING:
     from glovecal_service.camera.camera_tracking import CameraSummary
@@ -54,7 +55,7 @@ def main(text: str) -> int:
         with stopped_by_signals(stop, outlives_terminal=True):
             tell(str(run_camera(CameraSettings.from_text(text), stop)))
     except (GlovecalError, ClientError, OSError) as error:
-        tell(str(error))
+        tell(reason_of(error))
         return 1
     return 0
 

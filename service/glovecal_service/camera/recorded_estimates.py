@@ -26,6 +26,7 @@ from glovecal_models.errors import BadInput
 from glovecal_models.progress import Cancel, Report, stop_if
 from glovecal_models.takes.camera_reference.estimates import MOST_FRAMES, CameraEstimates, without_repeats
 from glovecal_service.camera.tracking_setup import TrackingSetup
+from glovecal_service.plain import reason_of
 
 CHECK_EVERY_S = 0.2
 """Of the recording: a check takes as long as looking the hand up, and counts until the next."""
@@ -117,7 +118,7 @@ class Recordings:
                         checked_s, present = at_s[frame], _findings(setup, pictures, labels)
                     pose = tracker.track(labels, float(at_s[frame]))
                 except (BadInput, ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
-                    unusable, problem, pose = unusable + 1, str(error), None
+                    unusable, problem, pose = unusable + 1, reason_of(error), None
                 found.update(present)
                 if pose is not None and present:
                     pose = replace(pose, accepted=np.zeros_like(pose.accepted))

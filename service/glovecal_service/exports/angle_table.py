@@ -5,27 +5,33 @@ Predicted angles are named ``p.``, not ``r.`` as a take's measured ones are: the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from glovecal_models.takes.write_table import write_columns
 from glovecal_service.exports.export_format import ExportFormat
-from glovecal_service.exports.hand_motion import Content, HandMotion
+from glovecal_service.exports.hand_motion import Content, HandMotion, blocks
 from glovecal_service.exports.markers import markers
 
 
 def write_table(motions: Sequence[HandMotion], content: Content, path: Path) -> None:
     """``p.`` and ``sd.`` in degrees, ``j.JOINT.x`` in mm, or raw ``s.``; of two hands each with its label."""
+    write_columns(_blocks(motions, content), path)
+
+
+def _blocks(motions: Sequence[HandMotion], content: Content) -> Iterator[dict[str, np.ndarray]]:
     time_s = motions[0].time_s
-    columns: dict[str, np.ndarray] = {"time_s": time_s - time_s[0]}
-    for motion in motions:
-        hand = f"{motion.label}." if len(motions) > 1 else ""
-        columns |= {f"{hand}{name}": values for name, values in _columns(motion, content).items()}
-    if any(motion.simulated for motion in motions):
-        columns["simulated"] = np.ones(len(time_s))
-    write_columns(columns, path)
+    for which in blocks(len(time_s)):
+        columns: dict[str, np.ndarray] = {"time_s": time_s[which] - time_s[0]}
+        for motion in motions:
+            hand = f"{motion.label}." if len(motions) > 1 else ""
+            found = _columns(motion.frames(which), content)
+            columns |= {f"{hand}{name}": values for name, values in found.items()}
+        if any(motion.simulated for motion in motions):
+            columns["simulated"] = np.ones(len(columns["time_s"]))
+        yield columns
 
 
 def _columns(motion: HandMotion, content: Content) -> dict[str, np.ndarray]:

@@ -7,10 +7,12 @@ wrist, and its wrist sensors are ignored. Markers are taken to lie on the bones:
 
 from __future__ import annotations
 
+import math
+from array import array
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TextIO
 
 import numpy as np
 
@@ -28,6 +30,11 @@ NEEDED: dict[Wrist, tuple[str, ...]] = {
 """Which markers place a hand, in order."""
 _UNITS = {"mm": 1.0, "m": 1000.0, "cm": 10.0}
 _HEAD_LINES = 5
+MOST_MARKERS = 1000
+MOST_CELLS = 20_000_000
+"""Of a file, 160 MB: 50 markers for half an hour at 70 Hz."""
+LONGEST_LINE = 100_000
+"""Characters: 1000 markers, each number with 30 digits."""
 SHORTEST_MM = 1.0
 
 
@@ -41,7 +48,14 @@ class BodyMarkers:
     """(N, 3) by name; NaN where a marker was not seen."""
 
     def at(self, time_s: np.ndarray) -> dict[str, np.ndarray]:
-        """At other times of the same clock, between frames that are 0.1 s apart at most."""
+        """At other times of the same clock, between frames that are 0.1 s apart at most. Raises BadInput for
+        more than ``MOST_CELLS`` numbers."""
+        count = 3 * len(self.places_mm) * len(time_s)
+        if count > MOST_CELLS:
+            raise BadInput(
+                f"{len(self.places_mm)} markers in {len(time_s)} frames are {count} numbers, {MOST_CELLS} at "
+                "most; leave markers out, or export a shorter take"
+            )
         return {name: _between(time_s, self.time_s, places) for name, places in self.places_mm.items()}
 
     def as_take(self) -> Take:
@@ -60,6 +74,10 @@ class HandFrame:
     """(N, 3)."""
     axes: np.ndarray
     """(N, 3, 3): columns x to the fingers, y to the right hand's thumb, z out of the back of the hand."""
+
+    def frames(self, which: slice) -> HandFrame:
+        """Some of the frames."""
+        return HandFrame(self.origin_mm[which], self.axes[which])
 
     def placed(self, places_mm: np.ndarray) -> np.ndarray:
         """(N, 3) of the hand's frame as places of the optical system's."""
@@ -90,31 +108,43 @@ def hand_frame(
 
 def read_trc(path: Path, name: str) -> BodyMarkers:
     """A TRC file in mm, cm or m. Raises BadInput that names ``name``, the line and what would be right."""
-    lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
-    if len(lines) <= _HEAD_LINES or not lines[0].startswith("PathFileType"):
-        raise BadInput(f"{name} is no TRC file: its first line must begin with PathFileType")
-    facts = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=False))
-    unit = facts.get("Units", "").strip()
-    if unit not in _UNITS:
-        raise BadInput(f"{name}, line 3: unit {unit!r} must be one of {', '.join(_UNITS)}")
-    names = [each.strip() for each in lines[3].rstrip().split("\t")[2:] if each.strip()]
-    if not names or len(set(names)) != len(names):
-        raise BadInput(f"{name}, line 4: markers must have names, each another")
-    rows = []
-    for number, line in enumerate(lines[_HEAD_LINES:], _HEAD_LINES + 1):
-        if not line.strip():
-            continue
-        cells = line.split("\t")[1 : 2 + 3 * len(names)]
-        cells += [""] * (1 + 3 * len(names) - len(cells))
-        try:
-            rows.append([float(cell) if cell.strip() else np.nan for cell in cells])
-        except ValueError as error:
-            raise BadInput(f"{name}, line {number}: {error}") from error
-    table = np.array(rows).reshape(-1, 1 + 3 * len(names))
+    with path.open(encoding="utf-8-sig", errors="replace") as stream:
+        head = [stream.readline(LONGEST_LINE).rstrip("\n") for _ in range(_HEAD_LINES)]
+        if not head[0].startswith("PathFileType"):
+            raise BadInput(f"{name} is no TRC file: its first line must begin with PathFileType")
+        facts = dict(zip(head[1].split("\t"), head[2].split("\t"), strict=False))
+        unit = facts.get("Units", "").strip()
+        if unit not in _UNITS:
+            raise BadInput(f"{name}, line 3: unit {unit[:40]!r} must be one of {', '.join(_UNITS)}")
+        names = [each.strip() for each in head[3].rstrip().split("\t")[2:] if each.strip()]
+        if not names or len(set(names)) != len(names):
+            raise BadInput(f"{name}, line 4: markers must have names, each another")
+        if len(names) > MOST_MARKERS:
+            raise BadInput(f"{name}, line 4: {len(names)} markers are too many; give at most {MOST_MARKERS}")
+        table = _rows(stream, name, 1 + 3 * len(names))
     if len(table) < 2 or not (np.diff(table[:, 0]) > 0).all():
         raise BadInput(f"{name} needs two frames or more, whose times increase")
     places = table[:, 1:].reshape(len(table), -1, 3) * _UNITS[unit]
     return BodyMarkers(table[:, 0], {each: places[:, at] for at, each in enumerate(names)})
+
+
+def _rows(stream: TextIO, name: str, width: int) -> np.ndarray:
+    """(N, width): time and places, NaN where a cell is empty."""
+    values = array("d")
+    number = _HEAD_LINES
+    while line := stream.readline(LONGEST_LINE):
+        number += 1
+        if not line.strip():
+            continue
+        cells = line.split("\t", 1 + width)[1 : 1 + width]
+        cells += [""] * (width - len(cells))
+        try:
+            values.extend([float(cell) if cell.strip() else math.nan for cell in cells])
+        except ValueError as error:
+            raise BadInput(f"{name}, line {number}: a number is expected in each field") from error
+        if len(values) > MOST_CELLS:
+            raise BadInput(f"{name} has more than {MOST_CELLS} numbers; divide it, or leave markers out")
+    return np.array(values).reshape(-1, width)
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

@@ -7,9 +7,10 @@ on even steps, and an angle that is not known there stays as it last was.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
@@ -26,7 +27,7 @@ from glovecal_service.exports.body_at_rest import (
     wrist_offset_mm,
 )
 from glovecal_service.exports.export_format import ExportFormat
-from glovecal_service.exports.hand_motion import Content, HandMotion, at_times
+from glovecal_service.exports.hand_motion import Content, HandMotion, at_times, blocks
 
 MOST_FRAMES = 1_000_000
 MM_PER_UNIT = 10.0
@@ -51,13 +52,20 @@ def write_bvh(motions: Sequence[HandMotion], content: Content, path: Path) -> No
         if label not in hands:
             hands[label] = _Hand.at_rest(motions[0].skeleton, label, len(time_s))
     bones = body_at_rest(length)
-    turns: dict[str, np.ndarray] = {}
     for label, hand in hands.items():
         bones += hand.bones(label, wrist_offset_mm(length, label))
-        turns |= hand.turns(label)
     if any(motion.simulated for motion in motions):
         bones.append(Bone(SIMULATED, ROOT, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-    path.write_text(_text(bones, turns, time_s), encoding="ascii", newline="\n")
+    with path.open("w", encoding="ascii", newline="\n") as stream:
+        order = _write_hierarchy(stream, bones)
+        step = (time_s[-1] - time_s[0]) / (len(time_s) - 1)
+        stream.write(f"MOTION\nFrames: {len(time_s)}\nFrame Time: {step:.9f}\n")
+        root = next(bone for bone in bones if bone.parent is None)
+        for which in blocks(len(time_s)):
+            turns: dict[str, np.ndarray] = {}
+            for label, hand in hands.items():
+                turns |= replace(hand, degrees=hand.degrees[which]).turns(label)
+            stream.writelines(_rows(root, order, turns, which.stop - which.start))
 
 
 @dataclass(frozen=True)
@@ -163,9 +171,8 @@ def _vector(values: np.ndarray) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _text(bones: Sequence[Bone], turns: dict[str, np.ndarray], time_s: np.ndarray) -> str:
-    from scipy.spatial.transform import Rotation  # slow to load, and every command that exports loads this
-
+def _write_hierarchy(stream: TextIO, bones: Sequence[Bone]) -> list[str]:
+    """The names of the bones in the order of their channels."""
     children: dict[str | None, list[Bone]] = {}
     for bone in bones:
         children.setdefault(bone.parent, []).append(bone)
@@ -192,9 +199,15 @@ def _text(bones: Sequence[Bone], turns: dict[str, np.ndarray], time_s: np.ndarra
             lines.extend([f"{tab}\tEnd Site", f"{tab}\t{{", f"{tab}\t\t{offset(bone.end_mm)}", f"{tab}\t}}"])
         lines.append(f"{tab}}}")
 
-    root = children[None][0]
-    write(root, 0)
-    count = len(time_s)
+    write(children[None][0], 0)
+    stream.write("\n".join(lines) + "\n")
+    return order
+
+
+def _rows(root: Bone, order: Sequence[str], turns: Mapping[str, np.ndarray], count: int) -> Iterator[str]:
+    """Lines of ``count`` frames; ``turns``: (count, 3, 3) by bone."""
+    from scipy.spatial.transform import Rotation  # slow to load, and every command that exports loads this
+
     columns = [np.tile(np.array(root.offset_mm) / MM_PER_UNIT, (count, 1))]
     for name in order:
         found = turns.get(name)
@@ -203,11 +216,8 @@ def _text(bones: Sequence[Bone], turns: dict[str, np.ndarray], time_s: np.ndarra
             if found is None
             else Rotation.from_matrix(found).as_euler(ORDER, degrees=True)
         )
-    step = (time_s[-1] - time_s[0]) / (count - 1)
-    lines += ["MOTION", f"Frames: {count}", f"Frame Time: {step:.9f}"]
     for row in (np.concatenate(columns, axis=1) + 0.0).tolist():
-        lines.append(" ".join(f"{value:.6f}" for value in row))
-    return "\n".join(lines) + "\n"
+        yield " ".join(f"{value:.6f}" for value in row) + "\n"
 
 
 FORMAT = ExportFormat(".bvh", "application/octet-stream", write_bvh)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
@@ -18,6 +18,7 @@ CONTENTS: tuple[Content, ...] = get_args(Content)
 BRIDGED_S = 0.1
 """Across longer gaps nothing is interpolated."""
 SAME_S = 1e-6
+FRAMES_AT_ONCE = 4096
 
 
 @dataclass(frozen=True)
@@ -46,10 +47,25 @@ class HandMotion:
     beside: Mapping[str, np.ndarray] = field(default_factory=dict)
     """Other markers, (N, 3) by name, mm, to be written with the hand."""
 
+    def frames(self, which: slice) -> HandMotion:
+        """Some of the frames."""
+        return replace(
+            self, time_s=self.time_s[which], readings=self.readings[which], degrees=self.degrees[which],
+            sd_deg=self.sd_deg[which], frame=None if self.frame is None else self.frame.frames(which),
+            beside={name: places[which] for name, places in self.beside.items()},
+        )  # fmt: skip
+
     def require_angles(self, content: Content) -> None:
         """Raises BadInput where nothing is calibrated."""
         if not self.rotations:
             raise BadInput(f"{content} need a model; without one a take has raw readings only")
+
+
+def blocks(count: int) -> Iterator[slice]:
+    """So many frames, ``FRAMES_AT_ONCE`` at a time: what is written of an hour takes no more memory than what
+    is written of a minute. One block at least."""
+    for begin in range(0, max(count, 1), FRAMES_AT_ONCE):
+        yield slice(begin, min(begin + FRAMES_AT_ONCE, count))
 
 
 def on_one_time(motions: Sequence[HandMotion], shifts_s: Sequence[float] = ()) -> tuple[HandMotion, ...]:

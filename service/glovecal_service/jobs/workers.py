@@ -112,7 +112,7 @@ class Workers:
             client = self._started()
             return client.submit(run_task, task, folder, cancel_file, progress_file, pure=False)
         except (OSError, TimeoutError, RuntimeError, ClosedClientError) as error:
-            raise WorkersLost(f"the training processes cannot be reached: {error}", client) from error
+            raise WorkersLost("the training processes cannot be reached", client) from error
 
     def check(self) -> None:
         """Raise WorkersLost when every process of our own has been gone for long.

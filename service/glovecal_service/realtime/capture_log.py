@@ -62,7 +62,7 @@ class CaptureLog:
                 int(status.get("wall_ns", asked_ns)) - asked_ns,
             )
         except (KeyError, TypeError, ValueError) as error:
-            raise NoAnswer(f"{self._keys.status}: the answer is not a capture daemon's: {error!r}") from error
+            raise NoAnswer(f"{self._keys.status}: the answer is not a capture daemon's") from error
 
     def block(self, run_id: int, first: int, last: int) -> list[Frame]:
         """The first of the frames ``first`` to ``last`` that the log has, flagged as repaired; [] if none.

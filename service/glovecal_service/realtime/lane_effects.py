@@ -16,6 +16,7 @@ from typing import Any
 from glovecal_client.wire.frame import Frame
 from glovecal_client.wire.pose import PoseFlag
 from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
+from glovecal_service.plain import reason_of
 from glovecal_service.realtime.served_model import ServedModel
 from glovecal_service.realtime.worn_gloves import WornGlove
 
@@ -57,7 +58,7 @@ class LaneEffects:
                 self.stream.reset()
             except Exception as error:  # an effect may be somebody else's code; the poses must go on
                 self.stream = self.model.predictor.stream()
-                self._count(f"an effect cannot start anew: {error}")
+                self._count(f"an effect cannot start anew: {reason_of(error)}")
         return flags
 
     def end_frame(self, problem: str, *, is_undefined: bool) -> None:

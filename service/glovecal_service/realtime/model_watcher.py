@@ -11,6 +11,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from glovecal_models.errors import BadInput, GlovecalError
 from glovecal_models.takes.known_latency import KnownLatency
+from glovecal_service.plain import reason_of
 from glovecal_service.realtime.glove_lane import GloveLane
 from glovecal_service.realtime.glove_metas import GloveMetas
 from glovecal_service.realtime.model_choice import choose
@@ -79,7 +80,7 @@ class ModelWatcher:
         except (StoreError, SQLAlchemyError, OSError) as error:
             if not self.database_problem:
                 _log.warning("the store does not answer, models stay as they are: %s", error)
-            self.database_problem = str(error)
+            self.database_problem = reason_of(error)
         else:
             self.database_problem = ""
 

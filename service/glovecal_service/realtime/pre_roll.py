@@ -16,6 +16,7 @@ from glovecal_client.gap_repair import fetch_frames
 from glovecal_client.keys import GloveKeys
 from glovecal_client.wire.frame import Frame
 from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
+from glovecal_service.plain import reason_of
 
 BLOCK_FRAMES = 512
 MOST_FRAMES = 120_000
@@ -79,7 +80,7 @@ class PreRoll:
             try:
                 block = self._ask()
             except (NoAnswer, WireError, zenoh.ZError) as error:
-                self._trouble = f"capture's log did not give more: {error}"
+                self._trouble = f"capture's log did not give more: {reason_of(error)}"
                 self._stop.wait(TRY_AGAIN_AFTER_S)
             else:
                 self._trouble = ""

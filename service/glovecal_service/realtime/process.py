@@ -15,6 +15,7 @@ from glovecal_client.keys import all_gloves, service_alive_key
 from glovecal_client.session import open_router
 from glovecal_models.threads import pin_blas_to_one_thread
 from glovecal_service.operating_system import go_first
+from glovecal_service.plain import reason_of
 from glovecal_service.realtime.arrivals import Arrivals
 from glovecal_service.realtime.glove_metas import GloveMetas
 from glovecal_service.realtime.live_explanations import LiveExplanations
@@ -110,7 +111,7 @@ def _thread(name: str, work: Callable[[Event], None], stopped: Event, failures: 
         except Exception as error:
             if not stopped.is_set():
                 _log.exception("the thread %s died", name)
-                failures.append(f"the thread {name} died: {error}")
+                failures.append(f"the thread {name} died: {reason_of(error)}")
         finally:
             stopped.set()
 

@@ -15,6 +15,7 @@ import zenoh
 
 from glovecal_client.errors import NoAnswer, QueryRefused, WireError
 from glovecal_client.wire.frame import Frame, encode_frame
+from glovecal_service.plain import reason_of
 from glovecal_service.realtime.capture_log import CaptureStanding
 from glovecal_service.realtime.run_ledger import RunBooks, RunLedger
 
@@ -78,7 +79,7 @@ def reconcile(file: RunLedger, log: Log, stop_wall_ns: int | None, patience: Pat
             if refusals >= REFUSALS:
                 return Outcome(True, why)
         except (NoAnswer, WireError, zenoh.ZError) as error:
-            why, refusals = str(error), 0
+            why, refusals = reason_of(error), 0
         except OutOfTime:
             return Outcome(False, "the capture log has more to give")
         if patience.is_over or time.monotonic() > unanswered_until:

@@ -19,6 +19,7 @@ from glovecal_client.errors import ClientError, NoAnswer
 from glovecal_client.keys import GloveKeys
 from glovecal_client.queries import ask_json
 from glovecal_models.errors import BadInput, GlovecalError
+from glovecal_service.plain import reason_of
 from glovecal_service.realtime.capture_log import CaptureLog
 from glovecal_service.realtime.live_recording import LiveRecording
 from glovecal_service.realtime.pre_roll_request import pre_roll_request
@@ -111,7 +112,7 @@ class Recorder:
                 live.take_pre_roll()
                 live.repair_now_and_then()
             except (ClientError, OSError, ValueError) as error:
-                self._note(id, sentence=f"recording goes on with trouble: {error}")
+                self._note(id, sentence=f"recording goes on with trouble: {reason_of(error)}")
         now = time.monotonic()
         try:
             if now - self._looked_at >= 2 * LOOK_EVERY_S:
@@ -158,7 +159,7 @@ class Recorder:
             self._looked_at = time.monotonic() + REPORT_EVERY_S
             return False
         except (GlovecalError, ClientError, OSError, ValueError) as error:
-            self._fail(store, record, str(error))
+            self._fail(store, record, reason_of(error))
         return True
 
     def _begin(self, store: Store, record: RecordingRecord) -> None:
@@ -219,7 +220,9 @@ class Recorder:
         try:
             return RunLedger.create(path, meta)
         except OSError as error:
-            raise StorageFull(f"recording {record.name}: {path.name} cannot be written: {error}") from error
+            raise StorageFull(
+                f"recording {record.name}: {path.name} cannot be written: {reason_of(error)}"
+            ) from error
 
     def _end(self, record: RecordingRecord) -> None:
         live = self._live.pop(record.id)

@@ -15,6 +15,7 @@ from glovecal_client.keys import GloveKeys
 from glovecal_models.errors import GlovecalError
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.guided.touch_watch import TouchWatch
+from glovecal_service.plain import reason_of
 from glovecal_service.realtime.live_sampling import LiveSampling
 from glovecal_service.realtime.sampling_takes import keep_sampled_takes
 from glovecal_service.settings import Settings
@@ -80,7 +81,7 @@ class SamplingRunner:
                     watch = _touch_watch(store, record, layout)
                     self._live[id] = LiveSampling(self._session, keys, record, layout, watch)
             except (GlovecalError, ClientError, KeyError, TypeError, ValueError) as error:
-                self._give_up(store, record, f"the sampling cannot go on: {error}")
+                self._give_up(store, record, f"the sampling cannot go on: {reason_of(error)}")
         self._revision = revision
 
     def _go_on(self, store: Store, live: LiveSampling) -> None:

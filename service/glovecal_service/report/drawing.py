@@ -30,6 +30,7 @@ GREY_SHARES = LinearSegmentedColormap.from_list("grey shares", ["#80868c00", "#8
 
 mpl.rcParams["svg.fonttype"] = "none"  # text stays text: small files, and a reader can search them
 mpl.rcParams["svg.hashsalt"] = "glovecal"
+mpl.rcParams["text.parse_math"] = False  # names of takes and columns may hold "$"
 mpl.rcParams["font.size"] = 9
 mpl.rcParams["legend.fontsize"] = 9
 mpl.rcParams["legend.frameon"] = False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -65,6 +66,7 @@ from glovecal_service.rest.take import (
     videos,
 )
 from glovecal_service.settings import Settings
+from glovecal_service.store.retention import sweep
 from glovecal_service.store.store import Store
 
 JSON_LIMIT_BYTES = 8_000_000
@@ -73,6 +75,7 @@ STUDIO_UPLOAD = re.compile(r"/studio/_nicegui/client/[^/]+/upload/\d+")
 MULTIPART_BYTES = 10_000
 """What a browser's form puts around the file."""
 BODY_PATIENCE_S = 30.0
+FIRST_SWEEP_AFTER_S, SWEEP_EVERY_S = 60.0, 3600.0
 ROUTERS = (
     *(subjects, usual_hand, layouts, live, commands, recordings, films, cameras, camera_files, samplings),
     *(
@@ -144,9 +147,11 @@ def create_app(
         app.state.parts = Parts(settings, opened, uploads_folder, metrics, Predictors(opened))
         dispatcher = Dispatcher(opened, settings, of_one_command=of_one_command)
         dispatcher.start()
+        sweeping = asyncio.create_task(_sweep_hourly(opened, settings))
         try:
             yield
         finally:
+            sweeping.cancel()
             await run_in_threadpool(app.state.parts.filming.close)
             await run_in_threadpool(app.state.parts.cameras.close)
             await run_in_threadpool(dispatcher.stop)
@@ -171,6 +176,14 @@ def create_app(
     install_openapi(app, layouts.LayoutBody)
     _guard(app, settings, metrics, body_patience_s)
     return app
+
+
+async def _sweep_hourly(store: Store, settings: Settings) -> None:
+    """Not at once: most commands are over sooner."""
+    await asyncio.sleep(FIRST_SWEEP_AFTER_S)
+    while True:
+        await run_in_threadpool(sweep, store, settings)
+        await asyncio.sleep(SWEEP_EVERY_S)
 
 
 def _guard(app: FastAPI, settings: Settings, metrics: Metrics, body_patience_s: float) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import secrets
+import shutil
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -24,6 +25,7 @@ from glovecal_service.store.errors import StorageFull, StoreUnavailable
 TEMPORARY = ".writing-"
 ABANDONED_AFTER_S = 600.0
 """A temporary file this old belongs to a process that was killed."""
+LEAST_FREE_BYTES = 50_000_000
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -85,7 +87,9 @@ class ObjectBlobs:
         try:
             self._store = obstore.store.from_url(url)
         except (obstore.exceptions.BaseError, ValueError, TypeError) as error:
-            raise BadInput(f"GLOVECAL_ARTIFACTS: {url!r} is not an object store: {error}") from error
+            raise BadInput(
+                f"GLOVECAL_ARTIFACTS: {url!r} is not the address of an object store; write it like s3://bucket/prefix"
+            ) from error
         self._url = url
 
     @property
@@ -116,7 +120,10 @@ class ObjectBlobs:
         try:
             yield
         except obstore.exceptions.BaseError as error:
-            raise StoreUnavailable(f"the object store {self._url} does not answer: {error}") from error
+            raise StoreUnavailable(
+                f"the object store {self._url} does not answer; is its address right, and may this "
+                "service log in?"
+            ) from error
 
 
 def write_durably(path: Path, content: bytes) -> None:
@@ -135,6 +142,15 @@ def write_durably(path: Path, content: bytes) -> None:
         except BaseException:
             temporary.unlink(missing_ok=True)
             raise
+
+
+def require_room(folder: Path) -> None:
+    """Raises StorageFull where the disk is nearly full: what recordings and the database need is left."""
+    free = shutil.disk_usage(folder).free
+    if free < LEAST_FREE_BYTES:
+        raise StorageFull(
+            f"only {free / 1e6:.0f} MB are free in {folder}; nothing was changed: free some disk space"
+        )
 
 
 @contextmanager

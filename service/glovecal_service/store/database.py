@@ -9,6 +9,8 @@ schema changes would commit half-way.
 
 from __future__ import annotations
 
+import logging
+import shutil
 import sqlite3
 import time
 from collections.abc import Iterator
@@ -20,9 +22,9 @@ from sqlalchemy.exc import (
     ArgumentError,
     DatabaseError,
     DataError,
+    IntegrityError,
     InterfaceError,
     NoSuchModuleError,
-    OperationalError,
     StatementError,
 )
 
@@ -31,11 +33,23 @@ from glovecal_models.errors import BadInput
 from glovecal_service.store.errors import StorageFull, StoreDamaged, StoreUnavailable
 from glovecal_service.store.json_text import json_text
 
+log = logging.getLogger("glovecal.store")
 BUSY_TIMEOUT_MS = 5000
-_DAMAGED = ("malformed", "not a database", "unsupported file format", "no such table", "no such column")
-"""SQLite's words; the schema was looked at when the store was opened, so a table that is gone is damage."""
-_DAMAGED_STATES = ("XX001", "XX002")
-"""PostgreSQL's data_corrupted and index_corrupted."""
+LEAST_ROOM_BYTES = 1 << 20
+"""With less the disk is called full where SQLite speaks of an I/O error: its shared memory grows by 32 kB."""
+UNSTORABLE = (
+    "a value cannot be stored: text must be without NUL and surrogates, whole numbers must fit 64 bits, "
+    "other numbers must be finite"
+)
+_FULL = ("SQLITE_FULL", "53100")
+_DAMAGED = (
+    *("SQLITE_CORRUPT", "SQLITE_NOTADB", "SQLITE_ERROR", "SQLITE_MISMATCH", "SQLITE_SCHEMA", "SQLITE_FORMAT"),
+    *("XX001", "XX002", "42"),
+)
+"""Beginnings of codes. Our statements are right and the schema was looked at when the store was opened, so
+what SQLite calls an error of a statement, or PostgreSQL one of its class 42, is a table that is not what was
+made. XX001 and XX002: data_corrupted and index_corrupted."""
+_NOT_ALLOWED = ("SQLITE_READONLY", "SQLITE_CANTOPEN", "SQLITE_PERM", "SQLITE_AUTH")
 _SQLITE_ENDS = ("", "-wal", "-shm", "-journal")
 
 
@@ -81,15 +95,18 @@ class Database:
             yield
         except DatabaseError as error:
             raise _meaning(error, self) from error
-        except UnicodeEncodeError as error:
-            raise BadInput(f"{error.object!r} is not text that can be stored") from error
+        except (UnicodeEncodeError, OverflowError) as error:
+            raise BadInput(UNSTORABLE) from error
         except InterfaceError as error:
-            raise StoreUnavailable(f"the database {self.name} cannot be used: {error.orig}") from error
+            log.info("database %s cannot be used: %s", self.name, str(error.orig).strip())
+            raise StoreUnavailable(
+                f"the database {self.name} cannot be used now; the log has what its driver said"
+            ) from error
         except StatementError as error:
             if isinstance(error.orig, BadInput):
                 raise error.orig from None
             if isinstance(error.orig, ValueError | TypeError | UnicodeError):
-                raise BadInput(f"a value cannot be stored: {error.orig}") from error
+                raise BadInput(UNSTORABLE) from error
             raise
 
     @property
@@ -110,7 +127,8 @@ def _engine(url: str | URL) -> Engine:
         raise BadInput(not_installed("GLOVECAL_DATABASE with PostgreSQL", "psycopg[binary]")) from error
     except (ArgumentError, NoSuchModuleError) as error:
         raise BadInput(
-            f"GLOVECAL_DATABASE: {error}; use sqlite:///FILE or postgresql+psycopg://USER@HOST/DATABASE"
+            "GLOVECAL_DATABASE is no address of SQLite or PostgreSQL; use sqlite:///FILE or "
+            "postgresql+psycopg://USER@HOST/DATABASE"
         ) from error
     if engine.dialect.name == "sqlite":
         event.listen(engine, "connect", _configure_sqlite)
@@ -148,14 +166,48 @@ def _begin_sqlite(connection: Connection) -> None:
 
 
 def _meaning(error: DatabaseError, database: Database) -> Exception:
-    name = database.name
-    text = str(error.orig)
-    if "disk is full" in text or getattr(error.orig, "sqlstate", None) == "53100":
+    """The store's error; the driver's own text goes to the log only."""
+    name, code = database.name, _code(error)
+    log.info("database %s refused (%s): %s", name, code, str(error.orig).strip())
+    if code in _FULL or (code.startswith("SQLITE_IOERR") and _disk_is_full(database)):
         return StorageFull(f"no room left for the database {name}; nothing was changed: free some disk space")
     if isinstance(error, DataError):
-        return BadInput(f"a value cannot be stored: {text.strip()}")
-    if any(words in text for words in _DAMAGED) or getattr(error.orig, "sqlstate", None) in _DAMAGED_STATES:
-        return StoreDamaged(f"the database {name} is damaged ({text}); restore a backup of it")
-    if isinstance(error, OperationalError):
-        return StoreUnavailable(f"the database {name} does not answer now: {text.strip()}")
-    return error
+        return BadInput(UNSTORABLE)
+    if code.startswith(_DAMAGED):
+        return StoreDamaged(f"the database {name} is damaged ({code}); restore a backup of it")
+    if code.startswith("SQLITE_IOERR"):
+        return StoreUnavailable(f"the disk of the database {name} fails ({code}); look at it, try again")
+    if code.startswith(_NOT_ALLOWED):
+        return StoreUnavailable(
+            f"the database {name} cannot be opened and written ({code}); look at its folder's permissions"
+        )
+    if code.startswith("SQLITE_BUSY"):
+        return StoreUnavailable(
+            f"the database {name} does not answer now: other programs were writing for "
+            f"{BUSY_TIMEOUT_MS / 1000:g} s; try again"
+        )
+    if isinstance(error, IntegrityError):
+        return error  # says that a name is taken, to who asked for it
+    return StoreUnavailable(
+        f"the database {name} does not answer now ({code}); is it running, may this user log in, and is the "
+        "address right? The log has what it said"
+    )
+
+
+def _code(error: DatabaseError) -> str:
+    """SQLite's name of the error, such as ``SQLITE_BUSY``, or PostgreSQL's five letters."""
+    return (
+        getattr(error.orig, "sqlite_errorname", None)
+        or getattr(error.orig, "sqlstate", None)
+        or type(error.orig).__name__
+    )
+
+
+def _disk_is_full(database: Database) -> bool:
+    """SQLite has no other word than I/O error where it cannot make its shared memory larger."""
+    if database.file is None:
+        return False
+    try:
+        return shutil.disk_usage(database.file.parent).free < LEAST_ROOM_BYTES
+    except OSError:
+        return False

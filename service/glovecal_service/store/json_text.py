@@ -13,4 +13,7 @@ def json_text(value: Any, *, sort_keys: bool = False) -> str:
     try:
         return json.dumps(value, allow_nan=False, sort_keys=sort_keys, separators=(",", ":"))
     except (ValueError, TypeError, RecursionError) as error:
-        raise BadInput(f"a value cannot be stored as JSON: {error}") from error
+        raise BadInput(
+            "a value cannot be stored: it is not finite, nested too deeply or no JSON; give plain text, "
+            "finite numbers, lists and objects"
+        ) from error

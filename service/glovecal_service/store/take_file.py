@@ -74,7 +74,7 @@ def load_take(content: bytes) -> Take:
             begins_s=description.get("begins_s"),
         )
     except (SafetensorError, KeyError, IndexError, TypeError, ValueError) as error:
-        raise DamagedArtifact(f"these bytes are no take file: {error}") from error
+        raise DamagedArtifact("these bytes are no take file, or were damaged") from error
 
 
 def frames_hash(take: Take) -> str:

@@ -238,7 +238,10 @@ class Takes:
         with self._database.write() as connection:
             record = _require(connection, id)
             if model := _trained_on(connection, record):
-                raise Conflict(f"model {model[:12]} was trained on take {id} ({record.name}), so it stays")
+                raise Conflict(
+                    f"model {model[:12]} was trained on take {id} ({record.name}), so it stays: a "
+                    "model can always name what it learned from"
+                )
             connection.execute(delete(tables.takes).where(tables.takes.c.id == id))
 
     def _content(self, take: Take) -> dict[str, Any]:

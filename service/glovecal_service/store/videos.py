@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import zipfile
 from pathlib import Path
@@ -13,11 +12,13 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from glovecal_client.operating_system import move_over
 from glovecal_client.pictures.preview import ABOUT, MOST_PICTURES, picture_name
+from glovecal_models.documents import UNREADABLE_ARCHIVE, read_json
 from glovecal_models.errors import BadInput
 from glovecal_service.store.errors import NotFound
 
 LARGEST_PICTURE = 1_000_000
 LARGEST_ABOUT = 2_000_000
+MADE_BY = "glovecal record --video makes one"
 JPEG_BEGINS = b"\xff\xd8\xff"
 Line = Annotated[str, Field(max_length=300)]
 
@@ -65,8 +66,8 @@ class Videos:
                 return file.read(picture_name(number))
         except KeyError as error:
             raise NotFound(f"the video of take {take} has no picture {number}") from error
-        except (zipfile.BadZipFile, OSError) as error:
-            raise BadInput(f"the video of take {take} is damaged: {error}") from error
+        except UNREADABLE_ARCHIVE as error:
+            raise BadInput(f"the video of take {take} is damaged; attach it again") from error
 
     def _found(self, take: str) -> Path:
         path = self._path(take)
@@ -97,8 +98,10 @@ def check_preview(path: Path) -> VideoFacts:
                 raise BadInput(f"{name} has {entry.file_size} bytes; at most {LARGEST_PICTURE}")
             try:
                 begins = file.open(entry).read(len(JPEG_BEGINS))
-            except (zipfile.BadZipFile, OSError) as error:
-                raise BadInput(f"{name} in the video cannot be read: {error}") from error
+            except UNREADABLE_ARCHIVE as error:
+                raise BadInput(
+                    f"{name} in the video cannot be read: it is encrypted or damaged; {MADE_BY}"
+                ) from error
             if begins != JPEG_BEGINS:
                 raise BadInput(f"{name} in the video is no JPEG picture")
     return facts
@@ -110,10 +113,13 @@ def _facts(path: Path) -> VideoFacts:
             entry = file.getinfo(ABOUT)
             if entry.file_size > LARGEST_ABOUT:
                 raise BadInput(f"{ABOUT} has {entry.file_size} bytes; at most {LARGEST_ABOUT}")
-            return VideoFacts.model_validate(json.loads(file.read(entry)))
-    except (zipfile.BadZipFile, KeyError, OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise BadInput(f"no preview of a video: {error}; glovecal record --video makes one") from error
+            return VideoFacts.model_validate(read_json(file.read(entry), f"{ABOUT} of the video"))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise BadInput(f"{ABOUT} of the video: {where}: {first['msg']}") from error
+        where = ".".join(map(str, error.errors()[0]["loc"]))
+        raise BadInput(f"{ABOUT} of the video: {where} is not what it should be; {MADE_BY}") from error
+    except BadInput:
+        raise
+    except UNREADABLE_ARCHIVE as error:
+        raise BadInput(
+            f"no preview of a video: the file is no zip file with {ABOUT}, encrypted or damaged; {MADE_BY}"
+        ) from error

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 
+from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.rotations import FINGERS
 from glovecal_models.hand.skeleton import Handedness
@@ -28,10 +29,7 @@ JOINTS = {letter: f"{letter}_IP" if letter == "T" else f"{letter}_PIP" for lette
 
 
 def read(text: str, counts: Counts, hand: Handedness) -> FoundLines:
-    try:
-        document = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise BadInput(f"not valid JSON: {error}") from None
+    document = read_json(text, "the calibration")
     if not isinstance(document, dict):
         raise BadInput('expected {"thumb": {"min": 310, "max": 3820}, ...}')
     lines, left_out = {}, {}

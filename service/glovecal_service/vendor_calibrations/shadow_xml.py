@@ -29,15 +29,15 @@ def read(text: str, counts: Counts, hand: Handedness) -> FoundLines:
         raise BadInput("the file declares a document type or entities; a Shadow calibration needs none")
     try:
         root = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError) as error:
-        raise BadInput(f"not valid XML: {error}") from None
+    except (ElementTree.ParseError, ValueError):
+        raise BadInput("the file is not valid XML; is it a Shadow calibration, whole?") from None
     if root.tag != ROOT:
         raise BadInput(f"the root is {root.tag[:40]!r}, expected {ROOT!r}")
     points: dict[str, Points] = {}
-    for joint in root.iter("Joint"):
+    for joint in root.findall("Joint"):
         name = joint.get("name", "")
         words = [
-            (each.get("raw_value", ""), each.get("calibrated_value", "")) for each in joint.iter("calib")
+            (each.get("raw_value", ""), each.get("calibrated_value", "")) for each in joint.findall("calib")
         ]
         pairs = [numbers(pair, f"joint {name[:40]!r}") for pair in words]
         points[name] = [(raw, degrees) for raw, degrees in pairs]

@@ -81,7 +81,10 @@ def _table(text: str) -> dict[tuple[int, int], tuple[float, float]]:
             )
         if len(rows) == 4 * len(GROUPS):
             return {(place // 4, place % 4): row for place, row in enumerate(rows)}
-    raise BadInput(f"{len(rows)} rows of offset and gain; a VirtualHand calibration has {4 * len(GROUPS)}")
+    raise BadInput(
+        f"{len(rows)} rows of offset and gain were found; {4 * len(GROUPS)} are expected in a "
+        "VirtualHand calibration"
+    )
 
 
 def write(lines: Mapping[str, SensorLine], counts: Counts, hand: Handedness) -> str:

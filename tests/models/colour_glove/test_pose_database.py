@@ -1,10 +1,13 @@
 """Poses and their sampling; a database is built once, the same in any number of processes, or not at all."""
 
+import os
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from glovecal_models.colour_glove import database as made
 from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.database import (
     VIEW_FOCAL_PX,
@@ -124,6 +127,25 @@ def test_two_processes_build_what_one_builds(tmp_path: Path):
     two = pose_database(SKIN, PATTERN, poses, tmp_path / "two", settings, workers=2)
     for name in ("tiny", "transforms", "areas", "windows", "rotations"):
         assert np.array_equal(getattr(one, name), getattr(two, name))
+
+
+def test_databases_have_a_limit_together_and_leave_room_on_the_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """A database that nobody used for longest goes first; one that does not fit is not begun."""
+    monkeypatch.setattr(made, "MOST_BYTES", 3 * 20 * made.ENTRY_BYTES)
+    poses, found = generated_poses(50), []
+    for seed in range(4):
+        settings = DatabaseSettings(20, seed=seed)
+        found.append(pose_database(SKIN, PATTERN, poses, tmp_path, settings, workers=1).folder)
+        os.utime(found[-1], (1e9 + seed, 1e9 + seed))
+    assert [place.exists() for place in found] == [False, True, True, True]
+    free = shutil.disk_usage(tmp_path).free
+    monkeypatch.setattr(made, "ENTRY_BYTES", free)
+    monkeypatch.setattr(made, "MOST_BYTES", 100 * free)
+    with pytest.raises(BadInput, match=r"takes .* GB, and .* free some disk space, or ask for fewer entries"):
+        pose_database(SKIN, PATTERN, poses, tmp_path, DatabaseSettings(20, seed=9), workers=1)
+    assert sorted(tmp_path.iterdir()) == sorted(found[1:])
 
 
 def test_cancelled_it_leaves_nothing(tmp_path: Path):

@@ -159,3 +159,47 @@ def test_a_manifest_with_anything_in_it_is_refused_or_works(elsewhere: RestClien
         return
     assert model["id"] == model_id(content)
     assert elsewhere.get(f"/models/{model['id']}")["layout"] == load(content).layout.name
+
+
+def test_the_senders_id_is_compared(elsewhere: RestClient, kept: Callable[[bytes], Path]) -> None:
+    """A flipped bit may well give a model that predicts: only its name tells that it is another one."""
+    id = model_id(ARTIFACT)
+    flipped = bytearray(ARTIFACT)
+    flipped[-3] ^= 1  # the last bits of a weight
+    file = kept(bytes(flipped))
+    with pytest.raises(Refused, match=f"the sender's is {id[:12]}, this file is .* send it again"):
+        elsewhere.import_model(file, create_subject=True, id=id)
+    named = file.rename(file.with_name(f"anna-glove-{id[:12]}.safetensors"))
+    with pytest.raises(Refused, match="changed on its way"):
+        elsewhere.import_model(named, create_subject=True)
+    assert elsewhere.get("/models") == []
+    named.write_bytes(ARTIFACT)
+    assert elsewhere.import_model(named, create_subject=True)["is_new"]
+
+
+@pytest.mark.parametrize(
+    ("where", "value"),
+    [
+        ("uncertain_above_deg", -1.0), ("uncertain_above_deg", 1e300), ("held_out_rmse_deg", -2.0),
+        ("held_out_rmse_deg", 1e12), ("held_out_rmse_deg", "2"), ("samples", -5), ("samples", 1e15),
+    ],
+)  # fmt: skip
+def test_absurd_numbers_are_refused(
+    elsewhere: RestClient, kept: Callable[[bytes], Path], where: str, value: object
+) -> None:
+    manifest = read_manifest(ARTIFACT)
+    manifest["rotations"][0][where] = value
+    with pytest.raises(Refused, match=rf"{where} is .*; it lies between 0 and"):
+        elsewhere.import_model(kept(changed(manifest)), create_subject=True)
+    assert elsewhere.get("/models") == []
+
+
+def test_a_weight_beyond_any_trained_one_is_refused(
+    elsewhere: RestClient, kept: Callable[[bytes], Path]
+) -> None:
+    arrays = safetensors.numpy.load(ARTIFACT)
+    name = next(iter(arrays))
+    arrays[name] = np.full_like(arrays[name], 1e20)
+    metadata = {"manifest": json.dumps(read_manifest(ARTIFACT))}
+    with pytest.raises(Refused, match="must be finite float64, at most 1e"):
+        elsewhere.import_model(kept(safetensors.numpy.save(arrays, metadata=metadata)), create_subject=True)

@@ -29,7 +29,7 @@ from glovecal_client.capture.device_clock import DeviceClock
 from glovecal_client.capture.serial_link import SerialLink
 from glovecal_client.capture.stream.arrival_times import ArrivalTimes
 from glovecal_client.clock import clock_ns, wall_ns
-from glovecal_client.errors import DeviceError, DeviceLost
+from glovecal_client.errors import DeviceError, DeviceLost, reason_of
 
 _WAIT_S = 0.05
 _logger = logging.getLogger(__name__)
@@ -129,7 +129,9 @@ class CyberGlove:
         except BaseException as error:
             found.link.close()
             if isinstance(error, Unanswered) and not error.refused:
-                raise DeviceLost(f"{self.port} stopped answering while it was set up: {error}") from error
+                raise DeviceLost(
+                    f"{self.port} stopped answering while it was set up: {reason_of(error)}"
+                ) from error
             raise
         self._link = found.link
 

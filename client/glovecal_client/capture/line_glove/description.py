@@ -74,8 +74,10 @@ def read_description(file: Path) -> LineDescription:
         document = tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise BadOption(f"line: {file} cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise BadOption(f"line: {file} is not TOML: {error}") from error
+    except (ValueError, RecursionError) as error:
+        found = re.search(r"line \d+, column \d+", str(error))
+        place = f" from {found[0]} on" if found else ", or not UTF-8 text"
+        raise BadOption(f"line: {file} is not TOML{place}; docs/own-glove.md shows one") from error
     return _Reader(file.name, document).description(file.stem.lower())
 
 

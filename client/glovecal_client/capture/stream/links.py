@@ -15,7 +15,7 @@ import weakref
 from typing import Protocol
 
 from glovecal_client.capture.serial_link import SerialLink
-from glovecal_client.errors import BadOption, DeviceLost
+from glovecal_client.errors import BadOption, DeviceLost, reason_of
 from glovecal_client.operating_system import listen_alone
 
 LOOPBACK = "127.0.0.1"
@@ -129,7 +129,7 @@ class _TcpLink:
                 return b""
             data = self._connection.recv(_AT_MOST)
         except (OSError, ValueError) as error:
-            raise DeviceLost(f"{self._name} is gone ({error})") from error
+            raise DeviceLost(f"{self._name} is gone ({reason_of(error)})") from error
         if not data:
             raise DeviceLost(f"{self._name} closed its connection: switched off, or out of reach?")
         return data
@@ -138,7 +138,7 @@ class _TcpLink:
         try:
             self._connection.sendall(data)
         except OSError as error:
-            raise DeviceLost(f"{self._name} is gone ({error})") from error
+            raise DeviceLost(f"{self._name} is gone ({reason_of(error)})") from error
 
     def close(self) -> None:
         self._connection.close()
@@ -189,7 +189,7 @@ class _UdpLink:
         except ConnectionResetError:  # Windows: what was sent to the glove before met a closed port
             return b""
         except (OSError, ValueError) as error:
-            raise DeviceLost(f"nothing can be received any more ({error})") from error
+            raise DeviceLost(f"nothing can be received any more ({reason_of(error)})") from error
         if self._peer not in (None, peer):
             return b""  # another sender: the glove is the one that was heard first
         self._peer = peer
@@ -219,5 +219,7 @@ def _bound(name: str, address: tuple[str, int], kind: socket.SocketKind) -> sock
         opened.bind(address)
     except OSError as error:
         opened.close()
-        raise DeviceLost(f"cannot listen at {name} ({error}): is another program using this port?") from error
+        raise DeviceLost(
+            f"cannot listen at {name} ({reason_of(error)}): is another program using this port?"
+        ) from error
     return opened

@@ -11,12 +11,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile, ZipFile
+from zipfile import ZipFile
 
 import cv2
 import numba
 import numpy as np
 
+from glovecal_models.documents import UNREADABLE_ARCHIVE
 from glovecal_models.errors import BadInput
 
 LEVELS = 64
@@ -107,8 +108,12 @@ class ColourTable:
                     raise BadInput(f"{file.name} holds more than a table of colours")
             with file.open("rb") as stream, np.load(stream, allow_pickle=False) as held:
                 table = held["labels_of"]
-        except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
-            raise BadInput(f"{file.name} holds no table of colours: {error}") from error
+        except BadInput:
+            raise
+        except UNREADABLE_ARCHIVE as error:
+            raise BadInput(
+                f"{file.name} holds no table of colours that can be read; glovecal camera colours makes one"
+            ) from error
         if table.shape != (LEVELS,) * 3 or table.dtype != np.uint8:
             raise BadInput(f"{file.name} holds a table {table.shape} {table.dtype}, not 64 x 64 x 64 uint8")
         return cls(table)

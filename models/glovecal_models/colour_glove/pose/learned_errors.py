@@ -14,12 +14,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM
 from glovecal_models.colour_glove.pose_estimate import STAGES
+from glovecal_models.documents import UNREADABLE_ARCHIVE
 from glovecal_models.errors import BadInput
 
 _LEAST_DISAGREEING = 0.02
@@ -71,8 +71,11 @@ class LearnedErrors:
                 arrays = {name: held[name] for name in held.files}
             scales = {n.removeprefix("scale:"): v for n, v in arrays.items() if n.startswith("scale:")}
             found = cls(arrays["blend_covariance"], arrays["speed"], scales)
-        except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
-            raise BadInput(f"{file.name} holds no errors of the colour glove's tracker: {error}") from error
+        except UNREADABLE_ARCHIVE as error:
+            raise BadInput(
+                f"{file.name} holds no errors of the colour glove's tracker that can be read; remove it, and "
+                "it is made again"
+            ) from error
         shapes = [found.blend_covariance.shape, found.speed.shape, *(v.shape for v in scales.values())]
         expected = [
             (DEGREES_OF_FREEDOM,) * 2,

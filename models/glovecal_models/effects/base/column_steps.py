@@ -59,7 +59,7 @@ class ColumnSteps:
         try:
             return cls(**{name: float(value) for name, value in settings[IN_STEPS].items()})
         except (AttributeError, TypeError, ValueError) as error:
-            raise BadInput(f"not the steps of a column: {error}") from error
+            raise BadInput("not the steps of a column: they are missing, or no numbers") from error
 
     def to_settings(self) -> dict[str, Any]:
         return {IN_STEPS: asdict(self)}

@@ -130,7 +130,9 @@ class LaneCurves:
             curves = tuple(FormCurve.from_document(item) for item in inputs)
             return cls(float(document["lowest_deg"]), float(document["highest_deg"]), curves)
         except (KeyError, TypeError, ValueError) as error:
-            raise BadInput(f"not the curves of a learned form: {error!r}") from error
+            raise BadInput(
+                "not the curves of a learned form: something in it is missing, or no number"
+            ) from error
 
 
 def _short(values: Sequence[float] | np.ndarray) -> tuple[float, ...]:

@@ -210,7 +210,7 @@ class LearnedForm:
             )
             terms = tuple(FormTerm.from_document(item) for item in document["terms"])
         except (KeyError, TypeError, ValueError) as error:
-            raise BadInput(f"not a learned form: {error!r}") from error
+            raise BadInput("not a learned form: something in it is missing, or no number") from error
         named = {name for term in terms for name in term.inputs}
         if set(low) != named or set(high) != named:
             raise BadInput(f"a learned form of {sorted(named)} has ranges of {sorted(low)}")

@@ -106,7 +106,7 @@ class WearingCurves:
             ends = (tuple(map(float, form[end][OWN])) for end in ("low", "high"))
             return _curves(tuple(document["wearings"]), terms, *ends)
         except (KeyError, TypeError, ValueError) as error:
-            raise BadInput(f"not the curves of wearings: {error!r}") from error
+            raise BadInput("not the curves of wearings: something in it is missing, or no number") from error
 
 
 @lru_cache(maxsize=64)

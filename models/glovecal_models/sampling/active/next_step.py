@@ -18,7 +18,7 @@ import numpy as np
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.samples import require_layout
 from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
-from glovecal_models.errors import BadInput
+from glovecal_models.errors import BadInput, reason_of
 from glovecal_models.layout import Layout
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.sampling.active.known_readings import known_from_state, known_from_takes
@@ -127,7 +127,7 @@ class NextStep:
         try:
             found = propose(self._layout, known_from_state(state), left, limits=self._limits)
         except (BadInput, np.linalg.LinAlgError) as error:
-            return self._ending(f"Nothing can be proposed: {error}")
+            return self._ending(f"Nothing can be proposed: {reason_of(error)}")
         if found.is_enough:
             return self._ending(found.verdict(), found.to_document(most=0))
         best = found.ranked[0]

@@ -17,16 +17,15 @@ from __future__ import annotations
 
 import io
 import os
-import struct
 import zipfile
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from glovecal_models.errors import BadInput
+from glovecal_models.documents import UNREADABLE_ARCHIVE
+from glovecal_models.errors import BadInput, reason_of
 from glovecal_models.names import check_channel_name
 
 VERSION = 1
@@ -36,11 +35,6 @@ MOST_ROTATIONS = 64
 LARGEST_ESTIMATES = 1 << 30
 """Of all arrays, unpacked."""
 _SHAPES = {"time_s": "F", "angles_deg": "FK", "sd_deg": "FK", "accepted": "FK", "patches": "F"}
-_UNREADABLE = (
-    zipfile.BadZipFile, zlib.error, struct.error, ValueError, EOFError, OSError, KeyError, RuntimeError,
-    MemoryError, OverflowError, SyntaxError,
-)  # fmt: skip
-"""What reading a damaged archive raises."""
 _PLAIN = ("version", "rotations", "simulated")
 
 
@@ -128,7 +122,7 @@ def read_estimates(path: Path) -> CameraEstimates:
     try:
         content = path.read_bytes() if path.stat().st_size <= LARGEST_ESTIMATES else b""
     except OSError as error:
-        raise BadInput(f"{path.name} cannot be read: {error.strerror or error}") from error
+        raise BadInput(f"{path.name} cannot be read: {reason_of(error)}") from error
     if not content:
         raise BadInput(f"{path.name} is empty, or larger than {LARGEST_ESTIMATES} bytes")
     return _checked(_arrays(content, path.name), path.name)
@@ -143,9 +137,9 @@ def _arrays(content: bytes, name: str) -> dict[str, np.ndarray]:
         if set(sizes) == wanted and sum(sizes.values()) <= LARGEST_ESTIMATES:
             with np.load(io.BytesIO(content), allow_pickle=False) as archive:
                 arrays = {key: archive[key] for key in wanted}
-    except _UNREADABLE as error:
+    except UNREADABLE_ARCHIVE as error:
         raise BadInput(
-            f"{name} is no whole file of a camera's estimates (.npz): {str(error)[:120]}"
+            f"{name} is no whole file of a camera's estimates (.npz), or was damaged; send it again"
         ) from error
     if not arrays:
         raise BadInput(

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from glovecal_client.errors import ClientError, ServiceError
+from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput
 from glovecal_service.cli.terminal.printing import err
 from glovecal_service.cli.terminal.waiting import wait_seconds
@@ -52,12 +52,10 @@ def attach_video(service: RestClient, video: Path, takes: Sequence[str]) -> None
 
     described = video.with_suffix(".json")
     try:
-        about = json.loads(described.read_text(encoding="utf-8"))
+        about = read_json(described.read_bytes(), str(described))
         about = {key: about[key] for key in ("source", "simulated", "computer")}
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
-        raise BadInput(
-            f"{described} must describe {video.name}, as glovecal record writes it: {error}"
-        ) from error
+    except (OSError, KeyError, TypeError) as error:
+        raise BadInput(f"{described} must describe {video.name}, as glovecal record writes it") from error
     preview = write_preview(video, about)
     try:
         upload = service.upload(preview)

@@ -241,6 +241,14 @@ def import_model(
     create_subject: Annotated[
         bool, typer.Option("--create-subject", help="Add the subject if it is not there.")
     ] = False,
+    id: Annotated[
+        str | None,
+        typer.Option(
+            "--id",
+            help="The model's id where it was exported, or its first digits: a file that was changed "
+            "since is refused. Else as the file's name ends.",
+        ),
+    ] = None,
     form: VendorFormat = None,
     layout: Annotated[
         str | None, typer.Option("--layout", "-l", help="Of the glove; with --format only.")
@@ -260,7 +268,7 @@ def import_model(
             )
             print_left_out(left_out)
         else:
-            found = service.import_model(file, subject=subject, create_subject=create_subject)
+            found = service.import_model(file, subject=subject, create_subject=create_subject, id=id)
     if as_json:
         print_json(found)
         return

@@ -28,7 +28,7 @@ def imported_calibration(
     try:
         text = file.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
-        raise Refusal(f"{file}: {error}") from error
+        raise Refusal(f"{file} is not UTF-8 text; save it as UTF-8") from error
     body = {"format": form, "text": text, "layout": layout, "subject": subject}
     answer = service.post("/models/calibrations", body | {"create_subject": create_subject})
     return answer, answer.pop("left_out")

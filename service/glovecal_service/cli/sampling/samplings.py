@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier
 from glovecal_models.sampling.catalogue import PROTOCOLS
@@ -187,10 +187,7 @@ def _pose_angles(path: Path | None) -> dict[str, Any]:
     """The content of a JSON file. Raises BadInput, OSError."""
     if path is None:
         return {}
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise BadInput(f"{path}: not JSON: {error}") from error
+    document = read_json(path.read_bytes(), str(path))
     if not isinstance(document, dict):
         raise BadInput(f'{path}: write it like {{"flat": {{"I_MCP": 2.5}}}}')
     return document

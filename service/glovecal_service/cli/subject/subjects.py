@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from glovecal_models.documents import read_toml
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import Handedness, Palm
@@ -196,15 +196,13 @@ def _remove_takes(service: RestClient, subject: str) -> None:
 def measured_dimensions(length_mm: float | None, file: Path | None) -> dict[str, float]:
     """What was measured, in mm; the length given by itself counts. Raises Refusal that names the file."""
     try:
-        measured = {} if file is None else tomllib.loads(file.read_text(encoding="utf-8"))
+        measured = {} if file is None else read_toml(file.read_bytes(), "it")
         wrong = [name for name, value in measured.items() if type(value) not in (int, float)]
         if wrong:
             raise BadInput(f"{wrong[0]} is {measured[wrong[0]]!r}; give a number of mm")
         if length_mm is not None:
             measured["hand_length"] = length_mm
         HandDimensions.from_measured(measured)
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise Refusal(f"{file}: not valid TOML: {error}") from error
     except BadInput as error:
         raise Refusal(f"{file}: {error}" if file is not None else str(error)) from error
     return {name: float(value) for name, value in measured.items()}

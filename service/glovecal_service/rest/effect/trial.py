@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 from pydantic import BaseModel, Field
 
-from glovecal_models.calibration.model_recipe import (
-    declared_effects,
-    repaired_takes,
-    requested_effects,
-)
-from glovecal_models.calibration.training_settings import LINEAR_METHODS
-from glovecal_models.diagnosis.diagnose import diagnose
-from glovecal_models.diagnosis.known_effect import known_effects
-from glovecal_models.effects.catalogue import known_by_name
+from glovecal_models.diagnosis.effect_trial import EffectTrial
+from glovecal_models.diagnosis.effect_trial import try_effect as judge_effect
+from glovecal_models.effects.catalogue import DeclaredEffect
 from glovecal_models.errors import BadInput
-from glovecal_service.rest.effect.declarations import AskedEffect, asked_effect
+from glovecal_models.progress import Cancel
+from glovecal_service.jobs.model_work import is_short
+from glovecal_service.rest.effect.declarations import AskedEffect, asked_effect, declaration_document
 from glovecal_service.rest.http.answers import change_problems
-from glovecal_service.rest.http.dependencies import PartsNeeded
+from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
+from glovecal_service.rest.http.long_answers import in_process, in_time
 from glovecal_service.rest.http.request_types import ModelInPath, StrictBody
 from glovecal_service.rest.model.model_takes import TakesNamed, model_takes
 from glovecal_service.views.diagnosis import CandidateView
 
 router = APIRouter(prefix="/models", tags=["models"])
 
+LIMIT_S = 60.0
 MOST_FRAMES = 200_000
 """Times rotations; more belong into a job."""
 
@@ -48,10 +46,18 @@ class TrialView(BaseModel):
     summary="What one effect would save on left-out takes",
     responses=change_problems(409),
 )
-def try_effect(id: ModelInPath, body: TrialRequest, parts: PartsNeeded) -> TrialView:
+async def try_effect(id: ModelInPath, body: TrialRequest, request: Request, parts: PartsNeeded) -> TrialView:
     """As a diagnosis judges it, alone and in seconds: nothing is stored. 422 for an expression that cannot be
-    read, and for one that has no value in some frame.
+    read, for one that has no value in some frame, and for one that takes longer than a minute.
     """
+
+    def compute(cancelled: Cancel) -> TrialView:
+        return _tried(id, body, parts, cancelled)
+
+    return await in_time(request, parts, compute, limit_s=LIMIT_S, what="this trial")
+
+
+def _tried(id: str, body: TrialRequest, parts: Parts, cancelled: Cancel) -> TrialView:
     record = parts.store.models.get(id)
     model, _ = parts.predictors.get(record.id)
     rows = model_takes(parts.store, record, body.takes)
@@ -59,24 +65,17 @@ def try_effect(id: ModelInPath, body: TrialRequest, parts: PartsNeeded) -> Trial
     takes = [parts.store.takes.load(row.id) for row in rows]
     if sum(len(take.time_s) * len(take.rotations) for take in takes) > MOST_FRAMES:
         raise BadInput("so many frames take too long for an answer; name fewer takes, or diagnose in a job")
-    with known_by_name([*declared_effects(model), effect]):
-        found = diagnose(
-            repaired_takes(takes, requested_effects(model)),
-            model.layout,
-            linear=model.method in LINEAR_METHODS,
-            known=known_effects(model),
-            effects=[effect],
-            signatures=False,
-            judge_residual=False,
-            noise_floors={},
-        )
-    judged = next((item for item in found.assessments if item.effect == effect.name), None)
-    why = next((item.why for item in found.not_identifiable if item.effect == effect.name), None)
+    declaration = declaration_document(effect) if isinstance(effect, DeclaredEffect) else None
+    trial = EffectTrial(parts.store.models.load_bytes(record.id), takes, effect.name, declaration)
+    if declaration is None and is_short(takes):
+        found = judge_effect(trial)
+    else:
+        found = in_process(judge_effect, trial, "this trial", cancelled)
     return TrialView(
         model=record.id,
         effect=effect.name,
         explanation=effect.explanation,
         takes=[row.id for row in rows],
-        judged=None if judged is None else CandidateView.of(judged),
-        not_identifiable=why,
+        judged=None if found.judged is None else CandidateView.of(found.judged),
+        not_identifiable=found.not_identifiable,
     )

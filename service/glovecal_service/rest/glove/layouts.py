@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from datetime import datetime
 from typing import Annotated, Any
 
@@ -11,8 +10,9 @@ from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, Field, FiniteFloat, StringConstraints, ValidationError
 from starlette.concurrency import run_in_threadpool
 
-from glovecal_models.errors import BadLayout
-from glovecal_models.layout import Layout
+from glovecal_models.documents import read_toml
+from glovecal_models.errors import BadInput, BadLayout
+from glovecal_models.layout import MOST_NAMES, Layout
 from glovecal_models.takes.tap_latency import FEWEST_TAPS
 from glovecal_service.rest.http.answers import change_problems, problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
@@ -33,7 +33,7 @@ from glovecal_service.store.records import GloveRecord, LayoutRecord
 
 router = APIRouter(prefix="/gloves", tags=["gloves"])
 
-MOST_CHANNELS = 512
+MOST_CHANNELS = MOST_NAMES
 Channels = Annotated[list[Channel], Field(max_length=MOST_CHANNELS)]
 Expression = Annotated[str, StringConstraints(max_length=2000, pattern=ONE_LINE)]
 
@@ -197,9 +197,9 @@ def _checked(content: bytes, content_type: str) -> LayoutBody:
     try:
         if kind == "application/json":
             return LayoutBody.model_validate_json(content)
-        return LayoutBody.model_validate(tomllib.loads(content.decode("utf-8")))
+        return LayoutBody.model_validate(read_toml(content, "layout"))
     except ValidationError as error:
         found = error.errors(include_input=False, include_url=False)
         raise RequestValidationError([{**item, "loc": ("body", *item["loc"])} for item in found]) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise BadLayout(f"layout: not valid TOML: {error}") from error
+    except BadInput as error:
+        raise BadLayout(str(error)) from error

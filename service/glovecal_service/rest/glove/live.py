@@ -7,11 +7,11 @@ from typing import Any, Literal
 
 import zenoh
 from fastapi import APIRouter
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, ValidationError
 
-from glovecal_client.errors import NoAnswer
+from glovecal_client.errors import BadName, NoAnswer
 from glovecal_client.keys import all_gloves, parse_glove_key
-from glovecal_client.queries import ask, ask_json, json_object
+from glovecal_client.queries import ask, json_object
 from glovecal_client.session import open_client
 from glovecal_service.realtime.service_status import all_service_statuses
 from glovecal_service.rest.http.answers import change_problems
@@ -46,25 +46,39 @@ class LiveGlove(BaseModel):
 
 
 @router.get("", response_model=list[LiveGlove], summary="Gloves now", responses=change_problems(409))
-def live_gloves(parts: PartsNeeded) -> list[dict[str, Any]]:
+def live_gloves(parts: PartsNeeded) -> list[LiveGlove]:
     """Each glove whose frames arrive: how it is served, and warnings. 409 where real time does not answer."""
     try:
         with open_client((parts.settings.zenoh,), wait_s=WITHIN_S) as session:
-            said = ask_json(session, all_service_statuses(parts.settings.site), timeout_s=WITHIN_S)
+            answers = ask(session, all_service_statuses(parts.settings.site), timeout_s=WITHIN_S)
             on_for = _on_for_s(session, parts.settings.site)
     except NoAnswer as error:
         raise Conflict(f"real time does not answer: {error}; is glovecal serve running?") from error
+    found: dict[str, LiveGlove] = {}
+    for answer in answers:
+        gloves = (json_object(answer.payload.to_bytes()) or {}).get("gloves")
+        for glove, one in gloves.items() if isinstance(gloves, dict) else ():
+            view = _as_said(glove, one, on_for.get(glove))
+            if view is not None:
+                found.setdefault(glove, view)
+    return list(found.values())
+
+
+def _as_said(glove: str, said: Any, on_for_s: float | None) -> LiveGlove | None:
+    """None for what real time does not say: anyone in the network may answer in its name."""
+    if not isinstance(said, dict):
+        return None
     names = ("state", "subject", "wearing", "layout", "model", "sentence")
-    return [
-        {
-            "glove": glove,
-            "warnings": one.get("warnings", []),
-            "on_for_s": on_for.get(glove),
-            "warm_up_left_s": warm_up_left_s(on_for[glove]) if glove in on_for else None,
-            **{name: one.get(name) for name in names},
-        }
-        for glove, one in said.get("gloves", {}).items()
-    ]
+    try:
+        return LiveGlove(
+            glove=glove,
+            warnings=said.get("warnings", []),
+            on_for_s=on_for_s,
+            warm_up_left_s=None if on_for_s is None else warm_up_left_s(on_for_s),
+            **{name: said.get(name) for name in names},
+        )
+    except ValidationError:
+        return None
 
 
 def _on_for_s(session: zenoh.Session, site: str) -> dict[str, float]:
@@ -74,6 +88,8 @@ def _on_for_s(session: zenoh.Session, site: str) -> dict[str, float]:
         for sample in ask(session, all_gloves(site, "status"), timeout_s=WITHIN_S):
             status = json_object(sample.payload.to_bytes()) or {}
             began, now = status.get("started_wall_ns"), status.get("wall_ns")
-            if isinstance(began, int) and isinstance(now, int):
-                found[parse_glove_key(str(sample.key_expr))[0].glove] = max(0.0, (now - began) / 1e9)
+            with suppress(BadName, OverflowError):  # a stranger's key, or times of hundreds of digits
+                glove = parse_glove_key(str(sample.key_expr))[0].glove
+                if isinstance(began, int) and isinstance(now, int):
+                    found[glove] = max(0.0, (now - began) / 1e9)
     return found

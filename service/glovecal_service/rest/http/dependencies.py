@@ -23,6 +23,7 @@ from glovecal_service.store.store import Store
 from glovecal_service.store.videos import Videos
 
 IMPORTS_AT_ONCE = 2
+LONG_ANSWERS_AT_ONCE = 2
 MOST_KEPT = 8
 """Models ready to predict: those used last."""
 
@@ -65,6 +66,10 @@ class Parts:
         default_factory=lambda: anyio.CapacityLimiter(IMPORTS_AT_ONCE)
     )
     """Tables are parsed in memory: so many at once and no more, the others wait."""
+    answer_slots: anyio.CapacityLimiter = field(
+        default_factory=lambda: anyio.CapacityLimiter(LONG_ANSWERS_AT_ONCE)
+    )
+    """The same for answers that are worked out in a process of their own."""
 
     @cached_property
     def filming(self) -> Filming:

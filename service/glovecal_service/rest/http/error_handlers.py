@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import errno
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from fastapi import APIRouter, FastAPI, Request
@@ -23,8 +23,8 @@ from glovecal_models.errors import (
     NotTrainable,
 )
 from glovecal_service.plain import plain_text
+from glovecal_service.rest.http.field_problems import what_is_right
 from glovecal_service.rest.http.problem import Problem
-from glovecal_service.rest.http.request_types import MEANING
 from glovecal_service.store.errors import Conflict, NotFound, StorageFull, StoreDamaged, StoreUnavailable
 
 MOST_FIELD_PROBLEMS = 20
@@ -76,18 +76,13 @@ def invalid_request(errors: Sequence[Any]) -> Problem:
     fields = [
         {
             "location": plain_text(".".join(map(str, item["loc"])), 200),
-            "problem": _what_is_right(item),
+            "problem": what_is_right(item),
         }
         for item in errors[:MOST_FIELD_PROBLEMS]
     ]
     more = f" and {len(errors) - 1} more" if len(errors) > 1 else ""
     first = f"{fields[0]['location']}: {fields[0]['problem']}" if fields else "the request is not valid"
     return Problem(422, "invalid-request", f"{first}{more}", errors=fields)
-
-
-def _what_is_right(item: Mapping[str, Any]) -> str:
-    pattern = item.get("ctx", {}).get("pattern")
-    return MEANING.get(pattern) or plain_text(item["msg"], 300)
 
 
 def storage_full(detail: str) -> Problem:

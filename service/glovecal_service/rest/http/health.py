@@ -12,9 +12,12 @@ from fastapi import APIRouter, Response
 from prometheus_client import CONTENT_TYPE_LATEST
 from pydantic import BaseModel, Field
 
+from glovecal_service.plain import reason_of
 from glovecal_service.rest.http.answers import problems
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.problem import Problem
+from glovecal_service.restarts import AWAY_TIMES, AWAY_WITHIN_S, TOLD_FOR_S, Restarts
+from glovecal_service.store.blobs import LEAST_FREE_BYTES
 from glovecal_service.store.errors import StoreDamaged, StoreError
 from glovecal_service.store.store import Store
 
@@ -23,7 +26,6 @@ router = APIRouter(tags=["health"])
 REALTIME_ALIVE = "realtime.alive"
 """A file in the data folder that the real-time process touches once a second."""
 SEEN_WITHIN_S = 5.0
-LEAST_FREE_BYTES = 50_000_000
 
 
 class Live(BaseModel):
@@ -38,6 +40,7 @@ class Storage(BaseModel):
 class Ready(Storage):
     status: Literal["ready"] = "ready"
     realtime_seen_s_ago: float
+    realtime_restarts: int = Field(description="In the last 10 minutes; 503 after three within one.")
     problems: list[str] = Field(
         description="What does not keep the service from working, such as a damaged active model: what to do."
     )
@@ -59,7 +62,16 @@ def ready(parts: PartsNeeded, response: Response) -> Ready:
     seen_s_ago = realtime_seen_s_ago(parts)
     if seen_s_ago is None or seen_s_ago > SEEN_WITHIN_S:
         raise Problem(503, "not-ready", _no_realtime(seen_s_ago))
-    return Ready(**storage.model_dump(), realtime_seen_s_ago=seen_s_ago, problems=_problems(parts.store))
+    restarts = Restarts(parts.settings.data)
+    if restarts.within(AWAY_WITHIN_S) >= AWAY_TIMES:
+        raise Problem(503, "not-ready", f"gloves are served with interruptions: {restarts.sentence()}")
+    told = [sentence for sentence in (restarts.sentence(),) if sentence]
+    return Ready(
+        **storage.model_dump(),
+        realtime_seen_s_ago=seen_s_ago,
+        realtime_restarts=restarts.within(TOLD_FOR_S),
+        problems=[*told, *_problems(parts.store)],
+    )
 
 
 @router.get(
@@ -110,7 +122,7 @@ def _check_artifacts(store: Store, data: Path) -> str:
     try:
         store.artifacts.exists("0" * 64)
     except (StoreError, OSError) as error:
-        raise Problem(503, "not-ready", f"the artifacts cannot be reached: {error}") from error
+        raise Problem(503, "not-ready", f"the artifacts cannot be reached: {reason_of(error)}") from error
     if not os.access(data, os.W_OK):
         raise Problem(503, "not-ready", "the data folder cannot be written to")
     free = shutil.disk_usage(data).free

@@ -16,7 +16,7 @@ from pathlib import Path
 from starlette.concurrency import run_in_threadpool
 
 from glovecal_client.operating_system import move_over, name_for_a_file, sync_file
-from glovecal_service.store.blobs import full_disk_named
+from glovecal_service.store.blobs import full_disk_named, require_room
 
 TEMPORARY = ".partial"
 WRITE_AT_ONCE = 2**20
@@ -58,6 +58,7 @@ class UploadFolder:
         Raises StorageFull, and whatever ``chunks`` raises; either way nothing
         is left behind. Memory used is ``WRITE_AT_ONCE`` and one chunk, whatever the size.
         """
+        require_room(self.folder)
         temporary = self.folder / f"{secrets.token_hex(16)}{TEMPORARY}"
         try:
             with full_disk_named(self.folder):

@@ -19,7 +19,7 @@ from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.problem import Problem
-from glovecal_service.rest.http.request_types import SubjectName
+from glovecal_service.rest.http.request_types import SHA256_PREFIX, SubjectName
 from glovecal_service.rest.model.models import Model, ModelInFull, model_details, model_row
 from glovecal_service.store.clock import now
 from glovecal_service.store.errors import Conflict, NotFound
@@ -42,6 +42,11 @@ class ModelImport(BaseModel):
 
     subject: SubjectName | None = Field(None, description="Null: the subject that the model names.")
     create_subject: bool = Field(False, description="Add the subject if it is not there; else 404.")
+    id: str | None = Field(
+        None, pattern=SHA256_PREFIX,
+        description="The model's id where it was exported, or its first digits; 422 for another file. "
+        "Null: what the file holds is taken for what was sent.",
+    )  # fmt: skip
 
 
 @router.post(
@@ -87,6 +92,11 @@ def _import(parts: Parts, path: Path, options: ModelImport) -> dict[str, Any]:
 
 def import_artifact(parts: Parts, artifact: bytes, options: ModelImport) -> dict[str, Any]:
     """An ``ImportedModel``. Raises BadInput for what does not predict a frame, NotFound, Conflict."""
+    if options.id is not None and not model_id(artifact).startswith(options.id):
+        raise BadInput(
+            f"no model was imported: the sender's is {options.id[:12]}, this file is "
+            f"{model_id(artifact)[:12]}: it was changed on its way; send it again"
+        )
     model = _tried(artifact)
     subject = options.subject or model.subject
     layout_is_new = _layout_is_new(parts, model)

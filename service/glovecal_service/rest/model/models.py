@@ -181,7 +181,7 @@ def export_model(id: ModelInPath, store: StoreNeeded) -> Response:
     return Response(
         store.models.load_bytes(record.id),
         media_type="application/octet-stream",
-        headers={"Content-Disposition": f'attachment; filename="{name}"'},
+        headers={"Content-Disposition": f'attachment; filename="{name}"', "ETag": f'"{record.id}"'},
     )
 
 

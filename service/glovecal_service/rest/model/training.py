@@ -8,7 +8,7 @@ from fastapi import APIRouter, Response
 from pydantic import Field, field_validator
 
 from glovecal_models.calibration.training_settings import Method
-from glovecal_models.errors import LayoutMismatch, NotTrainable
+from glovecal_models.errors import BadInput, LayoutMismatch, NotTrainable
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
 from glovecal_service.rest.http.request_types import Id, Identifier, ModelReference, StrictBody, SubjectName
@@ -49,7 +49,7 @@ class Training(StrictBody):
     @classmethod
     def _not_one(cls, folds: int) -> int:
         if folds == 1:
-            raise ValueError("one fold would hold out everything; 0 or at least 2")
+            raise BadInput("one fold would hold out everything; 0 or at least 2")
         return folds
 
 

@@ -3,34 +3,33 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse
 from pydantic import Field, FiniteFloat
 from starlette.background import BackgroundTask
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.rotations import PALM
-from glovecal_models.takes.common_event import common_events
-from glovecal_service.exports.body_markers import Wrist, hand_frame, read_trc
+from glovecal_models.progress import Cancel
+from glovecal_service.exports.body_markers import Wrist
 from glovecal_service.exports.formats import FORMATS, format_of
-from glovecal_service.exports.hand_motion import Content, HandMotion, on_one_time
-from glovecal_service.exports.take_motion import motion_of
+from glovecal_service.exports.hand_motion import Content
+from glovecal_service.exports.motion_file import Body as BodyFile
+from glovecal_service.exports.motion_file import HandTake, MotionFile, write_motion
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
+from glovecal_service.rest.http.long_answers import in_process, in_time
 from glovecal_service.rest.http.request_types import ModelReference, StrictBody, TakeReference
-from glovecal_service.rest.take.hands import hand_alignment
 from glovecal_service.store.errors import Conflict, NotFound
 
 router = APIRouter(prefix="/motion", tags=["takes"])
 
 MOST_HANDS = 2
 LARGEST_SHIFT_S = 1e9
-CLAPS_WITHIN_S = 5.0
+LIMIT_S = 1800.0
+"""An hour of one hand took 4 minutes on two loaded cores."""
 MarkerNames = Annotated[list[Annotated[str, Field(min_length=1, max_length=64)]], Field(max_length=4)]
 Shift = Annotated[FiniteFloat, Field(ge=-LARGEST_SHIFT_S, le=LARGEST_SHIFT_S)]
 
@@ -89,33 +88,23 @@ class Motion(StrictBody):
         }
     },
 )
-def export_motion(body: Motion, parts: PartsNeeded) -> FileResponse:
+async def export_motion(body: Motion, request: Request, parts: PartsNeeded) -> FileResponse:
     """Calibrated by the model that is named, else by the active one; effects with a memory start in the
     pre-roll. 409 where angles are asked for and no model is active.
     """
-    chosen = format_of(f"motion.{body.format}")
-    for name, given in (("models", body.models), ("shifts_s", body.shifts_s)):
-        if given and len(given) != len(body.takes):
-            raise BadInput(f"{len(given)} {name} for {len(body.takes)} takes: give one a take, or none")
-    models = body.models or [None] * len(body.takes)
-    hands = [_hand(parts, take, model, body.content) for take, model in zip(body.takes, models, strict=True)]
-    labels = [one.label for one in hands]
-    if len(set(labels)) < len(labels):
-        raise BadInput("both takes are of the same hand; one of the two subjects has the other hand")
-    if len(hands) == MOST_HANDS and not body.shifts_s:
-        found, _ = hand_alignment(parts.store, body.takes[0], body.takes[1], claps=body.claps)
-        hands[1] = replace(hands[1], time_s=found.onto_first(hands[1].time_s))
-    hands = on_one_time(hands, body.shifts_s)
-    if body.wrist == "optical":
-        hands = [replace(one, wrist="optical") for one in hands]
-    if body.body is not None:
-        if (body.content, body.format) != ("joints", "trc"):
-            raise BadInput("markers of a body are joined to joints in a TRC file: content joints, format trc")
-        hands = _with_body(parts, body, body.body, hands)
     folder = tempfile.TemporaryDirectory(prefix="glovecal-motion-")
     try:
+        chosen = format_of(f"motion.{body.format}")
         path = Path(folder.name, f"motion{chosen.suffix}")
-        chosen.write(hands, body.content, path)
+
+        def write(cancelled: Cancel) -> None:
+            asked = _asked(parts, body, path)
+            if asked.is_short:
+                write_motion(asked)
+            else:
+                in_process(write_motion, asked, "the export", cancelled)
+
+        await in_time(request, parts, write, limit_s=LIMIT_S, what="this export")
     except BaseException:
         folder.cleanup()
         raise
@@ -124,30 +113,25 @@ def export_motion(body: Motion, parts: PartsNeeded) -> FileResponse:
     )
 
 
-def _with_body(parts: Parts, asked: Motion, body: Body, hands: Sequence[HandMotion]) -> list[HandMotion]:
-    """Hands placed by the body's markers where those are named, and the markers beside the first."""
-    path = parts.uploads.find(body.upload)
-    if path is None:
-        raise NotFound(f"no upload {body.upload[:12]}; send the TRC file to /v1/uploads first")
-    found = read_trc(path, "the body's file")
-    shift_s = float(hands[0].time_s[0] - found.time_s[0]) if body.shift_s is None else body.shift_s
-    if asked.claps:
-        take = parts.store.takes.load(asked.takes[0])
-        moved = replace(found, time_s=found.time_s + shift_s).as_take()
-        shift_s += common_events(take, moved, CLAPS_WITHIN_S).shift_s
-    at = replace(found, time_s=found.time_s + shift_s).at(hands[0].time_s)
-    placed = []
-    for hand in hands:
-        names = body.left if hand.label == "L" else body.right
-        frame = hand_frame(at, names, asked.wrist, is_left=hand.label == "L") if names else None
-        placed.append(replace(hand, frame=frame))
-    return [replace(placed[0], beside=at), *placed[1:]]
+def _asked(parts: Parts, body: Motion, path: Path) -> MotionFile:
+    for name, given in (("models", body.models), ("shifts_s", body.shifts_s)):
+        if given and len(given) != len(body.takes):
+            raise BadInput(f"{len(given)} {name} for {len(body.takes)} takes: give one a take, or none")
+    models = body.models or [None] * len(body.takes)
+    hands = [_hand(parts, take, model, body.content) for take, model in zip(body.takes, models, strict=True)]
+    markers = None
+    if body.body is not None:
+        file = parts.uploads.find(body.body.upload)
+        if file is None:
+            raise NotFound(f"no upload {body.body.upload[:12]}; send the TRC file to /v1/uploads first")
+        markers = BodyFile(file, body.body.shift_s, tuple(body.body.right), tuple(body.body.left))
+    return MotionFile(tuple(hands), body.content, path, tuple(body.shifts_s), body.claps, body.wrist, markers)
 
 
-def _hand(parts: Parts, take: str, model: str | None, content: Content) -> HandMotion:
+def _hand(parts: Parts, take: str, model: str | None, content: Content) -> HandTake:
     record = parts.store.takes.get(take)
     subject = parts.store.subjects.get(record.subject)
-    found = None
+    artifact = None
     if content != "raw":
         chosen = (
             parts.store.models.active(record.subject, record.layout)
@@ -159,8 +143,5 @@ def _hand(parts: Parts, take: str, model: str | None, content: Content) -> HandM
                 f"no model of {record.subject} with layout {record.layout} is active: name a model, or ask "
                 "for raw readings"
             )
-        found, _ = parts.predictors.get(chosen.id)
-    label = "L" if subject.hand == "left" else "R"
-    arches = found is not None and found.method == "template" and PALM in found.rotation_names
-    skeleton = subject.skeleton(palm="arching" if arches else "rigid")
-    return motion_of(parts.store.takes.load(record.id), found, skeleton, label)
+        artifact = parts.store.models.load_bytes(chosen.id)
+    return HandTake(parts.store.takes.load(record.id), subject, artifact, record.accounting)

@@ -1,0 +1,120 @@
+"""One hand's take, or both hands', as a motion file: all that is needed as plain data, so that a process of
+its own can write it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from glovecal_models.calibration.artifact import load
+from glovecal_models.errors import BadInput
+from glovecal_models.hand.rotations import PALM
+from glovecal_models.takes.common_event import common_events
+from glovecal_models.takes.hand_clocks import TakeClock, align
+from glovecal_models.takes.take import Take
+from glovecal_service.exports.body_markers import Wrist, hand_frame, read_trc
+from glovecal_service.exports.formats import format_of
+from glovecal_service.exports.hand_motion import Content, HandMotion, on_one_time
+from glovecal_service.exports.take_motion import motion_of
+from glovecal_service.store.records import SubjectRecord
+
+CLAPS_WITHIN_S = 5.0
+MOST_FRAMES = 2_000_000
+"""Of all hands together: four hours and a half at 120 Hz."""
+SHORT = 10_000
+"""Frames that are written before a process of its own would have started."""
+
+
+@dataclass(frozen=True)
+class HandTake:
+    """A take and what makes it a hand's motion."""
+
+    take: Take
+    subject: SubjectRecord
+    artifact: bytes | None
+    """The model's; None for raw readings."""
+    accounting: Mapping[str, Any] | None
+
+    @property
+    def label(self) -> str:
+        return "L" if self.subject.hand == "left" else "R"
+
+    def motion(self) -> HandMotion:
+        model = None if self.artifact is None else load(self.artifact)
+        arches = model is not None and model.method == "template" and PALM in model.rotation_names
+        skeleton = self.subject.skeleton(palm="arching" if arches else "rigid")
+        return motion_of(self.take, model, skeleton, self.label)
+
+
+@dataclass(frozen=True)
+class Body:
+    """Markers of an optical system, in a TRC file."""
+
+    file: Path
+    shift_s: float | None
+    right: tuple[str, ...]
+    left: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class MotionFile:
+    hands: tuple[HandTake, ...]
+    content: Content
+    path: Path
+    """Its ending is the format."""
+    shifts_s: tuple[float, ...]
+    claps: bool
+    wrist: Wrist
+    body: Body | None
+
+    def __post_init__(self) -> None:
+        labels = [hand.label for hand in self.hands]
+        if len(set(labels)) < len(labels):
+            raise BadInput("both takes are of the same hand; one of the two subjects has the other hand")
+        if self.body is not None and (self.content, self.path.suffix) != ("joints", ".trc"):
+            raise BadInput("markers of a body are joined to joints in a TRC file: content joints, format trc")
+        if self.frames > MOST_FRAMES:
+            raise BadInput(f"{self.frames} frames are too many for one file; export at most {MOST_FRAMES}")
+
+    @property
+    def frames(self) -> int:
+        return sum(len(hand.take.time_s) for hand in self.hands)
+
+    @property
+    def is_short(self) -> bool:
+        return self.frames <= SHORT and self.body is None
+
+
+def write_motion(asked: MotionFile) -> None:
+    """Raises BadInput, LayoutMismatch, DamagedArtifact."""
+    motions = [hand.motion() for hand in asked.hands]
+    if len(motions) > 1 and not asked.shifts_s:
+        clocks = [TakeClock.of_accounting(hand.accounting) for hand in asked.hands]
+        first, second = (hand.take for hand in asked.hands)
+        found = align(first, second, (clocks[0], clocks[1]), claps=asked.claps)
+        motions[1] = replace(motions[1], time_s=found.onto_first(motions[1].time_s))
+    hands = list(on_one_time(motions, asked.shifts_s))
+    if asked.wrist == "optical":
+        hands = [replace(one, wrist="optical") for one in hands]
+    if asked.body is not None:
+        hands = _with_body(asked, asked.body, hands)
+    format_of(asked.path.name).write(hands, asked.content, asked.path)
+
+
+def _with_body(asked: MotionFile, body: Body, hands: Sequence[HandMotion]) -> list[HandMotion]:
+    """Hands placed by the body's markers where those are named, and the markers beside the first."""
+    found = read_trc(body.file, "the body's file")
+    shift_s = float(hands[0].time_s[0] - found.time_s[0]) if body.shift_s is None else body.shift_s
+    if asked.claps:
+        moved = replace(found, time_s=found.time_s + shift_s).as_take()
+        shift_s += common_events(asked.hands[0].take, moved, CLAPS_WITHIN_S).shift_s
+    at = replace(found, time_s=found.time_s + shift_s).at(hands[0].time_s)
+    placed = []
+    for hand in hands:
+        is_left = hand.label == "L"
+        names = body.left if is_left else body.right
+        frame = hand_frame(at, names, asked.wrist, is_left=is_left) if names else None
+        placed.append(replace(hand, frame=frame))
+    return [replace(placed[0], beside=at), *placed[1:]]

@@ -1,0 +1,67 @@
+"""What a data folder need not keep for ever: swept once an hour, the oldest first.
+
+Kept whatever their age: database, artifacts, and each upload that a stored take came from. Swept
+``GLOVECAL_KEEP_DAYS`` after they were last written: uploads that no take came from, films (a take's video is
+a copy in ``videos``), and the ledgers of recordings that are over, whose frames are in their takes.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from glovecal_service.settings import Settings
+from glovecal_service.store.errors import DamagedRows, StoreError
+from glovecal_service.store.store import Store
+
+DAY_S = 86_400.0
+ENDED = ("done", "failed")
+
+
+@dataclass(frozen=True)
+class Swept:
+    files: int
+    size_bytes: int
+
+
+def sweep(store: Store, settings: Settings) -> Swept:
+    """Remove what is older than ``settings.keep_days``. Nothing where the store does not answer."""
+    before = time.time() - settings.keep_days * DAY_S
+    count = size = 0
+    try:
+        candidates = [*_uploads(store, settings), *_films(settings), *_ledgers(store, settings)]
+    except StoreError:  # what came from an upload is not known now: another time
+        return Swept(0, 0)
+    for file in candidates:
+        with suppress(OSError):
+            about = file.stat()
+            if about.st_mtime < before:
+                file.unlink()
+                count, size = count + 1, size + about.st_size
+    return Swept(count, size)
+
+
+def _uploads(store: Store, settings: Settings) -> Iterator[Path]:
+    """Raises StoreError, also where a damaged row may have named one of them."""
+    used = {record.original_sha256 for record in store.takes.list()}
+    for file in settings.uploads_folder.glob("*"):
+        if file.is_file() and file.name not in used and len(file.name) == 64:
+            yield file
+
+
+def _films(settings: Settings) -> Iterator[Path]:
+    return (file for file in settings.films_folder.glob("*") if file.is_file())
+
+
+def _ledgers(store: Store, settings: Settings) -> Iterator[Path]:
+    try:
+        rows = store.recordings.list()
+    except DamagedRows as error:
+        rows = error.sound
+    over = {row.id for row in rows if row.state in ENDED}
+    for file in settings.recordings_folder.glob("*"):
+        if file.is_file() and file.name.partition(".")[0] in over:
+            yield file

@@ -1,0 +1,69 @@
+"""What the data folder forgets after its days, and what it keeps whatever its age."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from filled_store import META
+from stored_takes import LAYOUT, make_take
+
+from glovecal_service.filming import Filming
+from glovecal_service.settings import Settings
+from glovecal_service.store import Store
+from glovecal_service.store.errors import StorageFull
+from glovecal_service.store.retention import sweep
+
+
+def old(file: Path, days: float) -> Path:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(file.name.encode())
+    at = os.stat(file).st_mtime - days * 86_400
+    os.utime(file, (at, at))
+    return file
+
+
+def sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def test_old_files_go_and_what_a_take_came_from_stays(store: Store, store_settings: Settings) -> None:
+    settings = store_settings.model_copy(update={"keep_days": 30.0})
+    store.subjects.create("anna")
+    source = sha256("the take's file")
+    store.takes.add(make_take(1), subject="anna", layout=LAYOUT.name, source="import", original_sha256=source)
+    for glove in ("left", "right"):
+        store.gloves.seen(glove, META)
+    recordings = [
+        store.recordings.request(glove, name="walk", subject="anna", wearing="w")
+        for glove in ("left", "right")
+    ]
+    store.recordings.update(recordings[0].id, state="done", sent=1, missing=0)
+    gone = [
+        old(settings.uploads_folder / sha256("forgotten"), 31),
+        old(settings.films_folder / "20260101-120000-001.mkv", 31),
+        old(settings.recordings_folder / f"{recordings[0].id}.run", 31),
+    ]
+    kept = [
+        old(settings.uploads_folder / source, 1000),
+        old(settings.uploads_folder / sha256("new"), 29),
+        old(settings.films_folder / "20260101-120000-002.mkv", 1),
+        old(settings.recordings_folder / f"{recordings[1].id}.run", 1000),
+        old(settings.data / "unknown.txt", 1000),
+    ]
+    assert sweep(store, settings).files == 3
+    assert [file.exists() for file in gone] == [False] * 3
+    assert [file.exists() for file in kept] == [True] * 5
+    assert len(store.takes.load(store.takes.list()[0].id).time_s) == 300
+
+
+def test_nothing_is_filmed_onto_a_disk_that_is_nearly_full(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=40_000_000))
+    with pytest.raises(StorageFull, match=r"only 40 MB are free .* free some disk space"):
+        Filming(tmp_path / "films").start("rendered")
