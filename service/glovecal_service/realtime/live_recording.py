@@ -23,7 +23,8 @@ from glovecal_service.realtime.pre_roll_request import PreRollRequest
 from glovecal_service.realtime.reconciliation import OutOfTime, Patience, fill_gaps, reconcile
 from glovecal_service.realtime.recording_account import Settlement, recording_account
 from glovecal_service.realtime.refusal import Refusal, Refused
-from glovecal_service.realtime.run_ledger import OWN_CLOCK, RunLedger, decoded
+from glovecal_service.realtime.run_books import OWN_CLOCK
+from glovecal_service.realtime.run_ledger import RunLedger, decoded
 from glovecal_service.realtime.sequence_order import SequenceOrder
 from glovecal_service.store.recordings import PRE_ROLL
 
@@ -83,7 +84,8 @@ class LiveRecording:
             return
         for books in self.file.runs.values():
             if f"{books.run_id:016x}" == run_id:
-                books.last, books.ended = max(books.last, last), True
+                books.note_given(last)
+                books.ended = True
 
     def take_pre_roll(self) -> None:
         """Write what was fetched of the pre-roll since the last call; never waits."""
@@ -119,8 +121,8 @@ class LiveRecording:
         begins = frame.run_id != self._run_id
         self._run_id, self._heard_ns = frame.run_id, received_ns
         if begins:
-            self._order.begin(frame.sequence, received_ns)
-            self.file.add(frame, message, jumped=self.file.has_jumped(frame))
+            self._order.begin(frame)
+            self.file.add(frame, message)
         else:
             self._record_in_order(frame, message, received_ns)
 
@@ -128,7 +130,7 @@ class LiveRecording:
         """Record a frame that fits; hold one that does not until it is clear whether its publisher jumped."""
         jumps = self._order.jumps
         try:
-            self._order.follow(frame.sequence, received_ns)
+            self._order.follow(frame, received_ns)
         except Refused as refused:
             if self.file.lacks(frame):
                 self.file.add(frame, message)
@@ -148,8 +150,8 @@ class LiveRecording:
         first = self._order.jumped_to
         held = [item for item in self._held if first <= item[0].sequence < frame.sequence]
         self.refused -= sum(is_new for _, _, is_new in held)
-        for at, (each, bytes_of_it, _) in enumerate([*held, (frame, message, True)]):
-            self.file.add(each, bytes_of_it, jumped=at == 0 and not self.file.lacks(each))
+        for each, bytes_of_it, _ in [*held, (frame, message, True)]:
+            self.file.add(each, bytes_of_it)
 
     def repair_now_and_then(self) -> None:
         """Twice a second at most, ask capture's log for what is missing."""

@@ -73,11 +73,15 @@ def read_take(path: Path, *, name: str, wearing: str, first_sequence: int = 0) -
 
 
 def _in_order(frames: Sequence[Frame]) -> list[Frame]:
-    """By run, in the order the runs were met, and by sequence number: repaired frames were written late.
+    """By run, in the order the runs began, and by sequence number: repaired frames were written late.
 
-    Where a publisher's numbers went on from a lower one, by time.
+    Where a publisher's numbers went on from a lower one, by time. The run met first is the first.
     """
-    order = {run_id: place for place, run_id in enumerate(dict.fromkeys(frame.run_id for frame in frames))}
+    began_ns: dict[int, int] = {}
+    for frame in frames:
+        began_ns[frame.run_id] = min(frame.wall_ns, began_ns.get(frame.run_id, frame.wall_ns))
+    first, *others = began_ns
+    order = {run: place for place, run in enumerate([first, *sorted(others, key=lambda run: began_ns[run])])}
     restarted = _restarted(frames)
 
     def place(frame: Frame) -> tuple[int, int]:
