@@ -57,6 +57,8 @@ class LiveRecording:
         self._held: deque[tuple[Frame, bytes, bool]] = deque(maxlen=HELD_LIMIT)
         """Frames with their messages, and whether they were counted as refused."""
         self._repair_at = 0.0
+        self._end_ns: int | None = None
+        """Once its end was asked for: by capture's clock, as far as that is known."""
         self._log = CaptureLog(session, keys)
         self._arrivals = Arrivals(session, keys.raw, limit=WAITING_LIMIT)
         self._statuses = Arrivals(session, keys.status, limit=STATUSES_LIMIT)
@@ -114,6 +116,8 @@ class LiveRecording:
         if frame is None:
             self.refused += 1
             return
+        if self._end_ns is not None and frame.wall_ns > self._end_ns:
+            return
         silent = received_ns - self._heard_ns > TAKEOVER_AFTER_NS
         if frame.run_id != self._run_id and self._run_id is not None and not silent:
             self.refused += 1
@@ -154,11 +158,14 @@ class LiveRecording:
             self.file.add(each, bytes_of_it)
 
     def repair_now_and_then(self) -> None:
-        """Twice a second at most, ask capture's log for what is missing."""
+        """Twice a second at most, ask capture for what is missing, and who it is if it did not say so."""
         now = time.monotonic()
         if now < self._repair_at:
             return
         self._repair_at = now + REPAIR_AFTER_S
+        if not self.file.capture and self.file.first_frame is not None:
+            with suppress(NoAnswer):
+                self.file.note_capture(self._log.standing().meta)
         if not self._repair(Patience(REPAIR_AFTER_S, Event())) and self.file.has_gaps:
             self._repair_at = now + 10 * REPAIR_AFTER_S
 
@@ -173,6 +180,8 @@ class LiveRecording:
     def finish(self, stop_wall_ns: int | None, patience: Patience) -> Settlement:
         """Stop: fetch or wait for everything captured up to the stop, close the file; as in ``reconcile``."""
         patience.wait(ON_THE_WAY_S)
+        if stop_wall_ns is not None and self.file.clock_ahead_ns is not None:
+            self._end_ns = stop_wall_ns + self.file.clock_ahead_ns
         self._stop_listening()
         outcome = reconcile(self.file, self._log, stop_wall_ns, patience)
         self._finish_pre_roll(patience)

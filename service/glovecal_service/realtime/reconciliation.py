@@ -97,6 +97,7 @@ def _reconcile_once(file: RunLedger, log: Log, stop_wall_ns: int | None, patienc
     end_ns = None if stop_wall_ns is None else stop_wall_ns + standing.clock_ahead_ns
     if end_ns is not None:
         _open_runs_of(file, standing, end_ns)
+    file.note_capture(standing.meta)
     refused = None
     for books in list(file.runs.values()):
         try:

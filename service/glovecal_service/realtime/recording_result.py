@@ -11,7 +11,7 @@ from glovecal_models.errors import BadInput
 from glovecal_service.realtime.recording_account import Settlement
 from glovecal_service.realtime.recording_take import read_take
 from glovecal_service.realtime.run_books import OWN_CLOCK
-from glovecal_service.realtime.run_ledger import SUFFIX
+from glovecal_service.realtime.run_ledger import CAPTURE, SUFFIX
 from glovecal_service.store.errors import NotFound
 from glovecal_service.store.recordings import ENDED_BY
 from glovecal_service.store.records import RecordingRecord, TakeRecord
@@ -48,6 +48,7 @@ def keep_as_take(
         name=record.name,
         wearing=record.wearing or "",
         first_sequence=account["first_sequence"],
+        capture=record.facts.get(CAPTURE) or glove.meta,
     )
     take = _stored_before(store, subject, record)
     accounting = {**account, **recorded.clock, OWN_CLOCK: _own_clock(account, take)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from glovecal_client.log_records import Recording
 from glovecal_client.wire.frame import Frame
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.take import Take
+from glovecal_service.realtime.run_ledger import CAPTURE
 
 
 @dataclass(frozen=True)
@@ -26,16 +27,19 @@ class RecordedTake:
     monotonic clock ``time_s`` is of, null where capture did not say."""
 
 
-def read_take(path: Path, *, name: str, wearing: str, first_sequence: int = 0) -> RecordedTake:
+def read_take(
+    path: Path, *, name: str, wearing: str, first_sequence: int = 0, capture: Mapping[str, Any] | None = None
+) -> RecordedTake:
     """The frames of all runs in order; ``time_s`` is the capture computer's monotonic clock in seconds.
 
-    Fetched frames of the first run with numbers below ``first_sequence`` are the pre-roll.
+    Fetched frames of the first run with numbers below ``first_sequence`` are the pre-roll. ``capture``: what
+    it said of itself, where the file's header does not have it.
     Frames whose time does not increase, or with another number of sensors, are left out and counted.
     Raises BadInput if nothing usable remains, DamagedLog, OSError.
     """
     recording = Recording.open(path)
     frames = _in_order(list(recording.frames()))
-    meta = recording.meta.get("capture") or {}
+    meta = recording.meta.get(CAPTURE) or capture or {}
     sensors = tuple(str(sensor) for sensor in meta.get("sensors") or ())
     if not sensors:
         raise BadInput(f"recording {path.name}: capture did not say which sensors its frames hold")

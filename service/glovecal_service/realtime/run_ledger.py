@@ -18,7 +18,10 @@ from glovecal_service.store.recordings import with_pre_roll
 SUFFIX = ".glog"
 BEGIN = "begin"
 """Of the header: ``run_id``, ``sequence`` and ``wall_ns`` (its clock) where capture stood when the recording
-began. Where it did not say so the recording begins with the first frame that came."""
+began, and ``clock_ahead_ns``, by how much that clock was ahead of this computer's. Where it did not say so
+the recording begins with the first frame that came."""
+CAPTURE = "capture"
+"""Of the header, and of a recording's facts where capture said it only later: its meta."""
 CREATED = "created_wall_ns"
 LEFT_FREE_BYTES = 256 << 20
 """Of the disk, for frames that were asked for: hours of one glove."""
@@ -35,6 +38,8 @@ class RunLedger:
         if begin is not None:
             run_id, wall_ns = int(begin["run_id"], 16), int(begin["wall_ns"])
             self.runs[run_id] = RunBooks(run_id, begin["sequence"] + 1, wall_ns, since_wall_ns=wall_ns)
+        self.capture: dict[str, Any] = dict(log.meta.get(CAPTURE) or {})
+        """What capture said of itself and its glove; empty until it did."""
         self.created_wall_ns = int(log.meta.get(CREATED) or 0)
         """By this computer's clock."""
         self.last_wall_ns = 0
@@ -69,6 +74,11 @@ class RunLedger:
     @property
     def meta(self) -> dict[str, Any]:
         return with_pre_roll(self._log.meta)
+
+    @property
+    def clock_ahead_ns(self) -> int | None:
+        """By how much capture's clock was ahead when the recording began; None where it did not say so."""
+        return self._log.meta.get(BEGIN, {}).get("clock_ahead_ns")
 
     @property
     def problem(self) -> str | None:
@@ -124,6 +134,11 @@ class RunLedger:
             first, *others = *self.runs.values(), books
             others.sort(key=lambda run: run.began_wall_ns)
             self.runs = {run.run_id: run for run in (first, *others)}
+
+    def note_capture(self, meta: Mapping[str, Any]) -> None:
+        """Keep what capture says of itself, if it is of a run recorded here and nothing is known yet."""
+        if not self.capture and any(meta.get("run_id") == f"{run_id:016x}" for run_id in self.runs):
+            self.capture = dict(meta)
 
     def lacks(self, frame: Frame) -> bool:
         """Whether the frame is one of those that are missing."""

@@ -15,6 +15,7 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from threading import Event
 
 import pytest
 from realtime_support import SteadyDevice, eventually, free_endpoint
@@ -22,7 +23,8 @@ from recorder_support import GLOVE, capturing, logged, recording_thread
 
 from glovecal_client import Recording
 from glovecal_client.capture.device import Reading
-from glovecal_client.session import open_router
+from glovecal_client.session import open_client, open_router
+from glovecal_service.realtime.recorder import Recorder
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 from glovecal_service.store.recordings import STOP_ASKED
@@ -95,6 +97,38 @@ def test_numbers_far_ahead_are_judged_by_the_clock_of_their_frames(settings: Set
     assert store.takes.get(record.facts["take"]).frames == record.facts["recorded"]
 
 
+def test_a_stop_asked_for_meanwhile_ends_the_recording_there(settings: Settings, store: Store) -> None:
+    """What came after it waits with all the rest, and is not of the recording."""
+    with (
+        open_router([settings.zenoh]),
+        capturing(settings),
+        open_client([settings.zenoh], wait_s=20) as session,
+    ):
+        recorder = Recorder(session, settings, lambda: Store.open(settings))
+        asked = store.recordings.request(GLOVE, name="stopped meanwhile", lead_s=0)
+
+        def until(state: str) -> None:
+            def looked() -> bool:
+                recorder.look()
+                return store.recordings.get(asked.id).state == state
+
+            eventually(looked, state)
+
+        until("recording")
+        time.sleep(0.3)
+        store.recordings.stop(asked.id)
+        time.sleep(0.7)
+        until("done")
+        stopping = Event()
+        stopping.set()
+        recorder.run(stopping)
+    record = store.recordings.get(asked.id)
+    frames = list(Recording.open(settings.recordings_folder / record.facts["file"]).frames())
+    assert len(frames) == record.facts["recorded"] > 20
+    late_s = max(frame.wall_ns for frame in frames) / 1e9 - record.facts[STOP_ASKED]
+    assert late_s < 0.3, "two clocks are compared by a question and its answer"
+
+
 @contextmanager
 def service_and_capture(folder: Path) -> Iterator[dict[str, list[int]]]:
     """Both as their commands start them; the ids of their processes."""
@@ -107,17 +141,20 @@ def service_and_capture(folder: Path) -> Iterator[dict[str, list[int]]]:
     capture += ["--connect", zenoh, "--data", str(folder / "captured")]
     with ExitStack() as running:
         output = running.enter_context(log.open("wb"))
-        for command in (serve, capture):
+
+        def start(command: list[str]) -> int:
             process = subprocess.Popen(command, env=environment, stdout=output, stderr=subprocess.STDOUT)
             running.callback(process.wait)
             running.callback(process.terminate)
-            if command is serve:
-                served = process.pid
-                eventually(lambda: "Glovecal is running" in log.read_text(), "the service is there")
+            return process.pid
+
+        served = start(serve)
+        eventually(lambda: "Glovecal is running" in log.read_text(), "the service is there")
+        captured = start(capture)
         children = Path(f"/proc/{served}/task/{served}/children").read_text().split()
         real_time, recorder, *_ = sorted(map(int, children))
         yield {
-            "capture": [process.pid],
+            "capture": [captured],
             "recorder": [recorder],
             "real time": [real_time],
             "service": [served, *map(int, children)],
