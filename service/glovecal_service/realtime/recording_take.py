@@ -18,13 +18,13 @@ from glovecal_service.realtime.run_ledger import CAPTURE
 
 @dataclass(frozen=True)
 class RecordedTake:
-    """The take, and what has to be known about its time."""
+    """The take, and what has to be known about its time and its glove."""
 
     take: Take
     clock: dict[str, Any]
     """``wall_minus_time_s``: add it to ``time_s`` for seconds since 1970; ``begins_s``: ``time_s`` of the
     first frame that was asked for, after the pre-roll; ``left_out``: frames not taken; ``computer``: whose
-    monotonic clock ``time_s`` is of, null where capture did not say."""
+    monotonic clock ``time_s`` is of, and ``hand``: of the glove, null where capture did not say."""
 
 
 def read_take(
@@ -73,6 +73,7 @@ def read_take(
         "left_out": len(frames) - len(taken),
     }
     clock["computer"] = meta.get("computer")
+    clock["hand"] = meta.get("hand")
     return RecordedTake(take, clock)
 
 

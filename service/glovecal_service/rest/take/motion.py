@@ -15,6 +15,7 @@ from starlette.background import BackgroundTask
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.rotations import PALM
+from glovecal_models.hand.skeleton import Handedness
 from glovecal_models.takes.common_event import common_events
 from glovecal_service.exports.body_markers import Wrist, hand_frame, read_trc
 from glovecal_service.exports.formats import FORMATS, format_of
@@ -58,6 +59,10 @@ class Motion(StrictBody):
         default_factory=list,
         description="One a take; null: the model that is active for its subject and layout.",
     )
+    hands: Annotated[list[Handedness | None], Field(max_length=MOST_HANDS)] = Field(
+        default_factory=list,
+        description="One a take; null, or not given: as its capture said, or else as its subject has it.",
+    )
     content: Content = Field(
         "joints", description="joints: places in mm; angles: calibrated degrees; raw: readings."
     )
@@ -91,17 +96,22 @@ class Motion(StrictBody):
 )
 def export_motion(body: Motion, parts: PartsNeeded) -> FileResponse:
     """Calibrated by the model that is named, else by the active one; effects with a memory start in the
-    pre-roll. 409 where angles are asked for and no model is active.
+    pre-roll. 409 where angles are asked for and no model is active, or nobody said which hand it is.
     """
     chosen = format_of(f"motion.{body.format}")
-    for name, given in (("models", body.models), ("shifts_s", body.shifts_s)):
+    for name, given in (("models", body.models), ("hands", body.hands), ("shifts_s", body.shifts_s)):
         if given and len(given) != len(body.takes):
             raise BadInput(f"{len(given)} {name} for {len(body.takes)} takes: give one a take, or none")
     models = body.models or [None] * len(body.takes)
-    hands = [_hand(parts, take, model, body.content) for take, model in zip(body.takes, models, strict=True)]
+    sides = body.hands or [None] * len(body.takes)
+    asked = zip(body.takes, models, sides, strict=True)
+    hands = [_hand(parts, take, model, body.content, side) for take, model, side in asked]
     labels = [one.label for one in hands]
     if len(set(labels)) < len(labels):
-        raise BadInput("both takes are of the same hand; one of the two subjects has the other hand")
+        raise BadInput(
+            "both takes are of the same hand; if one is not, say so, in the order of the takes: --hand right "
+            "--hand left"
+        )
     if len(hands) == MOST_HANDS and not body.shifts_s:
         found, _ = hand_alignment(parts.store, body.takes[0], body.takes[1], claps=body.claps)
         hands[1] = replace(hands[1], time_s=found.onto_first(hands[1].time_s))
@@ -144,7 +154,10 @@ def _with_body(parts: Parts, asked: Motion, body: Body, hands: Sequence[HandMoti
     return [replace(placed[0], beside=at), *placed[1:]]
 
 
-def _hand(parts: Parts, take: str, model: str | None, content: Content) -> HandMotion:
+def _hand(
+    parts: Parts, take: str, model: str | None, content: Content, hand: Handedness | None
+) -> HandMotion:
+    """``hand`` counts where it is given, then what capture said of the glove, then the subject's."""
     record = parts.store.takes.get(take)
     subject = parts.store.subjects.get(record.subject)
     found = None
@@ -160,7 +173,12 @@ def _hand(parts: Parts, take: str, model: str | None, content: Content) -> HandM
                 "for raw readings"
             )
         found, _ = parts.predictors.get(chosen.id)
-    label = "L" if subject.hand == "left" else "R"
+    side = hand or record.known_hand or subject.known_hand
+    if side is None:
+        raise Conflict(
+            f"nobody said which hand take {record.name} is of: name it with --hand left or --hand right, or "
+            f"say it of the subject: glovecal subject measure {record.subject} --hand left"
+        )
     arches = found is not None and found.method == "template" and PALM in found.rotation_names
-    skeleton = subject.skeleton(palm="arching" if arches else "rigid")
-    return motion_of(parts.store.takes.load(record.id), found, skeleton, label)
+    skeleton = subject.skeleton(side, "arching" if arches else "rigid")
+    return motion_of(parts.store.takes.load(record.id), found, skeleton, "L" if side == "left" else "R")
