@@ -83,6 +83,6 @@ def _require_one_hand(records: Sequence[TakeRecord]) -> None:
     left, right = of["left"], of["right"]
     if left is not None and right is not None:
         raise NotTrainable(
-            f"take {left.name} is of a left glove and take {right.name} of a right one: one model cannot read "
-            "both. Leave the takes of one hand out, and give each hand a subject of its own"
+            f"take {left.name} is of a left glove and take {right.name} of a right one: no model reads both. "
+            "Leave the takes of one hand out, and give each hand a subject of its own"
         )
