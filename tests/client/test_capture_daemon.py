@@ -313,17 +313,46 @@ def test_second_capture_into_the_same_folder_is_refused(wire: Wire, tmp_path: Pa
 
 
 def test_of_two_captures_that_met_only_when_the_router_came_one_gives_way(tmp_path: Path) -> None:
+    """It goes on recording, says why it does not publish, and publishes once the other is gone."""
     endpoint = free_endpoint()
     with (
         capturing(SignalGenerator(), endpoint, tmp_path / "a") as first,
         capturing(SignalGenerator(), endpoint, tmp_path / "b") as second,
     ):
         eventually(lambda: first.sentences and second.sentences, "both record without a router")
-        with open_router([endpoint]):
-            eventually(lambda: first.ended or second.ended, "one gives way")
-            loser, winner = (first, second) if first.ended else (second, first)
-            assert isinstance(loser.fail(), CaptureRefused)
-            assert winner.finish().frames > 0
+        with open_router([endpoint]) as router:
+
+            def gave_way(one: RunningCapture) -> bool:
+                return any("is already published by run" in sentence for sentence in one.sentences)
+
+            eventually(lambda: gave_way(first) or gave_way(second), "one gives way")
+            loser, winner = (first, second) if gave_way(first) else (second, first)
+            wire = Wire(router, endpoint)
+            eventually(lambda: len(wire.frames) > 5, "frames of the other")
+            assert not loser.ended
+            won = winner.finish()
+            eventually(lambda: wire.frames[-1].run_id != won.run_id, "frames of the one that gave way")
+            lost = loser.finish()
+    assert {frame.run_id for frame in wire.frames} == {won.run_id, lost.run_id}
+    assert [frame.sequence for frame in logged(lost.log)] == list(range(lost.frames))
+    assert lost.frames_not_logged == 0
+
+
+def test_a_status_that_nobody_stands_behind_ends_nothing(wire: Wire, tmp_path: Path) -> None:
+    """A stranger's word, or one of a capture that is gone: publishing pauses to look, and that once."""
+    with capturing(SignalGenerator(), wire.endpoint, tmp_path) as running:
+        eventually(lambda: len(wire.frames) > 5, "frames")
+        claim = {"run_id": f"{7:016x}", "started_wall_ns": 0, "state": "streaming", "device": "nothing"}
+        wire.session.put(KEYS.status, json.dumps(claim))
+        published = f"publishing to {KEYS.raw}"
+        eventually(lambda: running.sentences.count(published) == 2, "it publishes again")
+        before = len(wire.frames)
+        wire.session.put(KEYS.status, json.dumps(claim))
+        eventually(lambda: len(wire.frames) > before + 20, "frames afterwards")
+        assert running.sentences.count(published) == 2
+        assert any("is already published by run" in sentence for sentence in running.sentences)
+        summary = running.finish()
+    assert [frame.sequence for frame in logged(summary.log)] == list(range(summary.frames))
 
 
 def test_recording_starts_without_a_router_and_publishing_when_it_comes(tmp_path: Path) -> None:

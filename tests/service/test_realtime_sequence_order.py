@@ -33,9 +33,11 @@ class Stream:
     def missing(self) -> int:
         return self.gate.standing.missing if self.gate.standing else 0
 
-    def give(self, sequence: int, at_ns: int, *, run_id: int = 1) -> bool:
+    def give(self, sequence: int, at_ns: int, *, run_id: int = 1, sent_ns: int | None = None) -> bool:
+        """``sent_ns``: by the frame's own clock, where that is not when it came."""
         self.given += 1
-        frame = Frame(sequence, run_id, at_ns + self.given, 0, np.zeros(2, np.float32))
+        own_ns = at_ns if sent_ns is None else sent_ns
+        frame = Frame(sequence, run_id, own_ns + self.given, own_ns, np.zeros(2, np.float32))
         try:
             self.gate.pass_frame(encode_frame(frame), at_ns)
         except Refused as refused:
@@ -77,6 +79,28 @@ def test_an_outage_is_a_loss_and_no_jump() -> None:
     stream.run(range(100), from_s=0.0)
     assert stream.run(range(100 + 7200, 100 + 7300), from_s=60.0) == 100
     assert (stream.missing, stream.gate.jumps) == (7200, 0)
+
+
+@pytest.mark.parametrize("stood_s", [5, 20, 60, 3600])
+def test_frames_that_waited_while_this_process_stood_still_are_no_jump(stood_s: int) -> None:
+    """What a buffer kept of them arrives at once, and right after it the glove is far ahead."""
+    stream, rate_hz = Stream(), 120
+    stream.run(range(100), from_s=0.0)
+    woke_ns = (1 + stood_s) * SECOND
+    for sequence in range(100, 200):
+        assert stream.give(sequence, woke_ns, sent_ns=sequence * SECOND // rate_hz)
+    for sequence in range(100 + stood_s * rate_hz, 200 + stood_s * rate_hz):
+        assert stream.give(sequence, woke_ns + sequence, sent_ns=sequence * SECOND // rate_hz)
+    assert (stream.missing, stream.gate.jumps) == (stood_s * rate_hz - 100, 0)
+
+
+def test_a_run_that_began_while_this_process_stood_still_is_missing_from_its_first_frame() -> None:
+    stream = Stream()
+    stream.run(range(100), from_s=0.0)
+    assert stream.give(100, 21 * SECOND, sent_ns=SECOND)
+    woke_ns = 21 * SECOND + 2 * TAKEOVER_AFTER_NS
+    assert stream.give(2400, woke_ns, sent_ns=21 * SECOND, run_id=2)
+    assert stream.missing == 2400
 
 
 @pytest.mark.parametrize("begins_at", [10**9, LARGEST - 500, 0, 40])

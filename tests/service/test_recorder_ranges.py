@@ -48,7 +48,7 @@ def test_a_file_opened_again_knows_where_the_numbers_jumped(tmp_path: Path) -> N
     for at, number in enumerate(numbers):
         time_ns = at * 8_000_000
         frame = Frame(number, 1, time_ns, time_ns, np.zeros(3, np.float32))
-        assert file.add(frame, encode_frame(frame), jumped=number in (100, 10**6, 0))
+        assert file.add(frame, encode_frame(frame))
     repaired = Frame(110, 1, 0, 0, np.zeros(3, np.float32), flags=int(FrameFlag.REPAIRED))
     assert file.add(repaired, encode_frame(repaired))
     account = file.runs[1].document()

@@ -13,7 +13,7 @@ from threading import Event
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from glovecal_client import Frame, Recording, encode_frame
@@ -58,8 +58,8 @@ class Capture:
         self.queries = LogQueries(self.folder)
         self.sequence = -1
 
-    def frame(self, logged: bool) -> Frame:
-        self.now_ns += 8 * MS
+    def frame(self, logged: bool, step_ns: int = 8 * MS) -> Frame:
+        self.now_ns += step_ns
         self.sequence += 1
         wall_ns = self.now_ns + CLOCK_AHEAD_NS
         readings = np.array([self.sequence], np.float32)
@@ -121,8 +121,12 @@ class Story:
         elif what == "unreachable":
             self.capture.reachable = not self.capture.reachable
             return
+        elif what == "jumped":
+            self.capture.sequence += count
+            return
+        step_ns = MS // 10 if "in no time" in what else 8 * MS
         for _ in range(count):
-            frame = self.capture.frame("not logged" not in what)
+            frame = self.capture.frame("not logged" not in what, step_ns)
             if what.startswith("received"):
                 self.file.add(frame, encode_frame(frame))
 
@@ -156,6 +160,8 @@ def check(story: Story, settlement: Settlement, stop_ns: int) -> None:
         assert account["missing"] == []
         return
     recorded = {(frame.run_id, frame.sequence) for frame in Recording.open(story.path).frames()}
+    given = {(item.frame.run_id, item.frame.sequence) for item in story.capture.numbered}
+    assert lacking <= given, "a number that was never given is not missing"
     first = (account["runs"][0]["run_id"], account["first_sequence"])
     last = {run["run_id"]: run["last_sequence"] for run in account["runs"]}
     for item in story.capture.numbered[story.begin :]:
@@ -172,6 +178,12 @@ def check(story: Story, settlement: Settlement, stop_ns: int) -> None:
 
 
 @settings(max_examples=150, deadline=None, derandomize=True)
+@example(before=[("received", 3), ("lost in no time", 1500), ("received", 2)], after=[("received", 1)])
+@example(
+    before=[("unreachable", 0), ("received", 3), ("jumped", 5000), ("lost", 2), ("received", 2)],
+    after=[("received", 1)],
+)
+@example(before=[("restarted", 2), ("restarted", 0), ("received", 1)], after=[("received", 1)])
 @given(before=STEPS, after=STEPS)
 def test_every_frame_up_to_the_stop_is_recorded_or_missing(
     before: list[tuple[str, int]], after: list[tuple[str, int]]

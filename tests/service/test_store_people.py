@@ -20,7 +20,7 @@ def test_subjects_are_created_listed_and_removed(store):
     ben = store.subjects.create("ben")
     assert store.subjects.list() == [anna, ben]
     assert store.subjects.get("anna") == anna
-    assert (anna.dimensions, anna.hand, ben.hand) == ({"hand_length": 182.0}, "left", "right")
+    assert (anna.dimensions, anna.hand, ben.hand) == ({"hand_length": 182.0}, "left", "unknown")
     with pytest.raises(Conflict, match="already a subject 'anna'"):
         store.subjects.create("anna")
     store.subjects.remove("ben")

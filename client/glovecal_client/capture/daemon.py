@@ -27,7 +27,7 @@ from glovecal_client.capture.reading_check import ReadingCheck
 from glovecal_client.capture.reopening_device import ReopeningDevice
 from glovecal_client.capture.status import CaptureState, CaptureStatus
 from glovecal_client.clock import wall_ns
-from glovecal_client.errors import CaptureRefused, DeviceError, DeviceFinished, DeviceLost
+from glovecal_client.errors import DeviceError, DeviceFinished, DeviceLost
 from glovecal_client.frame_log import BackgroundSync
 from glovecal_client.keys import GloveKeys
 from glovecal_client.session import DEFAULT_ENDPOINT
@@ -128,8 +128,6 @@ class CaptureDaemon:
     def _capture(self, device: ReopeningDevice, stop: threading.Event) -> None:
         next_status = 0.0
         while not stop.is_set() and not self._log_is_full:
-            if self._link.refusal:
-                raise CaptureRefused(self._link.refusal)
             if time.monotonic() >= next_status:
                 self._beat()
                 next_status = time.monotonic() + _STATUS_PERIOD_S

@@ -1,6 +1,7 @@
 """The daemon's side of the wire: connects when the router is there, publishes, answers queries.
 
-Recording never waits for it: while there is no router, ``publish`` does nothing and the log has the frames.
+Recording never waits for it: while there is no router, or another capture has the glove's name, ``publish``
+does nothing and the log has the frames. It is tried again and again.
 """
 
 from __future__ import annotations
@@ -21,6 +22,9 @@ from glovecal_client.session import open_client
 from glovecal_client.wire.frame import FRAME_ENCODING
 
 _RETRY_S = 1.0
+_MOST_EMPTY_CLAIMS = 64
+_OTHER_RETRY_S = 2.0
+"""After another publisher was found: it is asked whether it is still there."""
 
 
 @dataclass(frozen=True)
@@ -45,16 +49,22 @@ class CaptureLink:
         sources: LinkSources,
         report: Callable[[str], None],
     ) -> None:
-        self.refusal: str | None = None
-        """Why this capture must give way to another publisher, once that is found."""
         self._keys = keys
         self._endpoints = endpoints
         self._run = run
         self._sources = sources
         self._report = report
         self._stop = threading.Event()
+        self._wake = threading.Event()
+        """There is something to do: to stop, or to give way."""
         self._thread: threading.Thread | None = None
         self._stopped: Callable[[], bool] = self._stop.is_set
+        self._claim: tuple[int, str] | None = None
+        """Run id of another publisher whose status was heard, and a sentence about it."""
+        self._empty_claims: set[int] = set()
+        """Runs whose publisher was not there when it was looked for: a status alone is no publisher."""
+        self._told = ""
+        self._putting = threading.Lock()
         self._put_problem: str | None = None
         self._served = ""
         self._open = ExitStack()
@@ -67,7 +77,7 @@ class CaptureLink:
         return self._frames is not None
 
     def start(self, stopped: Callable[[], bool]) -> None:
-        """Try once now; without a router go on trying in a thread. Raises CaptureRefused.
+        """Try once now, go on in a thread. Raises CaptureRefused where another publisher is there already.
 
         ``stopped`` ends the waiting for another publisher's token to go.
         """
@@ -75,21 +85,43 @@ class CaptureLink:
         try:
             self._connect(wait_s=0.0)
         except NoAnswer as error:
-            self._report(f"recording without publishing: {error}")
-            self._thread = threading.Thread(target=self._keep_trying, name="capture link", daemon=True)
-            self._thread.start()
+            self._tell(str(error))
+        self._thread = threading.Thread(target=self._keep_publishing, name="capture link", daemon=True)
+        self._thread.start()
 
-    def _keep_trying(self) -> None:
+    def _keep_publishing(self) -> None:
         while not self._stop.is_set():
+            if self.connected:
+                self._wake.wait()
+                self._wake.clear()
+                self._give_way()
+                continue
             try:
                 self._connect(wait_s=None)
-                return
             except CaptureRefused as error:
-                self.refusal = str(error)
-                return
+                self._tell(str(error))
+                self._claim = None
+                self._stop.wait(_OTHER_RETRY_S)
             except (ClientError, zenoh.ZError) as error:
-                self._report(f"recording without publishing: {reason_of(error)}")
+                self._tell(reason_of(error))
                 self._stop.wait(_RETRY_S)
+
+    def _tell(self, why: str) -> None:
+        """Why nothing is published: once, not at each attempt."""
+        if why != self._told:
+            self._told = why
+            self._report(f"recording without publishing: {why}")
+
+    def _give_way(self) -> None:
+        """To the publisher that was heard, if any; whether it is really there shows at the next attempt."""
+        if self._claim is not None and not self._stop.is_set():
+            self._tell(self._claim[1])
+            self._disconnect()
+
+    def _disconnect(self) -> None:
+        with self._putting:
+            self._frames, self._documents = None, {}
+        self._open.close()
 
     def _connect(self, wait_s: float | None) -> None:
         with ExitStack() as opened:
@@ -99,8 +131,14 @@ class CaptureLink:
             other = other_publisher(session, self._keys, self._is_stopping)
             if other is not None:
                 raise CaptureRefused(other)
+            if self._claim is not None:
+                if len(self._empty_claims) >= _MOST_EMPTY_CLAIMS:
+                    self._empty_claims.clear()
+                self._empty_claims.add(self._claim[0])
+                self._claim = None
             self._declare(session, opened)
             self._open = opened.pop_all()
+        self._told = ""
         self._report(f"publishing to {self._keys.raw}")
 
     def _is_stopping(self) -> bool:
@@ -135,8 +173,9 @@ class CaptureLink:
         self.publish_meta()
 
     def publish(self, message: bytes) -> None:
-        """Send one frame, or nothing while there is no router. Never blocks, never raises for the wire."""
-        self._put(self._frames, message)
+        """Send one frame, or nothing while that cannot be. Never blocks, never raises for the wire."""
+        with self._putting:
+            self._put(self._frames, message)
 
     def publish_status(self) -> None:
         """Send the status of this moment."""
@@ -148,7 +187,9 @@ class CaptureLink:
 
     def _publish_document(self, key: str, text: Callable[[], str]) -> None:
         if key in self._documents:
-            self._put(self._documents[key], text())
+            payload = text()
+            with self._putting:
+                self._put(self._documents.get(key), payload)
 
     def _put(self, publisher: zenoh.Publisher | None, payload: bytes | str) -> None:
         """Put; a failure is told once, not once a frame."""
@@ -166,11 +207,10 @@ class CaptureLink:
     def close(self) -> None:
         """Stop trying, close the session. What was put before is still sent."""
         self._stop.set()
+        self._wake.set()
         if self._thread is not None:
             self._thread.join()
-        self._frames = None
-        self._documents = {}
-        self._open.close()
+        self._disconnect()
 
     def _answer_status(self, query: zenoh.Query) -> None:
         with query:
@@ -202,7 +242,10 @@ class CaptureLink:
             self._report(served)
 
     def _hear_status(self, sample: zenoh.Sample) -> None:
-        """Two captures that started while the router was away meet here; the later one gives way."""
+        """Two captures that started while the router was away meet here; the later one gives way.
+
+        It goes on recording, and publishes again once the other is gone.
+        """
         other = json_object(sample.payload.to_bytes())
         if other is None or other.get("state") == "stopped":
             return
@@ -211,5 +254,6 @@ class CaptureLink:
         except (KeyError, ValueError, TypeError):
             return
         mine = self._run
-        if run_id != mine[1] and (started, run_id) < mine:
-            self.refusal = describe_publisher(self._keys, other)
+        if run_id != mine[1] and (started, run_id) < mine and run_id not in self._empty_claims:
+            self._claim = run_id, describe_publisher(self._keys, other)
+            self._wake.set()

@@ -11,6 +11,7 @@ from typing import Any
 from glovecal_models.calibration.artifact import load
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.rotations import PALM
+from glovecal_models.hand.skeleton import Handedness
 from glovecal_models.takes.common_event import common_events
 from glovecal_models.takes.hand_clocks import TakeClock, align
 from glovecal_models.takes.take import Take
@@ -33,18 +34,19 @@ class HandTake:
 
     take: Take
     subject: SubjectRecord
+    hand: Handedness
     artifact: bytes | None
     """The model's; None for raw readings."""
     accounting: Mapping[str, Any] | None
 
     @property
     def label(self) -> str:
-        return "L" if self.subject.hand == "left" else "R"
+        return "L" if self.hand == "left" else "R"
 
     def motion(self) -> HandMotion:
         model = None if self.artifact is None else load(self.artifact)
         arches = model is not None and model.method == "template" and PALM in model.rotation_names
-        skeleton = self.subject.skeleton(palm="arching" if arches else "rigid")
+        skeleton = self.subject.skeleton(self.hand, "arching" if arches else "rigid")
         return motion_of(self.take, model, skeleton, self.label)
 
 
@@ -72,7 +74,10 @@ class MotionFile:
     def __post_init__(self) -> None:
         labels = [hand.label for hand in self.hands]
         if len(set(labels)) < len(labels):
-            raise BadInput("both takes are of the same hand; one of the two subjects has the other hand")
+            raise BadInput(
+                "both takes are of the same hand; if one is not, say so, in the order of the takes: --hand right "
+                "--hand left"
+            )
         if self.body is not None and (self.content, self.path.suffix) != ("joints", ".trc"):
             raise BadInput("markers of a body are joined to joints in a TRC file: content joints, format trc")
         if self.frames > MOST_FRAMES:

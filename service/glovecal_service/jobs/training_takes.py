@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.errors import NotTrainable
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.guided.guided_calibration import BASELINES, GuidedSamples, guided_samples
 from glovecal_models.sampling.guided.labelled_takes import LabelledTake
@@ -39,6 +40,7 @@ class TrainingTakes:
 
         A session with no reference system has an error estimate of its own.
         """
+        _require_one_hand(records)
         sampled = [record for record in records if record.sampling and settings.method not in BASELINES]
         plain = tuple(
             store.takes.load(record.id)
@@ -73,3 +75,14 @@ class TrainingTakes:
     def finished(self, model: CalibrationModel) -> CalibrationModel:
         """``model`` as it is kept."""
         return model if self._sampled is None else self._sampled.finished(model)
+
+
+def _require_one_hand(records: Sequence[TakeRecord]) -> None:
+    """A model is of one hand. Raises NotTrainable."""
+    of = {hand: next((row for row in records if row.known_hand == hand), None) for hand in ("left", "right")}
+    left, right = of["left"], of["right"]
+    if left is not None and right is not None:
+        raise NotTrainable(
+            f"take {left.name} is of a left glove and take {right.name} of a right one: no model reads both. "
+            "Leave the takes of one hand out, and give each hand a subject of its own"
+        )

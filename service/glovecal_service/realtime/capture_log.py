@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import zenoh
 
@@ -37,6 +38,8 @@ class CaptureStanding:
     """Numbered frames may be waiting in the daemon's memory for room in its log."""
     clock_ahead_ns: int
     """By how much the capture computer's wall clock is ahead of this one's, at most."""
+    meta: dict[str, Any] = field(default_factory=dict)
+    """What it says of itself and its glove."""
 
 
 class CaptureLog:
@@ -60,6 +63,7 @@ class CaptureLog:
                 status.get("disk") == "full",
                 # a capture of before this field was there is taken to have this computer's clock
                 int(status.get("wall_ns", asked_ns)) - asked_ns,
+                meta,
             )
         except (KeyError, TypeError, ValueError) as error:
             raise NoAnswer(f"{self._keys.status}: the answer is not a capture daemon's") from error

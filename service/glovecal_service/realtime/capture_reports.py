@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 from threading import Lock
-from typing import NamedTuple
 
 import zenoh
 
@@ -15,7 +14,7 @@ from glovecal_client.keys import all_gloves, parse_glove_key
 from glovecal_client.plausible_loss import PlausibleLoss
 from glovecal_client.queries import json_object
 from glovecal_service.realtime.arrivals import Arrival, Arrivals
-from glovecal_service.realtime.frame_gate import Standing
+from glovecal_service.realtime.frame_gate import Place, Standing
 from glovecal_service.realtime.glove_lanes import GLOVES_LIMIT
 
 SETTLED_AFTER_NS = 500_000_000
@@ -23,17 +22,10 @@ SETTLED_AFTER_NS = 500_000_000
 _REPORTS = 8
 
 
-class _Report(NamedTuple):
-    run_id: int
-    sequence: int
-    """The last number given, -1 before the first."""
-    heard_ns: int
-
-
 @dataclass
 class _Glove:
-    first: _Report
-    newest: deque[_Report] = field(default_factory=lambda: deque(maxlen=_REPORTS))
+    first: Place
+    newest: deque[Place] = field(default_factory=lambda: deque(maxlen=_REPORTS))
     ended: dict[int, int] = field(default_factory=dict)
     """Frames missing after the last one that came of runs that are over, by run."""
 
@@ -58,7 +50,7 @@ class CaptureReports:
             if known is None:
                 return 0
             before_ns = clock_ns() - SETTLED_AFTER_NS
-            settled = next((report for report in reversed(known.newest) if report.heard_ns < before_ns), None)
+            settled = next((report for report in reversed(known.newest) if report.at_ns < before_ns), None)
             if standing is None:
                 return 0 if settled is None else _possible(settled.sequence, known.first, settled) - received
             missing = self._of_ended_runs(known, standing) + _before_the_first(known.first, standing)
@@ -72,42 +64,47 @@ class CaptureReports:
             glove = parse_glove_key(arrival.key)[0].glove
             sequence = document["sequence"]
             run_id, sequence = int(document["run_id"], 16), -1 if sequence is None else int(sequence)
+            wall_ns = int(document.get("wall_ns") or 0)
         except (BadName, KeyError, TypeError, ValueError):
             return
-        report = _Report(run_id, sequence, arrival.received_ns)
+        report = Place(run_id, sequence, arrival.received_ns, wall_ns)
         if glove in self._gloves or len(self._gloves) < 2 * GLOVES_LIMIT:
             self._gloves.setdefault(glove, _Glove(report)).newest.append(report)
 
     def _of_ended_runs(self, known: _Glove, standing: Standing) -> int:
-        if standing.ended is not None:
-            run_id, sequence, at_ns = standing.ended
+        if (ended := standing.ended) is not None:
             for report in known.newest:
-                if report.run_id == run_id:
-                    missing = _possible(report.sequence, _Report(run_id, sequence, at_ns), report)
-                    known.ended[run_id] = max(known.ended.get(run_id, 0), missing)
+                if report.run_id == ended.run_id:
+                    missing = _possible(report.sequence, ended, report)
+                    known.ended[ended.run_id] = max(known.ended.get(ended.run_id, 0), missing)
         return sum(known.ended.values())
 
 
-def _possible(sequence: int, since: _Report, report: _Report) -> int:
-    """Frames from ``since`` to ``sequence``; 0 where no glove can have sent so many until ``report``."""
+def _possible(sequence: int, since: Place, report: Place) -> int:
+    """Frames from ``since`` to ``sequence``; 0 where no glove can have sent so many until ``report``.
+
+    By the capture computer's clock: reports that waited for this process arrive at once.
+    """
     missing = max(0, sequence - since.sequence)
-    return missing if PlausibleLoss(since.heard_ns).allows(missing, report.heard_ns) else 0
+    if since.wall_ns and report.wall_ns:
+        return missing if PlausibleLoss(since.wall_ns).allows(missing, report.wall_ns) else 0
+    return missing if PlausibleLoss(since.at_ns).allows(missing, report.at_ns) else 0
 
 
-def _before_the_first(first: _Report, standing: Standing) -> int:
+def _before_the_first(first: Place, standing: Standing) -> int:
     """Of the first run: between the first report on it and the first frame that came."""
-    run_id, sequence, at_ns = standing.began
-    if first.run_id != run_id or first.heard_ns > at_ns:
+    began = standing.began
+    if first.run_id != began.run_id or first.at_ns > began.at_ns:
         return 0
-    return _possible(sequence - 1, first, _Report(run_id, sequence, at_ns))
+    return _possible(began.sequence - 1, first, began)
 
 
-def _after(standing: Standing, settled: _Report) -> int:
+def _after(standing: Standing, settled: Place) -> int:
     """Between the newest frame that came and what was reported; of a new run, all its frames."""
-    newest = _Report(standing.run_id, standing.sequence, standing.at_ns)
-    if settled.run_id == standing.run_id:
+    newest = standing.newest
+    if settled.run_id == newest.run_id:
         return _possible(settled.sequence, newest, settled)
-    ended = standing.ended is not None and standing.ended[0] == settled.run_id
-    if ended or settled.heard_ns < standing.at_ns:
+    ended = standing.ended is not None and standing.ended.run_id == settled.run_id
+    if ended or settled.at_ns < newest.at_ns:
         return 0
     return _possible(settled.sequence, newest._replace(sequence=-1), settled)

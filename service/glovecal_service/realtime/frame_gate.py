@@ -15,25 +15,33 @@ TAKEOVER_AFTER_NS = 500_000_000
 _VERSION_AT = 4
 _KNOWN_VERSION = 1
 _REFUSED_RUNS = 8
-_Place = tuple[int, int, int]
+
+
+class Place(NamedTuple):
+    """How far a run was at one moment."""
+
+    run_id: int
+    sequence: int
+    """The last number given, -1 before the first."""
+    at_ns: int
+    """When this process heard of it, by its monotonic clock."""
+    wall_ns: int
+    """The same moment by the capture computer's clock; 0 where that is not known."""
 
 
 class Standing(NamedTuple):
     """How far a glove is, all of one moment: what other threads may read."""
 
-    run_id: int
-    sequence: int
-    """Of the newest frame in order."""
-    at_ns: int
-    """When it arrived."""
+    newest: Place
+    """The newest frame in order."""
     missing: int
     """Frames that were sent until then, as the numbers of those that passed tell, and never arrived."""
     messages: int
     """All that arrived until then."""
-    began: _Place
-    """The first frame of all: run, sequence number, when it arrived."""
-    ended: _Place | None
-    """The newest frame of the run before this one, likewise."""
+    began: Place
+    """The first frame of all."""
+    ended: Place | None
+    """The newest frame of the run before this one."""
 
 
 class FrameGate:
@@ -81,16 +89,15 @@ class FrameGate:
         except WireError as error:
             self._unread += 1
             raise Refused(_reason(message, error), str(error)) from error
-        known = self.standing
+        known, newest = self.standing, Place(frame.run_id, frame.sequence, received_ns, frame.wall_ns)
         if known is None or frame.run_id != self.run_id:
-            began, ended = self._begin_run(frame, received_ns)
+            self._begin_run(frame, received_ns)
+            began, ended = (newest, None) if known is None else (known.began, known.newest)
         else:
             began, ended = known.began, known.ended
-            self._missing += self._order.follow(frame.sequence, received_ns, unread=self._unread)
+            self._missing += self._order.follow(frame, received_ns, unread=self._unread)
         self._unread = 0
-        self.standing = Standing(
-            frame.run_id, frame.sequence, received_ns, self._missing, self._messages, began, ended
-        )
+        self.standing = Standing(newest, self._missing, self._messages, began, ended)
         before, self._monotonic_ns = self._monotonic_ns, frame.monotonic_ns
         if frame.monotonic_ns <= before:
             raise Refused(
@@ -100,8 +107,7 @@ class FrameGate:
         self._passed_at_ns = received_ns
         return frame
 
-    def _begin_run(self, frame: Frame, received_ns: int) -> tuple[_Place, _Place | None]:
-        """The first frame of all, and the newest of the run that is over."""
+    def _begin_run(self, frame: Frame, received_ns: int) -> None:
         there_ns = max(self._passed_at_ns, self._order.tried_ns)
         if self.run_id is not None and received_ns - there_ns <= TAKEOVER_AFTER_NS:
             self._note_refused_run(frame.run_id)
@@ -109,16 +115,11 @@ class FrameGate:
                 Refusal.SECOND_PUBLISHER,
                 f"run {frame.run_id:016x} publishes while run {self.run_id:016x} has the glove; stop one",
             )
-        known = self.standing
         unread = self._unread + self._refused_of_run.pop(frame.run_id, 0)
-        whole = known is not None
-        self._missing += self._order.begin(frame.sequence, received_ns, unread=unread, whole=whole)
+        self._missing += self._order.begin(frame, unread=unread, whole=self.standing is not None)
         self.run_id = frame.run_id
         self.runs += 1
         self._monotonic_ns = frame.monotonic_ns - 1  # clocks of two runs cannot be compared
-        if known is None:
-            return (frame.run_id, frame.sequence, received_ns), None
-        return known.began, (known.run_id, known.sequence, known.at_ns)
 
     def _note_refused_run(self, run_id: int) -> None:
         """Count a frame that a run lost because another had the glove; of a few runs only."""

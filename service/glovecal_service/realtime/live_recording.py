@@ -23,7 +23,8 @@ from glovecal_service.realtime.pre_roll_request import PreRollRequest
 from glovecal_service.realtime.reconciliation import OutOfTime, Patience, fill_gaps, reconcile
 from glovecal_service.realtime.recording_account import Settlement, recording_account
 from glovecal_service.realtime.refusal import Refusal, Refused
-from glovecal_service.realtime.run_ledger import OWN_CLOCK, RunLedger, decoded
+from glovecal_service.realtime.run_books import OWN_CLOCK
+from glovecal_service.realtime.run_ledger import RunLedger, decoded
 from glovecal_service.realtime.sequence_order import SequenceOrder
 from glovecal_service.store.recordings import PRE_ROLL
 
@@ -56,6 +57,8 @@ class LiveRecording:
         self._held: deque[tuple[Frame, bytes, bool]] = deque(maxlen=HELD_LIMIT)
         """Frames with their messages, and whether they were counted as refused."""
         self._repair_at = 0.0
+        self._end_ns: int | None = None
+        """Once its end was asked for: by capture's clock, as far as that is known."""
         self._log = CaptureLog(session, keys)
         self._arrivals = Arrivals(session, keys.raw, limit=WAITING_LIMIT)
         self._statuses = Arrivals(session, keys.status, limit=STATUSES_LIMIT)
@@ -83,7 +86,8 @@ class LiveRecording:
             return
         for books in self.file.runs.values():
             if f"{books.run_id:016x}" == run_id:
-                books.last, books.ended = max(books.last, last), True
+                books.note_given(last)
+                books.ended = True
 
     def take_pre_roll(self) -> None:
         """Write what was fetched of the pre-roll since the last call; never waits."""
@@ -112,6 +116,8 @@ class LiveRecording:
         if frame is None:
             self.refused += 1
             return
+        if self._end_ns is not None and frame.wall_ns > self._end_ns:
+            return
         silent = received_ns - self._heard_ns > TAKEOVER_AFTER_NS
         if frame.run_id != self._run_id and self._run_id is not None and not silent:
             self.refused += 1
@@ -119,8 +125,8 @@ class LiveRecording:
         begins = frame.run_id != self._run_id
         self._run_id, self._heard_ns = frame.run_id, received_ns
         if begins:
-            self._order.begin(frame.sequence, received_ns)
-            self.file.add(frame, message, jumped=self.file.has_jumped(frame))
+            self._order.begin(frame)
+            self.file.add(frame, message)
         else:
             self._record_in_order(frame, message, received_ns)
 
@@ -128,7 +134,7 @@ class LiveRecording:
         """Record a frame that fits; hold one that does not until it is clear whether its publisher jumped."""
         jumps = self._order.jumps
         try:
-            self._order.follow(frame.sequence, received_ns)
+            self._order.follow(frame, received_ns)
         except Refused as refused:
             if self.file.lacks(frame):
                 self.file.add(frame, message)
@@ -148,15 +154,18 @@ class LiveRecording:
         first = self._order.jumped_to
         held = [item for item in self._held if first <= item[0].sequence < frame.sequence]
         self.refused -= sum(is_new for _, _, is_new in held)
-        for at, (each, bytes_of_it, _) in enumerate([*held, (frame, message, True)]):
-            self.file.add(each, bytes_of_it, jumped=at == 0 and not self.file.lacks(each))
+        for each, bytes_of_it, _ in [*held, (frame, message, True)]:
+            self.file.add(each, bytes_of_it)
 
     def repair_now_and_then(self) -> None:
-        """Twice a second at most, ask capture's log for what is missing."""
+        """Twice a second at most, ask capture for what is missing, and who it is if it did not say so."""
         now = time.monotonic()
         if now < self._repair_at:
             return
         self._repair_at = now + REPAIR_AFTER_S
+        if not self.file.capture and self.file.first_frame is not None:
+            with suppress(NoAnswer):
+                self.file.note_capture(self._log.standing().meta)
         if not self._repair(Patience(REPAIR_AFTER_S, Event())) and self.file.has_gaps:
             self._repair_at = now + 10 * REPAIR_AFTER_S
 
@@ -171,6 +180,8 @@ class LiveRecording:
     def finish(self, stop_wall_ns: int | None, patience: Patience) -> Settlement:
         """Stop: fetch or wait for everything captured up to the stop, close the file; as in ``reconcile``."""
         patience.wait(ON_THE_WAY_S)
+        if stop_wall_ns is not None and self.file.clock_ahead_ns is not None:
+            self._end_ns = stop_wall_ns + self.file.clock_ahead_ns
         self._stop_listening()
         outcome = reconcile(self.file, self._log, stop_wall_ns, patience)
         self._finish_pre_roll(patience)

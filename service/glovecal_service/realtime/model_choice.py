@@ -77,10 +77,10 @@ def _other_hand(store: Store, subject: str, glove: str, meta: Mapping[str, Any] 
     """That glove and wearer are said to be of different hands, a clause; "" where they are not."""
     said = (meta or {}).get("hand")
     try:
-        hand = store.subjects.get(subject).hand
+        hand = store.subjects.get(subject).known_hand
     except NotFound:
         return ""
-    if said not in HANDS or hand == said:
+    if said not in HANDS or hand in (None, said):
         return ""
     return (
         f"wrong hand: {glove} is a {said} glove and {subject} a {hand} hand; exchange the gloves, or say who "

@@ -98,6 +98,7 @@ def _reconcile_once(file: RunLedger, log: Log, stop_wall_ns: int | None, patienc
     end_ns = None if stop_wall_ns is None else stop_wall_ns + standing.clock_ahead_ns
     if end_ns is not None:
         _open_runs_of(file, standing, end_ns)
+    file.note_capture(standing.meta)
     refused = None
     for books in list(file.runs.values()):
         try:
@@ -111,20 +112,32 @@ def _reconcile_once(file: RunLedger, log: Log, stop_wall_ns: int | None, patienc
 
 
 def _open_runs_of(file: RunLedger, standing: CaptureStanding, end_ns: int) -> None:
-    """The runs that began after the last one known and before the end: they belong to the recording whole."""
-    began_ns = file.last_wall_ns or file.created_wall_ns + standing.clock_ahead_ns
+    """The runs that began during the recording, whether a frame of them came or not: all of each."""
+    began_ns = file.began_wall_ns
+    if began_ns is None:
+        began_ns = file.created_wall_ns + standing.clock_ahead_ns
     for run in standing.runs:
         if began_ns < run.started_wall_ns <= end_ns:
-            file.open_run(run.run_id)
+            file.open_run(run.run_id, run.started_wall_ns)
 
 
 def fill_gaps(file: RunLedger, books: RunBooks, log: Log, patience: Patience) -> int:
-    """Fetch what is missing of a run up to its last frame known; how many came. Raises as ``Log`` does."""
+    """Fetch what is missing of a run up to its last frame known, and what of numbers that jumped is there.
+
+    How many came. Raises as ``Log`` does.
+    """
+    came = sum(_fetch(file, books, log, patience, *gap) for gap in books.missing())
+    for gap in books.doubtful():
+        came += _fetch(file, books, log, patience, *gap)
+        books.note_asked(*gap)
+    return came
+
+
+def _fetch(file: RunLedger, books: RunBooks, log: Log, patience: Patience, first: int, last: int) -> int:
     came = 0
-    for first, last in books.missing():
-        while first <= last and (block := _block(log, books, first, last, patience)):
-            came += sum(file.add(frame, encode_frame(frame)) for frame in block)
-            first = block[-1].sequence + 1
+    while first <= last and (block := _block(log, books, first, last, patience)):
+        came += sum(file.add(frame, encode_frame(frame)) for frame in block)
+        first = block[-1].sequence + 1
     return came
 
 
@@ -149,7 +162,7 @@ def _go_on_to(
     if books.run_id == standing.runs[-1].run_id and standing.sequence > books.last:
         if standing.disk_full:
             raise NoAnswer("the capture computer's disk is full: frames wait there to be logged")
-        books.last = standing.sequence
+        books.note_given(standing.sequence)
 
 
 def _block(log: Log, books: RunBooks, first: int, last: int, patience: Patience) -> list[Frame]:

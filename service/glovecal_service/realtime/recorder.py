@@ -27,13 +27,12 @@ from glovecal_service.realtime.reconciliation import Patience
 from glovecal_service.realtime.recording_account import Settlement
 from glovecal_service.realtime.recording_repair import repair, settle
 from glovecal_service.realtime.recording_result import keep_as_take
-from glovecal_service.realtime.run_ledger import BEGIN, CREATED, SUFFIX, RunLedger
+from glovecal_service.realtime.run_ledger import BEGIN, CAPTURE, CREATED, SUFFIX, RunLedger
 from glovecal_service.settings import Settings
 from glovecal_service.store.clock import now
 from glovecal_service.store.errors import (
     Conflict,
     DamagedRows,
-    NotFound,
     StorageFull,
     StoreDamaged,
     StoreError,
@@ -105,7 +104,14 @@ class Recorder:
             self._store.close()
 
     def look(self) -> None:
-        """Write what arrived, repair gaps, follow the store, report. Nothing here raises."""
+        """Follow the store, write what arrived, repair gaps, report. Nothing here raises.
+
+        The store first: after this process stood still, it says where a recording ended meanwhile.
+        """
+        now = time.monotonic()
+        if now - self._looked_at >= 2 * LOOK_EVERY_S:
+            self._looked_at = now
+            self._with_store(self._follow)
         for id, live in list(self._live.items()):
             try:
                 live.take_in()
@@ -113,17 +119,16 @@ class Recorder:
                 live.repair_now_and_then()
             except (ClientError, OSError, ValueError) as error:
                 self._note(id, sentence=f"recording goes on with trouble: {reason_of(error)}")
-        now = time.monotonic()
+        if now - self._reported_at >= REPORT_EVERY_S:
+            self._reported_at = now
+            self._with_store(self._report)
+
+    def _with_store(self, work: Callable[[Store], None]) -> None:
         try:
-            if now - self._looked_at >= 2 * LOOK_EVERY_S:
-                self._looked_at = now
-                self._follow(self._opened())
-            if now - self._reported_at >= REPORT_EVERY_S:
-                self._reported_at = now
-                self._report(self._opened())
+            work(self._opened())
         except (StoreError, SQLAlchemyError, OSError) as error:
             _log.warning("the store does not answer, recordings go on: %s", error)
-            self._looked_at = now + REPORT_EVERY_S
+            self._looked_at = time.monotonic() + REPORT_EVERY_S
 
     def _opened(self) -> Store:
         if self._store is None:
@@ -206,15 +211,16 @@ class Recorder:
         meta: dict[str, Any] = {"recording": record.id, "name": record.name, "glove": record.glove}
         meta[CREATED] = wall_ns()
         try:
-            meta["capture"] = ask_json(self._session, keys.meta, timeout_s=5.0)
+            meta[CAPTURE] = ask_json(self._session, keys.meta, timeout_s=5.0)
             standing = CaptureLog(self._session, keys).standing()
             meta[BEGIN] = {
                 "run_id": f"{standing.runs[-1].run_id:016x}",
                 "sequence": standing.sequence,
                 "wall_ns": wall_ns() + standing.clock_ahead_ns,
+                "clock_ahead_ns": standing.clock_ahead_ns,
             }
         except NoAnswer:
-            meta.setdefault("capture", _stored_meta(store, record.glove))
+            _log.info("recording %s of glove %s begins with its first frame", record.name, record.glove)
         others = _sound(lambda: store.recordings.list(record.glove))
         meta[PRE_ROLL] = pre_roll_request(record, store.gloves.get(record.glove), others, now()).document()
         try:
@@ -324,10 +330,3 @@ def _stop_wall_ns(record: RecordingRecord, later_s: float = 0.0) -> int | None:
     """When its end was asked for, ``later_s`` added; None: nobody asked for it."""
     asked_s = record.facts.get(STOP_ASKED)
     return None if asked_s is None else round((asked_s + later_s) * 1e9)
-
-
-def _stored_meta(store: Store, glove: str) -> dict[str, Any]:
-    try:
-        return dict(store.gloves.get(glove).meta)
-    except NotFound:
-        return {}

@@ -7,7 +7,7 @@ from typing import Any
 
 from glovecal_service.realtime.pre_roll_request import PreRollRequest
 from glovecal_service.realtime.reconciliation import Outcome
-from glovecal_service.realtime.run_ledger import RunLedger
+from glovecal_service.realtime.run_ledger import CAPTURE, RunLedger
 from glovecal_service.store.recordings import PRE_ROLL
 
 
@@ -47,7 +47,8 @@ def recording_account(
     runs = [books.document() for books in file.runs.values()]
     gaps = [gap for run in runs for gap in run["missing"]]
     frames = sum(last - first + 1 for first, last in gaps)
-    return {
+    said_later = {} if CAPTURE in file.meta or not file.capture else {CAPTURE: file.capture}
+    return said_later | {
         "complete": complete,
         "first_sequence": runs[0]["first_sequence"] if runs else None,
         "last_sequence": runs[-1]["last_sequence"] if runs else None,

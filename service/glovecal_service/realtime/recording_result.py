@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from glovecal_models.errors import BadInput
+from glovecal_models.hand.skeleton import Handedness
 from glovecal_service.realtime.recording_account import Settlement
 from glovecal_service.realtime.recording_take import read_take
-from glovecal_service.realtime.run_ledger import OWN_CLOCK, SUFFIX
+from glovecal_service.realtime.run_books import OWN_CLOCK
+from glovecal_service.realtime.run_ledger import CAPTURE, SUFFIX
 from glovecal_service.store.errors import NotFound
 from glovecal_service.store.recordings import ENDED_BY
-from glovecal_service.store.records import RecordingRecord, TakeRecord
+from glovecal_service.store.records import RecordingRecord, TakeRecord, known_hand
 from glovecal_service.store.store import Store
 
 
@@ -47,13 +49,14 @@ def keep_as_take(
         name=record.name,
         wearing=record.wearing or "",
         first_sequence=account["first_sequence"],
+        capture=record.facts.get(CAPTURE) or glove.meta,
     )
     take = _stored_before(store, subject, record)
     accounting = {**account, **recorded.clock, OWN_CLOCK: _own_clock(account, take)}
     if take is None and "take" in record.facts:
         return {"sentence": f"{sentence}; its take was removed"}
     if take is None:
-        _require_subject(store, subject)
+        _require_subject(store, subject, known_hand(recorded.clock["hand"]))
         take = store.takes.add(
             recorded.take,
             subject=subject,
@@ -92,11 +95,11 @@ def _known_layout(store: Store, subject: str, said: str, sensors: Sequence[str])
     return used[-1] if used else same[0]
 
 
-def _require_subject(store: Store, subject: str) -> None:
+def _require_subject(store: Store, subject: str, hand: Handedness | None) -> None:
     try:
         store.subjects.get(subject)
     except NotFound:
-        store.subjects.create(subject)
+        store.subjects.create(subject, hand=hand)
 
 
 def _sentence(record: RecordingRecord, settlement: Settlement) -> str:

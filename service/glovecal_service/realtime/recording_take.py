@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,29 +13,33 @@ from glovecal_client.log_records import Recording
 from glovecal_client.wire.frame import Frame
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.take import Take
+from glovecal_service.realtime.run_ledger import CAPTURE
 
 
 @dataclass(frozen=True)
 class RecordedTake:
-    """The take, and what has to be known about its time."""
+    """The take, and what has to be known about its time and its glove."""
 
     take: Take
     clock: dict[str, Any]
     """``wall_minus_time_s``: add it to ``time_s`` for seconds since 1970; ``begins_s``: ``time_s`` of the
     first frame that was asked for, after the pre-roll; ``left_out``: frames not taken; ``computer``: whose
-    monotonic clock ``time_s`` is of, null where capture did not say."""
+    monotonic clock ``time_s`` is of, and ``hand``: of the glove, null where capture did not say."""
 
 
-def read_take(path: Path, *, name: str, wearing: str, first_sequence: int = 0) -> RecordedTake:
+def read_take(
+    path: Path, *, name: str, wearing: str, first_sequence: int = 0, capture: Mapping[str, Any] | None = None
+) -> RecordedTake:
     """The frames of all runs in order; ``time_s`` is the capture computer's monotonic clock in seconds.
 
-    Fetched frames of the first run with numbers below ``first_sequence`` are the pre-roll.
+    Fetched frames of the first run with numbers below ``first_sequence`` are the pre-roll. ``capture``: what
+    it said of itself, where the file's header does not have it.
     Frames whose time does not increase, or with another number of sensors, are left out and counted.
     Raises BadInput if nothing usable remains, DamagedLog, OSError.
     """
     recording = Recording.open(path)
     frames = _in_order(list(recording.frames()))
-    meta = recording.meta.get("capture") or {}
+    meta = recording.meta.get(CAPTURE) or capture or {}
     sensors = tuple(str(sensor) for sensor in meta.get("sensors") or ())
     if not sensors:
         raise BadInput(f"recording {path.name}: capture did not say which sensors its frames hold")
@@ -69,15 +73,20 @@ def read_take(path: Path, *, name: str, wearing: str, first_sequence: int = 0) -
         "left_out": len(frames) - len(taken),
     }
     clock["computer"] = meta.get("computer")
+    clock["hand"] = meta.get("hand")
     return RecordedTake(take, clock)
 
 
 def _in_order(frames: Sequence[Frame]) -> list[Frame]:
-    """By run, in the order the runs were met, and by sequence number: repaired frames were written late.
+    """By run, in the order the runs began, and by sequence number: repaired frames were written late.
 
-    Where a publisher's numbers went on from a lower one, by time.
+    Where a publisher's numbers went on from a lower one, by time. The run met first is the first.
     """
-    order = {run_id: place for place, run_id in enumerate(dict.fromkeys(frame.run_id for frame in frames))}
+    began_ns: dict[int, int] = {}
+    for frame in frames:
+        began_ns[frame.run_id] = min(frame.wall_ns, began_ns.get(frame.run_id, frame.wall_ns))
+    first, *others = began_ns
+    order = {run: place for place, run in enumerate([first, *sorted(others, key=lambda run: began_ns[run])])}
     restarted = _restarted(frames)
 
     def place(frame: Frame) -> tuple[int, int]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from shutil import disk_usage
 from typing import Any
@@ -11,91 +10,21 @@ from typing import Any
 from glovecal_client.errors import WireError
 from glovecal_client.frame_log import FrameLog
 from glovecal_client.log_records import Recording
-from glovecal_client.plausible_loss import BURST_FRAMES, PlausibleLoss
 from glovecal_client.wire.frame import Frame, decode_frame
+from glovecal_service.realtime.run_books import RunBooks
 from glovecal_service.realtime.sequence_ranges import SequenceRanges
 from glovecal_service.store.recordings import with_pre_roll
 
 SUFFIX = ".glog"
 BEGIN = "begin"
 """Of the header: ``run_id``, ``sequence`` and ``wall_ns`` (its clock) where capture stood when the recording
-began. Where it did not say so the recording begins with the first frame that came."""
-OWN_CLOCK = "own_clock"
+began, and ``clock_ahead_ns``, by how much that clock was ahead of this computer's. Where it did not say so
+the recording begins with the first frame that came."""
+CAPTURE = "capture"
+"""Of the header, and of a recording's facts where capture said it only later: its meta."""
 CREATED = "created_wall_ns"
 LEFT_FREE_BYTES = 256 << 20
 """Of the disk, for frames that were asked for: hours of one glove."""
-
-
-@dataclass
-class RunBooks:
-    """The frames of one start of the capture daemon."""
-
-    run_id: int
-    first: int
-    """Where the recording begins in this run; 0 for a run that began while it was going on, if it can be."""
-    recorded: SequenceRanges = field(default_factory=SequenceRanges)
-    repaired: int = 0
-    """Of the recorded frames, those fetched from the capture log."""
-    last: int = -1
-    """The last frame that belongs to the recording, as far as is known; ``first - 1``: none."""
-    last_wall_ns: int = 0
-    """Of the last frame recorded."""
-    ended: bool = False
-    """Capture said that the run is over, and that ``last`` was its last frame."""
-    own_clock: dict[str, Any] | None = None
-    """How the glove's own clock stood against the computer's, as capture said last."""
-    earlier: list[RunBooks] = field(default_factory=list)
-    """What came before each jump of the publisher's numbers; the numbers jumped over were never sent."""
-
-    def __post_init__(self) -> None:
-        self.last = max(self.last, self.first - 1)
-
-    def missing(self) -> list[tuple[int, int]]:
-        before = [gap for books in self.earlier for gap in books.missing()]
-        return [*before, *self.recorded.missing(self.first, self.last)]
-
-    @property
-    def sent(self) -> int:
-        return sum(books.sent for books in self.earlier) + max(0, self.last - self.first + 1)
-
-    @property
-    def recorded_frames(self) -> int:
-        return sum(len(books.recorded) for books in (*self.earlier, self))
-
-    def lacks(self, sequence: int) -> bool:
-        """Whether the frame is missing."""
-        return any(
-            books.first <= sequence <= books.last and sequence not in books.recorded
-            for books in (*self.earlier, self)
-        )
-
-    def jump_to(self, sequence: int) -> None:
-        """From ``sequence`` on the numbers are counted anew."""
-        self.earlier.append(RunBooks(self.run_id, self.first, self.recorded, last=self.last))
-        self.first, self.last, self.recorded = sequence, sequence - 1, SequenceRanges()
-
-    def enter(self, frame: Frame) -> bool:
-        """Note a frame as recorded; False if it was."""
-        for books in self.earlier:
-            if books.lacks(frame.sequence):
-                return books.recorded.add(frame.sequence)
-        if not self.recorded.add(frame.sequence):
-            return False
-        if frame.sequence >= self.last:
-            self.last, self.last_wall_ns = frame.sequence, frame.wall_ns
-        return True
-
-    def document(self) -> dict[str, Any]:
-        """``sent`` equals ``recorded`` plus the frames in ``missing``, which may still come."""
-        return {
-            "run_id": f"{self.run_id:016x}",
-            "first_sequence": (*self.earlier, self)[0].first,
-            "last_sequence": self.last,
-            "sent": self.sent,
-            "recorded": self.recorded_frames,
-            "repaired": self.repaired,
-            "missing": [list(gap) for gap in self.missing()],
-        } | ({} if self.own_clock is None else {OWN_CLOCK: self.own_clock})
 
 
 class RunLedger:
@@ -104,12 +33,13 @@ class RunLedger:
     def __init__(self, log: FrameLog) -> None:
         self._log = log
         self.runs: dict[int, RunBooks] = {}
-        """In the order they were first met."""
+        """In the order they began."""
         begin = log.meta.get(BEGIN)
         if begin is not None:
-            run_id = int(begin["run_id"], 16)
-            self.runs[run_id] = RunBooks(run_id, begin["sequence"] + 1)
-        self._begin_wall_ns = 0 if begin is None else int(begin["wall_ns"])
+            run_id, wall_ns = int(begin["run_id"], 16), int(begin["wall_ns"])
+            self.runs[run_id] = RunBooks(run_id, begin["sequence"] + 1, wall_ns, since_wall_ns=wall_ns)
+        self.capture: dict[str, Any] = dict(log.meta.get(CAPTURE) or {})
+        """What capture said of itself and its glove; empty until it did."""
         self.created_wall_ns = int(log.meta.get(CREATED) or 0)
         """By this computer's clock."""
         self.last_wall_ns = 0
@@ -134,23 +64,8 @@ class RunLedger:
         """
         file = cls(FrameLog.resume(path))
         for frame in Recording.open(path).frames():
-            file._enter(frame, jumped=not frame.repaired and file.has_jumped(frame))
+            file._enter(frame)
         return file
-
-    def has_jumped(self, frame: Frame) -> bool:
-        """Whether the numbers jumped to ``frame``, as far as the frames in the file and their times tell."""
-        books = self.runs.get(frame.run_id)
-        if books is None:
-            lost = frame.sequence if self.runs else 0
-        elif books.lacks(frame.sequence):
-            return False
-        else:
-            lost = frame.sequence - books.last - 1
-            if lost < 0 and not books.recorded_frames:  # on its way when capture said where it stood
-                return -lost > BURST_FRAMES
-        return lost < 0 or not PlausibleLoss(self.last_wall_ns or self._begin_wall_ns).allows(
-            lost, frame.wall_ns
-        )
 
     @property
     def path(self) -> Path:
@@ -161,16 +76,18 @@ class RunLedger:
         return with_pre_roll(self._log.meta)
 
     @property
+    def clock_ahead_ns(self) -> int | None:
+        """By how much capture's clock was ahead when the recording began; None where it did not say so."""
+        return self._log.meta.get(BEGIN, {}).get("clock_ahead_ns")
+
+    @property
     def problem(self) -> str | None:
         """Why frames do not reach the disk, None if they do."""
         return self._log.problem
 
-    def add(self, frame: Frame, message: bytes, *, jumped: bool = False) -> bool:
-        """Write a frame, or False if it is in already. While the disk is full frames wait in memory.
-
-        ``jumped``: its publisher gave it another number than the next; the numbers between were never sent.
-        """
-        if not self._enter(frame, jumped=jumped):
+    def add(self, frame: Frame, message: bytes) -> bool:
+        """Write a frame, or False if it is in already. While the disk is full frames wait in memory."""
+        if not self._enter(frame):
             return False
         self._log.append(message)
         return True
@@ -182,7 +99,8 @@ class RunLedger:
 
     @property
     def has_gaps(self) -> bool:
-        return any(books.missing() for books in self.runs.values())
+        """Whether the capture log can have more: frames are missing, or numbers that jumped are in doubt."""
+        return any(books.missing() or books.doubtful() for books in self.runs.values())
 
     @property
     def has_ended(self) -> bool:
@@ -200,9 +118,27 @@ class RunLedger:
         """Whether the disk takes more than the frames that were asked for."""
         return self.problem is None and disk_usage(self.path.parent).free > LEFT_FREE_BYTES
 
-    def open_run(self, run_id: int) -> RunBooks:
-        """The books of a run; one that was not met before belongs to the recording from its start."""
-        return self.runs.setdefault(run_id, RunBooks(run_id, 0))
+    @property
+    def began_wall_ns(self) -> int | None:
+        """By the capture computer's clock; None before that is known."""
+        return next((books.began_wall_ns for books in self.runs.values()), None)
+
+    def open_run(self, run_id: int, started_wall_ns: int) -> None:
+        """Have the books of a run that began, by capture's clock, while the recording was going on.
+
+        It belongs to the recording from its start, in its place among the runs.
+        """
+        if run_id not in self.runs:
+            since_wall_ns = self.last_wall_ns or self.began_wall_ns or 0
+            books = RunBooks(run_id, 0, started_wall_ns, since_wall_ns=since_wall_ns)
+            first, *others = *self.runs.values(), books
+            others.sort(key=lambda run: run.began_wall_ns)
+            self.runs = {run.run_id: run for run in (first, *others)}
+
+    def note_capture(self, meta: Mapping[str, Any]) -> None:
+        """Keep what capture says of itself, if it is of a run recorded here and nothing is known yet."""
+        if not self.capture and any(meta.get("run_id") == f"{run_id:016x}" for run_id in self.runs):
+            self.capture = dict(meta)
 
     def lacks(self, frame: Frame) -> bool:
         """Whether the frame is one of those that are missing."""
@@ -212,25 +148,30 @@ class RunLedger:
     def has(self, frame: Frame) -> bool:
         """Whether a frame of this number is recorded."""
         books = self.runs.get(frame.run_id)
-        return books is not None and any(frame.sequence in part.recorded for part in (*books.earlier, books))
+        return books is not None and books.has(frame.sequence)
 
-    def _enter(self, frame: Frame, *, jumped: bool = False) -> bool:
-        books = self.runs.get(frame.run_id)
-        if books is None:
-            first = 0 if self.runs and not jumped else frame.sequence
-            books = self.runs[frame.run_id] = RunBooks(frame.run_id, first)
-        elif jumped:
-            books.jump_to(frame.sequence)
-        if frame.sequence < books.first and not books.lacks(frame.sequence):
-            return frame.repaired and self._enter_pre_roll(frame)
+    def _enter(self, frame: Frame) -> bool:
+        if not self.runs:
+            self.runs[frame.run_id] = RunBooks(
+                frame.run_id, frame.sequence, frame.wall_ns, since_wall_ns=frame.wall_ns
+            )
+        self.open_run(frame.run_id, frame.wall_ns)
+        books, is_first = self.runs[frame.run_id], frame.run_id == next(iter(self.runs))
+        if is_first and self._is_before_the_first(frame, books):
+            return self._enter_pre_roll(frame)
         if not books.enter(frame):
             return False
-        if books is next(iter(self.runs.values())):
+        if is_first:
             self.first_frame = _earlier(frame, self.first_frame)
             self.oldest_frame = _earlier(frame, self.oldest_frame)
-        books.repaired += frame.repaired
         self.last_wall_ns = max(self.last_wall_ns, frame.wall_ns)
         return True
+
+    def _is_before_the_first(self, frame: Frame, books: RunBooks) -> bool:
+        first = self.first_frame
+        if not frame.repaired or first is None or books.lacks(frame.sequence):
+            return False
+        return frame.sequence < books.first and frame.monotonic_ns < first.monotonic_ns
 
     def _enter_pre_roll(self, frame: Frame) -> bool:
         if not self.pre_roll.add(frame.sequence):
@@ -250,9 +191,7 @@ class RunLedger:
     def _count_again(self) -> None:
         self.pre_roll, self.oldest_frame = SequenceRanges(), self.first_frame
         for run in self.runs.values():
-            run.repaired = run.last_wall_ns = 0
-            for books in (*run.earlier, run):
-                books.recorded = SequenceRanges()
+            run.count_again()
         for frame in Recording.open(self.path).frames():
             self._enter(frame)
 

@@ -1,5 +1,8 @@
 """The sequence numbers of one run: they grow, and not faster than a glove can send.
 
+How many frames can lie between two is judged by the frames' own clock: messages that waited, because this
+process, its computer or the network stood still, arrive at once.
+
 A number that does not fit is refused. If its publisher means it (it was restarted without a new run id, or
 jumped), frames that fit each other follow, and the glove's own frames stay away: then the numbers go on from
 there, within a second.
@@ -10,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from glovecal_client.plausible_loss import PlausibleLoss
+from glovecal_client.wire.frame import Frame
 from glovecal_service.realtime.refusal import Refusal, Refused
 
 CONFIRMED_AFTER_NS = 400_000_000
@@ -39,7 +43,7 @@ class _Track:
 
 
 class SequenceOrder:
-    """Where one publisher stands. Times are of this process' monotonic clock, when a message arrived.
+    """Where one publisher stands. ``at_ns`` is when a message arrived, by this process' monotonic clock.
 
     ``last`` is the newest number that fitted, -1 before the first. Between two frames it counts what never
     arrived; frames that arrived and could not be read (``unread``) may be those whose numbers are missing.
@@ -54,54 +58,57 @@ class SequenceOrder:
         self.tried_ns = 0
         """When a number last fitted others that are not confirmed yet: their publisher is there."""
         self._loss = PlausibleLoss(0)
+        self._wall_ns = 0
+        """Of the newest frame that fitted: the clock that two runs may share."""
         self._followed = 0
         self._tracks: list[_Track] = []
         self._gap = (0, 0, 0)
         """The newest loss: the frame before it, the frame after it, frames missing."""
 
-    def begin(self, sequence: int, at_ns: int, *, unread: int = 0, whole: bool = False) -> int:
+    def begin(self, frame: Frame, *, unread: int = 0, whole: bool = False) -> int:
         """Start with the first frame of a run; the number of frames missing before it.
 
         ``whole``: the run began after the last frame that fitted, so its first frames belong to the account.
         """
-        missing = max(0, sequence - unread) if whole else 0
-        if not self._loss.allows(missing, at_ns):
+        missing = max(0, frame.sequence - unread) if whole else 0
+        if not PlausibleLoss(self._wall_ns).allows(missing, frame.wall_ns):
             missing = 0
-        self._go_on(sequence, at_ns)
+        self._go_on(frame)
         return missing
 
-    def follow(self, sequence: int, at_ns: int, *, unread: int = 0) -> int:
+    def follow(self, frame: Frame, at_ns: int, *, unread: int = 0) -> int:
         """Take the next frame of the run; the number of frames missing before it.
 
         The number is negative when earlier losses prove wrong: the numbers had gone on from a made-up one.
         Raises Refused for a number that does not fit (yet).
         """
-        lost = sequence - self.last - 1
+        lost = frame.sequence - self.last - 1
         if lost >= 0:
             missing = lost - unread if lost > unread else 0
-            if self._loss.allows(missing, at_ns):
+            if self._loss.allows(missing, frame.monotonic_ns):
                 if missing:
-                    self._gap = self.last, sequence, missing
-                self.last = sequence
+                    self._gap = self.last, frame.sequence, missing
+                self.last, self._wall_ns = frame.sequence, frame.wall_ns
                 self._followed += 1
                 return missing
-        return self._track(sequence, at_ns, unread)
+        return self._track(frame, at_ns, unread)
 
-    def _track(self, sequence: int, at_ns: int, unread: int) -> int:
+    def _track(self, frame: Frame, at_ns: int, unread: int) -> int:
         """Note a number that does not fit. Raises Refused unless those like it are confirmed now."""
-        track = self._track_of(sequence, at_ns)
+        track = self._track_of(frame, at_ns)
         if track.frames >= CONFIRMED_BY_FRAMES and at_ns - track.since_ns >= CONFIRMED_AFTER_NS:
             if (self._followed - track.followed_before) * SHARE <= track.frames:
-                return self._take_up(track, at_ns, unread)
+                return self._take_up(track, frame, unread)
             track.begin_again(at_ns, self._followed)
-        raise Refused(*self._reason(sequence))
+        raise Refused(*self._reason(frame.sequence))
 
-    def _track_of(self, sequence: int, at_ns: int) -> _Track:
+    def _track_of(self, frame: Frame, at_ns: int) -> _Track:
         """The track that the number continues, or a new one in the place of the weakest."""
+        sequence = frame.sequence
         for track in sorted(self._tracks, key=lambda track: track.last, reverse=True):
             if track.last == sequence:
                 return track
-            if track.last < sequence and track.loss.allows(sequence - track.last - 1, at_ns):
+            if track.last < sequence and track.loss.allows(sequence - track.last - 1, frame.monotonic_ns):
                 track.last, track.last_ns, track.frames = sequence, at_ns, track.frames + 1
                 if track.frames >= CONFIRMED_BY_FRAMES:
                     self.tried_ns = at_ns
@@ -109,25 +116,26 @@ class SequenceOrder:
         if len(self._tracks) >= _TRACKS:
             late_ns = at_ns - CONFIRMED_AFTER_NS
             self._tracks.remove(min(self._tracks, key=lambda track: (track.last_ns > late_ns, track.frames)))
-        loss = PlausibleLoss(at_ns, _TRACK_BURST)
+        loss = PlausibleLoss(frame.monotonic_ns, _TRACK_BURST)
         track = _Track(sequence, sequence, at_ns, self._followed, loss, at_ns)
         self._tracks.append(track)
         return track
 
-    def _take_up(self, track: _Track, at_ns: int, unread: int) -> int:
+    def _take_up(self, track: _Track, frame: Frame, unread: int) -> int:
+        """``frame`` is the newest of the track."""
         missing = max(0, track.last - track.first + 1 - track.frames - unread)
         before, after, wrong = self._gap
         if before < track.first < after:  # what looked lost was still to come
             missing += track.first - before - 1 - wrong
         self.jumps += 1
         self.jumped_to = track.first
-        self._go_on(track.last, at_ns)
+        self._go_on(frame)
         return missing
 
-    def _go_on(self, sequence: int, at_ns: int) -> None:
-        self.last = sequence
+    def _go_on(self, frame: Frame) -> None:
+        self.last, self._wall_ns = frame.sequence, frame.wall_ns
         self._followed += 1
-        self._loss = PlausibleLoss(at_ns)
+        self._loss = PlausibleLoss(frame.monotonic_ns)
         self._tracks.clear()
         self._gap = (0, 0, 0)
 

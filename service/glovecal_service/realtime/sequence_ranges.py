@@ -54,6 +54,16 @@ class SequenceRanges:
         self._count += 1
         return True
 
+    def append(self, later: SequenceRanges) -> None:
+        """Put in numbers that are all higher than these."""
+        for first, last in later:
+            if self._lasts and self._lasts[-1] == first - 1:
+                self._lasts[-1] = last
+            else:
+                self._firsts.append(first)
+                self._lasts.append(last)
+        self._count += len(later)
+
     def missing(self, first: int, last: int) -> list[tuple[int, int]]:
         """The ranges of ``first`` to ``last`` that are not in, in order."""
         gaps = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import Handedness, Palm, Skeleton, hand_skeleton
@@ -23,6 +23,11 @@ FINISHED_JOB_STATES: tuple[JobState, ...] = ("done", "failed", "cancelled")
 OPEN_RECORDING_STATES: tuple[RecordingState, ...] = ("requested", "recording", "stopping")
 
 
+def known_hand(said: Any) -> Handedness | None:
+    """The hand that somebody named; None for anything else."""
+    return said if said in get_args(Handedness) else None
+
+
 @dataclass(frozen=True)
 class SubjectRecord:
     """A person: owns hand dimensions, takes and calibration models."""
@@ -32,11 +37,20 @@ class SubjectRecord:
     dimensions: dict[str, float]
     """Hand dimensions in millimetres by name; empty if nobody measured them."""
     created_at: datetime
-    hand: Handedness = "right"
+    hand: str = "unknown"
+    """The one that is calibrated: ``right``, ``left``, or ``unknown`` until somebody says it."""
+
+    @property
+    def known_hand(self) -> Handedness | None:
+        return known_hand(self.hand)
 
     def skeleton(self, hand: Handedness | None = None, palm: Palm = "rigid") -> Skeleton:
-        """This person's hand, or the other one. Raises BadInput for dimensions that no hand has."""
-        return hand_skeleton(HandDimensions.from_measured(self.dimensions), hand or self.hand, palm)
+        """This person's hand, or the one that is named; sizes and limits are the same for both.
+
+        Drawn as a right one while nobody said which it is. Raises BadInput for dimensions that no hand has.
+        """
+        shown = hand or self.known_hand or "right"
+        return hand_skeleton(HandDimensions.from_measured(self.dimensions), shown, palm)
 
 
 @dataclass(frozen=True)
@@ -108,6 +122,11 @@ class TakeRecord:
     @property
     def has_reference(self) -> bool:
         return self.reference_rows > 0 and bool(self.rotations)
+
+    @property
+    def known_hand(self) -> Handedness | None:
+        """Of the glove, as its capture said; None where it did not, and for imported files."""
+        return known_hand((self.accounting or {}).get("hand"))
 
     @property
     def state(self) -> Literal["complete", "repairing"]:

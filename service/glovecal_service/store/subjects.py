@@ -32,7 +32,7 @@ class Subjects:
         *,
         title: str = "",
         dimensions: Mapping[str, float] | None = None,
-        hand: Handedness = "right",
+        hand: Handedness | None = None,
     ) -> SubjectRecord:
         """Add a person. Raises BadInput for a bad name or dimension, Conflict if the name is taken."""
         record = SubjectRecord(
@@ -40,7 +40,7 @@ class Subjects:
             check_text(title, f"title of subject {name!r}", empty=True),
             _dimensions(name, dimensions or {}),
             now(),
-            _hand(name, hand),
+            "unknown" if hand is None else _hand(name, hand),
         )
         try:
             with self._database.write() as connection:
@@ -60,9 +60,16 @@ class Subjects:
             statement = select(tables.subjects).order_by(tables.subjects.c.name)
             return sound_rows(connection, tables.subjects, statement, _record)
 
-    def measure(self, name: str, dimensions: Mapping[str, float], hand: Handedness) -> SubjectRecord:
-        """Replace what was measured of a person's hand. Raises NotFound, BadInput."""
-        values = {"dimensions": _dimensions(name, dimensions), "hand": _hand(name, hand)}
+    def measure(
+        self, name: str, dimensions: Mapping[str, float], hand: Handedness | None = None
+    ) -> SubjectRecord:
+        """Replace what was measured of a person's hand, and say which one it is; None leaves that as it is.
+
+        Raises NotFound, BadInput.
+        """
+        values: dict[str, Any] = {"dimensions": _dimensions(name, dimensions)}
+        if hand is not None:
+            values["hand"] = _hand(name, hand)
         with self._database.write() as connection:
             require_subject(connection, name)
             changed = update(tables.subjects).where(tables.subjects.c.name == name)

@@ -30,7 +30,6 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
         reach = {"GLOVECAL_URL": f"http://127.0.0.1:{port}", "GLOVECAL_ZENOH": endpoint}
         reach["GLOVECAL_DATA"] = str(folder / "capture")
         for seed, hand in enumerate(HANDS):
-            assert glovecal(reach, "subject", "add", f"anna-{hand}", "--hand", hand).code == 0
             options = ("--option", f"seed={seed}", "--option", f"hand={hand}", "--option", "rate_hz=60")
             capture = start(
                 reach, "capture", "--device", "simulated", "--glove", hand, "--subject", f"anna-{hand}",
@@ -71,6 +70,8 @@ def test_both_hands_are_recorded_filmed_and_joined(
     markers = (tmp_path / "both.trc").read_text().splitlines()[3]
     assert "R_index" in markers
     assert "L_index" in markers
+    hands = {row["name"]: row["hand"] for row in run("subject", "list", "--json").json}
+    assert hands == {"anna-left": "left", "anna-right": "right"}, "as capture said: nobody added them"
 
 
 def test_shapes_at_both_ends_tell_the_drift(live: dict[str, str]) -> None:

@@ -77,6 +77,20 @@ def test_a_recording_becomes_a_take_with_nothing_missing(settings: Settings, sto
     assert abs(kept.accounting["wall_minus_time_s"] - (time.time() - time.monotonic())) < 1.0
 
 
+def test_a_recording_asked_for_before_capture_is_there_learns_its_sensors(
+    settings: Settings, store: Store
+) -> None:
+    with open_router([settings.zenoh]), recording_thread(settings):
+        asked = store.recordings.request(GLOVE, name="early")
+        eventually(lambda: store.recordings.get(asked.id).state == "recording", "it waits for frames")
+        with capturing(settings):
+            eventually(frames(store, asked.id, 20), "20 frames")
+            store.recordings.stop(asked.id)
+            record = finished(store, asked.id)
+    check_exact(store, record)
+    assert store.takes.load(record.facts["take"]).sensors == LAYOUT.sensors
+
+
 def test_frames_missed_while_the_router_was_away_are_repaired(settings: Settings, store: Store) -> None:
     with ExitStack() as running:
         router = running.enter_context(ExitStack())

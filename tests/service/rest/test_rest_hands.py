@@ -37,7 +37,6 @@ def test_the_skeleton_is_that_of_the_subject(client: RestClient) -> None:
         ({"dimensions": {"nose": 30}, "hand": "right"}, "a hand has no dimension 'nose'"),
         ({"dimensions": {"hand_length": 190}, "hand": "third"}, "hand"),
         ({"dimensions": {"hand_length": "190"}, "hand": "left"}, "hand_length"),
-        ({"dimensions": {"hand_length": 190}}, "hand"),
     ],
 )
 def test_what_no_hand_is_gets_a_sentence(shared: RestClient, body: dict, sentence: str) -> None:

@@ -89,6 +89,23 @@ def test_two_takes_of_one_hand_are_no_pair(client: RestClient) -> None:
         client.made("/motion", {"takes": [take, take], "content": "raw"})
 
 
+def test_a_hand_that_nobody_said_is_asked_for(client: RestClient, write_table: Write, tmp_path: Path) -> None:
+    client.post("/subjects", {"name": "kira"})
+    assert client.get("/subjects/kira")["hand"] == "unknown"
+    client.upload_takes(write_table("kira.csv", ("kira",), seed=2), subject="kira")
+    [take] = [row["id"] for row in client.get("/takes", {"subject": "kira"})]
+    body = {"takes": [take], "content": "raw"}
+    with pytest.raises(
+        Refused, match=r"nobody said which hand take \w+ is of: name it with --hand"
+    ) as refused:
+        client.made("/motion", body)
+    assert refused.value.status == 409
+    said = read(client.made("/motion", body | {"hands": ["left"]}), tmp_path)
+    assert said["Markers"] == ["L_index"]
+    client.put("/subjects/kira/hand", {"dimensions": {}, "hand": "left"})
+    assert read(client.made("/motion", body), tmp_path)["Markers"] == ["L_index"]
+
+
 def test_hands_of_imported_tables_are_joined_as_they_are_and_said_so(client: RestClient) -> None:
     found = client.post("/takes/hands", {"takes": takes(client)})
     assert (found["how"], found["shift_s"], found["sd_s"]) == ("assumed", 0, None)

@@ -63,7 +63,7 @@ def add(
 ) -> None:
     """Add a subject; with hand sizes, errors are also given in mm."""
     measured = measured_dimensions(hand_length_mm, dimensions)
-    body = {"name": name, "title": title, "dimensions": measured, "hand": hand or "right"}
+    body = {"name": name, "title": title, "dimensions": measured, "hand": hand}
     with connect() as service:
         service.post("/subjects", body)
     out.print(f"Added subject {name}.")
@@ -76,14 +76,16 @@ def measure(
     dimensions: DimensionsFile = None,
     hand: Hand = None,
 ) -> None:
-    """Set the measured sizes of a subject's hand; earlier ones are replaced."""
-    if hand_length_mm is None and dimensions is None:
-        raise typer.BadParameter("give --hand-length-mm or --dimensions")
+    """Set the measured sizes of a subject's hand, earlier ones are replaced; or say which hand it is."""
+    if hand_length_mm is None and dimensions is None and hand is None:
+        raise typer.BadParameter("give --hand-length-mm, --dimensions or --hand")
     measured = measured_dimensions(hand_length_mm, dimensions)
     with connect() as service:
-        hand = hand or service.get(f"/subjects/{name}")["hand"]
-        service.put(f"/subjects/{name}/hand", {"dimensions": measured, "hand": hand})
-    out.print(f"Subject {name}: {hand} hand, {text(measured)} mm.")
+        if not measured:
+            measured = service.get(f"/subjects/{name}")["dimensions"]
+        kept = service.put(f"/subjects/{name}/hand", {"dimensions": measured, "hand": hand})
+    which = "hand unknown" if kept["hand"] == "unknown" else f"{kept['hand']} hand"
+    out.print(f"Subject {name}: {which}, {text(measured)} mm." if measured else f"Subject {name}: {which}.")
 
 
 @app.command("history")

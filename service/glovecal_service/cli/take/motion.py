@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import typer
 
+from glovecal_models.hand.skeleton import Handedness
 from glovecal_service.cli.take.rows import find_take
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import model_id
@@ -18,6 +19,13 @@ MOST_HANDS = 2
 def _models(given: list[str] | None) -> list[str] | None:
     for id in given or ():
         model_id(id)
+    return given
+
+
+def _hands(given: list[str] | None) -> list[str] | None:
+    for hand in given or ():
+        if hand not in get_args(Handedness):
+            raise typer.BadParameter(f"{hand!r} is no hand: right or left")
     return given
 
 
@@ -35,6 +43,14 @@ def motion(
     model: Annotated[
         list[str] | None,
         typer.Option("--model", "-m", help="One a take; default: the active ones.", callback=_models),
+    ] = None,
+    hand: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[right|left]",
+            help="One a take; default: as its capture said, or its subject.",
+            callback=_hands,
+        ),
     ] = None,
     shift: Annotated[
         list[float] | None,
@@ -73,6 +89,7 @@ def motion(
         asked: dict[str, Any] = {
             "takes": [find_take(rows, name)["id"] for name in take],
             "models": model or [],
+            "hands": hand or [],
             "content": content,
             "format": chosen.suffix.removeprefix("."),
             "shifts_s": shift or [],

@@ -72,7 +72,7 @@ def start_camera(body: NewCamera, parts: PartsNeeded) -> CameraView:
     worn_by = None if body.subject is None else parts.store.subjects.get(body.subject)
     asked = CameraSettings(
         body.source, body.glove, settings.site, settings.zenoh, body.subject, body.keep,
-        data=settings.data, hand=body.hand or ("right" if worn_by is None else worn_by.hand),
+        data=settings.data, hand=body.hand or (worn_by and worn_by.known_hand) or "right",
         stage=body.stage,
         colours=None if body.colours is None else files.path("colours", body.colours),
         calibration=None if body.calibration is None else files.path("calibrations", body.calibration),

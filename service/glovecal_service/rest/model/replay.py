@@ -50,5 +50,5 @@ def replay_stretch(id: ModelInPath, body: ReplayedStretch, parts: PartsNeeded) -
         inside = np.array([np.argmin(np.abs(time - body.from_s))])
     frames = inside[:: max(1, -(-len(inside) // body.frames))]
     poses = poses_of_take(item, on.found.rotations).at(frames)
-    skeleton = parts.store.subjects.get(on.model.subject).skeleton()
+    skeleton = parts.store.subjects.get(on.model.subject).skeleton(row.known_hand)
     return replay_view(poses, time[frames], skeleton, on.model.id, row)

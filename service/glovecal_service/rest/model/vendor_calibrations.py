@@ -51,7 +51,7 @@ class CalibrationFile(BaseModel):
 def import_calibration(body: Calibration, response: Response, parts: PartsNeeded) -> dict[str, Any]:
     """Kept as a model of lines, each with its scale and offset; it is not activated. 422 names the line."""
     try:
-        hand = parts.store.subjects.get(body.subject).hand
+        hand = parts.store.subjects.get(body.subject).known_hand or "right"
     except NotFound:
         if not body.create_subject:
             raise
@@ -76,5 +76,6 @@ def export_calibration(
     """422 where no rotation is a line of one sensor, or effects would be lost."""
     record = parts.store.models.get(id)
     model, _ = parts.predictors.get(record.id)
-    written = write_model(model, calibration_format(format), parts.store.subjects.get(record.subject).hand)
+    hand = parts.store.subjects.get(record.subject).known_hand or "right"
+    written = write_model(model, calibration_format(format), hand)
     return CalibrationFile(text=written.text, left_out=dict(written.left_out))

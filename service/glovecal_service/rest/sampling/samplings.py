@@ -233,7 +233,7 @@ async def sampling_events(
 
 def _require_same_hand(store: Store, glove: GloveRecord, subject: str) -> None:
     person = store.subjects.get(subject)
-    if glove.hand in ("left", "right") and glove.hand != person.hand:
+    if glove.hand in ("left", "right") and person.known_hand not in (None, glove.hand):
         raise Conflict(
             f"glove {glove.name!r} is for the {glove.hand} hand; {subject}'s hand is the {person.hand} one"
         )

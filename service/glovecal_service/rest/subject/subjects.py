@@ -42,19 +42,19 @@ class NewSubject(StrictBody):
     name: SubjectName
     title: Title = ""
     dimensions: Dimensions = Field(default_factory=dict)
-    hand: Handedness = "right"
+    hand: Handedness | None = Field(None, description="Null: not known; asked for where it matters.")
 
 
 class MeasuredHand(StrictBody):
     dimensions: Dimensions
-    hand: Handedness
+    hand: Handedness | None = Field(None, description="Null: as it was.")
 
 
 class Subject(BaseModel):
     name: str
     title: str
     dimensions: dict[str, float] = Field(description="Measured hand dimensions in millimetres.")
-    hand: str
+    hand: str = Field(description="right, left, or unknown.")
     created_at: datetime
 
 

@@ -12,6 +12,7 @@ from pydantic import Field, FiniteFloat
 from starlette.background import BackgroundTask
 
 from glovecal_models.errors import BadInput
+from glovecal_models.hand.skeleton import Handedness
 from glovecal_models.progress import Cancel
 from glovecal_service.exports.body_markers import Wrist
 from glovecal_service.exports.formats import FORMATS, format_of
@@ -57,6 +58,10 @@ class Motion(StrictBody):
         default_factory=list,
         description="One a take; null: the model that is active for its subject and layout.",
     )
+    hands: Annotated[list[Handedness | None], Field(max_length=MOST_HANDS)] = Field(
+        default_factory=list,
+        description="One a take; null, or not given: as its capture said, or else as its subject has it.",
+    )
     content: Content = Field(
         "joints", description="joints: places in mm; angles: calibrated degrees; raw: readings."
     )
@@ -90,7 +95,7 @@ class Motion(StrictBody):
 )
 async def export_motion(body: Motion, request: Request, parts: PartsNeeded) -> FileResponse:
     """Calibrated by the model that is named, else by the active one; effects with a memory start in the
-    pre-roll. 409 where angles are asked for and no model is active.
+    pre-roll. 409 where angles are asked for and no model is active, or nobody said which hand it is.
     """
     folder = tempfile.TemporaryDirectory(prefix="glovecal-motion-")
     try:
@@ -114,11 +119,13 @@ async def export_motion(body: Motion, request: Request, parts: PartsNeeded) -> F
 
 
 def _asked(parts: Parts, body: Motion, path: Path) -> MotionFile:
-    for name, given in (("models", body.models), ("shifts_s", body.shifts_s)):
+    for name, given in (("models", body.models), ("hands", body.hands), ("shifts_s", body.shifts_s)):
         if given and len(given) != len(body.takes):
             raise BadInput(f"{len(given)} {name} for {len(body.takes)} takes: give one a take, or none")
     models = body.models or [None] * len(body.takes)
-    hands = [_hand(parts, take, model, body.content) for take, model in zip(body.takes, models, strict=True)]
+    sides = body.hands or [None] * len(body.takes)
+    asked = zip(body.takes, models, sides, strict=True)
+    hands = [_hand(parts, take, model, body.content, side) for take, model, side in asked]
     markers = None
     if body.body is not None:
         file = parts.uploads.find(body.body.upload)
@@ -128,7 +135,8 @@ def _asked(parts: Parts, body: Motion, path: Path) -> MotionFile:
     return MotionFile(tuple(hands), body.content, path, tuple(body.shifts_s), body.claps, body.wrist, markers)
 
 
-def _hand(parts: Parts, take: str, model: str | None, content: Content) -> HandTake:
+def _hand(parts: Parts, take: str, model: str | None, content: Content, hand: Handedness | None) -> HandTake:
+    """``hand`` counts where it is given, then what capture said of the glove, then the subject's."""
     record = parts.store.takes.get(take)
     subject = parts.store.subjects.get(record.subject)
     artifact = None
@@ -144,4 +152,10 @@ def _hand(parts: Parts, take: str, model: str | None, content: Content) -> HandT
                 "for raw readings"
             )
         artifact = parts.store.models.load_bytes(chosen.id)
-    return HandTake(parts.store.takes.load(record.id), subject, artifact, record.accounting)
+    side = hand or record.known_hand or subject.known_hand
+    if side is None:
+        raise Conflict(
+            f"nobody said which hand take {record.name} is of: name it with --hand left or --hand right, or "
+            f"say it of the subject: glovecal subject measure {record.subject} --hand left"
+        )
+    return HandTake(parts.store.takes.load(record.id), subject, side, artifact, record.accounting)

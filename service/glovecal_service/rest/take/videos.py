@@ -137,7 +137,7 @@ def get_hand(
     """What is not calibrated follows its rule or rests, as everywhere."""
     take, facts = parts.store.takes.get(id), parts.videos.facts(id)
     found, _ = parts.predictors.get(parts.store.models.get(model).id)
-    skeleton = parts.store.subjects.get(take.subject).skeleton()
+    skeleton = parts.store.subjects.get(take.subject).skeleton(take.known_hand)
     motion = motion_of(parts.store.takes.load(id), found, skeleton, "hand")
     at, time_s = np.array(facts.times_s), motion.time_s
     inside = (at >= time_s[0]) & (at <= time_s[-1])

@@ -71,7 +71,7 @@ class GloveAndWearer:
         known = [each["name"] for each in await self._studio.service.get("/subjects")]
         glove = self._gloves[self.glove]
         if self.subject not in known:
-            hand = glove["hand"] if glove["hand"] in ("left", "right") else "right"
+            hand = glove["hand"] if glove["hand"] in ("left", "right") else None
             await self._studio.service.post("/subjects", {"name": self.subject, "hand": hand})
         if wearing is not None or glove["subject"] != self.subject:
             body = {"subject": self.subject, "wearing": wearing or glove["wearing"]}

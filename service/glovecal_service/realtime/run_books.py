@@ -1,0 +1,206 @@
+"""The books of one run in a recording: which frames were sent, which are recorded, where numbers jumped.
+
+Between two frames a glove sends no more than the time between them allows, by the frames' own clock: when
+they arrived tells nothing, for what waited while somebody stood still arrives at once. Numbers that run ahead
+of that clock begin a new stretch. Those between are in doubt: the capture log, asked, has them, or they were
+never sent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+from glovecal_client.plausible_loss import BURST_FRAMES, PlausibleLoss
+from glovecal_client.wire.frame import Frame
+from glovecal_service.realtime.sequence_ranges import SequenceRanges
+
+OWN_CLOCK = "own_clock"
+
+
+@dataclass
+class Stretch:
+    """Numbers that were given one after another, as far as the clock of their frames tells."""
+
+    first: int
+    last: int
+    """The last number given, as far as is known; ``first - 1``: none."""
+    first_ns: int = 0
+    last_ns: int = 0
+    """Monotonic clock of capture: at the first and at the newest frame recorded; 0 before there is one."""
+    recorded: SequenceRanges = field(default_factory=SequenceRanges)
+    asked: bool = False
+    """Whether the capture log was asked for what lies between the stretch before and this one."""
+
+    @classmethod
+    def of(cls, frame: Frame) -> Stretch:
+        stretch = cls(frame.sequence, frame.sequence - 1)
+        stretch.enter(frame)
+        return stretch
+
+    def lacks(self, sequence: int) -> bool:
+        return self.first <= sequence <= self.last and sequence not in self.recorded
+
+    def enter(self, frame: Frame) -> None:
+        self.recorded.add(frame.sequence)
+        self.first_ns = self.first_ns or frame.monotonic_ns
+        self.last = max(self.last, frame.sequence)
+        self.last_ns = max(self.last_ns, frame.monotonic_ns)
+
+    def reaches(self, sequence: int, at_ns: int) -> bool:
+        """Whether a glove can have sent all between the last number and ``sequence``, sent at ``at_ns``."""
+        lost = sequence - self.last - 1
+        return lost >= 0 and PlausibleLoss(self.last_ns).allows(lost, at_ns)
+
+    def join(self, later: Stretch) -> None:
+        self.recorded.append(later.recorded)
+        self.last, self.last_ns = later.last, max(self.last_ns, later.last_ns)
+
+
+class RunBooks:
+    """The frames of one start of the capture daemon."""
+
+    def __init__(self, run_id: int, first: int, began_wall_ns: int, *, since_wall_ns: int = 0) -> None:
+        """``first``: where the recording begins in this run, 0 for one that began while it was going on.
+
+        Wall clocks are capture's: when the recording began in this run, and the last time before the run's
+        first frame at which all was accounted for.
+        """
+        self.run_id = run_id
+        self.began_wall_ns = began_wall_ns
+        self.stretches = [Stretch(first, first - 1)]
+        """In the order in which they were sent."""
+        self.repaired = 0
+        """Of the recorded frames, those fetched from the capture log."""
+        self.last_wall_ns = 0
+        """Of the newest frame recorded."""
+        self.ended = False
+        """Capture said that the run is over, and what its last number was."""
+        self.own_clock: dict[str, Any] | None = None
+        """How the glove's own clock stood against the computer's, as capture said last."""
+        self._since_wall_ns = since_wall_ns
+
+    @property
+    def first(self) -> int:
+        return self.stretches[0].first
+
+    @property
+    def last(self) -> int:
+        """The last number that belongs to the recording, as far as is known; ``first - 1``: none."""
+        return self.stretches[-1].last
+
+    def note_given(self, sequence: int) -> None:
+        """Capture said that it gave this number."""
+        newest = self.stretches[-1]
+        newest.last = max(newest.last, sequence)
+
+    def missing(self) -> list[tuple[int, int]]:
+        return [gap for part in self.stretches for gap in part.recorded.missing(part.first, part.last)]
+
+    def doubtful(self) -> list[tuple[int, int]]:
+        """Numbers that were jumped over, and for which the capture log was not asked yet."""
+        return [
+            (before.last + 1, after.first - 1)
+            for before, after in pairwise(self.stretches)
+            if not after.asked and before.last + 1 < after.first
+        ]
+
+    def note_asked(self, first: int, last: int) -> None:
+        """The capture log has given all it has of these numbers."""
+        for part in self.stretches:
+            part.asked = part.asked or first < part.first <= last + 1
+
+    @property
+    def sent(self) -> int:
+        return sum(part.last - part.first + 1 for part in self.stretches)
+
+    @property
+    def recorded_frames(self) -> int:
+        return sum(len(part.recorded) for part in self.stretches)
+
+    def lacks(self, sequence: int) -> bool:
+        """Whether the frame is missing."""
+        return any(part.lacks(sequence) for part in self.stretches)
+
+    def has(self, sequence: int) -> bool:
+        return any(sequence in part.recorded for part in self.stretches)
+
+    def enter(self, frame: Frame) -> bool:
+        """Note a frame as recorded; False if it was, or does not belong to the recording."""
+        part = next((part for part in self.stretches if part.lacks(frame.sequence)), None)
+        if part is not None:
+            part.enter(frame)
+        elif not (self._enter_fetched(frame) if frame.repaired else self._enter_newest(frame)):
+            return False
+        self.repaired += frame.repaired
+        if frame.sequence >= self.last:
+            self.last_wall_ns = frame.wall_ns
+        return True
+
+    def _enter_newest(self, frame: Frame) -> bool:
+        """A frame as it came: it follows, or begins a stretch."""
+        newest = self.stretches[-1]
+        if frame.sequence <= newest.last:
+            if newest.recorded:
+                is_late = frame.monotonic_ns <= newest.last_ns
+            else:  # on its way when capture said where it stood
+                is_late = newest.first - frame.sequence <= BURST_FRAMES
+            if is_late:
+                return False
+        if self._reach(newest, frame):
+            newest.enter(frame)
+        else:
+            self.stretches.append(Stretch.of(frame))
+        return True
+
+    def _enter_fetched(self, frame: Frame) -> bool:
+        """A frame of the capture log, from after the end of a stretch."""
+        for at, (part, begins) in enumerate(self._stretches_and_next_first()):
+            if part.last < frame.sequence < begins:
+                if self._reach(part, frame):
+                    part.enter(frame)
+                else:
+                    at += 1
+                    part = Stretch.of(frame)
+                    self.stretches.insert(at, part)
+                self._join_next(at)
+                return True
+        return False
+
+    def _stretches_and_next_first(self) -> Iterator[tuple[Stretch, float]]:
+        firsts = [*(part.first for part in self.stretches[1:]), float("inf")]
+        return zip(list(self.stretches), firsts, strict=True)
+
+    def _reach(self, part: Stretch, frame: Frame) -> bool:
+        if part.recorded:
+            return part.reaches(frame.sequence, frame.monotonic_ns)
+        lost = frame.sequence - part.last - 1
+        return lost >= 0 and PlausibleLoss(self._since_wall_ns).allows(lost, frame.wall_ns)
+
+    def _join_next(self, at: int) -> None:
+        """Two stretches are one where what lies between can have been sent."""
+        if at + 1 < len(self.stretches):
+            part, later = self.stretches[at], self.stretches[at + 1]
+            if part.reaches(later.first, later.first_ns):
+                part.join(later)
+                del self.stretches[at + 1]
+
+    def count_again(self) -> None:
+        """Nothing is recorded any more: every frame is entered anew."""
+        self.repaired = self.last_wall_ns = 0
+        for part in self.stretches:
+            part.recorded = SequenceRanges()
+
+    def document(self) -> dict[str, Any]:
+        """``sent`` equals ``recorded`` plus the frames in ``missing``, which may still come."""
+        return {
+            "run_id": f"{self.run_id:016x}",
+            "first_sequence": self.first,
+            "last_sequence": self.last,
+            "sent": self.sent,
+            "recorded": self.recorded_frames,
+            "repaired": self.repaired,
+            "missing": [list(gap) for gap in self.missing()],
+        } | ({} if self.own_clock is None else {OWN_CLOCK: self.own_clock})
