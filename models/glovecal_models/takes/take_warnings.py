@@ -14,13 +14,15 @@ _NUMBER = re.compile(r"[0-9]+(\.[0-9]+)?(e[-+]?[0-9]+)?")
 
 def take_warnings(takes: Sequence[Take]) -> list[str]:
     """The sentences of ``check_take``; of those that differ in numbers alone the first, and how many more."""
+    return alike_once([each for take in takes if len(take.time_s) for each in check_take(take).sentences])
+
+
+def alike_once(sentences: Sequence[str]) -> list[str]:
+    """Of those that differ in numbers alone the first, and how many more."""
     alike: dict[str, list[str]] = {}
-    for take in takes:
-        if not len(take.time_s):
-            continue
-        for sentence in check_take(take).sentences:
-            alike.setdefault(kind_of(sentence), []).append(sentence)
-    return [_summarized(sentences) for sentences in alike.values()]
+    for sentence in sentences:
+        alike.setdefault(kind_of(sentence), []).append(sentence)
+    return [_summarized(some) for some in alike.values()]
 
 
 def kind_of(sentence: str) -> str:

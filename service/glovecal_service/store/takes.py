@@ -36,6 +36,10 @@ CAMERA_REFERENCE = "camera_reference"
 and the range of each rotation that it saw; None where another reference came after."""
 
 
+UNWRAPPED = "unwrapped"
+"""Fact of a take: sentences on angles of its reference that are counted past a full turn."""
+
+
 class Takes:
     def __init__(self, database: Database, artifacts: Artifacts) -> None:
         self._database = database
@@ -160,7 +164,7 @@ class Takes:
             | dict(context or {}),
             poses=take.poses if poses is None else poses_at_frames(take.time_s, time_s, poses),
         )
-        stale = {CLOCK_OFFSET: 0.0, CLOCK_UNKNOWN: False, CAMERA_REFERENCE: None}
+        stale = {CLOCK_OFFSET: 0.0, CLOCK_UNKNOWN: False, CAMERA_REFERENCE: None, UNWRAPPED: []}
         stale = {name: stale[name] for name in stale if name in earlier.facts}
         return self._replace(earlier, take, stale | dict(facts or {}))
 

@@ -30,6 +30,7 @@ from glovecal_service.rest.http.request_types import (
 )
 from glovecal_service.rest.take.uploads import MEDIA_TYPES, TableFormat
 from glovecal_service.store.records import TakeRecord, incomplete_sentences
+from glovecal_service.store.takes import UNWRAPPED
 
 router = APIRouter(prefix="/takes", tags=["takes"])
 
@@ -112,7 +113,11 @@ def get_take(id: IdInPath, store: StoreNeeded) -> TakeRecord:
 def check_one_take(id: IdInPath, store: StoreNeeded) -> dict[str, Any]:
     record = store.takes.get(id)
     found = plain(asdict(check_take(store.takes.load(id))))
-    return {"take": record, **found, "sentences": [*incomplete_sentences([record]), *found["sentences"]]}
+    return {
+        "take": record,
+        **found,
+        "sentences": [*incomplete_sentences([record]), *record.facts.get(UNWRAPPED, ()), *found["sentences"]],
+    }
 
 
 class TakeLayout(StrictBody):
