@@ -87,11 +87,18 @@ def write_takes(takes: Take | Iterable[Take], path: str | PathLike[str]) -> list
     """
     from glovecal_models.takes.write_table import write_takes as write
 
-    return write(takes_in(takes), Path(path))
+    return write(_listed(takes), Path(path))
 
 
 def takes_in(takes: Take | Iterable[Take]) -> Sequence[Take]:
-    """One take or several as a list. Raises BadInput for anything else, and for none."""
+    """One take or several as they are worked with: a list, without reference angles that jump away and come
+    back. Raises BadInput for anything else, and for none."""
+    from glovecal_models.takes.reference_jumps import without_jumps
+
+    return [without_jumps(take) for take in _listed(takes)]
+
+
+def _listed(takes: Take | Iterable[Take]) -> Sequence[Take]:
     if isinstance(takes, Take):
         return [takes]
     if isinstance(takes, str | PathLike):

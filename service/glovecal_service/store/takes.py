@@ -15,6 +15,7 @@ from glovecal_models.layout import Layout
 from glovecal_models.names import check_identifier
 from glovecal_models.takes.camera_reference.camera_reference import CAMERA_PATCHES
 from glovecal_models.takes.clock_scan import aligned
+from glovecal_models.takes.reference_jumps import without_jumps
 from glovecal_models.takes.take import Take, poses_at_frames
 from glovecal_service.store import tables
 from glovecal_service.store.artifacts import Artifacts, check_sha256
@@ -124,6 +125,11 @@ class Takes:
             return sound_rows(connection, tables.takes, statement, _record, wanted)
 
     def load(self, id: str) -> Take:
+        """The take as it is worked with: ``load_recorded`` without angles that jump away and come back.
+        Raises NotFound, DamagedArtifact."""
+        return without_jumps(self.load_recorded(id))
+
+    def load_recorded(self, id: str) -> Take:
         """The take's arrays, verified, with what is known of its glove. Raises NotFound, DamagedArtifact."""
         record = self.get(id)
         with self._database.read() as connection:

@@ -75,6 +75,15 @@ class RotationRangeView(BaseModel):
     high_deg: float
 
 
+class ReferenceJumpView(BaseModel):
+    rotation: str
+    start_s: float = Field(description="On the reference's clock, as `time_s` of the take.")
+    end_s: float
+    rows: int
+    size_deg: float
+    comes_back: bool = Field(description="Its angles are left out of training and of errors.")
+
+
 class CheckView(BaseModel):
     take: Take
     rate_hz: float | None = Field(description="By the median interval between frames.")
@@ -88,6 +97,7 @@ class CheckView(BaseModel):
     pre_roll_s: float
     sensors: list[SensorRangeView]
     rotations: list[RotationRangeView]
+    jumps: list[ReferenceJumpView] = Field(description="Where the reference jumps while the sensors do not.")
     sentences: list[str] = Field(description="What looks wrong.")
 
 
@@ -169,7 +179,7 @@ def export_take(
     part: Literal["all", "frames", "reference"] = "all",
 ) -> FileResponse:
     """A take whose reference has a clock of its own is two tables: ask for each `part` (409 for `all`)."""
-    take = store.takes.load(id)
+    take = store.takes.load_recorded(id)
     folder = tempfile.TemporaryDirectory(prefix="glovecal-export-")
     try:
         path = _chosen_part(write_takes([take], Path(folder.name) / f"{id}.{format}"), part, take)
