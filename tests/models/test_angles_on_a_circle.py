@@ -48,8 +48,8 @@ def full_turn(values: np.ndarray) -> np.ndarray:
 def test_angles_are_counted_on_past_a_turn_and_told(shown, centre):
     takes = [bent(number, centre) for number in range(3)]
     found = unwrapped([shown_as(take, shown) for take in takes])
-    off = {float(turn) for one, other in zip(found.takes, takes, strict=True)
-           for turn in np.round((one.reference - other.reference)[:, 0], 6)}  # fmt: skip
+    pairs = zip(found.takes, takes, strict=True)
+    off = {float(turn) for one, two in pairs for turn in np.round((one.reference - two.reference)[:, 0], 6)}
     assert len(off) == 1, "the same for all takes"
     assert off <= {-360.0, 0.0, 360.0}
     assert all("I_PIP" in sentence and "unwrapped" in sentence for sentence in found.sentences)
@@ -57,15 +57,17 @@ def test_angles_are_counted_on_past_a_turn_and_told(shown, centre):
 
 
 def test_takes_on_either_side_of_the_place_where_angles_begin_again():
-    calm = [shown_as(bent(number, 178.0), lambda v: half_turn(180 + np.sign(0.5 - number) * (2 + np.abs(v - 178))))
-            for number in range(2)]  # fmt: skip
-    assert all(np.abs(np.diff(take.reference[:, 0])).max() < 90 for take in calm)
-    assert np.ptp(np.concatenate([take.reference[:, 0] for take in unwrapped(calm).takes])) < 120
+    takes = [
+        shown_as(bent(number, 178.0), lambda v, side=side: half_turn(180 + side * (2 + np.abs(v - 178))))
+        for number, side in enumerate((1, -1))
+    ]
+    assert all(np.abs(np.diff(take.reference[:, 0])).max() < 90 for take in takes)
+    assert np.ptp(np.concatenate([take.reference[:, 0] for take in unwrapped(takes).takes])) < 120
 
 
 def test_a_later_file_is_counted_as_the_takes_that_are_there():
     first = unwrapped([shown_as(bent(0, 178.0), half_turn)]).takes
-    later = unwrapped([shown_as(bent(1, 182.0), half_turn), bent(2, 178.0 - 360 * 0)], first).takes
+    later = unwrapped([shown_as(bent(1, 182.0), half_turn), bent(2, 178.0)], first).takes
     assert abs(np.mean(later[0].reference[:, 0]) - np.mean(first[0].reference[:, 0])) < 30
 
 

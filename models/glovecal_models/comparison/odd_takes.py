@@ -23,6 +23,8 @@ from glovecal_models.takes.take import Take
 
 FEWEST_TAKES = 3
 FEWEST_ROWS = 60
+MOST_ROWS = 1500
+"""Of a longer take every second, third ... row."""
 LEAST_ROTATION_SD_DEG = 3.0
 """A rotation that moved less in a take tells nothing of it."""
 LEAST_ODD_DEG = 5.0
@@ -68,8 +70,8 @@ class OddTake:
     @property
     def sentence(self) -> str:
         start = (
-            f"Take {self.take!r} does not fit the others: it is {self.error_deg:.1f} degrees off a line through"
-            f" them (they themselves at most {self.usual_deg:.1f})."
+            f"Take {self.take!r} does not fit the others: {self.error_deg:.1f} degrees off a line through"
+            f" them, which are at most {self.usual_deg:.1f} off."
         )
         if self.how == "nothing":
             return f"{start} No change of columns, signs, gains or clock makes it fit."
@@ -87,17 +89,20 @@ def odd_takes(takes: Sequence[Take], layout: Layout) -> tuple[OddTake, ...]:
     if not all(set(layout.sensors) <= set(take.sensors) for take in takes):
         return ()  # whoever works with them says which sensor is missing
     sums = [_Sums.of(take, layout) for take in takes]
-    left = [number for number, each in enumerate(sums) if each.is_told]
+    told = [number for number, each in enumerate(sums) if each.is_told]
+    most = (len(told) - 1) // 2
+    left, out = list(told), list[int]()
     found: list[OddTake] = []
-    most = (len(left) - 1) // 2
-    while len(left) >= FEWEST_TAKES and len(found) < most:
-        odd = _oddest([sums[number] for number in left])
-        if odd is None:
+    while not found and len(out) < most and len(left) >= FEWEST_TAKES:
+        suspect = _suspect([sums[number] for number in left])
+        if suspect is None:
             break
-        place, usual = odd
-        number = left.pop(place)
-        line = _Line.through([sums[each] for each in left])
-        found.append(_explained(number, takes[number], sums[number], line, usual))
+        out.append(left.pop(suspect))
+        rest = [sums[number] for number in left]
+        line, usual = _Line.through(rest), max(_errors(rest))
+        if all(_is_odd(sums[number], line, usual) for number in out):
+            found = [_explained(number, takes[number], sums[number], line, usual) for number in out]
+    left = left if found else told
     while len(left) >= FEWEST_TAKES and len(found) < most:
         far = _farthest([takes[number] for number in left], [sums[number] for number in left])
         if far is None:
@@ -118,6 +123,8 @@ class _Sums:
     """Of one take, for each of R rotations and S sensors, around the take's means."""
 
     layout: Layout
+    time_s: np.ndarray
+    """(N,)."""
     readings: np.ndarray
     """(N, S)."""
     angles: np.ndarray
@@ -126,7 +133,9 @@ class _Sums:
     @classmethod
     def of(cls, take: Take, layout: Layout) -> _Sums:
         order = [take.sensors.index(name) for name in layout.sensors]
-        return cls(layout, take.readings[:, order], take.reference_at_frames(layout.rotations))
+        some = slice(None, None, 1 + len(take.time_s) // MOST_ROWS)
+        angles = take.reference_at_frames(layout.rotations)
+        return cls(layout, take.time_s[some], take.readings[some][:, order], angles[some])
 
     @cached_property
     def told(self) -> np.ndarray:
@@ -202,29 +211,27 @@ class _Line:
         return cls(weight, told)
 
 
-def _oddest(sums: Sequence[_Sums]) -> tuple[int, float] | None:
-    """Place of the take that does not fit the rest, and the largest error of the rest without it."""
-    errors = [each.error(_Line.through(sums, [place])) for place, each in enumerate(sums)]
+def _suspect(sums: Sequence[_Sums]) -> int | None:
+    """Place of the take without which the others agree best; None where all agree."""
+    errors = _errors(sums)
     if max(errors) < LEAST_ODD_DEG:
         return None
-    # An odd take is among those that are farthest off: the others are only as far as it pulls the line.
+    # It is among those that are farthest off: the others are only as far off as it pulls the line.
     suspects = np.argsort(errors)[::-1][:MOST_SUSPECTS]
-    usual = {int(place): _largest_error(sums, int(place)) for place in suspects}
-    best = min(usual, key=lambda place: usual[place])
-    line = _Line.through(sums, [best])
-    error, spread = sums[best].error(line), sums[best].spread(line)
-    is_odd = (
-        error >= LEAST_ODD_DEG
-        and error >= TIMES_USUAL * max(usual[best], 1.0)
-        and error >= LEAST_SHARE * spread
-    )
-    return (best, usual[best]) if is_odd else None
+    return int(min(suspects, key=lambda place: float(np.square(_errors(sums, int(place))).sum())))
 
 
-def _largest_error(sums: Sequence[_Sums], without: int) -> float:
-    """Of the takes but one, each against the line through the rest of them."""
-    rest = [place for place in range(len(sums)) if place != without]
-    return max(sums[place].error(_Line.through(sums, [without, place])) for place in rest)
+def _errors(sums: Sequence[_Sums], without: int | None = None) -> list[float]:
+    """Of each take but one, against the line through the rest of them."""
+    gone = [] if without is None else [without]
+    return [
+        each.error(_Line.through(sums, [*gone, place])) for place, each in enumerate(sums) if place != without
+    ]
+
+
+def _is_odd(take: _Sums, line: _Line, usual: float) -> bool:
+    error = take.error(line)
+    return error >= max(LEAST_ODD_DEG, TIMES_USUAL * max(usual, 1.0), LEAST_SHARE * take.spread(line))
 
 
 def _farthest(takes: Sequence[Take], sums: Sequence[_Sums]) -> tuple[int, OddTake] | None:
@@ -268,7 +275,7 @@ def _explained(place: int, take: Take, sums: _Sums, line: _Line, usual: float) -
     """The simplest change that makes the take fit."""
     error = sums.error(line)
     least = MADE_TO_FIT * max(usual, 1.0)
-    tried = list(_changes(take, sums, line))
+    tried = list(_changes(sums, line))
     fits = [(how, left, change) for how, left, change in tried if left <= least and left < CLEARLY * error]
     if not fits:
         return OddTake(place, take.name, error, usual, "nothing", error, "")
@@ -286,9 +293,9 @@ def _lower(text: str) -> str:
     return text[0].lower() + text[1:]
 
 
-def _changes(take: Take, sums: _Sums, line: _Line) -> Iterator[tuple[How, float, str]]:
+def _changes(sums: _Sums, line: _Line) -> Iterator[tuple[How, float, str]]:
     """How, the error that is left, and a sentence's beginning: the simplest first."""
-    yield _shifted(take, sums, line)
+    yield _shifted(sums, line)
     yield _turned(sums, line)
     yield _other_sensors(sums, line)
     yield _other_rotations(sums, line)
@@ -300,20 +307,20 @@ def _changes(take: Take, sums: _Sums, line: _Line) -> Iterator[tuple[How, float,
     )  # fmt: skip
 
 
-def _shifted(take: Take, sums: _Sums, line: _Line) -> tuple[How, float, str]:
-    step = max(SHIFT_STEP_S, float(np.median(np.diff(take.time_s))))
-    longest = min(LONGEST_SHIFT_S, 0.25 * take.duration_s)
-    time = np.arange(take.time_s[0], take.time_s[-1], step)
+def _shifted(sums: _Sums, line: _Line) -> tuple[How, float, str]:
+    step = max(SHIFT_STEP_S, float(np.median(np.diff(sums.time_s))))
+    longest = min(LONGEST_SHIFT_S, 0.25 * float(sums.time_s[-1] - sums.time_s[0]))
+    time = np.arange(sums.time_s[0], sums.time_s[-1], step)
     shown = (sums.readings - sums.readings.mean(axis=0)) @ line.weight.T
     told = np.flatnonzero(sums.told & line.told)
-    at = np.column_stack([np.interp(time, take.time_s, shown[:, place]) for place in told])
+    at = np.column_stack([np.interp(time, sums.time_s, shown[:, place]) for place in told])
     angles = [sums.angles[:, place] for place in told]
     known = [np.isfinite(part) for part in angles]
     best, best_shift = np.inf, 0.0
     for shift in np.arange(-longest, longest + step / 2, step):
         squares = []
         for column, (part, mask) in enumerate(zip(angles, known, strict=True)):
-            there = np.interp(time + shift, take.time_s[mask], part[mask], np.nan, np.nan)
+            there = np.interp(time + shift, sums.time_s[mask], part[mask], np.nan, np.nan)
             away = there - at[:, column]
             squares.append(np.nanvar(away))
         error = float(np.sqrt(np.mean(squares)))
@@ -356,7 +363,8 @@ def _other_sensors(sums: _Sums, line: _Line) -> tuple[How, float, str]:
     def changed(order: np.ndarray) -> _Sums:
         return replace(sums, readings=sums.readings[:, order])
 
-    order = _best_order(len(sums.layout.sensors), lambda order: changed(order).error(line))
+    read = np.flatnonzero((line.weight != 0).any(axis=0))
+    order = _best_order(len(sums.layout.sensors), read, lambda order: changed(order).error(line))
     return _of_order("sensors", "sensor columns", sums.layout.sensors, order, changed, line)
 
 
@@ -366,7 +374,8 @@ def _other_rotations(sums: _Sums, line: _Line) -> tuple[How, float, str]:
     def changed(order: np.ndarray) -> _Sums:
         return replace(sums, angles=sums.angles[:, order])
 
-    order = _best_order(len(sums.layout.rotations), lambda order: changed(order).error(line))
+    told = np.flatnonzero(sums.told & line.told)
+    order = _best_order(len(sums.layout.rotations), told, lambda order: changed(order).error(line))
     return _of_order("rotations", "reference columns", sums.layout.rotations, order, changed, line)
 
 
@@ -391,33 +400,36 @@ def _of_order(
     return how, changed(order).error(line), text
 
 
-def _best_order(count: int, error: Callable[[np.ndarray], float]) -> np.ndarray:
-    """The order of columns with the smallest error: reversed, shifted, or by exchanges of two that help."""
-    places = np.arange(count)
-    starts = [places, places[::-1], *_reversed_parts(count), *(np.roll(places, by) for by in (1, -1))]
-    best = min(starts, key=error)
+def _best_order(count: int, some: np.ndarray, error: Callable[[np.ndarray], float]) -> np.ndarray:
+    """The order of ``count`` columns with the smallest error: ``some`` of them reversed, rolled by one, or
+    exchanged by twos as long as that helps."""
+    starts = []
+    for begin in range(len(some)):
+        for end in range(begin + 2, len(some) + 1):
+            part = some[begin:end]
+            starts += [
+                _moved(count, part, order) for order in (part[::-1], np.roll(part, 1), np.roll(part, -1))
+            ]
+    best = min([np.arange(count), *starts], key=error)
     least = error(best)
     while True:
-        tries = []
-        for one in range(count):
-            for other in range(one + 1, count):
-                order = best.copy()
-                order[[one, other]] = order[[other, one]]
-                tries.append((error(order), order))
-        if not tries:
-            return best
-        left, order = min(tries, key=lambda item: item[0])
-        if left >= KEPT * least:
+        tries = [_moved_in(best, one, other) for place, one in enumerate(some) for other in some[place + 1 :]]
+        order = min(tries, key=error, default=best)
+        if error(order) >= KEPT * least:
             return _put_back(best, error)
-        best, least = order, left
+        best, least = order, error(order)
 
 
-def _reversed_parts(count: int) -> Iterator[np.ndarray]:
-    for begin in range(count):
-        for end in range(begin + 3, count + 1):
-            order = np.arange(count)
-            order[begin:end] = order[begin:end][::-1]
-            yield order
+def _moved(count: int, places: np.ndarray, to: np.ndarray) -> np.ndarray:
+    order = np.arange(count)
+    order[places] = to
+    return order
+
+
+def _moved_in(order: np.ndarray, one: int, other: int) -> np.ndarray:
+    result = order.copy()
+    result[[one, other]] = order[[other, one]]
+    return result
 
 
 def _put_back(order: np.ndarray, error: Callable[[np.ndarray], float]) -> np.ndarray:
@@ -426,8 +438,7 @@ def _put_back(order: np.ndarray, error: Callable[[np.ndarray], float]) -> np.nda
     for one in range(len(order)):
         if best[one] != one:
             other = int(np.flatnonzero(best == one)[0])
-            tried = best.copy()
-            tried[[one, other]] = tried[[other, one]]
+            tried = _moved_in(best, one, other)
             left = error(tried)
             if left <= least * 1.02:
                 best, least = tried, left

@@ -188,23 +188,25 @@ MOST_TIMES = 4
 
 
 def jump_sentences(take: Take, jumps: Sequence[ReferenceJump]) -> list[str]:
-    """One for the angles of each rotation that come back, one for each step that stays."""
-    who, sentences = f"Take {take.name!r}", []
-    for rotation in dict.fromkeys(jump.rotation for jump in jumps):
-        own = [jump for jump in jumps if jump.rotation == rotation and jump.comes_back]
-        if own:
-            at = ", ".join(f"{jump.start_s:.2f}" for jump in own[:MOST_TIMES])
-            more = ", ..." * (len(own) > MOST_TIMES)
-            times = "once" if len(own) == 1 else f"{len(own)} times"
-            sentences.append(
-                f"{who}: the reference of {rotation} jumps away and back {times} while the sensors do not (by"
-                f" up to {max(jump.size_deg for jump in own):.0f} degrees; at {at}{more} s). These"
-                f" {sum(jump.rows for jump in own)} angles are left out of training and of errors."
-            )
-        sentences += [
-            f"{who}: the reference of {rotation} steps by {jump.size_deg:.0f} degrees at {jump.start_s:.2f} s"
-            " while the sensors do not, and stays. Did a marker swap?"
-            for jump in jumps
-            if jump.rotation == rotation and not jump.comes_back
+    """One for all angles that come back, one for each step that stays."""
+    who, away = f"Take {take.name!r}", [jump for jump in jumps if jump.comes_back]
+    sentences = []
+    if away:
+        times = sorted(jump.start_s for jump in away)
+        at = ", ".join(f"{each:.2f}" for each in times[:MOST_TIMES])
+        more = ", ..." * (len(times) > MOST_TIMES)
+        each = [
+            f"{name} {sum(jump.rows for jump in away if jump.rotation == name)}"
+            for name in dict.fromkeys(jump.rotation for jump in away)
         ]
-    return sentences
+        sentences.append(
+            f"{who}: reference angles jump away and back while the sensors do not, by up to"
+            f" {max(jump.size_deg for jump in away):.0f} degrees (at {at}{more} s; take check lists all)."
+            f" Left out of training and of errors: {', '.join(each)}."
+        )
+    return sentences + [
+        f"{who}: the reference of {jump.rotation} steps by {jump.size_deg:.0f} degrees at {jump.start_s:.2f}"
+        " s while the sensors do not, and stays. Did a marker swap?"
+        for jump in jumps
+        if not jump.comes_back
+    ]
