@@ -33,6 +33,8 @@ class Diagnosis(Shown):
 
     inner: InnerDiagnosis
     """``glovecal_models.diagnosis.diagnosis.Diagnosis``: evidence for each rotation and block of time."""
+    set_aside: tuple[str, ...] = ()
+    """A sentence on each take that does not fit the others, and what would make it fit."""
 
     @property
     def effect(self) -> str | None:
@@ -57,7 +59,7 @@ class Diagnosis(Shown):
         """What to know, the most important first."""
         from glovecal_models.diagnosis.text import diagnosis_sentences
 
-        return tuple(diagnosis_sentences(self.inner))
+        return (*self.set_aside, *diagnosis_sentences(self.inner))
 
     @property
     def not_identifiable(self) -> dict[str, str]:
@@ -109,12 +111,14 @@ def diagnose(
 ) -> Diagnosis:
     """Try every known effect on held-out takes, beside a control with the same freedom that cannot be right.
 
-    ``also``: effects of your own as text, such as ``"name = strap; columns = c.strap_n * own"``. ``seed`` is
-    of the controls. Raises BadInput, Cancelled.
+    A take that does not fit the others is set aside first, and told. ``also``: effects of your own as text,
+    such as ``"name = strap; columns = c.strap_n * own"``. ``seed`` is of the controls. Raises BadInput,
+    Cancelled.
     """
     from glovecal_models.calibration.model_recipe import declared_effects, repaired_takes, requested_effects
     from glovecal_models.calibration.training_settings import LINEAR_METHODS
     from glovecal_models.comparison.noise_floor import rotation_noise
+    from glovecal_models.comparison.odd_takes import fitting, odd_takes
     from glovecal_models.comparison.residuals import residuals
     from glovecal_models.diagnosis.diagnose import diagnose as diagnose_inner
     from glovecal_models.diagnosis.known_effect import known_effects
@@ -123,6 +127,9 @@ def diagnose(
     inner, takes = inner_model(model), takes_in(takes)
     own = declared(also)
     with library_call(progress) as report, known_by_name([*declared_effects(inner), *own]):
+        report("holding the takes against each other", 0.0)
+        odd = odd_takes(takes, inner.layout)
+        takes = fitting(takes, odd)
         report("measuring the noise floors", 0.0)
         noise = rotation_noise(residuals(inner, takes))
         found = diagnose_inner(
@@ -135,4 +142,4 @@ def diagnose(
             cancelled=cancelled,
             report=report,
         )
-    return Diagnosis(found)
+    return Diagnosis(found, tuple(item.set_aside for item in odd))

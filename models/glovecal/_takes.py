@@ -22,6 +22,11 @@ COLUMNS = (
 class Takes(Shown, list[Take]):
     """A list of takes that shows what they hold."""
 
+    def __init__(self, takes: Iterable[Take] = (), sentences: Sequence[str] = ()) -> None:
+        super().__init__(takes)
+        self.sentences = tuple(sentences)
+        """What was done to the takes on reading them, and what looks wrong."""
+
     def table(self) -> Table:
         """One row for each take."""
         rows = [
@@ -31,7 +36,8 @@ class Takes(Shown, list[Take]):
             )
             for item in self
         ]  # fmt: skip
-        return Table.of(COLUMNS, rows, before=[f"{len(self)} {'take' if len(self) == 1 else 'takes'}"])
+        count = f"{len(self)} {'take' if len(self) == 1 else 'takes'}"
+        return Table.of(COLUMNS, rows, before=[count], after=self.sentences)
 
     def worn(self, *wearings: str) -> Takes:
         """Those of the wearings of these names."""
@@ -55,19 +61,22 @@ def read_takes(
     were stamped in batches. Raises BadInput with file, line, column and value; nothing is half read.
     """
     from glovecal_models.calibration.samples import require_layout
+    from glovecal_models.takes.angles_on_a_circle import unwrapped
     from glovecal_models.takes.table import read_takes as read
+    from glovecal_models.takes.take_warnings import alike_once, take_warnings
 
     if reference is not None and len(paths) != 1:
         raise BadInput(f"one reference table belongs to one file of frames, not to {len(paths)}")
     beside = None if reference is None else Path(reference)
-    found = Takes()
+    found: list[Take] = []
     for path in paths:
         found += read(Path(path), beside, name=name, wearing=wearing, equal_times=equal_times)
     if layout is not None:
         wanted = layout_for(layout, found)
         for take in found:
             require_layout(take, wanted)
-    return found
+    circle = unwrapped(found)
+    return Takes(circle.takes, [*alike_once(circle.sentences), *take_warnings(circle.takes)])
 
 
 def write_takes(takes: Take | Iterable[Take], path: str | PathLike[str]) -> list[Path]:
@@ -78,11 +87,18 @@ def write_takes(takes: Take | Iterable[Take], path: str | PathLike[str]) -> list
     """
     from glovecal_models.takes.write_table import write_takes as write
 
-    return write(takes_in(takes), Path(path))
+    return write(_listed(takes), Path(path))
 
 
 def takes_in(takes: Take | Iterable[Take]) -> Sequence[Take]:
-    """One take or several as a list. Raises BadInput for anything else, and for none."""
+    """One take or several as they are worked with: a list, without reference angles that jump away and come
+    back. Raises BadInput for anything else, and for none."""
+    from glovecal_models.takes.reference_jumps import without_jumps
+
+    return [without_jumps(take) for take in _listed(takes)]
+
+
+def _listed(takes: Take | Iterable[Take]) -> Sequence[Take]:
     if isinstance(takes, Take):
         return [takes]
     if isinstance(takes, str | PathLike):

@@ -17,6 +17,9 @@ LONG_ENOUGH_S = 60
 def next_command(model: str, stored: Mapping[str, Any], subject: str = "") -> str:
     """For a diagnosis document of that model of ``subject``, also one that an earlier service stored."""
     found, short = current(stored), model[:SHORT]
+    if found.get("odd_takes"):
+        without = "".join(f" --leave-out {take['id']}" for take in found["odd_takes"])
+        return _train(subject, found.get("method") or "lmc_gpr") + without
     if found.get("reference_problems"):
         return f"glovecal take check {_take_of(found)}"
     named, following = found.get("named"), found.get("next_take")
@@ -65,12 +68,10 @@ def _train(subject: str, method: str) -> str:
 
 
 def _take_of(found: Mapping[str, Any]) -> str:
-    """The take that the first problem speaks of, else the first of all."""
-    names = [take["name"] for take in found.get("takes") or ()]
-    problem = found["reference_problems"][0]
-    spoken_of = [name for name in names if f"take {name}:" in problem]
-    name = (spoken_of or names or ["TAKE"])[0]
-    return f"'{name}'" if " " in name else name
+    """The id of the take that the first problem speaks of, else of the first: names need not be unique."""
+    takes, problem = found.get("takes") or (), found["reference_problems"][0]
+    spoken_of = [take for take in takes if f"take {take['name']}:" in problem]
+    return next((take["id"] for take in (*spoken_of, *takes)), "TAKE")
 
 
 def _is_on_rotations(found: Mapping[str, Any]) -> bool:

@@ -27,6 +27,7 @@ from glovecal_models.ceiling.black_box_ceiling import black_box_ceiling
 from glovecal_models.ceiling.ceiling import Ceiling
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.noise_floor import noise_floors
+from glovecal_models.comparison.odd_takes import OddTake, fitting, odd_takes
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.actions import Action
 from glovecal_models.diagnosis.diagnose import diagnose
@@ -65,12 +66,16 @@ def improve(
 ) -> Improvement:
     """Train, then add what the diagnosis names while it pays. Raises NotTrainable, BadInput, Cancelled.
 
-    Errors are on ``holdout`` when given, else on held-out takes. ``ceiling``: see at the end whether anything
+    Takes that do not fit the others are set aside first. Errors are on ``holdout`` when given, else on
+    held-out takes. ``ceiling``: see at the end whether anything
     is left to gain from what was recorded; needs the extra ``ceiling`` of this package.
     """
     settings = settings or TrainingSettings()
+    odd = odd_takes(takes, layout)
+    if len(take_hashes) == len(takes):
+        take_hashes = fitting(take_hashes, odd)
     loop = _Loop(
-        takes,
+        fitting(takes, odd),
         layout,
         subject,
         settings,
@@ -81,6 +86,7 @@ def improve(
         cancelled,
         report,
     )
+    loop.odd_takes = odd
     loop.start()
     while len(loop.steps) <= max_steps and loop.go_on():
         pass
@@ -119,6 +125,8 @@ class _Loop:
         self.errors = HeldOutErrors({}, {})
         self.has_looked = False
         self.found_before = FoundBefore()
+        self.odd_takes: tuple[OddTake, ...] = ()
+        """Set aside, as they do not fit the others."""
 
     def start(self) -> None:
         """The base model and its error."""
@@ -182,7 +190,7 @@ class _Loop:
         self._say("done", 1.0)
         return Improvement(
             tuple(self.steps), floors, stopped, self.diagnosis, tuple(self.trials), scale,
-            tuple(take_warnings(self.takes)), self.usable,
+            (*(item.set_aside for item in self.odd_takes), *take_warnings(self.takes)), self.usable,
             self.takes[0].duration_s if len(self.takes) == 1 and not self.holdout else None, found,
         )  # fmt: skip
 

@@ -78,7 +78,7 @@ def stuck(time_s: np.ndarray, readings: np.ndarray, low: float, high: float, mov
     """Runs of one value for a second or more, outside the ends of the range ``low`` to ``high``.
 
     ``moved`` (N,) is what the reference has travelled, in multiples of what must be seen; a run counts
-    when it travels by one or more inside it.
+    when it travels by one or more inside it. A reference that does so within one frame jumps instead.
     """
     found = np.zeros(len(readings), dtype=bool)
     margin = GRADUAL_SHARE * (high - low)
@@ -89,8 +89,9 @@ def stuck(time_s: np.ndarray, readings: np.ndarray, low: float, high: float, mov
     possible = lasts & (within | never_changes)
     for first, after in zip(start[possible], end[possible], strict=True):
         inside = moved[first:after]
-        inside = inside[np.isfinite(inside)]
-        found[first:after] = len(inside) > 1 and np.ptp(inside) >= 1.0
+        steps = np.diff(inside[np.isfinite(inside)])
+        path = np.cumsum(np.where(np.abs(steps) < 1.0, steps, 0.0))
+        found[first:after] = len(path) > 0 and np.ptp(path, axis=0) >= 1.0
     return found
 
 

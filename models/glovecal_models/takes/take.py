@@ -15,6 +15,21 @@ LONGEST_INTERPOLATED_GAP_S = 0.1
 
 
 @dataclass(frozen=True)
+class ReferenceJump:
+    """Rows of one rotation's reference that stand apart from those before and after."""
+
+    rotation: str
+    start_s: float
+    """Of the first of them, on the reference's clock; ``end_s`` of the last."""
+    end_s: float
+    rows: int
+    size_deg: float
+    """How far away they are, degrees at most; of a step that stays, its height."""
+    comes_back: bool
+    """False: a step that stays, at ``start_s``."""
+
+
+@dataclass(frozen=True)
 class Take:
     """A continuous recording inside one wearing.
 
@@ -48,6 +63,8 @@ class Take:
     reference_sd: np.ndarray | None = None
     """Standard deviation of each reference angle as its source states it, shape (R, len(rotations)), degrees;
     NaN where no angle was measured, and in whole columns that state none. None: nothing is stated."""
+    left_out: tuple[ReferenceJump, ...] = ()
+    """Angles that were measured and are NaN in ``reference``, as they jump away and come back."""
 
     def __post_init__(self) -> None:
         frames, rows = len(self.time_s), len(self.reference_time_s)

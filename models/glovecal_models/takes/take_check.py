@@ -9,7 +9,8 @@ import numpy as np
 from glovecal_models.takes.dead_sensor import dead_sensors
 from glovecal_models.takes.frame_times import time_unit_warning
 from glovecal_models.takes.reference_check import frames_with_reference, radians_problem, reference_warnings
-from glovecal_models.takes.take import Take
+from glovecal_models.takes.reference_jumps import jump_sentences, reference_jumps
+from glovecal_models.takes.take import ReferenceJump, Take
 
 GAP_INTERVALS = 2.5
 """An interval longer than this many median ones is a gap: at least one frame in between is missing."""
@@ -55,6 +56,8 @@ class TakeCheck:
     """Frames, and seconds, recorded before the take was asked for."""
     sensors: tuple[SensorRange, ...]
     rotations: tuple[RotationRange, ...]
+    jumps: tuple[ReferenceJump, ...]
+    """Where the reference jumps while the sensors do not."""
     sentences: tuple[str, ...]
 
 
@@ -66,6 +69,7 @@ def check_take(take: Take) -> TakeCheck:
     changed = take.readings[1:] != take.readings[:-1]
     repeated = float((~changed.any(axis=1)).mean()) if len(changed) else 0.0
     sensors = tuple(_sensor(take, index, changed[:, index]) for index in range(len(take.sensors)))
+    jumps = reference_jumps(take)
     return TakeCheck(
         rate_hz=None if typical is None else 1.0 / typical,
         gaps=gaps,
@@ -78,10 +82,12 @@ def check_take(take: Take) -> TakeCheck:
         rotations=tuple(
             item for index in range(len(take.rotations)) if (item := _rotation(take, index)) is not None
         ),
+        jumps=jumps,
         sentences=(
             *_frame_warnings(take, intervals, gaps, repeated, sensors),
             *reference_warnings(take),
             *_radians(take),
+            *jump_sentences(take, jumps),
         ),
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from glovecal_models.takes.reference_jumps import jump_sentences
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.take_check import check_take
 
@@ -14,13 +15,20 @@ _NUMBER = re.compile(r"[0-9]+(\.[0-9]+)?(e[-+]?[0-9]+)?")
 
 def take_warnings(takes: Sequence[Take]) -> list[str]:
     """The sentences of ``check_take``; of those that differ in numbers alone the first, and how many more."""
+    return alike_once([each for take in takes if len(take.time_s) for each in check_take(take).sentences])
+
+
+def left_out_sentences(takes: Sequence[Take]) -> list[str]:
+    """On reference angles that are left out of the takes, as they jump away and come back."""
+    return alike_once([each for take in takes for each in jump_sentences(take, take.left_out)])
+
+
+def alike_once(sentences: Sequence[str]) -> list[str]:
+    """Of those that differ in numbers alone the first, and how many more."""
     alike: dict[str, list[str]] = {}
-    for take in takes:
-        if not len(take.time_s):
-            continue
-        for sentence in check_take(take).sentences:
-            alike.setdefault(kind_of(sentence), []).append(sentence)
-    return [_summarized(sentences) for sentences in alike.values()]
+    for sentence in sentences:
+        alike.setdefault(kind_of(sentence), []).append(sentence)
+    return [_summarized(some) for some in alike.values()]
 
 
 def kind_of(sentence: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from glovecal_models.calibration.model import CalibrationModel
@@ -11,11 +11,13 @@ from glovecal_models.calibration.model_recipe import declared_effects, repaired_
 from glovecal_models.calibration.training_settings import LINEAR_METHODS
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.noise_floor import rotation_noise
+from glovecal_models.comparison.odd_takes import fitting, odd_takes
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.known_effect import known_effects
 from glovecal_models.effects.catalogue import effect_of_declaration, known_by_name
 from glovecal_models.progress import Report
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.take_warnings import left_out_sentences
 from glovecal_service.jobs.ceiling import known_ceiling
 from glovecal_service.jobs.job_kind import JobPlan, Step, Task, TaskResult
 from glovecal_service.jobs.model_work import ModelWork, takes_of, text_in
@@ -52,7 +54,10 @@ class DiagnoseJob:
 
         def finish(results: Sequence[TaskResult]) -> dict[str, Any]:
             named = [{"id": take.id, "name": take.name} for take in takes]
-            facts = {**results[0].facts, "model": record.id, "takes": named}
+            odd = [{**item, "id": takes[item.pop("place")].id} for item in results[0].facts["odd_takes"]]
+            facts = {**results[0].facts, "model": record.id, "method": record.method, "takes": named}
+            facts["odd_takes"] = odd
+            facts["left_out"] = left_out_sentences(on.takes)
             facts["model_effects"] = [effect_view(item) for item in on.model.effects]
             facts["ceiling"] = known_ceiling(store, record)
             return DiagnosisResult.model_validate(facts).document()
@@ -70,12 +75,15 @@ def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> T
     from glovecal_models.diagnosis.diagnose import diagnose  # heavy, and many commands run no job
 
     model = work.on.model
+    report("holding the takes against each other", 0.0)
+    odd = odd_takes(work.on.takes, model.layout)
+    takes = fitting(work.on.takes, odd)
     report("measuring the noise floors", 0.0)
-    floors = floors_of(model, work.on.takes)
+    floors = floors_of(model, takes)
     own = [effect_of_declaration(item) for item in work.declarations]
     with known_by_name([*declared_effects(model), *own]):
         found = diagnose(
-            repaired_takes(work.on.takes, requested_effects(model)),
+            repaired_takes(takes, requested_effects(model)),
             model.layout,
             linear=model.method in LINEAR_METHODS,
             known=known_effects(model),
@@ -84,7 +92,8 @@ def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> T
             cancelled=cancelled,
             report=report,
         )
-    return TaskResult({}, DiagnosisView.of(found).document())
+    facts = [{**asdict(item), "sentence": item.sentence} for item in odd]
+    return TaskResult({}, {**DiagnosisView.of(found).document(), "odd_takes": facts})
 
 
 def floors_of(model: CalibrationModel, takes: Sequence[Take]) -> dict[str, NoiseFloor]:

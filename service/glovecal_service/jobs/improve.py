@@ -129,6 +129,8 @@ def _keep(
     """Store each step's model under the one before it; the result with their ids."""
     steps: list[dict[str, Any]] = []
     parent: str | None = None
+    learned = set(load(result.arrays["model0"].tobytes()).takes) if result.facts["steps"] else set()
+    takes = [take for take in takes if take.artifact in learned]
     for number, step in enumerate(result.facts["steps"]):
         model = load(result.arrays[f"model{number}"].tobytes())
         model = replace(model, parent=parent)

@@ -17,6 +17,7 @@ from glovecal_models.calibration.text import order_sentences, plan_sentences, we
 from glovecal_models.calibration.training import assemble
 from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
 from glovecal_models.calibration.training_settings import LINEAR_METHODS, TrainingSettings
+from glovecal_models.comparison.odd_takes import odd_takes
 from glovecal_models.errors import BadInput, NotTrainable
 from glovecal_models.progress import Report
 from glovecal_models.regression.kernel_scores import choice_of, kernel_sentences
@@ -60,7 +61,7 @@ class TrainJob:
             fits = [_fit_result(result) for result in results]
             model = taught.finished(assemble(plan, fits, take_hashes=hashes, parent=parent))
             order = order_confounding(taught.takes)
-            said = [*taught.sentences, *order_sentences(order)]
+            said = [*taught.sentences, *_odd_sentences(taught, records), *order_sentences(order)]
             facts = _facts(model, plan, records, said) | {"settings": asdict(settings)}
             facts["confounded_order"] = _confounded(order)
             return _keep(store, model, layout_name, facts, activate=bool(payload.get("activate", False)))
@@ -172,6 +173,16 @@ def _facts(
         "simulated": model.simulated,
         "camera_ranges": camera_range_views(plan.camera_ranges),
     }
+
+
+def _odd_sentences(taught: TrainingTakes, records: Sequence[TakeRecord]) -> list[str]:
+    """On takes that do not fit the others; they are trained on all the same, as they were asked for."""
+    if len(taught.takes) != len(records):
+        return []
+    return [
+        f"{item.sentence} To train without it: --leave-out {records[item.place].id}"
+        for item in odd_takes(taught.takes, taught.layout)
+    ]
 
 
 def _confounded(order: Sequence[OrderConfounding]) -> list[dict[str, Any]]:

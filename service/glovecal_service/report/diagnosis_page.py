@@ -89,6 +89,8 @@ def diagnosis_page(
         Section("Details", [_details(found, takes)]),
     ]
     notes = [
+        *_warned("Takes set aside", [item["sentence"] for item in found.get("odd_takes") or ()]),
+        *_warned("Left out of the reference", found.get("left_out")),
         *_warned("Problems of the reference", found.get("reference_problems")),
         *_warned("Found in the recording", [item["sentence"] for item in found.get("findings") or ()]),
         *next_take_note(found.get("next_take")),

@@ -27,7 +27,9 @@ def reuse_takes(store: Store, record: SamplingRecord, subject: str) -> tuple[lis
     for id in record.takes:
         accounting = store.takes.get(id).accounting or {}
         try:
-            take, document = for_other_subject(store.takes.load(id), accounting["sampling"], record.subject)
+            take, document = for_other_subject(
+                store.takes.load_recorded(id), accounting["sampling"], record.subject
+            )
         except BadInput as error:
             left_out.append(str(error))
             continue

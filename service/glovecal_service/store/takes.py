@@ -15,6 +15,7 @@ from glovecal_models.layout import Layout
 from glovecal_models.names import check_identifier
 from glovecal_models.takes.camera_reference.camera_reference import CAMERA_PATCHES
 from glovecal_models.takes.clock_scan import aligned
+from glovecal_models.takes.reference_jumps import without_jumps
 from glovecal_models.takes.take import Take, poses_at_frames
 from glovecal_service.store import tables
 from glovecal_service.store.artifacts import Artifacts, check_sha256
@@ -34,6 +35,10 @@ CLOCK_OFFSET = "clock_offset_s"
 CAMERA_REFERENCE = "camera_reference"
 """Fact of a take whose reference a camera measured: its clock offset with its standard deviation, in seconds,
 and the range of each rotation that it saw; None where another reference came after."""
+
+
+UNWRAPPED = "unwrapped"
+"""Fact of a take: sentences on angles of its reference that are counted past a full turn."""
 
 
 class Takes:
@@ -120,6 +125,11 @@ class Takes:
             return sound_rows(connection, tables.takes, statement, _record, wanted)
 
     def load(self, id: str) -> Take:
+        """The take as it is worked with: ``load_recorded`` without angles that jump away and come back.
+        Raises NotFound, DamagedArtifact."""
+        return without_jumps(self.load_recorded(id))
+
+    def load_recorded(self, id: str) -> Take:
         """The take's arrays, verified, with what is known of its glove. Raises NotFound, DamagedArtifact."""
         record = self.get(id)
         with self._database.read() as connection:
@@ -160,7 +170,7 @@ class Takes:
             | dict(context or {}),
             poses=take.poses if poses is None else poses_at_frames(take.time_s, time_s, poses),
         )
-        stale = {CLOCK_OFFSET: 0.0, CLOCK_UNKNOWN: False, CAMERA_REFERENCE: None}
+        stale = {CLOCK_OFFSET: 0.0, CLOCK_UNKNOWN: False, CAMERA_REFERENCE: None, UNWRAPPED: []}
         stale = {name: stale[name] for name in stale if name in earlier.facts}
         return self._replace(earlier, take, stale | dict(facts or {}))
 

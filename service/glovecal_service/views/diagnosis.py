@@ -313,10 +313,30 @@ class TakeNamed(View):
     name: str
 
 
+class OddTakeView(View):
+    id: str
+    take: str = Field(description="Its name.")
+    sentence: str
+    how: str = Field(
+        description="What makes it fit: shift, signs, sensors or rotations (columns in another order),"
+        " columns (either), gains, own map; level: its readings lie elsewhere; nothing."
+    )
+    error_deg: float = Field(description="Of a line through the other takes.")
+    usual_deg: float = Field(description="The same of the other takes, at most.")
+    fitted_deg: float = Field(description="With what makes it fit.")
+
+
 class DiagnosisResult(DiagnosisView):
     """Of a ``diagnose`` job."""
 
     model: str
+    method: str | None = None
+    odd_takes: list[OddTakeView] = Field(
+        [], description="Takes that do not fit the others; nothing else was judged on them."
+    )
+    left_out: list[str] = Field(
+        [], description="On reference angles that jump away and come back: left out everywhere."
+    )
     takes: list[TakeNamed] = Field([])
     model_effects: list[EffectView] = Field([], description="What the model has learned already.")
     ceiling: CeilingView | None = Field(None, description="Of the model; null: not asked for yet.")

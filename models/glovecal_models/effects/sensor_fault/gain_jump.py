@@ -78,7 +78,8 @@ def gain_jump(
     shown = np.isfinite(angles)
     every = np.column_stack([np.ones(shown.sum()), (angles[shown] - angle.mean()) / spread])
     error, change = readings[shown] - every @ before, every @ (after - before)
-    if not _is_abrupt(time_s[shown], error, change, int(np.searchsorted(time_s[shown], time[cut]))):
+    at = int(np.searchsorted(time_s[shown], time[cut]))
+    if not _is_abrupt(time_s[shown], error, readings[shown], change, at):
         return None
     return GainJump(float(time[cut]), size, two / max(one, 1e-300))
 
@@ -114,8 +115,11 @@ def _line_left(sums: np.ndarray) -> np.ndarray:
     return np.maximum(syy - np.where(sxx > 1e-9, sxy**2 / np.maximum(sxx, 1e-9), 0.0), 0.0)
 
 
-def _is_abrupt(time: np.ndarray, error: np.ndarray, change: np.ndarray, cut: int) -> bool:
-    """Whether the error against the first line steps near the cut by what the lines differ there."""
+def _is_abrupt(
+    time: np.ndarray, error: np.ndarray, readings: np.ndarray, change: np.ndarray, cut: int
+) -> bool:
+    """Whether the error against the first line, and the reading, step near the cut by what the lines differ
+    there; where the reading does not, the reference jumps."""
     elapsed = np.diff(time, prepend=time[:1])
     # Across frames that were left out a movement looks like a step.
     adjacent = elapsed <= GAP_INTERVALS * float(np.median(elapsed))
@@ -128,7 +132,9 @@ def _is_abrupt(time: np.ndarray, error: np.ndarray, change: np.ndarray, cut: int
     before, after = slice(max(at - AROUND_FRAMES, 0), at), slice(at, at + AROUND_FRAMES)
     around = np.concatenate([steps[before], steps[at + 1 : at + 1 + AROUND_FRAMES]])
     kept = abs(float(np.median(error[after]) - np.median(error[before]))) if at else 0.0
-    if kept < STEP_SHARE * expected:
+    if kept < STEP_SHARE * expected or not at:
+        return False
+    if (readings[at] - readings[at - 1]) * np.sign(error[at] - error[at - 1]) < STEP_SHARE * steps[at]:
         return False
     limit = max(
         STEP_SHARE * expected,

@@ -30,6 +30,8 @@ DROPOUT_SHARE = 0.05
 DROPOUT_SPREADS = 8.0
 """Times the robust spread of a frame's change against the reference."""
 BEFORE_FRAMES = 5
+READING_SHARE = 0.5
+"""Of a jump against the reference, which the reading's own jump must be: else the reference jumps."""
 ALIKE = 0.5
 """The jump back is between this share of the jump away and its inverse."""
 
@@ -109,7 +111,10 @@ def small_dropouts(
     jump = change - median_of_five(np.pad(change, 2, mode="symmetric"))
     spread = 1.4826 * float(np.median(np.abs(jump[known])))
     limit = max(DROPOUT_SPREADS * spread, 4.0 * smallest_step(readings), DROPOUT_SHARE * span)
-    places = 1 + np.flatnonzero(np.abs(jump[1:]) > limit)
+    own = np.diff(readings, prepend=readings[:1])
+    own -= median_of_five(np.pad(own, 2, mode="symmetric"))
+    shown = own * np.sign(jump) >= READING_SHARE * np.abs(jump)
+    places = 1 + np.flatnonzero((np.abs(jump) > limit)[1:] & shown[1:])
     level = np.cumsum(change)
     at = 0
     while at + 1 < len(places):

@@ -28,6 +28,14 @@ app.command("holds")(holds.holds)
 app.command("motion")(motion.motion)
 app.command("video")(video.video)
 
+JUMPS = {
+    "rotation": "reference jumps",
+    "start_s": "from (s)",
+    "end_s": "to (s)",
+    "rows": "rows",
+    "size_deg": "by (deg)",
+    "left_out": "left out",
+}
 CONFLICT = 409
 """The service's answer when a take is two tables."""
 FORMATS = (".csv", ".parquet")
@@ -67,6 +75,10 @@ def check(take: Take, as_json: AsJson = False) -> None:
     print_table(
         found["rotations"], rotations, empty="No reference angles: nothing to train on or compare with."
     )
+    if found["jumps"]:
+        out.print()
+        jumps = [{**item, "left_out": item["comes_back"]} for item in found["jumps"]]
+        print_table(jumps, JUMPS, empty="")
     for sentence in found["sentences"]:
         err.print(sentence, style="yellow")
 

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+
+import numpy as np
 
 from glovecal_models.calibration.samples import require_layout
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
+from glovecal_models.takes.angles_on_a_circle import unwrapped
 from glovecal_models.takes.take import Take
-from glovecal_models.takes.take_warnings import take_warnings
+from glovecal_models.takes.take_warnings import alike_once, take_warnings
 from glovecal_service.store.errors import Conflict, DamagedRows
 from glovecal_service.store.records import TakeRecord
 from glovecal_service.store.store import Store
 
 MADE_OF_COLUMNS = "auto-"
 """Begins the names of layouts that an import made."""
+NEAR_A_HALF_TURN_DEG = 120.0
+"""Angles that stay below are counted as they are, whatever other takes hold."""
 
 
 @dataclass(frozen=True)
@@ -64,19 +69,22 @@ def import_takes(
     chosen = known or _layout_of_columns(store, takes)
     for take in takes:
         _require_fits(take, chosen)
-    stored = {
-        record.name: record
-        for record in store.takes.list(subject=subject, layout=chosen.name)
-        if record.original_sha256 == original_sha256
-    }
+    stored_before = store.takes.list(subject=subject, layout=chosen.name)
+    stored = {item.name: item for item in stored_before if item.original_sha256 == original_sha256}
     existing = {take.name: _same(take, stored[take.name]) for take in takes if take.name in stored}
     new = [take for take in takes if take.name not in stored]
+    beside = _newest_measured(store, stored_before, new)
+    circle = unwrapped(new, [] if beside is None else [store.takes.load(beside.id)])
     with ExitStack() as undo:
         if is_new:
             store.subjects.create(subject)
             undo.callback(store.subjects.remove, subject)
         added = store.takes.add_all(
-            new, subject=subject, layout=chosen.name, source="import", original_sha256=original_sha256
+            circle.takes,
+            subject=subject,
+            layout=chosen.name,
+            source="import",
+            original_sha256=original_sha256,
         )
         undo.pop_all()
     by_name = existing | {record.name: record for record in added}
@@ -84,9 +92,26 @@ def import_takes(
         chosen.name,
         [by_name[take.name] for take in takes],
         {record.id for record in existing.values()},
-        take_warnings(takes),
+        [*alike_once(circle.sentences), *take_warnings(_now_unwrapped(takes, circle.takes))],
         is_new,
     )
+
+
+def _now_unwrapped(takes: Sequence[Take], new: Sequence[Take]) -> list[Take]:
+    by_name = {take.name: take for take in new}
+    return [by_name.get(take.name, take) for take in takes]
+
+
+def _newest_measured(store: Store, records: Sequence[TakeRecord], new: Sequence[Take]) -> TakeRecord | None:
+    """The take whose angles tell from where those of ``new`` are counted; None where nothing is near a half
+    turn, or nothing was measured before."""
+    near = {
+        name
+        for take in new
+        for name, angles in zip(take.rotations, take.reference.T, strict=True)
+        if np.nanmax(np.abs(angles), initial=0.0) > NEAR_A_HALF_TURN_DEG
+    }
+    return next((item for item in reversed(records) if near & set(item.rotations)), None)
 
 
 def _require_no_other_owner(store: Store, original_sha256: str, subject: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -12,6 +13,7 @@ from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel, Field
 
 from glovecal_models.errors import BadInput
+from glovecal_models.takes.angles_on_a_circle import unwrapped
 from glovecal_models.takes.camera_reference.camera_reference import CAMERA_PATCHES, reference_from_camera
 from glovecal_models.takes.camera_reference.estimates import read_estimates
 from glovecal_models.takes.table import read_reference
@@ -22,7 +24,7 @@ from glovecal_service.rest.http.request_types import IdInPath
 from glovecal_service.rest.take.takes import Take
 from glovecal_service.rest.take.uploads import TABLE_BODY, FileName, file_name, keep_table
 from glovecal_service.store.records import TakeRecord
-from glovecal_service.store.takes import CAMERA_REFERENCE
+from glovecal_service.store.takes import CAMERA_REFERENCE, UNWRAPPED
 from glovecal_service.views.camera_range import CameraRangeView, camera_range_views
 
 router = APIRouter(prefix="/takes", tags=["takes"])
@@ -70,9 +72,18 @@ def _attach(parts: Parts, id: str, named: tuple[str, Path], clock: ReferenceCloc
             422, "bad-take-table", f"{path.name} holds no rows for take {record.name!r}", file=path.name
         )
     time_s = _on_take_clock(rows.time_s, clock, record)
-    return parts.store.takes.attach_reference(
-        id, time_s, rows.rotations, rows.reference, rows.poses, reference_sd=rows.reference_sd
+    take = replace(
+        parts.store.takes.load(id),
+        reference_time_s=time_s,
+        rotations=rows.rotations,
+        reference=rows.reference,
+        reference_sd=rows.reference_sd,
     )
+    circle = unwrapped([take])
+    return parts.store.takes.attach_reference(
+        id, time_s, rows.rotations, circle.takes[0].reference, rows.poses, reference_sd=rows.reference_sd,
+        facts={UNWRAPPED: list(circle.sentences)} if circle.sentences else None,
+    )  # fmt: skip
 
 
 def _on_take_clock(time_s: np.ndarray, clock: ReferenceClock, record: TakeRecord) -> np.ndarray:

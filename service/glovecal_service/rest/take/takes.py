@@ -30,6 +30,7 @@ from glovecal_service.rest.http.request_types import (
 )
 from glovecal_service.rest.take.uploads import MEDIA_TYPES, TableFormat
 from glovecal_service.store.records import TakeRecord, incomplete_sentences
+from glovecal_service.store.takes import UNWRAPPED
 
 router = APIRouter(prefix="/takes", tags=["takes"])
 
@@ -74,6 +75,15 @@ class RotationRangeView(BaseModel):
     high_deg: float
 
 
+class ReferenceJumpView(BaseModel):
+    rotation: str
+    start_s: float = Field(description="On the reference's clock, as `time_s` of the take.")
+    end_s: float
+    rows: int
+    size_deg: float
+    comes_back: bool = Field(description="Its angles are left out of training and of errors.")
+
+
 class CheckView(BaseModel):
     take: Take
     rate_hz: float | None = Field(description="By the median interval between frames.")
@@ -87,6 +97,7 @@ class CheckView(BaseModel):
     pre_roll_s: float
     sensors: list[SensorRangeView]
     rotations: list[RotationRangeView]
+    jumps: list[ReferenceJumpView] = Field(description="Where the reference jumps while the sensors do not.")
     sentences: list[str] = Field(description="What looks wrong.")
 
 
@@ -112,7 +123,11 @@ def get_take(id: IdInPath, store: StoreNeeded) -> TakeRecord:
 def check_one_take(id: IdInPath, store: StoreNeeded) -> dict[str, Any]:
     record = store.takes.get(id)
     found = plain(asdict(check_take(store.takes.load(id))))
-    return {"take": record, **found, "sentences": [*incomplete_sentences([record]), *found["sentences"]]}
+    return {
+        "take": record,
+        **found,
+        "sentences": [*incomplete_sentences([record]), *record.facts.get(UNWRAPPED, ()), *found["sentences"]],
+    }
 
 
 class TakeLayout(StrictBody):
@@ -164,7 +179,7 @@ def export_take(
     part: Literal["all", "frames", "reference"] = "all",
 ) -> FileResponse:
     """A take whose reference has a clock of its own is two tables: ask for each `part` (409 for `all`)."""
-    take = store.takes.load(id)
+    take = store.takes.load_recorded(id)
     folder = tempfile.TemporaryDirectory(prefix="glovecal-export-")
     try:
         path = _chosen_part(write_takes([take], Path(folder.name) / f"{id}.{format}"), part, take)
