@@ -287,7 +287,7 @@ def _insert(connection: Connection, take: Take, record: TakeRecord) -> None:
 def _require(connection: Connection, id: str) -> TakeRecord:
     row = connection.execute(select(tables.takes).where(tables.takes.c.id == id)).one_or_none()
     if row is None:
-        raise NotFound(f"there is no take {id!r}")
+        raise NotFound(f"there is no take {id!r}. List them: glovecal take list")
     return _record(sound_row(tables.takes, row))
 
 

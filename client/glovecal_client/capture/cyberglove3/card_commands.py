@@ -13,6 +13,7 @@ from glovecal_client.capture.cyberglove3.clock_poll import ClockReading, read_cl
 from glovecal_client.capture.cyberglove3.conversation import ask, battery_volts, command, question, quiet
 from glovecal_client.capture.stream.links import Link
 from glovecal_client.errors import BadOption, DeviceLost
+from glovecal_client.names import did_you_mean
 
 COMMANDS = {
     "status": "battery, clock, active file, files and free space",
@@ -30,7 +31,7 @@ _FREE = re.compile(rb"([0-9]+)MB left")
 def run_command(link: Link, name: str, argument: str, frame_rate: float) -> dict[str, Any]:
     """Carry out one of ``COMMANDS`` on a glove that does not stream now. Raises DeviceLost, BadOption."""
     if name not in COMMANDS:
-        raise BadOption(f"no command {name!r}; there are {', '.join(COMMANDS)}")
+        raise BadOption(f"no command {name!r}; {did_you_mean(name, COMMANDS)}")
     quiet(link)
     if name == "start":
         _open_file(link, argument)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -22,9 +23,10 @@ from glovecal_models.errors import (
     LayoutMismatch,
     NotTrainable,
 )
+from glovecal_models.names import did_you_mean
 from glovecal_service.plain import plain_text
 from glovecal_service.rest.http.problem import Problem
-from glovecal_service.rest.http.request_types import MEANING
+from glovecal_service.rest.http.request_types import LONGEST_SHOWN, MEANING
 from glovecal_service.store.errors import Conflict, NotFound, StorageFull, StoreDamaged, StoreUnavailable
 
 MOST_FIELD_PROBLEMS = 20
@@ -72,7 +74,7 @@ def problem_of(error: Exception) -> Problem:
 
 
 def invalid_request(errors: Sequence[Any]) -> Problem:
-    """422 from pydantic's findings. The input is left out: it may be huge, secret, or not JSON."""
+    """422 from pydantic's findings. Of the input names alone are shown: it may be huge, or secret."""
     fields = [
         {
             "location": plain_text(".".join(map(str, item["loc"])), 200),
@@ -86,8 +88,14 @@ def invalid_request(errors: Sequence[Any]) -> Problem:
 
 
 def _what_is_right(item: Mapping[str, Any]) -> str:
-    pattern = item.get("ctx", {}).get("pattern")
-    return MEANING.get(pattern) or plain_text(item["msg"], 300)
+    given, context = item.get("input"), item.get("ctx", {})
+    is_name = isinstance(given, str) and given.isprintable() and 0 < len(given) <= LONGEST_SHOWN
+    if meaning := MEANING.get(context.get("pattern")):
+        return f"{given!r} is not allowed; {meaning}" if is_name else meaning
+    if item["type"] == "literal_error" and is_name:
+        meant = did_you_mean(given, re.findall("'([^']*)'", context["expected"]))
+        return f"{given!r} is not known; {meant}"
+    return plain_text(item["msg"], 1000)
 
 
 def storage_full(detail: str) -> Problem:
