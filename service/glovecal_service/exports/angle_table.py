@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from glovecal_models.takes.write_table import write_columns
+from glovecal_models.takes.write_table import SIMULATED_CONTEXT, write_columns
 from glovecal_service.exports.export_format import ExportFormat
 from glovecal_service.exports.hand_motion import Content, HandMotion
 from glovecal_service.exports.markers import markers
@@ -24,7 +24,7 @@ def write_table(motions: Sequence[HandMotion], content: Content, path: Path) -> 
         hand = f"{motion.label}." if len(motions) > 1 else ""
         columns |= {f"{hand}{name}": values for name, values in _columns(motion, content).items()}
     if any(motion.simulated for motion in motions):
-        columns["simulated"] = np.ones(len(time_s))
+        columns[f"c.{SIMULATED_CONTEXT}"] = np.ones(len(time_s))
     write_columns(columns, path)
 
 

@@ -30,6 +30,8 @@ from glovecal_service.exports.hand_motion import Content, HandMotion, at_times
 
 MOST_FRAMES = 1_000_000
 MM_PER_UNIT = 10.0
+STEP_DIGITS = 9
+"""Of the frame time, seconds."""
 ORDER = "ZXY"
 """Of a bone's three turns. The middle one, about the finger's length, stays far from 90 degrees."""
 SIMULATED = "SimulatedGlove"
@@ -44,7 +46,7 @@ def write_bvh(motions: Sequence[HandMotion], content: Content, path: Path) -> No
         motion.require_angles(content)
         if motion.frame is not None:
             raise BadInput("BVH puts hands on a body at rest; hands placed by markers go into .trc")
-    time_s = _even_times(motions[0].time_s)
+    time_s, step_s = _even_times(motions[0].time_s)
     hands = {motion.label: _Hand.moving(at_times(motion, time_s)) for motion in motions}
     length = float(np.mean([motion.skeleton.dimensions.hand_length_mm for motion in motions]))
     for label in SIDES:
@@ -57,7 +59,7 @@ def write_bvh(motions: Sequence[HandMotion], content: Content, path: Path) -> No
         turns |= hand.turns(label)
     if any(motion.simulated for motion in motions):
         bones.append(Bone(SIMULATED, ROOT, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-    path.write_text(_text(bones, turns, time_s), encoding="ascii", newline="\n")
+    path.write_text(_text(bones, turns, len(time_s), step_s), encoding="ascii", newline="\n")
 
 
 @dataclass(frozen=True)
@@ -141,14 +143,15 @@ def _places(skeleton: Skeleton) -> Iterator[tuple[int, int]]:
         yield joint, last
 
 
-def _even_times(time_s: np.ndarray) -> np.ndarray:
+def _even_times(time_s: np.ndarray) -> tuple[np.ndarray, float]:
     if len(time_s) < 2:
         raise BadInput(f"{len(time_s)} frames are no motion; BVH needs two or more")
-    step = float(np.median(np.diff(time_s)))
-    count = round((time_s[-1] - time_s[0]) / step) + 1
+    lasts = float(time_s[-1] - time_s[0])
+    count = round(lasts / float(np.median(np.diff(time_s)))) + 1
     if count > MOST_FRAMES:
         raise BadInput(f"{count} frames on even steps are too many; at most {MOST_FRAMES}")
-    return np.minimum(time_s[0] + step * np.arange(count), time_s[-1])
+    step = round(lasts / (count - 1), STEP_DIGITS)  # as it is written, or frames run away from it
+    return np.minimum(time_s[0] + step * np.arange(count), time_s[-1]), step
 
 
 def _held(degrees: np.ndarray) -> np.ndarray:
@@ -163,7 +166,7 @@ def _vector(values: np.ndarray) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _text(bones: Sequence[Bone], turns: dict[str, np.ndarray], time_s: np.ndarray) -> str:
+def _text(bones: Sequence[Bone], turns: dict[str, np.ndarray], count: int, step_s: float) -> str:
     from scipy.spatial.transform import Rotation  # slow to load, and every command that exports loads this
 
     children: dict[str | None, list[Bone]] = {}
@@ -194,7 +197,6 @@ def _text(bones: Sequence[Bone], turns: dict[str, np.ndarray], time_s: np.ndarra
 
     root = children[None][0]
     write(root, 0)
-    count = len(time_s)
     columns = [np.tile(np.array(root.offset_mm) / MM_PER_UNIT, (count, 1))]
     for name in order:
         found = turns.get(name)
@@ -203,8 +205,7 @@ def _text(bones: Sequence[Bone], turns: dict[str, np.ndarray], time_s: np.ndarra
             if found is None
             else Rotation.from_matrix(found).as_euler(ORDER, degrees=True)
         )
-    step = (time_s[-1] - time_s[0]) / (count - 1)
-    lines += ["MOTION", f"Frames: {count}", f"Frame Time: {step:.9f}"]
+    lines += ["MOTION", f"Frames: {count}", f"Frame Time: {step_s:.{STEP_DIGITS}f}"]
     for row in (np.concatenate(columns, axis=1) + 0.0).tolist():
         lines.append(" ".join(f"{value:.6f}" for value in row))
     return "\n".join(lines) + "\n"

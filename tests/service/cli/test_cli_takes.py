@@ -342,13 +342,24 @@ def test_units_that_look_wrong_are_told_once_for_all_files_by_every_import(run: 
     assert "The same in 2 more files.\n" in improved.err
 
 
+def _exported(run: Run, folder: Path, take: str) -> Path:
+    assert run("take", "export", take, folder / "take.csv").code == 0
+    return folder / "take.csv"
+
+
 def test_a_take_becomes_a_motion_file(anna: Run, tmp_path: Path) -> None:
     take = anna("take", "list", "--json").json[0]["name"]
     file = tmp_path / "hand.trc"
     made = anna("take", "motion", file, take, "--content", "raw")
     assert made.code == 0, made.err
     assert made.out.strip() == f"Wrote {file}."
-    assert file.read_text().startswith("PathFileType\t4\t(X/Y/Z)\tmotion.trc (simulated)\n")
+    assert file.read_text().startswith(f"PathFileType\t4\t(X/Y/Z)\t{file.name} (simulated)\n")
     assert "--overwrite" in anna("take", "motion", file, take).said
+    table = tmp_path / "readings.csv"
+    assert anna("take", "motion", table, take, "--content", "raw").code == 0
+    (again,) = read_takes(table)
+    (exported,) = (one for one in read_takes(_exported(anna, tmp_path, take)))
+    assert again.simulated
+    assert np.array_equal(again.readings, exported.readings)
     assert "no model of anna" in anna("take", "motion", tmp_path / "a.trc", take).said
     assert "must end in .trc" in anna("take", "motion", tmp_path / "a.fbx", take).said

@@ -75,6 +75,7 @@ def motion(
             "models": model or [],
             "content": content,
             "format": chosen.suffix.removeprefix("."),
+            "file_name": file.name,
             "shifts_s": shift or [],
             "claps": claps,
             "wrist": wrist,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Annotated
 
 from fastapi import APIRouter
@@ -13,6 +13,7 @@ from fastapi.responses import FileResponse
 from pydantic import Field, FiniteFloat
 from starlette.background import BackgroundTask
 
+from glovecal_client.operating_system import name_for_a_file
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.rotations import PALM
 from glovecal_models.takes.common_event import common_events
@@ -22,7 +23,7 @@ from glovecal_service.exports.hand_motion import Content, HandMotion, on_one_tim
 from glovecal_service.exports.take_motion import motion_of
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
-from glovecal_service.rest.http.request_types import ModelReference, StrictBody, TakeReference
+from glovecal_service.rest.http.request_types import ModelReference, StrictBody, TakeReference, Title
 from glovecal_service.rest.take.hands import hand_alignment
 from glovecal_service.store.errors import Conflict, NotFound
 
@@ -31,6 +32,8 @@ router = APIRouter(prefix="/motion", tags=["takes"])
 MOST_HANDS = 2
 LARGEST_SHIFT_S = 1e9
 CLAPS_WITHIN_S = 5.0
+LONGEST_NAME = 50
+"""Characters of a file's name, four bytes each at most."""
 MarkerNames = Annotated[list[Annotated[str, Field(min_length=1, max_length=64)]], Field(max_length=4)]
 Shift = Annotated[FiniteFloat, Field(ge=-LARGEST_SHIFT_S, le=LARGEST_SHIFT_S)]
 
@@ -63,6 +66,9 @@ class Motion(StrictBody):
     )
     format: Annotated[str, Field(pattern=r"^[a-z0-9]{1,16}$")] = Field(
         "trc", description=f"One of {', '.join(suffix[1:] for suffix in FORMATS)}."
+    )
+    file_name: Annotated[Title, Field(min_length=1)] = Field(
+        "motion", description="That the file is to have; TRC names itself in its first line."
     )
     shifts_s: Annotated[list[Shift], Field(max_length=MOST_HANDS)] = Field(
         default_factory=list,
@@ -114,7 +120,8 @@ def export_motion(body: Motion, parts: PartsNeeded) -> FileResponse:
         hands = _with_body(parts, body, body.body, hands)
     folder = tempfile.TemporaryDirectory(prefix="glovecal-motion-")
     try:
-        path = Path(folder.name, f"motion{chosen.suffix}")
+        name = PurePosixPath(body.file_name).name.removesuffix(chosen.suffix)[:LONGEST_NAME] or "motion"
+        path = Path(folder.name, name_for_a_file(name + chosen.suffix))
         chosen.write(hands, body.content, path)
     except BaseException:
         folder.cleanup()
