@@ -4,12 +4,26 @@ from __future__ import annotations
 
 from glovecal_models.errors import BadInput
 from glovecal_models.names import did_you_mean
-from glovecal_service.vendor_calibrations import asr, opengloves, shadow_xml, shadow_yaml, virtualhand
+from glovecal_service.vendor_calibrations import (
+    asr,
+    lerobot,
+    opengloves,
+    shadow_xml,
+    shadow_yaml,
+    virtualhand,
+)
 from glovecal_service.vendor_calibrations.calibration_format import CalibrationFormat
 
 FORMATS: dict[str, CalibrationFormat] = {
     one.name: one
-    for one in (virtualhand.FORMAT, asr.FORMAT, shadow_xml.FORMAT, shadow_yaml.FORMAT, opengloves.FORMAT)
+    for one in (
+        virtualhand.FORMAT,
+        asr.FORMAT,
+        shadow_xml.FORMAT,
+        shadow_yaml.FORMAT,
+        opengloves.FORMAT,
+        lerobot.FORMAT,
+    )
 }
 
 

@@ -23,6 +23,7 @@ COMMANDS = {
 }
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,7}(\.[A-Za-z0-9]{1,3})?")
 """Names as a card of its time takes them: 8.3."""
+_WHOLE_ECHO_TRIES = 5
 _TEXT_END = re.compile(rb"\0\Z")
 _OPENED = re.compile(rb"[\0\x01]\Z")
 _FREE = re.compile(rb"([0-9]+)MB left")
@@ -89,6 +90,15 @@ def _open_file(link: Link, name: str) -> None:
 
 
 def _text(link: Link, query: bytes) -> str:
-    """What a query answers, without its echo and the NUL."""
-    heard = question(link, query, _TEXT_END)
-    return heard.replace(query, b"", 1).rstrip(b"\0").decode("latin-1")
+    """What a query answers, without its echo and the NUL. Raises DeviceLost when no echo comes whole.
+
+    What is left of an echo that lost a byte cannot be told from the beginning of a file's name.
+    """
+    for _ in range(_WHOLE_ECHO_TRIES):
+        heard = question(link, query, _TEXT_END)
+        if heard.startswith(query):
+            return heard[len(query) :].rstrip(b"\0").decode("latin-1")
+    raise DeviceLost(
+        f"the glove answers {query!r} with {heard[:24]!r}, whose beginning is damaged each time: check its "
+        "cable or WiFi"
+    )
