@@ -34,6 +34,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -55,6 +56,8 @@ OWN_PYTHON = {
     "UV_PYTHON_INSTALL_DIR": str(TOOLS / "python"),
 }
 PRODUCT = ("models", "client", "service")
+STOPPING = ("SIGTERM", "SIGHUP", "SIGINT")
+"""Windows has not all of them."""
 OTHER_SYSTEMS = ("Windows", "Darwin")
 NOT_THE_SAME = """
     asyncio concurrent ctypes errno faulthandler fcntl locale mmap msvcrt multiprocessing os pathlib pty
@@ -121,7 +124,31 @@ def run(*command: str, groups: tuple[str, ...] = (), dev: bool = False, beside: 
     if not os.access(Path.home(), os.W_OK):
         environment.setdefault("UV_CACHE_DIR", str(TOOLS / "cache"))
     find_python(environment)
-    return subprocess.run([*uv(), *quiet, *options, *command], cwd=ROOT, env=environment).returncode
+    return exit_code_of([*uv(), *quiet, *options, *command], environment)
+
+
+def exit_code_of(command: list[str], environment: dict[str, str] | None = None) -> int:
+    """Of a process that is asked to stop when this one is, so that it leaves nothing running."""
+    process = subprocess.Popen(command, cwd=ROOT, env=environment)
+
+    def pass_on(number: int, _frame: object) -> None:
+        if number != signal.SIGINT or not is_at_terminal():  # whose Ctrl-C reaches both
+            process.send_signal(number)
+
+    for name in STOPPING:
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, pass_on)
+    return process.wait()
+
+
+def is_at_terminal() -> bool:
+    """Whether keys typed at a terminal reach this process and those that it started."""
+    try:
+        with open("/dev/tty", "rb") as terminal:
+            return os.tcgetpgrp(terminal.fileno()) == os.getpgrp()
+    except (OSError, AttributeError):
+        return sys.platform == "win32"
 
 
 def demo(arguments: list[str]) -> int:
@@ -203,7 +230,7 @@ def picture(arguments: list[str]) -> int:
 
 def fresh(arguments: list[str]) -> int:
     """Needs no locked package: nothing is installed for it."""
-    return subprocess.run([sys.executable, "tests/fresh/fresh.py", *arguments], cwd=ROOT).returncode
+    return exit_code_of([sys.executable, "tests/fresh/fresh.py", *arguments])
 
 
 def containers(arguments: list[str]) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from glovecal_client.errors import BadName
-from glovecal_client.names import check_identifier
+from glovecal_client.names import check_identifier, did_you_mean
 
 ROOT = "glovecal"
 PLANES = ("raw", "pose", "pose/meta", "pose/explain", "status", "meta", "alive", "log", "control", "picture")
@@ -84,7 +84,7 @@ def all_gloves(site: str, plane: str) -> str:
     """Key expression for one plane of every glove of a site, such as ``glovecal/lab/*/raw``."""
     check_identifier(site, "site")
     if plane not in PLANES:
-        raise BadName(f"plane: {plane!r} does not exist; there are {', '.join(PLANES)}")
+        raise BadName(f"plane: {plane!r} does not exist; {did_you_mean(plane, PLANES)}")
     return f"{ROOT}/{site}/*/{plane}"
 
 

@@ -5,7 +5,9 @@ The rule is the same as in glovecal_models, which the client must not import; a 
 
 from __future__ import annotations
 
+import difflib
 import re
+from collections.abc import Iterable
 
 from glovecal_client.errors import BadName
 
@@ -13,6 +15,8 @@ IDENTIFIER = re.compile(r"[a-z0-9][a-z0-9_-]{0,63}\Z")
 CHANNEL = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}\Z")
 DEVICES = {"con", "prn", "aux", "nul"} | {f"{port}{n}" for port in ("com", "lpt") for n in range(10)}
 """Identifiers that no file can have on Windows; a data folder may be moved there."""
+MOST_LISTED = 24
+"""Names in a sentence; an unknown one is mostly a slip of the finger, and the nearest comes first."""
 
 
 def check_identifier(name: str, what: str) -> str:
@@ -38,3 +42,16 @@ def check_channel_name(name: str, what: str) -> str:
 def subject_name(name: str) -> str:
     """A subject's name as it is stored, which is in lower case: ``Anna`` is ``anna``. Raises BadName."""
     return check_identifier(name.lower() if name.isascii() else name, "subject")
+
+
+def did_you_mean(name: str, known: Iterable[str], *, there: str = "there are") -> str:
+    """What follows an unknown ``name`` in a sentence: the nearest of ``known``, and which there are."""
+    names = list(dict.fromkeys(known))
+    if not names:
+        return f"{there} none"
+    shown = ", ".join(names[:MOST_LISTED])
+    more = f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else ""
+    listed = f"{there} {shown}{more}"
+    plain = {each.casefold(): each for each in reversed(names)}
+    near = difflib.get_close_matches(name.casefold(), plain, n=1)
+    return f"did you mean {plain[near[0]]!r}? {listed[:1].upper()}{listed[1:]}" if near else listed

@@ -127,8 +127,9 @@ class RestClient:
     ) -> dict[str, Any]:
         """Import a take table, streamed from disk, with its reference table if that is a second file.
 
-        ``options`` are ``name``, ``wearing``, ``equal_times`` and ``create_subject``. The answer holds
-        ``takes``, ``imported``, ``existing`` (ids), ``layout``, ``subject_created`` and ``warnings``.
+        ``options`` are ``name``, ``wearing``, ``equal_times``, ``create_subject`` and ``replace``. The answer
+        holds ``takes``, ids in ``imported``, ``existing`` and ``replaced``, ``layout``, ``subject_created``,
+        and ``warnings``.
         """
         query: dict[str, str | bool] = {"subject": subject, "filename": file.name, **options}
         if layout is not None:

@@ -9,6 +9,7 @@ from glovecal._shown import Shown
 from glovecal._table import Column, Table
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 
 Kind = TypeVar("Kind", bound=type[Effect])
 COLUMNS = (Column("effect"), Column("kind"), Column("context"), Column("explanation"))
@@ -22,7 +23,7 @@ class Catalogue(Mapping[str, Effect], Shown):
 
     def __getitem__(self, name: str) -> Effect:
         if name not in self._known:
-            raise KeyError(f"no effect {name!r}; there are {', '.join(self._known)}")
+            raise KeyError(f"no effect {name!r}; {did_you_mean(name, self._known)}")
         return self._known[name]
 
     def __iter__(self) -> Iterator[str]:

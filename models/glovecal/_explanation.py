@@ -11,6 +11,7 @@ from glovecal._model import CalibrationModel, inner_model
 from glovecal._shown import Shown
 from glovecal._table import Column, Table
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 from glovecal_models.takes.take import Take
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ class Explanation(Shown):
                 for term in item.terms:
                     found[term.name] = found.get(term.name, 0.0) + term.degrees
                 return found
-        raise BadInput(f"rotation {rotation!r} is not explained; there are {', '.join(self.rotations)}")
+        raise BadInput(f"rotation {rotation!r} is not explained; {did_you_mean(rotation, self.rotations)}")
 
     def table(self) -> Table:
         """One row for each term, then one for the angle."""

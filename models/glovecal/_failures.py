@@ -15,6 +15,7 @@ from glovecal._shown import Shown
 from glovecal._table import Column, Table
 from glovecal._takes import takes_in
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 from glovecal_models.takes.take import Take
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ class WhereItFails(Shown):
         for item in self.inner.rotations:
             if item.rotation == rotation:
                 return item
-        raise BadInput(f"no rotation {rotation!r} was measured; there are {', '.join(self.rotations)}")
+        raise BadInput(f"no rotation {rotation!r} was measured; {did_you_mean(rotation, self.rotations)}")
 
 
 def _dependence(found: RotationFindings, column: str | None) -> Dependence:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from glovecal_models.errors import BadLayout, reason_of
 from glovecal_models.layout import BUILT_IN, Layout
+from glovecal_models.names import did_you_mean
 from glovecal_models.takes.take import Take
 
 LayoutLike = Layout | str | PathLike[str] | None
@@ -25,7 +26,8 @@ def read_layout(layout: str | PathLike[str]) -> Layout:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise BadLayout(
-            f"no layout {str(layout)!r}: there is no such file, and built in are {', '.join(BUILT_IN)}"
+            f"no layout {str(layout)!r}: there is no such file; "
+            + did_you_mean(str(layout), BUILT_IN, there="built in are")
         ) from None
     except (OSError, UnicodeDecodeError) as error:
         raise BadLayout(f"layout {path}: cannot be read: {reason_of(error)}") from error

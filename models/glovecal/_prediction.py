@@ -14,6 +14,7 @@ from glovecal._plotting import axes_for, finished
 from glovecal._shown import Shown
 from glovecal._table import Cell, Column, Table
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 from glovecal_models.takes.take import Take
 
 if TYPE_CHECKING:
@@ -62,7 +63,8 @@ class Angles(Shown):
         chosen = self.rotations if rotations is None else tuple(rotations)
         unknown = [name for name in chosen if name not in self.rotations]
         if unknown:
-            raise BadInput(f"no rotation {unknown[0]!r} was predicted; there are {', '.join(self.rotations)}")
+            meant = did_you_mean(unknown[0], self.rotations)
+            raise BadInput(f"no rotation {unknown[0]!r} was predicted; {meant}")
         axes = axes_for(ax)
         for name in chosen:
             mean, sd = (item[:, self.rotations.index(name)] for item in (self.mean_deg, self.sd_deg))

@@ -13,6 +13,7 @@ from glovecal._table import Table
 from glovecal._takes import Takes
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
+from glovecal_models.names import did_you_mean
 
 if TYPE_CHECKING:
     from glovecal_models.simulation.session import RecordedSession
@@ -80,7 +81,7 @@ def simulate(
         plan = SessionPlan.of_layout(given, **size)
     unknown = [name for name in on or () if name not in plan.sensors]
     if unknown:
-        raise BadInput(f"no sensor {unknown[0]!r}; there are {', '.join(plan.sensors)}")
+        raise BadInput(f"no sensor {unknown[0]!r}; {did_you_mean(unknown[0], plan.sensors)}")
     channels = None if on is None else tuple(on)
     causes = [] if effect is None else [Cause(effect, form, strength_deg=strength_deg, channels=channels)]
     with library_call():

@@ -21,6 +21,7 @@ from typing import NoReturn
 import numpy as np
 
 from glovecal_models.errors import BadInput, BadLayout
+from glovecal_models.names import did_you_mean
 
 LONGEST_TEXT = 500
 DEEPEST = 30
@@ -87,7 +88,8 @@ def check_names(nodes: Collection[Node], known: Collection[str], *, source: str)
         for name in node.names:
             if name not in known:
                 what = "context column" if name.startswith("c.") else "signal or parameter"
-                raise BadInput(f"{source}: no {what} {name!r}; known are {', '.join(known)}")
+                meant = did_you_mean(name, known, there="known are")
+                raise BadInput(f"{source}: no {what} {name!r}; {meant}")
 
 
 @dataclass(frozen=True)
@@ -241,7 +243,7 @@ class _Reader:
         if token not in self._functions:
             if self.kind == "sign" and self.token == "(":
                 raise BadInput(
-                    f"{self._source}: no function {token!r}; there are {', '.join(self._functions) or 'none'}"
+                    f"{self._source}: no function {token!r}; {did_you_mean(token, self._functions)}"
                 )
             return self._node("name", start)
         self._need("(")

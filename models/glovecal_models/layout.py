@@ -21,7 +21,7 @@ import numpy as np
 from glovecal_models.documents import read_toml
 from glovecal_models.errors import BadInput, BadLayout
 from glovecal_models.expression import SensorExpression
-from glovecal_models.names import check_channel_name
+from glovecal_models.names import check_channel_name, did_you_mean
 
 CorrespondenceKind = Literal["1S1R", "MS1R", "0S1R", "MSMR"]
 BUILT_IN = (
@@ -86,7 +86,8 @@ class Layout:
             if item.rotation == rotation:
                 return item
         raise BadLayout(
-            f"layout {self.name!r} has no rotation {rotation!r}; it has {', '.join(self.rotations)}"
+            f"layout {self.name!r} has no rotation {rotation!r}; "
+            + did_you_mean(rotation, self.rotations, there="it has")
         )
 
     @classmethod
@@ -102,7 +103,7 @@ class Layout:
     def built_in(cls, name: str) -> Layout:
         """One of ``BUILT_IN``. Raises BadLayout."""
         if name not in BUILT_IN:
-            raise BadLayout(f"no built-in layout {name!r}; there are {', '.join(BUILT_IN)}")
+            raise BadLayout(f"no built-in layout {name!r}; {did_you_mean(name, BUILT_IN)}")
         return cls.from_toml(built_in_toml(name), source=name)
 
     @classmethod
@@ -147,7 +148,8 @@ _KEYS = {
 def _from_document(document: Mapping[str, Any], source: str) -> Layout:
     unknown = set(document) - _KEYS
     if unknown:
-        raise BadLayout(f"{source}: unknown key {sorted(unknown)[0]!r}; known are {', '.join(sorted(_KEYS))}")
+        key = sorted(unknown)[0]
+        raise BadLayout(f"{source}: unknown key {key!r}; {did_you_mean(key, sorted(_KEYS))}")
     sensors = _names(document.get("sensors"), "sensors", source)
     if not sensors:
         raise BadLayout(f'{source}: no sensors; give sensors = ["NAME", ...]')

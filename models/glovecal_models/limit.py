@@ -12,6 +12,7 @@ from dataclasses import Field, dataclass, field, fields, replace
 from typing import Any, TypeVar, cast
 
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 
 _KEY = "limit"
 Number = TypeVar("Number", int, float)
@@ -44,7 +45,7 @@ def with_limits(limits: Limits, values: Mapping[str, Any]) -> Limits:
     known = {item.name: item for item in _limits_in(type(limits))}
     for name, value in values.items():
         if name not in known:
-            raise BadInput(f"there is no limit {name!r}; there are {', '.join(sorted(known))}")
+            raise BadInput(f"there is no limit {name!r}; {did_you_mean(name, sorted(known))}")
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise BadInput(f"limit {name} has to be a number, not {value!r}")
         if isinstance(known[name].default, int) and not isinstance(value, int):

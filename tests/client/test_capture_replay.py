@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from glovecal_client import Frame, FrameLog, encode_frame
 from glovecal_client.capture.device import Reading, build_device
 from glovecal_client.capture.replay import ReplayDevice
 from glovecal_client.errors import BadOption, DeviceFinished
+from glovecal_models.takes.table import read_takes
 
 TABLE = """time_s,take,s.A,s.B,r.A,c.supply_v
 10.00,one,1,2,0.5,4.9
@@ -168,3 +170,32 @@ def test_a_table_of_simulated_takes_is_replayed_as_simulated(tmp_path):
     assert simulated.context == ("supply_v",)
     assert not ReplayDevice(table(tmp_path, marked.format(mark="0.0"))).simulated
     assert not ReplayDevice(table(tmp_path)).simulated
+
+
+def test_a_table_is_replayed_as_it_is_imported(tmp_path: Path) -> None:
+    text = (
+        '\ufeff\r\ntime_s, take , s.A, s.B,c.simulated\r\n0, one, 1, 2.5, 1\r\n\r\n0.01, one,"3", "4",1\r\n'
+    )
+    path = table(tmp_path, text)
+    (take,) = read_takes(path)
+    device = ReplayDevice(path, speed=1000)
+    played = play(device)
+    assert device.sensors == take.sensors == ("A", "B")
+    assert np.array([reading.readings for reading in played]).tolist() == take.readings.tolist()
+    assert device.simulated == take.simulated
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("sep=,\n" + TABLE, "remove the lines above"),
+        (
+            TABLE.replace("10.00,", "s,,raw,raw,deg,V\n10.00,", 1),
+            "'raw' is no number; remove this line if it",
+        ),
+        (TABLE.replace("10.01,", "# a cable moved\n10.01,", 1), "line 3 has 1 values, the header 6; remove"),
+    ],
+)
+def test_lines_that_are_no_rows_are_to_be_removed(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(BadOption, match=re.escape(said)):
+        play(ReplayDevice(table(tmp_path, text), speed=1000))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import socket
 import sys
 import time
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -18,12 +19,14 @@ from test_cyberglove_driver import in_layout_order
 from glovecal_client.capture.device import Device, Reading, build_device
 from glovecal_client.capture.reopening_device import ReopeningDevice
 from glovecal_client.errors import DeviceLost
+from glovecal_models.layout import Layout
 from glovecal_service.emulators.catalogue import PROTOCOLS, faults_of
 from glovecal_service.emulators.cyberglove.emulated import EmulatedCyberGlove
 from glovecal_service.emulators.emulation import Emulation
 from glovecal_service.emulators.glove import EmulatedGlove
 from glovecal_service.emulators.hand import MovingHand
 from glovecal_service.emulators.line_glove import DESCRIPTION
+from glovecal_service.emulators.opencyberglove import EmulatedOpenCyberGlove
 from glovecal_service.emulators.ports import Port, TcpDialer, UdpSender
 from glovecal_service.emulators.pseudo_terminal import PseudoTerminal
 
@@ -337,4 +340,43 @@ def test_a_closed_driver_stops_the_stream_of_a_cyberglove3(tmp_path: Path) -> No
         readings(both.device, 3)
         both.device.close()
         eventually(lambda: both.glove.commands[-1] == b"\x03", "it was told to stop", 5)  # type: ignore[attr-defined]
-        assert both.glove.commands[:7] == [b"\x03", b"V", b"1eu", b"1dw", b"1m\x04", b"1S", b"\x03"]  # type: ignore[attr-defined]
+        assert both.glove.commands[:5] == [b"\x03", b"V", b"1eu", b"1dw", b"1m\x04"]  # type: ignore[attr-defined]
+        assert both.glove.commands[5:9] == [b"1u\x01", b"1w\x01", b"1S", b"\x03"]  # type: ignore[attr-defined]
+
+
+def test_a_rate_that_another_program_divided_is_whole_again(tmp_path: Path) -> None:
+    with pair("cyberglove3", tmp_path) as both:
+        both.glove.dividers.update(u=3, w=3)  # type: ignore[attr-defined]
+        opened(both.device)
+        readings(both.device, 3)
+        assert both.glove.dividers == {"s": 1, "u": 1, "w": 1}  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("asked", [0, 1])
+def test_what_is_left_of_an_echo_is_no_part_of_a_file_name(asked: int, tmp_path: Path) -> None:
+    with pair("cyberglove3", tmp_path, "dropped-echo") as both:
+        both.glove.card["lefty.dat"] = both.glove.card["MONDAY.DAT"] = b""  # type: ignore[attr-defined]
+        opened(both.device)
+        readings(both.device, 3)
+        for _ in range(asked):  # every second echo is damaged: another one now
+            both.device.command("set-clock", "")  # type: ignore[attr-defined]
+        assert both.device.command("status", "")["files"] == ["lefty.dat", "MONDAY.DAT"]  # type: ignore[attr-defined]
+
+
+def test_a_bent_joint_moves_the_sensor_that_the_opencyberglove_layout_reads() -> None:
+    layout = Layout.built_in("opencyberglove")
+    glove = EmulatedOpenCyberGlove()
+    for rotation in layout.rotations:
+        glove.hand = OneJoint(rotation)  # type: ignore[assignment]
+        (sensor,) = layout.correspondence(rotation).sensors
+        assert layout.sensors[int(np.argmax(glove.values(0.0)))] == sensor
+
+
+class OneJoint:
+    """A hand of which one joint is bent."""
+
+    def __init__(self, bent: str) -> None:
+        self._bent = bent
+
+    def bent(self, _time_s: float) -> Mapping[str, float]:
+        return defaultdict(float, {self._bent: 1.0})

@@ -41,3 +41,31 @@ def test_the_held_part_counts_not_the_way_into_it() -> None:
 def test_sequences_without_a_common_shape_are_refused() -> None:
     with pytest.raises(BadInput, match="no shape is in both"):
         session_drift({"flat": shape(1, 0, 1)}, {"fist": shape(1, 0, 1)}, None)
+
+
+def test_hands_that_never_held_a_shape_have_no_drift() -> None:
+    start, end = ({name: moving(seed + at) for at, name in enumerate(SHAPES)} for seed in (100, 200))
+    with pytest.raises(BadInput, match=r"no shape was held at both ends.*flat: the hand moved in the first"):
+        session_drift(start, end, None)
+
+
+def test_what_was_not_held_or_is_another_shape_is_left_out() -> None:
+    start = {name: shape(at, 0.0, at) for at, name in enumerate(SHAPES)}
+    end = {name: shape(at, 3.0, 10 + at) for at, name in enumerate(SHAPES)}
+    end["spread"] = moving(7)
+    end["o-pinky"] = shape(0, 3.0, 30)
+    found = session_drift(start, end, None)
+    assert found.shapes == ("flat", "fist", "o-index")
+    assert "moved in the last by" in found.left_out["spread"]
+    assert found.left_out["o-pinky"] == "at the end the hand looks like flat"
+    np.testing.assert_allclose(found.common_counts, [3.0, -6.0], atol=0.4)
+    assert "Left out: spread, the hand moved" in drift_sentence(found)
+
+
+def moving(seed: int) -> Take:
+    """Four seconds of a hand that bends and stretches all the time."""
+    random = np.random.default_rng(seed)
+    time_s = np.arange(240) / 60
+    phase = random.uniform(0, 6, 2)
+    readings = 80 + 80 * np.sin(3 * time_s[:, None] + phase) + random.normal(0, 1, (240, 2))
+    return Take("t", "w", SENSORS, time_s, readings)

@@ -64,6 +64,19 @@ BROKEN = [
     ("time_s,pose,s.A\n0," + "x" * 300 + ",1\n", 2, "pose", "300 characters"),
     ("time_s,s.A\n0," + "9" * 200_000 + "\n", 2, None, "field larger"),
     ('time_s,s.A\n0,"1\n1,2\n', 2, None, "quote"),
+    ('time_s,s.A\n0,"1,321"\n', 2, "s.A", "(a separator of thousands? write 1321; a decimal comma? write a"),
+    ('time_s,s.A\n0,"-12.321.000,5"\n', 2, "s.A", "write -12321000.5;"),
+    ('time_s,s.A\n0,"0,321"\n', 2, "s.A", "write a decimal point"),
+    ("time_s,s.A\n0,1 321\n", 2, "s.A", "write 1321;"),
+    ("sep=,\ntime_s,s.A\n0,1\n", 1, None, "remove this line"),
+    ("sep=;\ntime_s;s.A\n0;1\n", 1, None, "remove this line"),
+    ("# of Monday\ntime_s,s.A\n0,1\n", 1, None, "a comment; remove this line"),
+    ("Glove,right\nRate,60\ntime_s,s.A\n0,1\n", 1, None, "named in line 3; remove the lines above it"),
+    ("time_s,s.A\ns,counts\n0,1\n", 2, None, "no number stands here (s, counts): units, or nothing"),
+    ("time_s,take,s.A\n[s],,[raw]\n0,p,1\n", 2, None, "remove this line"),
+    ("time_s,s.A\n0,1\n# glove off\n1,1\n", 3, None, "a comment; remove this line"),
+    ("time_s,s.A\n0,1\ntime_s,s.A\n1,1\n", 3, None, "names of the columns again; remove this line"),
+    ("time_s,s.A\n0,1\n,\n", 3, None, "remove this line"),
     ("time_s," + ",".join(f"s.A{i}" for i in range(1000)) + "\n0\n", 1, None, "1001 columns"),
 ]
 
@@ -79,6 +92,29 @@ def test_broken_csv_is_refused_with_its_place(tmp_path, content, line, column, w
     assert words in error.problem
     assert "take.csv" in str(error)
     assert len(str(error)) < 600
+
+
+def test_a_line_named_for_removal_is_all_there_is_to_remove(tmp_path):
+    path = tmp_path / "take.csv"
+    lines = [
+        "sep=,",
+        "# of Monday",
+        "time_s,s.A",
+        "s,counts",
+        "0,1",
+        "% cable moved",
+        "time_s,s.A",
+        "1,2",
+        ",",
+    ]
+    for _ in range(7):
+        path.write_text("\n".join(lines) + "\n")
+        with pytest.raises(BadTakeTable, match="remove this line") as caught:
+            read_takes(path)
+        del lines[(caught.value.line or 0) - 1]
+    path.write_text("\n".join(lines) + "\n")
+    (take,) = read_takes(path)
+    assert take.time_s.tolist() == [0.0, 1.0]
 
 
 @pytest.mark.parametrize(

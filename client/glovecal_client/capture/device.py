@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,7 +12,7 @@ import numpy as np
 
 from glovecal_client.errors import BadName, BadOption, DeviceError, UnknownDevice
 from glovecal_client.installation import not_installed
-from glovecal_client.names import check_channel_name
+from glovecal_client.names import check_channel_name, did_you_mean
 from glovecal_client.wire.frame import MAX_CONTEXT, MAX_SENSORS
 
 DEVICE_GROUP = "glovecal.devices"
@@ -162,6 +161,4 @@ def _device_class(name: str) -> type[Device]:
             except ImportError as error:
                 raise DeviceError(not_installed(f"device {name!r}", error.name or point.module)) from error
     known = device_names()
-    near = difflib.get_close_matches(name, known, n=1)
-    hint = f"did you mean {near[0]!r}?" if near else f"installed are {', '.join(known) or 'none'}"
-    raise UnknownDevice(f"no device {name!r}; {hint}")
+    raise UnknownDevice(f"no device {name!r}; {did_you_mean(name, known, there='installed are')}")

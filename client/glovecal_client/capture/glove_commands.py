@@ -15,6 +15,7 @@ import zenoh
 from glovecal_client.capture.device import Device
 from glovecal_client.errors import ClientError, DeviceLost, reason_of
 from glovecal_client.keys import JSON_ENCODING
+from glovecal_client.names import did_you_mean
 from glovecal_client.queries import REFUSAL_ENCODING
 
 MOST_WAITING = 8
@@ -39,7 +40,8 @@ class GloveCommands:
         if not commands:
             _refuse(query, f"{self._device.name} is only listened to: it has no commands")
         elif name not in commands:
-            _refuse(query, f"{self._device.name} has no command {name!r}; there are {', '.join(commands)}")
+            meant = did_you_mean(name, commands)
+            _refuse(query, f"{self._device.name} has no command {name!r}; {meant}")
         else:
             try:
                 self._queue.put_nowait(query)

@@ -6,7 +6,7 @@ import csv
 import itertools
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -19,6 +19,7 @@ from glovecal_client.names import check_channel_name
 
 SIMULATED_COLUMN = "c.simulated"
 """Marks the takes of a table that were never measured."""
+STRAY = "; remove this line if it holds units or a comment"
 _NOT_SIMULATED = ("", "0", "0.0")
 
 
@@ -88,6 +89,14 @@ def _identifier(text: str) -> str:
     return re.sub(r"[^a-z0-9_-]+", "-", text.lower()).strip("-_")[:64] or "table"
 
 
+def _filled_rows(file: Iterable[str]) -> Iterator[tuple[int, list[str]]]:
+    """The rows of a table that are not blank, each with its line; blanks after commas belong to no cell."""
+    rows = csv.reader(file, skipinitialspace=True)
+    for row in rows:
+        if row:
+            yield rows.line_num, row
+
+
 class _TableRecording:
     """A take table; ``c.simulated`` other than 0 in its first row marks it, and is no context."""
 
@@ -97,10 +106,14 @@ class _TableRecording:
         self._path = path
         self.layout = _identifier(path.stem)
         with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = csv.reader(file)
-            header, first = next(rows, []), next(rows, [])
+            rows = _filled_rows(file)
+            (line, header), (_, first) = next(rows, (1, [])), next(rows, (0, []))
+        header = [name.strip() for name in header]
         if "time_s" not in header:
-            raise BadOption(f"replay of {path}: line 1 has no column time_s")
+            raise BadOption(
+                f"replay of {path}: line {line} has no column time_s; if the columns are named below, remove "
+                "the lines above"
+            )
         self._time = header.index("time_s")
         self._take = header.index("take") if "take" in header else None
         self._sensor_columns = [i for i, name in enumerate(header) if name.startswith("s.")]
@@ -112,26 +125,23 @@ class _TableRecording:
         self.sensors = tuple(check_channel_name(header[i][2:], "sensor") for i in self._sensor_columns)
         self.context = tuple(check_channel_name(header[i][2:], "context") for i in self._context_columns)
         if not self.sensors:
-            raise BadOption(f"replay of {path}: line 1 has no sensor columns; they are named s.SENSOR")
+            raise BadOption(f"replay of {path}: line {line} has no sensor columns; they are named s.SENSOR")
         self._header = header
 
     def frames(self) -> Iterator[ReplayedFrame]:
         with self._path.open(encoding="utf-8-sig", newline="") as file:
-            rows = csv.reader(file)
+            line = 0
             try:
-                next(rows)
-                for row in rows:
-                    if row:
-                        yield self._frame(row, rows.line_num)
+                for line, row in itertools.islice(_filled_rows(file), 1, None):
+                    yield self._frame(row, line)
             except (csv.Error, UnicodeDecodeError) as error:
-                raise BadOption(
-                    f"replay of {self._path}: after line {rows.line_num}: {reason_of(error)}"
-                ) from error
+                raise BadOption(f"replay of {self._path}: after line {line}: {reason_of(error)}") from error
 
     def _frame(self, row: list[str], line: int) -> ReplayedFrame:
         if len(row) != len(self._header):
             raise BadOption(
                 f"replay of {self._path}: line {line} has {len(row)} values, the header {len(self._header)}"
+                f"{STRAY}"
             )
         time_s = self._number(row, self._time, line)
         if not math.isfinite(time_s):
@@ -153,6 +163,7 @@ class _TableRecording:
         except ValueError:
             raise BadOption(
                 f"replay of {self._path}: line {line}, column {self._header[column]!r}: {text!r} is no number"
+                f"{STRAY}"
             ) from None
 
 

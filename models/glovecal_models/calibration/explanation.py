@@ -20,6 +20,7 @@ from glovecal_models.calibration.samples import require_layout
 from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
 from glovecal_models.effects.base.signature_effect import SignatureEffect
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 from glovecal_models.takes.take import Take
 
 TermKind = Literal["base", "noise"] | PartKind
@@ -216,7 +217,7 @@ def chosen_rotations(model: CalibrationModel, wanted: Sequence[str]) -> tuple[st
     there = model.rotation_names
     unknown = [name for name in wanted if name not in there]
     if unknown:
-        raise BadInput(f"no rotation {unknown[0]!r} in this model; there are {', '.join(there)}")
+        raise BadInput(f"no rotation {unknown[0]!r} in this model; {did_you_mean(unknown[0], there)}")
     return tuple(name for name in there if name in wanted) if wanted else there
 
 

@@ -17,6 +17,7 @@ from glovecal_models.calibration.sample_weight import Recorded, fit_weighted
 from glovecal_models.calibration.samples import Samples, representative_index
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput, NotTrainable
+from glovecal_models.names import did_you_mean
 from glovecal_models.progress import Cancel, Report, part
 from glovecal_models.regression.kernel_candidates import CANDIDATE, LMC, KernelCandidate, candidates_of
 from glovecal_models.regression.kernel_scores import CandidateScore, KernelScores, with_choice
@@ -189,7 +190,7 @@ def fit_best_kernel(
     """
     kept = dict(settings.kernels).get(rotation)
     if kept is not None and kept not in CANDIDATE:
-        raise BadInput(f"no kernel {kept!r} for {rotation}; there are {', '.join(CANDIDATE)}")
+        raise BadInput(f"no kernel {kept!r} for {rotation}; {did_you_mean(kept, CANDIDATE)}")
     candidates = (CANDIDATE[kept],) if kept else candidates_of(settings.method)
     base = fit_weighted(
         samples, known=dict(settings.optima).get(rotation), seed=settings.seed,

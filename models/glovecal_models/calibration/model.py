@@ -13,6 +13,7 @@ from glovecal_models.calibration.effect_correction import EffectCorrection, Sign
 from glovecal_models.calibration.unseen_wearing import UnseenWearing
 from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.layout import Correspondence, Layout
+from glovecal_models.names import did_you_mean
 from glovecal_models.regression.linear_regressor import LinearRegressor
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.regression.regressor import Regressor, RuleRegressor
@@ -32,7 +33,7 @@ def restore_regressor(arrays: Mapping[str, np.ndarray], settings: Mapping[str, A
     """The regressor whose ``arrays`` and ``settings`` these are. Raises DamagedArtifact."""
     method = settings.get("method")
     if method not in _KINDS:
-        raise DamagedArtifact(f"unknown method {method!r}; known are {', '.join(_KINDS)}")
+        raise DamagedArtifact(f"unknown method {method!r}; {did_you_mean(str(method), _KINDS)}")
     return _KINDS[method].restore(arrays, settings)
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 from glovecal_models.regression.linear_regressor import LinearRegressor
 
 LEAST_SCALE, MOST_SCALE = 0.1, 10.0
@@ -74,7 +75,8 @@ def refinable(model: CalibrationModel) -> tuple[str, ...]:
 
 def _require_line(item: RotationModel | None, name: str, model: CalibrationModel) -> None:
     if item is None:
-        raise BadInput(f"no rotation {name!r} in this model; it has {', '.join(model.rotation_names)}")
+        meant = did_you_mean(name, model.rotation_names, there="it has")
+        raise BadInput(f"no rotation {name!r} in this model; {meant}")
     if name in refinable(model):
         return
     lines = ", ".join(refinable(model)) or "none"

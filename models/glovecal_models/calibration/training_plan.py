@@ -34,6 +34,7 @@ from glovecal_models.calibration.training_settings import (
 from glovecal_models.calibration.usable_sensors import UsableSensors, usable_sensors
 from glovecal_models.errors import NotTrainable
 from glovecal_models.layout import Correspondence, Layout
+from glovecal_models.names import did_you_mean
 from glovecal_models.regression.regressor import RuleRegressor
 from glovecal_models.regression.training_samples import check_samples
 from glovecal_models.takes.camera_reference.covered_range import CoveredRange, covered_ranges
@@ -82,7 +83,7 @@ def plan_training(
     """
     settings = settings or TrainingSettings()
     if settings.method not in METHODS:
-        raise NotTrainable(f"unknown method {settings.method!r}; known are {', '.join(METHODS)}")
+        raise NotTrainable(f"unknown method {settings.method!r}; {did_you_mean(settings.method, METHODS)}")
     usable = usable_sensors(layout, takes)
     if settings.keep_dead:
         usable = UsableSensors(layout, (), ())

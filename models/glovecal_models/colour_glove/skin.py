@@ -20,6 +20,7 @@ from glovecal_models.hand.dimensions import ASSUMED_LENGTH_MM
 from glovecal_models.hand.forward_kinematics import forward_kinematics
 from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS
 from glovecal_models.hand.skeleton import Skeleton, hand_skeleton
+from glovecal_models.names import did_you_mean
 
 CELL_MM = 3.6
 """Of the grid that the surface is meshed on: about 5,000 vertices."""
@@ -89,7 +90,7 @@ def hand_skin(
     radii = {name: (low * grown, high * grown) for name, (low, high) in RADII_MM.items()}
     for name, ends in (radii_mm or {}).items():
         if name not in radii:
-            raise BadInput(f"a hand has no bone {name!r}; there are {', '.join(radii)}")
+            raise BadInput(f"a hand has no bone {name!r}; {did_you_mean(name, radii)}")
         if len(ends) != 2 or not all(np.isfinite(ends)) or not min(ends) > 0:
             raise BadInput(f"radii of {name} are {ends}; two numbers above 0 mm are expected")
         radii[name] = (float(ends[0]), float(ends[1]))

@@ -23,6 +23,7 @@ from glovecal_models.effects.context_dependence import PREFIX as CONTEXT
 from glovecal_models.effects.context_dependence import ContextDependence, unfamiliar_columns
 from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 
 GROUP = "glovecal.effects"
 _DECLARED: ContextVar[Mapping[str, Effect]] = ContextVar("declared effects", default=MappingProxyType({}))
@@ -59,7 +60,7 @@ def effect(name: str) -> Effect:
         if name.startswith(prefix) and len(name) > len(prefix):
             return of_column(name.removeprefix(prefix))
     if name not in known:
-        raise BadInput(f"no effect {name!r}; there are {', '.join(known)}")
+        raise BadInput(f"no effect {name!r}; {did_you_mean(name, known)}")
     return known[name]
 
 

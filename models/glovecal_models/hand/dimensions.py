@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 
 ASSUMED_LENGTH_MM = 190.0
 """From the wrist crease to the tip of the middle finger; between the means of women (180) and men (194)."""
@@ -98,7 +99,7 @@ def _scaled(length: float, breadth: float | None) -> dict[str, float]:
 def _require_believable(measured_mm: Mapping[str, float]) -> None:
     unknown = [name for name in measured_mm if name not in DIMENSIONS]
     if unknown:
-        raise BadInput(f"a hand has no dimension {unknown[0]!r}; known are {', '.join(DIMENSIONS)}")
+        raise BadInput(f"a hand has no dimension {unknown[0]!r}; {did_you_mean(unknown[0], DIMENSIONS)}")
     if measured_mm and "hand_length" not in measured_mm:
         raise BadInput(
             "hand_length is missing: measure in mm from the wrist crease to the tip of the middle finger"

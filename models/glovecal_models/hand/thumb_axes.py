@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 
 PAPER_DEG = (-39.0, -13.0, 27.0)
 ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
@@ -42,7 +43,7 @@ class ThumbAxes:
         from scipy.spatial.transform import Rotation  # slow to load, and seldom needed
 
         if order not in ORDERS:
-            raise BadInput(f"order of the thumb's turns is {order!r}; there are {', '.join(ORDERS)}")
+            raise BadInput(f"order of the thumb's turns is {order!r}; {did_you_mean(order, ORDERS)}")
         if len(angles_deg) != 3 or not np.isfinite(angles_deg).all():
             raise BadInput(
                 f"the thumb's post-rotation is {tuple(angles_deg)}, expected three angles, degrees"
@@ -57,7 +58,7 @@ class ThumbAxes:
         from scipy.spatial.transform import Rotation
 
         if order not in ORDERS:
-            raise BadInput(f"order of the thumb's turns is {order!r}; there are {', '.join(ORDERS)}")
+            raise BadInput(f"order of the thumb's turns is {order!r}; {did_you_mean(order, ORDERS)}")
         frame = np.column_stack([self.roll, self.abduction, np.cross(self.roll, self.abduction)])
         with warnings.catch_warnings():  # where the middle turn is 90 degrees, one of many answers is given
             warnings.simplefilter("ignore", UserWarning)

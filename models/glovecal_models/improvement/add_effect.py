@@ -34,6 +34,7 @@ from glovecal_models.improvement.addition import Addition, total_rmse_deg
 from glovecal_models.improvement.control_share import share_left_by_control
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 from glovecal_models.improvement.proposals import proposed
+from glovecal_models.names import did_you_mean
 from glovecal_models.progress import Cancel, Report, part
 from glovecal_models.takes.take import Take
 
@@ -157,7 +158,8 @@ def _chosen(model: CalibrationModel, effect: Effect, rotations: Sequence[str] | 
     chosen = tuple(every if rotations is None or effect.kind == "repair" else rotations)
     unknown = [item for item in chosen if item not in every]
     if unknown:
-        raise BadInput(f"no rotation {unknown[0]!r} is trained in this model; it has {', '.join(every)}")
+        meant = did_you_mean(unknown[0], every, there="it has")
+        raise BadInput(f"no rotation {unknown[0]!r} is trained in this model; {meant}")
     return chosen
 
 

@@ -21,6 +21,7 @@ from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.addition import Addition
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
+from glovecal_models.names import did_you_mean
 from glovecal_models.progress import Cancel
 from glovecal_models.takes.take import Take
 
@@ -64,8 +65,8 @@ def remove_effect(
     """The model without effect ``name``. Raises BadInput when it has none of that name, Cancelled."""
     has = requested_effects(model)
     if name not in {item.name for item in has}:
-        there = ", ".join(item.name for item in has) or "none"
-        raise BadInput(f"the model has no effect {name!r}; it has {there}")
+        meant = did_you_mean(name, (item.name for item in has), there="it has")
+        raise BadInput(f"the model has no effect {name!r}; {meant}")
     settings = settings_of(model, settings)
     wanted = [item for item in has if item.name != name]
     every = trained_rotations(model)

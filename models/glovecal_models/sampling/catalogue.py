@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
+from glovecal_models.names import did_you_mean
 from glovecal_models.sampling.order import in_random_order
 from glovecal_models.sampling.protocol import Protocol, Step
 from glovecal_models.sampling.steps import (
@@ -89,7 +90,7 @@ def _in_fixed_order(name: str, layout: Layout, own: Equipment) -> Protocol:
     if name == "second_wearing":
         return Protocol(name, tuple(steps_for_layout([_loosen(3.0), *check_steps(KEY_POSES)], layout)))
     if name not in steps:
-        raise BadInput(f"no protocol {name!r}; there are {', '.join(PROTOCOLS)}")
+        raise BadInput(f"no protocol {name!r}; {did_you_mean(name, PROTOCOLS)}")
     asked = steps_for_layout(steps[name], layout)
     around = (
         steps_for_layout([_loosen(6.0), *verification_steps("start")], layout),

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 
 Kind = Literal["range", "verification", "fk_independent", "fk_cross_couple", "ik"]
 """``range`` shows how far each sensor goes, ``verification`` whether the glove stayed where it was; the
@@ -94,7 +95,7 @@ class Protocol:
         for step in self.steps:
             if step.name == name:
                 return step
-        raise BadInput(f"no step {name!r} in protocol {self.name}; there are {', '.join(self._names)}")
+        raise BadInput(f"no step {name!r} in protocol {self.name}; {did_you_mean(name, self._names)}")
 
     @property
     def _names(self) -> list[str]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Literal, get_args
 
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 from glovecal_models.sampling import speech
 from glovecal_models.sampling.limits import SAMPLING_LIMITS, SamplingLimits
 from glovecal_models.sampling.protocol import Protocol, Step
@@ -92,7 +93,7 @@ class UserEvents(Transitions):
         its widget really has. Raises NotNow, BadInput for no event or step of that name; then nothing
         changed."""
         if name not in EVENTS:
-            raise BadInput(f"no event {name!r}; there are {', '.join(EVENTS)}")
+            raise BadInput(f"no event {name!r}; {did_you_mean(name, EVENTS)}")
         if self.state.phase in OVER:
             raise NotNow(f"this sampling is {self.state.phase}; {name} comes too late")
         if self.state.phase == "paused" and name not in ("resume", "stop"):

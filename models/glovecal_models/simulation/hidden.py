@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 from glovecal_models.simulation.causes.catalogue import forms
 from glovecal_models.simulation.causes.form import Cause, Draws, Form, HiddenCause, Stage
 from glovecal_models.simulation.scene import Scene
@@ -130,9 +131,8 @@ def _form(cause: Cause, random: np.random.Generator) -> Form:
     for form in known:
         if form.name == cause.form:
             return form
-    raise BadInput(
-        f"{cause.name} has no form {cause.form!r}; it has {', '.join(form.name for form in known)}"
-    )
+    meant = did_you_mean(cause.form, (form.name for form in known), there="it has")
+    raise BadInput(f"{cause.name} has no form {cause.form!r}; {meant}")
 
 
 def _affected(cause: Cause, form: Form, sensors: tuple[str, ...], random: np.random.Generator) -> np.ndarray:

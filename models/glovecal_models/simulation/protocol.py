@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 from glovecal_models.simulation.hand_motion import (
     HandMotion,
     PostureSequence,
@@ -125,7 +126,7 @@ def segments(motion: str, seed: int) -> list[Segment]:
         "evaluation": evaluation_segment,
     }
     if motion not in single:
-        raise BadInput(f"no motion {motion!r}; there are {', '.join(MOTIONS)}")
+        raise BadInput(f"no motion {motion!r}; {did_you_mean(motion, MOTIONS)}")
     return [single[motion](seed)]
 
 

@@ -12,6 +12,7 @@ from typing import Any, Literal, get_args
 
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
+from glovecal_models.names import did_you_mean
 
 TakeMotion = Literal["natural", "fast", "ramps", "holds", "one_finger", "poses", "still", "palm"]
 TAKE_MOTIONS: tuple[TakeMotion, ...] = get_args(TakeMotion)
@@ -70,7 +71,8 @@ class SessionPlan:
             raise BadInput(f"{len(self.motions)} motions for {self.takes_per_wearing} takes per wearing")
         unknown = set(self.motions) - set(TAKE_MOTIONS)
         if unknown:
-            raise BadInput(f"no motion {sorted(unknown)[0]!r}; there are {', '.join(TAKE_MOTIONS)}")
+            meant = did_you_mean(sorted(unknown)[0], TAKE_MOTIONS)
+            raise BadInput(f"no motion {sorted(unknown)[0]!r}; {meant}")
 
     @property
     def takes(self) -> int:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 from glovecal_models.simulation.session_plan import (
     SHORTEST_TAKE_S,
     TAKE_MOTIONS,
@@ -88,7 +89,7 @@ def one_more(
 ) -> tuple[TakeStart, ...]:
     """The start of one take after the planned ones, as a schedule of one. Raises BadInput."""
     if motion not in TAKE_MOTIONS:
-        raise BadInput(f"no motion {motion!r}; there are {', '.join(TAKE_MOTIONS)}")
+        raise BadInput(f"no motion {motion!r}; {did_you_mean(motion, TAKE_MOTIONS)}")
     if take_s < SHORTEST_TAKE_S or wearing < 0 or repeat < 0:
         raise BadInput(f"no take of {take_s:g} s in wearing {wearing}, repeat {repeat}: both count from 0")
     before = schedule(plan)

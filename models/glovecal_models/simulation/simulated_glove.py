@@ -24,6 +24,7 @@ import numpy as np
 from glovecal_models.errors import BadInput
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.layout import Layout
+from glovecal_models.names import did_you_mean
 from glovecal_models.simulation.simulated_hand import SimulatedHand
 from glovecal_models.simulation.stretch import bent_share, stretches
 from glovecal_models.typical_counts import TYPICAL_COUNTS
@@ -143,9 +144,8 @@ class SimulatedGlove:
         """``layout`` is cyberglove18 or cyberglove22; raises BadInput for another."""
         self.layout = Layout.built_in(layout) if isinstance(layout, str) else layout
         if self.layout.name not in LAYOUTS:
-            raise BadInput(
-                f"no glove of layout {self.layout.name!r} is simulated; there are {', '.join(LAYOUTS)}"
-            )
+            meant = did_you_mean(self.layout.name, LAYOUTS)
+            raise BadInput(f"no glove of layout {self.layout.name!r} is simulated; {meant}")
         if seed < 0 or wearing < 0:
             raise BadInput(f"seed and wearing are counted from 0, not {seed} and {wearing}")
         self.seed = seed

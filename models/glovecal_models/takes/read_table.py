@@ -7,6 +7,7 @@ CSV: UTF-8 (with or without a mark at its start), commas, decimal points. Parque
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
@@ -27,6 +28,10 @@ from glovecal_models.takes.raw_table import (
     what_is_wrong,
 )
 
+COMMENT = ("#", "%", "//")
+"""Begin lines that other programs pass over."""
+_THOUSANDS = re.compile(r"([+-]?[1-9]\d{0,2}(?:([,.' \xa0\u2009\u202f])\d{3})(?:\2\d{3})*)([.,]\d+)?\Z")
+_HEADER_WITHIN = 40
 _ROWS_AT_ONCE = 128  # small enough to stay in the cache; 4096 took a third longer
 _FOREIGN_STARTS = {
     b"\xff\xfe": "UTF-16 text; save it as UTF-8",
@@ -41,7 +46,7 @@ def read_csv_table(path: Path) -> RawTable:
     _refuse_foreign_start(path)
     try:
         with path.open(encoding="utf-8-sig", newline="") as stream:
-            return _read(csv.reader(stream, strict=True), path.name)
+            return _read(csv.reader(stream, strict=True, skipinitialspace=True), path.name)
     except UnicodeDecodeError as error:
         raise _undecodable(path) from error
 
@@ -51,19 +56,25 @@ def _read(reader, file: str) -> RawTable:  # csv.reader's type has no public nam
     first = next(rows, None)
     if first is None:
         raise BadTakeTable("the file is empty", file=file)
-    columns = _parse_csv_header(first[1], file)
+    columns = _parse_csv_header(*first, rows, file)
     numbers: dict[str, list[np.ndarray]] = {c.header: [] for c in columns if not c.is_text}
     texts: dict[str, list[str]] = {c.header: [] for c in columns if c.is_text}
     lines: list[int] = []
     while batch := list(islice(rows, _ROWS_AT_ONCE)):
         at = [line for line, _ in batch]
         cells = [row for _, row in batch]
-        _require_full_rows(cells, at, columns, file)
-        for column, values in zip(columns, zip(*cells, strict=True), strict=True):
-            if column.is_text:
-                texts[column.header].extend(_checked_texts(column, values, at, file))
-            else:
-                numbers[column.header].append(_parse_numbers(column, values, at, file))
+        try:
+            _require_full_rows(cells, at, columns, file)
+            for column, values in zip(columns, zip(*cells, strict=True), strict=True):
+                if column.is_text:
+                    texts[column.header].extend(_checked_texts(column, values, at, file))
+                else:
+                    numbers[column.header].append(_parse_numbers(column, values, at, file))
+        except BadTakeTable as error:
+            stray = _stray_line(cells[at.index(error.line)], columns) if error.line in at else None
+            if stray is None:
+                raise
+            raise BadTakeTable(f"{stray}; remove this line", file=file, line=error.line) from error
         lines.extend(at)
         if len(lines) * len(columns) > MOST_CELLS:
             raise BadTakeTable(f"more than {MOST_CELLS} cells; divide it into several files", file=file)
@@ -90,16 +101,57 @@ def _numbered_rows(reader, file: str) -> Iterator[tuple[int, list[str]]]:
         begins = reader.line_num + 1
 
 
-def _parse_csv_header(headers: Sequence[str], file: str) -> list[Column]:
+def _stray_line(cells: Sequence[str], columns: Sequence[Column]) -> str | None:
+    """What a line is that is no row of a table; None where a row of it may be meant."""
+    if cells[0].lstrip().startswith(COMMENT):
+        return "this is a comment"
+    if [cell.strip() for cell in cells] == [column.header for column in columns]:
+        return "these are the names of the columns again"
+    if len(cells) != len(columns):
+        return None
+    written = [
+        cell for cell, column in zip(cells, columns, strict=True) if cell.strip() and not column.is_text
+    ]
+    if not any(map(_begins_a_number, written)):
+        return f"no number stands here ({', '.join(cells)[:60]}): units, or nothing at all"
+    return None
+
+
+def _begins_a_number(cell: str) -> bool:
+    return _is_number(cell) or cell.lstrip(" +-.,'\xa0")[:1].isdigit()
+
+
+def _parse_csv_header(
+    line: int, headers: Sequence[str], rows: Iterator[tuple[int, list[str]]], file: str
+) -> list[Column]:
+    first = headers[0].strip()
+    if first.startswith(COMMENT):
+        raise BadTakeTable("this is a comment; remove this line", file=file, line=line)
+    if first.lower().startswith("sep="):
+        raise BadTakeTable(
+            "this tells a spreadsheet what separates columns, which are commas here; remove this line",
+            file=file,
+            line=line,
+        )
     for mark, name in ((";", "semicolons"), ("\t", "tabs")):
         if len(headers) == 1 and mark in headers[0]:
             raise BadTakeTable(
                 f"columns are separated by {name}; save the table with commas between columns "
                 "and points in decimal numbers",
                 file=file,
-                line=1,
+                line=line,
+            )
+    if not _has_time(headers):
+        later = next((at for at, row in islice(rows, _HEADER_WITHIN) if _has_time(row)), None)
+        if later is not None:
+            raise BadTakeTable(
+                f"the columns are named in line {later}; remove the lines above it", file=file, line=line
             )
     return parse_header(headers, file)
+
+
+def _has_time(cells: Sequence[str]) -> bool:
+    return "time_s" in (cell.strip() for cell in cells)
 
 
 def _require_full_rows(
@@ -146,10 +198,16 @@ def _bad_cell(column: Column, cell: str, line: int, file: str) -> BadTakeTable:
     elif not cell.strip():
         problem = f"the cell is empty; {what_is_right(column)}"
     else:
-        comma = _is_number(cell.replace(",", ".", 1))
-        hint = " (write a decimal point, not a comma)" if comma else ""
-        problem = f"{shown!r} is not a number{hint}; {what_is_right(column)}"
+        problem = f"{shown!r} is not a number{_comma_hint(cell.strip())}; {what_is_right(column)}"
     return BadTakeTable(problem, file=file, line=line, column=column.header, value=cell[:60])
+
+
+def _comma_hint(cell: str) -> str:
+    """What separates digits in a cell that is no number: thousands where three follow, else decimals."""
+    if thousands := _THOUSANDS.match(cell):
+        whole = re.sub(r"[^\d+-]", "", thousands[1]) + (thousands[3] or "").replace(",", ".")
+        return f" (a separator of thousands? write {whole}; a decimal comma? write a point)"
+    return " (write a decimal point, not a comma)" if _is_number(cell.replace(",", ".", 1)) else ""
 
 
 def _checked_texts(column: Column, texts: Sequence[str], lines: Sequence[int], file: str) -> Sequence[str]:

@@ -43,7 +43,15 @@ def drift_sentence(found: SessionDrift) -> str:
         named = ", ".join(f"{found.sensors[at]} {found.common_counts[at]:+.1f}" for at in largest)
         return (
             f"Drift from start to end {over}: most in {named} counts (mean). No model is active: no angles."
+            f"{_left_out(found)}"
         )
     largest = np.argsort(np.abs(found.common_deg))[::-1][:MOST_NAMED]
     named = ", ".join(f"{found.rotations[at]} {found.common_deg[at]:+.1f}" for at in largest)
-    return f"Drift from start to end: {found.rms_deg:.1f} degrees RMS {over}; most in {named} degrees (mean)."
+    return (
+        f"Drift from start to end: {found.rms_deg:.1f} degrees RMS {over}; most in {named} degrees (mean)."
+        f"{_left_out(found)}"
+    )
+
+
+def _left_out(found: SessionDrift) -> str:
+    return "".join(f" Left out: {name}, {why}." for name, why in found.left_out.items())

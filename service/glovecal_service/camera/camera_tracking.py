@@ -26,6 +26,7 @@ from glovecal_client.wire.pose import Pose, PoseFlag, RotationFlag, encode_pose
 from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS
 from glovecal_models.colour_glove.pose_estimate import STAGES, PoseEstimate
 from glovecal_models.errors import BadInput, Cancelled
+from glovecal_models.names import did_you_mean
 from glovecal_service.camera.camera_health import HAND, NO_HAND, CameraHealth
 from glovecal_service.camera.camera_light import CameraLight
 from glovecal_service.camera.camera_link import CameraAnswers, CameraLink
@@ -243,7 +244,7 @@ class CameraTracking:
             self._stop.set()
             return {"stopping": True}
         if name not in COMMANDS:
-            raise BadInput(f"a camera has no command {name!r}; there are {', '.join(COMMANDS)}")
+            raise BadInput(f"a camera has no command {name!r}; {did_you_mean(name, COMMANDS)}")
         if self._setup is None:
             raise BadInput(f"the camera is not ready yet: {self._status.sentence}")
         return self._balance(self._setup) if name == "balance" else self._choose_stage(self._setup, argument)

@@ -16,6 +16,7 @@ from glovecal_models.colour_glove.pose_estimate import PoseEstimate
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import posed
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 
 LAYERS = ("picture", "labels", "model")
 USUAL_WIDTH, WIDEST = 640, 1920
@@ -47,7 +48,7 @@ def asked_layers(text: str) -> frozenset[str]:
     """From ``picture,labels,model``; all for an empty text. Raises BadInput."""
     layers = frozenset(text.split(",")) if text else frozenset(LAYERS)
     if not layers <= set(LAYERS):
-        raise BadInput(f"layers {text!r}: there are {', '.join(LAYERS)}")
+        raise BadInput(f"layers {text!r}: {did_you_mean(text, LAYERS)}")
     return layers
 
 

@@ -134,7 +134,7 @@ def _cameras(settings: TrackingSettings, sources: Sequence[PictureSource]) -> tu
     if settings.calibration is None:
         if len(sizes) > 1:
             raise BadInput(
-                "two cameras are tracked together only with their calibration: "
+                "two cameras are tracked together only with their calibration; "
                 "glovecal camera calibrate --second tells where the second one stands"
             )
         height, width = sizes[0]
@@ -143,7 +143,7 @@ def _cameras(settings: TrackingSettings, sources: Sequence[PictureSource]) -> tu
     cameras = read_cameras(settings.calibration)
     if len(cameras) < len(sources):
         raise BadInput(
-            f"{settings.calibration} holds {len(cameras)} camera, {len(sources)} are to be tracked: "
+            f"{settings.calibration} holds {len(cameras)} camera, {len(sources)} are to be tracked; "
             "glovecal camera calibrate --second calibrates both"
         )
     for camera, source, (height, width) in zip(cameras, sources, sizes, strict=False):

@@ -167,8 +167,8 @@ NEXT = """
 Next:
   glovecal demo --effect hysteresis | none | unknown   another effect, none, or one outside the catalogue
   glovecal demo --stay      opens the studio at the end and keeps its glove moving
-  glovecal serve            your own service; then glovecal capture --device cyberglove --glove right
-  glovecal take import      calibrate from recordings you have (CSV, Parquet)"""
+  glovecal serve            your own service; then: glovecal capture --device cyberglove --glove right
+  glovecal take import FILE --subject NAME   calibrate from recordings you have (CSV, Parquet)"""
 PAGES = """
   docs/tutorial.md          the second part step by step, command by command
   README.md                 connect your glove, improve its model, deploy"""

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES, UNKNOWN_CAUSES
 from glovecal_models.simulation.causes.form import Cause, HiddenCause
 from glovecal_models.simulation.session import RecordedSession, RecordedTake, record_session
@@ -96,7 +97,7 @@ def check_effect(effect: str) -> str:
     known = tuple(name for name in KNOWN_CAUSES if name not in UNSEEN)
     choices = ("random", "none", "unknown", *known, *UNKNOWN_CAUSES)
     if effect not in choices:
-        raise BadInput(f"no effect {effect!r} can be hidden; there are {', '.join(choices)}")
+        raise BadInput(f"no effect {effect!r} can be hidden; {did_you_mean(effect, choices)}")
     return effect
 
 

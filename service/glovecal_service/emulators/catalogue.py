@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 from glovecal_service.emulators import line_glove
 from glovecal_service.emulators.cyberglove.emulated import EmulatedCyberGlove
 from glovecal_service.emulators.cyberglove3 import EmulatedCyberGlove3
@@ -81,7 +82,7 @@ PROTOCOLS: dict[str, Protocol] = {
 def protocol(name: str) -> Protocol:
     """Raises BadInput with the names there are."""
     if name not in PROTOCOLS:
-        raise BadInput(f"no emulated glove {name!r}; there are {', '.join(PROTOCOLS)}")
+        raise BadInput(f"no emulated glove {name!r}; {did_you_mean(name, PROTOCOLS)}")
     return PROTOCOLS[name]
 
 
@@ -90,5 +91,5 @@ def faults_of(name: str, names: Collection[str], seed: int) -> Faults:
     possible = protocol(name).faults
     for fault in names:
         if fault not in possible:
-            raise BadInput(f"{name} has no fault {fault!r}; there are {', '.join(possible)}")
+            raise BadInput(f"{name} has no fault {fault!r}; {did_you_mean(fault, possible)}")
     return Faults(names, seed)

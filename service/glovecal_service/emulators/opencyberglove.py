@@ -13,10 +13,10 @@ from glovecal_service.emulators.hand import MovingHand
 
 RANGE = 16384
 _DRIVEN_BY = (
-    "T_TMC", "T_MCP", "TI_ABD", "T_IP", "I_MCP", "I_PIP", "I_DIP", "IM_ABD", "M_MCP", "M_PIP",
+    "T_IP", "T_MCP", "TI_ABD", "T_TMC", "I_MCP", "I_PIP", "I_DIP", "IM_ABD", "M_MCP", "M_PIP",
     "M_DIP", "MR_ABD", "R_MCP", "R_PIP", "R_DIP", "RP_ABD", "P_MCP", "P_PIP", "P_DIP",
 )  # fmt: skip
-"""Which joint stretches which sensor here. The real glove's map is not published in text."""
+"""Which joint stretches which sensor, in the order that its makers publish."""
 _REST, _SPAN = 3000, 9000
 """Counts of a straight and of a fully bent joint; chosen, not measured."""
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from glovecal_models.takes.write_table import write_columns
+from glovecal_models.takes.write_table import SIMULATED_CONTEXT, write_columns
 from glovecal_service.exports.export_format import ExportFormat
 from glovecal_service.exports.hand_motion import Content, HandMotion, blocks
 from glovecal_service.exports.markers import markers
@@ -30,7 +30,7 @@ def _blocks(motions: Sequence[HandMotion], content: Content) -> Iterator[dict[st
             found = _columns(motion.frames(which), content)
             columns |= {f"{hand}{name}": values for name, values in found.items()}
         if any(motion.simulated for motion in motions):
-            columns["simulated"] = np.ones(len(columns["time_s"]))
+            columns[f"c.{SIMULATED_CONTEXT}"] = np.ones(len(columns["time_s"]))
         yield columns
 
 

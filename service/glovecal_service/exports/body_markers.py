@@ -17,6 +17,7 @@ from typing import Literal, TextIO
 import numpy as np
 
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 from glovecal_models.takes.take import LONGEST_INTERPOLATED_GAP_S, Take
 
 Wrist = Literal["glove", "optical"]
@@ -94,7 +95,7 @@ def hand_frame(
         )
     for name in names:
         if name not in markers:
-            raise BadInput(f"no marker {name!r}; there are {', '.join(markers)}")
+            raise BadInput(f"no marker {name!r}; {did_you_mean(name, markers)}")
     places = [markers[name] for name in names]
     origin = (places[0] + places[1]) / 2
     if wrist == "glove":

@@ -31,6 +31,8 @@ from glovecal_service.exports.hand_motion import Content, HandMotion, at_times, 
 
 MOST_FRAMES = 1_000_000
 MM_PER_UNIT = 10.0
+STEP_DIGITS = 9
+"""Of the frame time, seconds."""
 ORDER = "ZXY"
 """Of a bone's three turns. The middle one, about the finger's length, stays far from 90 degrees."""
 SIMULATED = "SimulatedGlove"
@@ -45,7 +47,7 @@ def write_bvh(motions: Sequence[HandMotion], content: Content, path: Path) -> No
         motion.require_angles(content)
         if motion.frame is not None:
             raise BadInput("BVH puts hands on a body at rest; hands placed by markers go into .trc")
-    time_s = _even_times(motions[0].time_s)
+    time_s, step_s = _even_times(motions[0].time_s)
     hands = {motion.label: _Hand.moving(at_times(motion, time_s)) for motion in motions}
     length = float(np.mean([motion.skeleton.dimensions.hand_length_mm for motion in motions]))
     for label in SIDES:
@@ -58,8 +60,7 @@ def write_bvh(motions: Sequence[HandMotion], content: Content, path: Path) -> No
         bones.append(Bone(SIMULATED, ROOT, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
     with path.open("w", encoding="ascii", newline="\n") as stream:
         order = _write_hierarchy(stream, bones)
-        step = (time_s[-1] - time_s[0]) / (len(time_s) - 1)
-        stream.write(f"MOTION\nFrames: {len(time_s)}\nFrame Time: {step:.9f}\n")
+        stream.write(f"MOTION\nFrames: {len(time_s)}\nFrame Time: {step_s:.{STEP_DIGITS}f}\n")
         root = next(bone for bone in bones if bone.parent is None)
         for which in blocks(len(time_s)):
             turns: dict[str, np.ndarray] = {}
@@ -149,14 +150,15 @@ def _places(skeleton: Skeleton) -> Iterator[tuple[int, int]]:
         yield joint, last
 
 
-def _even_times(time_s: np.ndarray) -> np.ndarray:
+def _even_times(time_s: np.ndarray) -> tuple[np.ndarray, float]:
     if len(time_s) < 2:
         raise BadInput(f"{len(time_s)} frames are no motion; BVH needs two or more")
-    step = float(np.median(np.diff(time_s)))
-    count = round((time_s[-1] - time_s[0]) / step) + 1
+    lasts = float(time_s[-1] - time_s[0])
+    count = round(lasts / float(np.median(np.diff(time_s)))) + 1
     if count > MOST_FRAMES:
         raise BadInput(f"{count} frames on even steps are too many; at most {MOST_FRAMES}")
-    return np.minimum(time_s[0] + step * np.arange(count), time_s[-1])
+    step = round(lasts / (count - 1), STEP_DIGITS)  # as it is written, or frames run away from it
+    return np.minimum(time_s[0] + step * np.arange(count), time_s[-1]), step
 
 
 def _held(degrees: np.ndarray) -> np.ndarray:

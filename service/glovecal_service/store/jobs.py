@@ -289,7 +289,7 @@ def _noted(connection: Connection, id: str) -> JobRecord:
 def _require(connection: Connection, id: str) -> JobRecord:
     row = connection.execute(select(tables.jobs).where(tables.jobs.c.id == id)).one_or_none()
     if row is None:
-        raise NotFound(f"there is no job {id!r}")
+        raise NotFound(f"there is no job {id!r}. List them: glovecal job list")
     return _record(sound_row(tables.jobs, row))
 
 

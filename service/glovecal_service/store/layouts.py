@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from sqlalchemy import Connection, delete, exists, insert, select
 
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import BUILT_IN, Layout
-from glovecal_models.names import check_identifier
+from glovecal_models.names import check_identifier, did_you_mean
 from glovecal_service.store import tables
 from glovecal_service.store.clock import now
 from glovecal_service.store.database import Database
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import LayoutRecord
 from glovecal_service.store.row_hash import sound_row, sound_rows
+
+
+def no_layout(name: str, known: Iterable[str]) -> NotFound:
+    """What is said of a layout that is neither built in nor stored."""
+    return NotFound(f"there is no layout {name!r}; {did_you_mean(name, known)}")
 
 
 class Layouts:
@@ -27,11 +32,12 @@ class Layouts:
         statement = select(tables.layouts).where(tables.layouts.c.name == name)
         with self._database.read() as connection:
             row = connection.execute(statement).one_or_none()
+            stored = connection.scalars(select(tables.layouts.c.name)).all()
         if row is not None:
             return Layout.from_document(sound_row(tables.layouts, row)["document"])
         if name in BUILT_IN:
             return Layout.built_in(name)
-        raise NotFound(f"there is no layout {name!r}; built in are {', '.join(BUILT_IN)}")
+        raise no_layout(name, [*BUILT_IN, *stored])
 
     def list(self) -> list[LayoutRecord]:
         """Built-in layouts first, then stored ones by name."""

@@ -195,7 +195,7 @@ def _one(connection: Connection, id: str) -> ModelRecord:
     matching = tables.models.c.id.startswith(id)
     rows = connection.execute(select(tables.models).where(matching).limit(2)).all()
     if not rows:
-        raise NotFound(f"there is no model {id!r}")
+        raise NotFound(f"there is no model {id!r}. List them: glovecal model list")
     if len(rows) > 1:
         raise Conflict(f"more than one model starts with {id!r}; give more digits")
     return _record(sound_row(tables.models, rows[0]))

@@ -9,7 +9,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Connection, select
 
 from glovecal_models.errors import BadInput
-from glovecal_models.names import check_identifier
+from glovecal_models.names import check_identifier, did_you_mean
 from glovecal_service.store import revision, tables
 from glovecal_service.store.clock import new_id, now
 from glovecal_service.store.database import Database
@@ -110,7 +110,7 @@ class Recordings:
         ``stopping``: look at the record that comes back. Raises NotFound, BadInput.
         """
         if state is not None and state not in _ORDER:
-            raise BadInput(f"{state!r} is no state of a recording; there are {', '.join(_ORDER)}")
+            raise BadInput(f"{state!r} is no state of a recording; {did_you_mean(state, _ORDER)}")
         with self._database.write() as connection:
             if state is not None:
                 revision.grow(connection)

@@ -97,7 +97,7 @@ class Samplings:
 def _require(connection: Connection, id: str) -> SamplingRecord:
     row = connection.execute(select(tables.samplings).where(tables.samplings.c.id == id)).one_or_none()
     if row is None:
-        raise NotFound(f"there is no sampling {id!r}")
+        raise NotFound(f"there is no sampling {id!r}. List them: glovecal sample list")
     return _record(sound_row(tables.samplings, row))
 
 

@@ -12,7 +12,7 @@ from sqlalchemy.exc import IntegrityError
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import Handedness
-from glovecal_models.names import check_identifier
+from glovecal_models.names import check_identifier, did_you_mean
 from glovecal_service.store import revision, tables
 from glovecal_service.store.clock import now
 from glovecal_service.store.database import Database
@@ -94,7 +94,10 @@ def require_subject(connection: Connection, name: str) -> SubjectRecord:
     """The subject, or NotFound."""
     row = connection.execute(select(tables.subjects).where(tables.subjects.c.name == name)).one_or_none()
     if row is None:
-        raise NotFound(f"there is no subject {name!r}")
+        every = connection.scalars(select(tables.subjects.c.name).order_by(tables.subjects.c.name))
+        raise NotFound(
+            f"there is no subject {name!r}; {did_you_mean(name, every)}. Add one: glovecal subject add {name}"
+        )
     return _record(sound_row(tables.subjects, row))
 
 

@@ -170,9 +170,23 @@ class Takes:
             | dict(context or {}),
             poses=take.poses if poses is None else poses_at_frames(take.time_s, time_s, poses),
         )
-        stale = {CLOCK_OFFSET: 0.0, CLOCK_UNKNOWN: False, CAMERA_REFERENCE: None, UNWRAPPED: []}
-        stale = {name: stale[name] for name in stale if name in earlier.facts}
-        return self._replace(earlier, take, stale | dict(facts or {}))
+        return self._replace(earlier, take, _of_another_reference(earlier) | dict(facts or {}))
+
+    def same_frames(self, take: Take, subject: str) -> TakeRecord | None:
+        """The take of ``subject`` with exactly these frames, whatever it is called."""
+        with self._database.read() as connection:
+            return _with_frames(connection, subject, frames_hash(take))
+
+    def correct(self, id: str, take: Take, *, layout: str, original_sha256: str) -> TakeRecord:
+        """Give a take all that its corrected file says beside the frames, which are the same.
+
+        The id stays; the artifact that was there is listed in ``facts["history"]``. Raises NotFound,
+        BadInput, StorageFull, Conflict if the take was changed meanwhile.
+        """
+        _check_keepable(take)
+        earlier = self.get(id)
+        columns = {"layout": layout, "original_sha256": check_sha256(original_sha256)}
+        return self._replace(earlier, take, _of_another_reference(earlier), **columns)
 
     def shift_reference(self, id: str, seconds: float) -> TakeRecord:
         """Move a take's reference in time, later by ``seconds``; ``facts`` keep the sum of all shifts.
@@ -289,6 +303,12 @@ def _check_keepable(take: Take) -> None:
 
 def _insert(connection: Connection, take: Take, record: TakeRecord) -> None:
     values = {**record.__dict__, "frames_sha256": frames_hash(take)}
+    if here := _with_frames(connection, record.subject, values["frames_sha256"]):
+        raise Conflict(
+            f"subject {record.subject!r} has exactly the frames of {take.name!r} already: take {here.name} "
+            f"({here.id}). To replace its reference and names, import the file with --replace (over REST "
+            f"replace=true); to remove it: glovecal take remove {here.id}"
+        )
     try:
         add_row(connection, tables.takes, values)
     except IntegrityError as error:
@@ -297,10 +317,22 @@ def _insert(connection: Connection, take: Take, record: TakeRecord) -> None:
         ) from error
 
 
+def _with_frames(connection: Connection, subject: str, digest: str) -> TakeRecord | None:
+    same = (tables.takes.c.subject == subject) & (tables.takes.c.frames_sha256 == digest)
+    row = connection.execute(select(tables.takes).where(same)).first()
+    return None if row is None else _record(sound_row(tables.takes, row))
+
+
+def _of_another_reference(record: TakeRecord) -> dict[str, Any]:
+    """What a take's facts say of a reference that is not known of the next one."""
+    unknown = {CLOCK_OFFSET: 0.0, CLOCK_UNKNOWN: False, CAMERA_REFERENCE: None, UNWRAPPED: []}
+    return {name: unknown[name] for name in unknown if name in record.facts}
+
+
 def _require(connection: Connection, id: str) -> TakeRecord:
     row = connection.execute(select(tables.takes).where(tables.takes.c.id == id)).one_or_none()
     if row is None:
-        raise NotFound(f"there is no take {id!r}")
+        raise NotFound(f"there is no take {id!r}. List them: glovecal take list")
     return _record(sound_row(tables.takes, row))
 
 

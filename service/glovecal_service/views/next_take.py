@@ -11,7 +11,9 @@ FREE_MOTION = "free-motion"
 
 
 class NextTakeView(View):
-    motion: str = Field("", description="Its kind, such as ramps; taps is no take: glovecal take latency.")
+    motion: str = Field(
+        "", description="Its kind, such as ramps; taps is no take but `glovecal take latency`."
+    )
     take_name: str = Field(
         "deciding",
         description="What to call it: a diagnosis tells by the name that no other take shows this motion.",

@@ -15,6 +15,7 @@ class SessionDriftView(BaseModel):
     rms_deg: float | None = Field(description="Over shapes and rotations; null without a model.")
     mean_deg: dict[str, float] = Field(description="By rotation, the mean over shapes, end less start.")
     mean_counts: dict[str, float] = Field(description="By sensor.")
+    left_out: dict[str, str] = Field(description="Shapes that were not held, or not in both, and why.")
     sentence: str
 
 
@@ -26,5 +27,6 @@ def session_drift_view(found: SessionDrift) -> dict[str, Any]:
         if found.rotations
         else {},
         "mean_counts": dict(zip(found.sensors, found.common_counts.tolist(), strict=True)),
+        "left_out": dict(found.left_out),
         "sentence": drift_sentence(found),
     }

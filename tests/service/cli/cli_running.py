@@ -5,12 +5,15 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from typing import Any
+
+from told_commands import complaint, with_samples
 
 from glovecal_models.simulation.protocol import segments
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
@@ -67,7 +70,14 @@ def glovecal(settings: Mapping[str, str], *arguments: object) -> Answer:
             main([str(argument) for argument in arguments])
         except SystemExit as end:
             code = end.code
+    _require_runnable(out.getvalue() + err.getvalue())
     return Answer(code or 0, out.getvalue(), err.getvalue())
+
+
+def _require_runnable(said: str) -> None:
+    """Whatever verb a test runs: the commands that it gives to go on with are taken as they are printed."""
+    for line in re.findall(r"(?:^|\s)(?:Next|To undo|Continue with): (glovecal .*)$", said, re.MULTILINE):
+        assert complaint(with_samples(line)) is None, line
 
 
 def start(settings: Mapping[str, str], *arguments: object, **options: Any) -> subprocess.Popen[str]:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from cli_running import Run
 
-from glovecal_models.takes.table import read_takes
+from glovecal_models.takes.table import read_takes, reference_beside
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.write_table import write_takes
 
@@ -106,6 +106,39 @@ def test_a_take_with_one_clock_comes_back_from_one_file(anna, tables, tmp_path, 
     assert list(tmp_path.iterdir()) == [file]
     before = {take.name: take for take in read_takes(tables / "train.csv")}["cross"]
     assert same(before, read_takes(file)[0])
+
+
+def test_a_corrected_file_replaces_what_it_corrects(run, tmp_path):
+    file = tmp_path / "walk.csv"
+    frames = "".join(f"{i / 10},walk,{i},{{}}\n" for i in range(5))
+    table = "time_s,take,s.A,r.R\n" + frames
+    file.write_text(table.format(*range(5)))
+    (first,) = run("take", "import", file, "-s", "anna", "--json").json
+    file.write_text(table.format(10, 11, 12, 13, 14).replace(",walk,", ",stairs,"))
+    refused = run("take", "import", file, "-s", "anna")
+    assert refused.code == 1
+    assert f"take walk ({first['id']})" in refused.said
+    assert "--replace" in refused.said
+    replaced = run("take", "import", file, "-s", "anna", "--replace", "--json")
+    assert f"replaced the reference and names of {first['id']}" in replaced.said
+    (row,) = run("take", "list", "--json").json
+    assert (row["id"], row["name"]) == (first["id"], "stairs")
+    assert run("take", "export", "stairs", tmp_path / "out.csv").code == 0
+    assert read_takes(tmp_path / "out.csv")[0].reference.T.tolist() == [[10, 11, 12, 13, 14]]
+    assert "were here already" in run("take", "import", file, "-s", "anna").said
+
+
+@pytest.mark.parametrize("endings", ["csv csv", "csv parquet", "parquet csv", "CSV csv"])
+def test_a_reference_beside_its_frames_is_found_by_every_verb(run, tables, tmp_path, endings):
+    of_frames, of_reference = endings.split()
+    (take,) = read_takes(tables / "test.frames.csv", tables / "test.reference.csv")
+    write_takes([take], tmp_path / f"a.{of_frames.lower()}")
+    write_takes([take], tmp_path / f"b.{of_reference}")
+    frames = (tmp_path / f"a.frames.{of_frames.lower()}").rename(tmp_path / f"x.frames.{of_frames}")
+    reference = (tmp_path / f"b.reference.{of_reference}").rename(tmp_path / f"x.reference.{of_reference}")
+    assert reference_beside(frames) == reference
+    (row,) = run("take", "import", frames, reference, "-s", "anna", "--json").json
+    assert row["reference_rows"] == len(take.reference_time_s)
 
 
 def test_an_export_replaces_nothing_unasked(anna, tmp_path):
@@ -207,7 +240,8 @@ def test_a_take_is_found_by_what_names_it(anna):
     for name in ("", "pose", "zz", "%2e%2e", "../x", "\N{SNOWMAN}"):
         refused = anna("take", "check", name)
         assert (refused.code, refused.out) == (1, "")
-        assert f"there is no take {name!r}; there are poses ({first['id']} of anna), cross" in refused.said
+        assert f"there is no take {name!r}; " in refused.said
+        assert "here are poses, cross, second. List them: glovecal take list" in refused.said
 
 
 def test_a_name_that_two_takes_have_is_asked_about(run, tables, tmp_path):
@@ -308,13 +342,24 @@ def test_units_that_look_wrong_are_told_once_for_all_files_by_every_import(run: 
     assert "The same in 2 more files.\n" in improved.err
 
 
+def _exported(run: Run, folder: Path, take: str) -> Path:
+    assert run("take", "export", take, folder / "take.csv").code == 0
+    return folder / "take.csv"
+
+
 def test_a_take_becomes_a_motion_file(anna: Run, tmp_path: Path) -> None:
     take = anna("take", "list", "--json").json[0]["name"]
     file = tmp_path / "hand.trc"
     made = anna("take", "motion", file, take, "--content", "raw")
     assert made.code == 0, made.err
     assert made.out.strip() == f"Wrote {file}."
-    assert file.read_text().startswith("PathFileType\t4\t(X/Y/Z)\tmotion.trc (simulated)\n")
+    assert file.read_text().startswith(f"PathFileType\t4\t(X/Y/Z)\t{file.name} (simulated)\n")
     assert "--overwrite" in anna("take", "motion", file, take).said
+    table = tmp_path / "readings.csv"
+    assert anna("take", "motion", table, take, "--content", "raw").code == 0
+    (again,) = read_takes(table)
+    (exported,) = (one for one in read_takes(_exported(anna, tmp_path, take)))
+    assert again.simulated
+    assert np.array_equal(again.readings, exported.readings)
     assert "no model of anna" in anna("take", "motion", tmp_path / "a.trc", take).said
     assert "must end in .trc" in anna("take", "motion", tmp_path / "a.fbx", take).said

@@ -74,13 +74,13 @@ def test_both_hands_are_recorded_filmed_and_joined(
     assert hands == {"anna-left": "left", "anna-right": "right"}, "as capture said: nobody added them"
 
 
-def test_shapes_at_both_ends_tell_the_drift(live: dict[str, str]) -> None:
+def test_hands_that_held_no_shape_are_told_no_drift(live: dict[str, str]) -> None:
     run = partial(glovecal, live)
     for place in ("start", "end"):
         done = run("shapes", *HANDS, "--at", place, "--seconds", 1.5, "--pause", 0)
         assert "10 takes of 5 shapes." in done.out, done.err
-    assert "anna-right: Drift from start to end over 5 shapes" in done.out
-    assert "anna-left: Drift" in done.out
+    for hand in HANDS:  # they moved freely all the time
+        assert f"anna-{hand}: no shape was held at both ends, so no drift is known (flat: the" in done.out
 
 
 def test_a_glove_without_a_card_says_so(live: dict[str, str]) -> None:

@@ -91,6 +91,25 @@ def test_steps_are_even_and_a_lost_angle_stays_as_it_was(tmp_path: Path) -> None
     assert (np.ptp(rows[5:], axis=0) == 0).sum() > (np.ptp(rows[:5], axis=0) == 0).sum()
 
 
+def test_frames_stand_where_the_header_says(tmp_path: Path) -> None:
+    """Steps of a glove that runs at its own rate: their median is not their mean."""
+    steps = np.where(np.arange(1400) % 4, 0.0166, 0.0169)
+    time_s = 1.7e9 + np.concatenate([[0.0], np.cumsum(steps)])
+    turning = moving(count=len(time_s))
+    degrees = np.zeros_like(turning.degrees)
+    degrees[:, turning.rotations.index("I_PIP")] = 60 * (time_s - time_s[0]) / (time_s[-1] - time_s[0])
+    WRITE([replace(turning, time_s=time_s, degrees=degrees)], "joints", tmp_path / "own-rate.bvh")
+    text = (tmp_path / "own-rate.bvh").read_text()
+    header, _, rows = text.partition("Frame Time: ")
+    step_s, frames = float(rows.splitlines()[0]), np.loadtxt(rows.splitlines()[1:])
+    told_s = step_s * np.arange(len(frames))
+    moved = frames[:, np.abs(frames[-1] - frames[0]).argmax()]
+    expected = np.interp(told_s, time_s - time_s[0], 60 * (time_s - time_s[0]) / (time_s[-1] - time_s[0]))
+    late_s = (np.abs(moved) - expected) / 60 * (time_s[-1] - time_s[0])
+    assert f"Frames: {len(frames)}\n" in header
+    assert np.abs(late_s).max() < 0.5e-3
+
+
 def test_what_no_person_did_is_marked(tmp_path: Path) -> None:
     WRITE([replace(moving(), simulated=True)], "joints", tmp_path / "made.bvh")
     assert "JOINT SimulatedGlove" in (tmp_path / "made.bvh").read_text()

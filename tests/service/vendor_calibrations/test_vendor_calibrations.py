@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -26,7 +28,12 @@ from glovecal_service.vendor_calibrations.line_model import read_model, write_mo
 
 LAYOUT22, LUCID = Layout.built_in("cyberglove22"), Layout.built_in("lucidglove")
 EIGHT, TWELVE = Counts(1.0, 255.0), Counts(1.0, 4095.0)
-LAYOUT_OF = {name: LUCID if name == "opengloves" else LAYOUT22 for name in FORMATS}
+HOMUNCULUS = Layout.built_in("homunculus")
+KNUCKLES = tuple(f"{finger}_MCP" for finger in "TIMRP")
+LAYOUT_OF = dict.fromkeys(FORMATS, LAYOUT22) | {
+    "opengloves": LUCID,
+    "lerobot": Layout.from_columns("knuckles", KNUCKLES, KNUCKLES),
+}
 WILD = st.text(max_size=400) | st.from_regex(r"([0-3] +-?[0-9.]+ +-?[0-9.e]+ +0\n){0,30}", fullmatch=True)
 LINE = st.builds(
     SensorLine,
@@ -35,7 +42,7 @@ LINE = st.builds(
 )
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("name", [name for name in FORMATS if name != "lerobot"])
 @pytest.mark.parametrize("hand", ["right", "left"])
 @given(data=st.data())
 @settings(max_examples=25, deadline=None)
@@ -236,3 +243,46 @@ def test_what_is_no_line_of_one_sensor_is_left_out_or_refused() -> None:
 def test_formats_are_known_by_name() -> None:
     with pytest.raises(BadInput, match="no calibration format 'vh'; there are virtualhand, asr"):
         calibration_format("vh")
+
+
+LEROBOT = """{
+    "thumb_cmc": {"id": 0, "drive_mode": 1, "homing_offset": 0, "range_min": 1700, "range_max": 2600},
+    "index_mcp_abduction": {"id": 4, "drive_mode": 1, "homing_offset": 0, "range_min": 150, "range_max": 900},
+    "index_mcp_flexion": {"id": 5, "drive_mode": 0, "homing_offset": 0, "range_min": 1500, "range_max": 2500},
+    "index_dip": {"id": 6, "drive_mode": 0, "homing_offset": 0, "range_min": 2000, "range_max": 3000},
+    "ring_mcp_flexion": {"id": 11, "drive_mode": 1, "homing_offset": 0, "range_min": 1450, "range_max": 3150}
+}"""
+
+
+def test_a_lerobot_calibration_spans_the_hands_range_from_either_end() -> None:
+    model, found = read_model(LEROBOT, FORMATS["lerobot"], HOMUNCULUS, "anna", "right")
+    assert "middle" in found.left_out["I_ABD"]
+    sensors = model.layout.sensors
+    straight, bent = (np.full((1, len(sensors)), 2000.0) for _ in range(2))
+    ends = {"I_MCP": (1500, 2500), "I_DIP": (2000, 3000), "R_MCP": (3150, 1450)}
+    for sensor, (first, last) in ends.items():
+        straight[0, sensors.index(sensor)] = first
+        bent[0, sensors.index(sensor)] = last
+    low, high = predicted(model, straight), predicted(model, bent)
+    assert (low["I_MCP"], high["I_MCP"]) == pytest.approx((-10, 90))
+    assert (low["I_PIP"], high["I_PIP"]) == pytest.approx((0, 100))
+    assert (low["R_MCP"], high["R_MCP"]) == pytest.approx((-10, 90))
+    written = json.loads(write_model(model, FORMATS["lerobot"], "right").text)
+    for joint in ("index_mcp_flexion", "ring_mcp_flexion"):
+        assert written[joint] == json.loads(LEROBOT)[joint]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"index_mcp_flex": {"range_min": 1, "range_max": 2}}, "did you mean 'index_mcp_flexion'"),
+        ({"index_dip": {"range_min": 1}}, 'must have "range_min" and "range_max"'),
+        ({"index_dip": {"range_min": 9, "range_max": 2}}, "exchange them"),
+        ({"index_dip": {"range_min": 1, "range_max": 2, "drive_mode": 3}}, "drive_mode 3 must be 0 or 1"),
+        ({"index_dip": {"range_min": 1, "range_max": "many"}}, "'many' is no number"),
+        ({"index_dip": {"range_min": 7, "range_max": 7}}, "are one reading"),
+    ],
+)
+def test_what_a_lerobot_calibration_cannot_say_is_refused(wrong: dict, said: str) -> None:
+    with pytest.raises(BadInput, match=re.escape(said)):
+        FORMATS["lerobot"].read(json.dumps(wrong), TWELVE, "right")

@@ -13,6 +13,7 @@ from glovecal_client.capture.cyberglove3.clock_poll import ClockReading, read_cl
 from glovecal_client.capture.cyberglove3.conversation import ask, battery_volts, command, question, quiet
 from glovecal_client.capture.stream.links import Link
 from glovecal_client.errors import BadOption, DeviceLost
+from glovecal_client.names import did_you_mean
 
 COMMANDS = {
     "status": "battery, clock, active file, files and free space",
@@ -22,6 +23,7 @@ COMMANDS = {
 }
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,7}(\.[A-Za-z0-9]{1,3})?")
 """Names as a card of its time takes them: 8.3."""
+_WHOLE_ECHO_TRIES = 5
 _TEXT_END = re.compile(rb"\0\Z")
 _OPENED = re.compile(rb"[\0\x01]\Z")
 _FREE = re.compile(rb"([0-9]+)MB left")
@@ -30,7 +32,7 @@ _FREE = re.compile(rb"([0-9]+)MB left")
 def run_command(link: Link, name: str, argument: str, frame_rate: float) -> dict[str, Any]:
     """Carry out one of ``COMMANDS`` on a glove that does not stream now. Raises DeviceLost, BadOption."""
     if name not in COMMANDS:
-        raise BadOption(f"no command {name!r}; there are {', '.join(COMMANDS)}")
+        raise BadOption(f"no command {name!r}; {did_you_mean(name, COMMANDS)}")
     quiet(link)
     if name == "start":
         _open_file(link, argument)
@@ -88,6 +90,15 @@ def _open_file(link: Link, name: str) -> None:
 
 
 def _text(link: Link, query: bytes) -> str:
-    """What a query answers, without its echo and the NUL."""
-    heard = question(link, query, _TEXT_END)
-    return heard.replace(query, b"", 1).rstrip(b"\0").decode("latin-1")
+    """What a query answers, without its echo and the NUL. Raises DeviceLost when no echo comes whole.
+
+    What is left of an echo that lost a byte cannot be told from the beginning of a file's name.
+    """
+    for _ in range(_WHOLE_ECHO_TRIES):
+        heard = question(link, query, _TEXT_END)
+        if heard.startswith(query):
+            return heard[len(query) :].rstrip(b"\0").decode("latin-1")
+    raise DeviceLost(
+        f"the glove answers {query!r} with {heard[:24]!r}, whose beginning is damaged each time: check its "
+        "cable or WiFi"
+    )

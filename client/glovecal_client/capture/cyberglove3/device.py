@@ -80,6 +80,8 @@ class CyberGlove3(StreamedGlove):
             on, off = (b"w", b"u") if self._over_network else (b"u", b"w")
             replies += [command(link, b"1e" + on), command(link, b"1d" + off)]
         replies.append(command(link, b"1m" + bytes([self._multiplier])))
+        # What another program divided the rate by stays in the glove: 3 makes 30 Hz of 90.
+        replies += [command(link, divider + b"\x01") for divider in (b"1u", b"1w")]
         self.notice: str = "; ".join(_notices(volts, sum(not reply.echoed for reply in replies)))
         link.write(START)
 

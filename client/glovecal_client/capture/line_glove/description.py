@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 from glovecal_client.capture.line_glove.checksum import CHECKSUMS
 from glovecal_client.errors import BadName, BadOption
-from glovecal_client.names import check_channel_name, check_identifier
+from glovecal_client.names import check_channel_name, check_identifier, did_you_mean
 
 UNUSED = "-"
 MOST_LINES = 64
@@ -97,7 +97,7 @@ class _Reader:
             self._tables[name] = table
             for key in table:
                 if key not in keys:
-                    self._refuse(f"unknown key {self._named(name, key)}; known are {', '.join(keys)}")
+                    self._refuse(f"unknown key {self._named(name, key)}; {did_you_mean(key, keys)}")
 
     def description(self, default_name: str) -> LineDescription:
         pattern = self._pattern()

@@ -17,9 +17,7 @@ _TICKS_PER_SECOND = {"computer": None, "glove_us": 1_000_000, "glove_ms": 1_000}
 
 
 class OpenCyberGlove(StreamedGlove):
-    """Nineteen tensile sensors, named by their place in the packet: where each lies is published as a picture
-    only.
-    """
+    """Nineteen tensile sensors, named by their place in the packet; the layout says what each crosses."""
 
     name = "opencyberglove"
     layout = "opencyberglove"

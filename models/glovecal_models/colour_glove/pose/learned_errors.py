@@ -21,6 +21,7 @@ from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM
 from glovecal_models.colour_glove.pose_estimate import STAGES
 from glovecal_models.documents import UNREADABLE_ARCHIVE
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 
 _LEAST_DISAGREEING = 0.02
 _RANGE = {"angles": (0.3, 60.0), "turn": (0.2, 90.0), "position": (0.2, 300.0)}
@@ -53,7 +54,8 @@ class LearnedErrors:
         """(26,) standard deviations. Raises BadInput for a stage of which nothing was learned."""
         name = scale_name(stage, followed)
         if name not in self.scales:
-            raise BadInput(f"errors of {name!r} were never learned; known are {', '.join(self.scales)}")
+            meant = did_you_mean(name, self.scales, there="known are")
+            raise BadInput(f"errors of {name!r} were never learned; {meant}")
         features = error_features(posterior_sd[None], np.array([disagreeing]))[0]
         return np.clip(np.exp((self.scales[name] * features).sum(axis=1)), _LOW, _HIGH)
 

@@ -19,6 +19,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Curve
 
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 
 MM_OF_INCH = 25.4
 POINTS_OF_MM = 72 / MM_OF_INCH
@@ -51,7 +52,7 @@ class Sheet:
 
     def __init__(self, paper: str, title: str, *, landscape: bool = False) -> None:
         if paper not in PAPERS_MM:
-            raise BadInput(f"paper {paper!r}; there are {', '.join(PAPERS_MM)}")
+            raise BadInput(f"paper {paper!r}; {did_you_mean(paper, PAPERS_MM)}")
         short, long = PAPERS_MM[paper]
         self.width_mm, self.height_mm = (long, short) if landscape else (short, long)
         self.title = title

@@ -40,7 +40,7 @@ CROSSED = Motion(
 )
 TAPS = Motion(
     "taps",
-    "Measure the glove's own delay, which no take with a reference can show: glovecal take latency, and tap"
-    " a key at least 20 times with one finger.",
+    "Measure the glove's own delay, which no take with a reference can show. Run: glovecal take latency"
+    " GLOVE, and tap a key at least 20 times with one finger.",
     40,
 )

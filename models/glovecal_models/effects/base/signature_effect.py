@@ -18,6 +18,7 @@ from glovecal_models.effects.base.effect import ColumnlessEffect, Effect
 from glovecal_models.effects.base.facts import Kind, Settings, Stage
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 from glovecal_models.progress import Cancel
 from glovecal_models.takes.take import Take
 
@@ -240,7 +241,7 @@ def check_signature_input(
             if sensor not in take.sensors:
                 raise BadInput(
                     f"take {take.name!r} has no sensor {sensor!r} for rotation {rotation}; "
-                    f"it has {', '.join(take.sensors)}"
+                    f"{did_you_mean(sensor, take.sensors, there='it has')}"
                 )
     if errors is None:
         return

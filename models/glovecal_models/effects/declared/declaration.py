@@ -16,7 +16,7 @@ from typing import Any, get_args
 from glovecal_models.effects.base.facts import Control, Parameter
 from glovecal_models.errors import BadInput
 from glovecal_models.expression import FUNCTIONS, Node, check_names, parse_expressions
-from glovecal_models.names import check_channel_name, check_identifier
+from glovecal_models.names import check_channel_name, check_identifier, did_you_mean
 
 LONGEST_TEXT = 2000
 MOST_PARAMETERS = 2
@@ -83,7 +83,7 @@ class Declaration:
             document = {"control" if key == _OLD_KEY else key: value for key, value in document.items()}
         unknown = [key for key in document if key not in _KEYS]
         if unknown:
-            raise BadInput(f"effect: unknown part {unknown[0]!r}; known are {', '.join(_KEYS)}")
+            raise BadInput(f"effect: unknown part {unknown[0]!r}; {did_you_mean(unknown[0], _KEYS)}")
         for key in ("name", "columns"):
             if not isinstance(document.get(key), str) or not document[key].strip():
                 raise BadInput(f"effect: {key} is missing; write {key} = ...")

@@ -15,6 +15,7 @@ from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.declared.declaration import Declaration
 from glovecal_models.effects.declared.expression_value import Evaluation, Memory, Undefined
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 
 LARGEST = 1e9
 """Of a column: squares of more lose the digits of everything fitted beside it."""
@@ -87,7 +88,7 @@ class ExpressionEffect(Effect):
         for name in self._signals:
             if not any(name in take.others for take in takes):
                 known = sorted({other for take in takes for other in take.others})
-                return f"no signal {name} was recorded (there are {', '.join(known) or 'none'})"
+                return f"no signal {name} was recorded ({did_you_mean(name, known)})"
         why = super().not_applicable_reason(takes)
         return self._constant(takes) if why is None else why
 

@@ -247,8 +247,8 @@ def if_the_glove_is_late(late_s: float, confidence_set: Sequence[str]) -> str:
             f" decide, as keys report a press 5 to 20 ms late."
         )
     return (
-        f"If it is the glove, live poses are {1000 * late_s:.0f} ms late: glovecal take latency measures the"
-        " glove's own delay and decides."
+        f"If it is the glove, live poses are {1000 * late_s:.0f} ms late. This measures the glove's own"
+        " delay and decides: glovecal take latency GLOVE."
     )
 
 

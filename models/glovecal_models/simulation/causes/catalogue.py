@@ -13,6 +13,7 @@ from importlib.util import find_spec
 import numpy as np
 
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 from glovecal_models.simulation.causes import recorded_context
 from glovecal_models.simulation.causes.form import Draws, Form, Stage, form
 from glovecal_models.simulation.scene import Scene
@@ -156,7 +157,7 @@ def forms(name: str) -> tuple[Form, ...]:
     elif name in KNOWN_CAUSES:
         own = import_module(f"{PACKAGE}.{name}").FORMS
     else:
-        raise BadInput(f"no cause {name!r}; there are {', '.join(KNOWN_CAUSES + UNKNOWN_CAUSES)}")
+        raise BadInput(f"no cause {name!r}; {did_you_mean(name, KNOWN_CAUSES + UNKNOWN_CAUSES)}")
     return (
         *own, *_further("retired", name), *_further("set_aside", name), *_further("set_aside.unlike", name),
     )  # fmt: skip

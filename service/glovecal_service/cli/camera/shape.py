@@ -120,4 +120,4 @@ def shape(
             f"One camera leaves the size open by {100 * found.size_sd:.0f} %: distances from the camera are "
             "as uncertain, angles are not."
         )
-    out.print(f"Wrote {file}. Next: glovecal camera track or estimates with --shape {file}")
+    out.print(f"Wrote {file}. Next: glovecal camera track SOURCE --glove GLOVE --shape {file}")

@@ -69,7 +69,7 @@ def _findings(glove: str, seconds: float, endpoint: str, site: str) -> tuple[lis
             meta, before = (ask_json(session, key, timeout_s=2.0) for key in (wire.meta, wire.status))
         except NoAnswer:
             gone = f"Nothing is heard of glove {glove} at site {site}."
-            start = f"Start it where it is plugged in: glovecal capture --glove {glove}."
+            start = f"Start it where it is plugged in: glovecal capture --device DEVICE --glove {glove}."
             return [GloveFinding("capture", gone, start)], 0
         err.print(f"Listening for {seconds:g} s: bend, spread and turn the whole hand.")
         with heard_frames(session, wire.raw) as heard:
@@ -124,7 +124,7 @@ def _model(glove: str, meta: Mapping[str, Any]) -> tuple[CalibrationModel | None
         with connect() as service:
             subject = _wearer(service, glove) or meta.get("subject")
             if not subject:
-                put = f"Say who wears it: glovecal glove wear {glove} --subject NAME."
+                put = f"Say who wears it: glovecal glove wear {glove} SUBJECT."
                 return None, [GloveFinding("model", f"Nobody is known to wear {glove}.", put)]
             known = {row["name"]: row["hand"] for row in service.get("/subjects")}
             if subject not in known:

@@ -25,7 +25,11 @@ def list_jobs(as_json: AsJson = False) -> None:
         for row in rows
     ]
     columns = {"id": "job", "kind": "kind", "subject": "subject", "state": "state", "done": "done"}
-    print_table(shown, {**columns, "last": "last message"}, empty="No jobs yet. glovecal train starts one.")
+    print_table(
+        shown,
+        {**columns, "last": "last message"},
+        empty="No jobs yet. Start one: glovecal train --subject NAME",
+    )
 
 
 @app.command("show")

@@ -14,10 +14,10 @@ from glovecal_service.cli.terminal.refusal import Refusal
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
 
-FormatName = Literal["virtualhand", "asr", "shadow_xml", "shadow_yaml", "opengloves"]
+FormatName = Literal["virtualhand", "asr", "shadow_xml", "shadow_yaml", "opengloves", "lerobot"]
 VendorFormat = Annotated[
     FormatName | None,
-    typer.Option("--format", help="Of another program: VirtualHand and DCU, ASR, Shadow, OpenGloves."),
+    typer.Option("--format", help="Of another program: VirtualHand, DCU, ASR, Shadow, OpenGloves, LeRobot."),
 ]
 
 

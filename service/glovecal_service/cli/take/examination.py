@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from glovecal_models.names import did_you_mean
 from glovecal_service.cli.take.rows import find_take, find_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, OnlySubject, identifier
@@ -145,8 +146,8 @@ def _with_proposals(found: dict[str, Any], name: str, rotations: list[str]) -> d
     by_rotation = {item["rotation"]: item for item in found["proposals"] if item["is_sure"] is not None}
     unknown = [rotation for rotation in rotations if rotation not in by_rotation]
     if unknown:
-        there = ", ".join(by_rotation) or "none"
-        raise Refusal(f"there is no proposal for {unknown[0]}: examined were {there}")
+        meant = did_you_mean(unknown[0], by_rotation, there="examined were")
+        raise Refusal(f"there is no proposal for {unknown[0]!r}; {meant}")
     document = found["proposed_layout"]
     sensors = {
         item["rotation"]: item["sensors_now"] for item in found["proposals"] if item["kind_now"] != "0S1R"

@@ -60,6 +60,8 @@ class FileSubject:
         return [row["id"] for row in rows]
 
     def _imported(self, file: Path, warnings: ImportWarnings) -> list[dict[str, Any]]:
+        from glovecal_models.takes.table import reference_beside
+
         self._require_layout(file)
         try:
             answer = self.service.upload_takes(
@@ -103,15 +105,10 @@ def added_subject(service: RestClient, subject: str) -> str:
     return f"Added subject {subject}.{similar} To undo: glovecal subject remove {subject} --takes"
 
 
-def reference_beside(frames: Path) -> Path | None:
-    """X.reference.csv for X.frames.csv, when it is there."""
-    stem, mark, rest = frames.name.rpartition(".frames.")
-    partner = frames.with_name(f"{stem}.reference.{rest}")
-    return partner if mark and partner.is_file() else None
-
-
 def frames_among(files: Sequence[Path]) -> list[Path]:
     """``files`` without those that are the reference table of another one."""
+    from glovecal_models.takes.table import reference_beside
+
     return [
         file
         for file in dict.fromkeys(files)

@@ -143,7 +143,9 @@ def _require_here(glove: str, heard: list) -> None:
     while not heard and time.monotonic() < until:
         time.sleep(0.05)
     if not heard:
-        raise Refusal(f"glove {glove} sends no frames; start it: glovecal capture")
+        raise Refusal(
+            f"glove {glove} sends no frames; start it: glovecal capture --device DEVICE --glove {glove}"
+        )
     apart_s = abs(clock_ns() - heard[-1].monotonic_ns) / 1e9
     if apart_s > OTHER_COMPUTER_S:
         raise Refusal(

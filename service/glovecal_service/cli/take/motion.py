@@ -92,6 +92,7 @@ def motion(
             "hands": hand or [],
             "content": content,
             "format": chosen.suffix.removeprefix("."),
+            "file_name": file.name,
             "shifts_s": shift or [],
             "claps": claps,
             "wrist": wrist,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from glovecal_models.names import did_you_mean
 from glovecal_service.cli.terminal.printing import print_table
 from glovecal_service.cli.terminal.refusal import Refusal
 
@@ -41,8 +42,8 @@ def find_take(rows: Sequence[dict[str, Any]], wanted: str) -> dict[str, Any]:
         return found[0]
     if found:
         raise Refusal(f"{len(found)} takes are called {wanted!r}: {_listed(found)}; give the id of one")
-    there = f"there are {_listed(rows)}" if rows else "there are none"
-    raise Refusal(f"there is no take {wanted!r}; {there}")
+    meant = did_you_mean(wanted, (row["name"] for row in rows))
+    raise Refusal(f"there is no take {wanted!r}; {meant}. List them: glovecal take list")
 
 
 def find_takes(rows: Sequence[dict[str, Any]], wanted: Iterable[str]) -> list[dict[str, Any]]:

@@ -9,7 +9,7 @@ import typer
 
 from glovecal_client.errors import ServiceError
 from glovecal_service.cli.glove.layouts import layout_named
-from glovecal_service.cli.take.files import ImportWarnings, added_subject, frames_among, reference_beside
+from glovecal_service.cli.take.files import ImportWarnings, added_subject, frames_among
 from glovecal_service.cli.take.rows import print_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Subject
@@ -43,6 +43,10 @@ def import_takes(
         bool,
         typer.Option("--spread-equal-times", help="Frames stamped in batches: spread each over its batch."),
     ] = False,
+    replace: Annotated[
+        bool,
+        typer.Option("--replace", help="Takes that are here get the file's reference and names; ids stay."),
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Import take tables. X.reference.csv beside X.frames.csv is found by itself.
@@ -50,10 +54,13 @@ def import_takes(
     A subject that is not there yet is added. A file that cannot be imported is told and the others are
     imported; the exit code is 1 then.
     """
+    from glovecal_models.takes.table import reference_beside
+
     if reference and len(files) > 1:
         raise typer.BadParameter("--reference goes with one frames file")
     frames = frames_among(files)
     options = {"name": name, "wearing": wearing, "equal_times": "spread" if spread_equal_times else None}
+    options["replace"] = "true" if replace else None
     rows, refused, warnings = [], 0, ImportWarnings()
     with connect() as service:
         chosen = layout_named(service, layout)
@@ -90,7 +97,13 @@ def _import(
     )
     if answer["subject_created"]:
         err.print(added_subject(service, subject), style="yellow")
-    if not answer["imported"]:
+    if answer["replaced"]:
+        err.print(
+            f"{file}: replaced the reference and names of {', '.join(answer['replaced'])}. Existing models "
+            "are unchanged; retrain.",
+            style="yellow",
+        )
+    elif not answer["imported"]:
         err.print(f"{file}: its takes were here already", style="yellow")
     warnings.add(file, answer["warnings"])
     return answer["takes"]

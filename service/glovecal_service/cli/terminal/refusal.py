@@ -22,7 +22,7 @@ def sentence_of(error: Exception) -> str:
     """For a person: without HTTP's status numbers, and with the fields the service found wrong."""
     fields = getattr(error, "problem", {}).get("errors") if isinstance(error, ServiceError) else None
     if fields:
-        return "; ".join(f"{_field(item['location'])}: {item['problem']}" for item in fields)
+        return "; ".join(f"{_field(item['location'])}{item['problem']}" for item in fields)
     if isinstance(error, ServiceError):
         return error.detail or error.title
     if isinstance(error, OSError):
@@ -36,9 +36,12 @@ def exit_code_of(error: Exception) -> int:
 
 
 def _field(location: str) -> str:
-    """``body.folds`` is ``folds`` to somebody who never saw the body."""
-    part, _, rest = location.partition(".")
-    return rest if rest and part in ("body", "query", "path", "header") else location
+    """``body.rotations.0`` is ``rotations: `` to somebody who never saw the body: the value stands behind."""
+    part, *names = location.split(".")
+    if part not in ("body", "query", "path", "header"):
+        names = [part, *names]
+    shown = ", ".join(name for name in names if not name.isdigit())
+    return f"{shown}: " if shown else ""
 
 
 EXPECTED = (GlovecalError, ClientError, OSError)

@@ -12,6 +12,7 @@ from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Kind
 from glovecal_models.effects.catalogue import GROUP, catalogue, effect
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 from glovecal_service.plain import plain
 from glovecal_service.report.effect_schematic import schematic
 from glovecal_service.rest.http.answers import problems
@@ -103,7 +104,7 @@ def _known(name: str) -> Effect:
     try:
         return effect(name)
     except BadInput as error:
-        raise NotFound(f"there is no effect {name!r}; there are {', '.join(sorted(catalogue()))}") from error
+        raise NotFound(f"there is no effect {name!r}; {did_you_mean(name, sorted(catalogue()))}") from error
 
 
 def can_be_added(item: Effect) -> bool:

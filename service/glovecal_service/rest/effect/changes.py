@@ -12,6 +12,7 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.model_recipe import declaration_of, trained_rotations
 from glovecal_models.effects.catalogue import effect as known_effect
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 from glovecal_service.rest.effect.catalogue import EffectInPath, can_be_added
 from glovecal_service.rest.effect.declarations import (
     AskedEffect,
@@ -95,8 +96,8 @@ def remove_effect(
     model, _ = parts.predictors.get(record.id)
     has = list(dict.fromkeys(item.name for item in model.effects))
     if name not in has:
-        there = f"it has {', '.join(has)}" if has else "it has none"
-        raise NotFound(f"model {record.id[:12]} has no effect {name!r}; {there}")
+        meant = did_you_mean(name, has, there="it has")
+        raise NotFound(f"model {record.id[:12]} has no effect {name!r}; {meant}")
     model_takes(parts.store, record, None)
     payload = {"model": record.id, "effect": name, "activate": activate}
     return new_job(parts.store, response, "remove_effect", payload, record.subject)
@@ -130,5 +131,6 @@ def _checked_rotations(model: CalibrationModel, wanted: list[str] | None) -> lis
     every = trained_rotations(model)
     for name in wanted:
         if name not in every:
-            raise BadInput(f"no rotation {name!r} is trained in this model; it has {', '.join(every)}")
+            meant = did_you_mean(name, every, there="it has")
+            raise BadInput(f"no rotation {name!r} is trained in this model; {meant}")
     return list(dict.fromkeys(wanted))

@@ -11,6 +11,7 @@ from pydantic import Field, FiniteFloat
 from glovecal_models.effects.catalogue import effect
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
+from glovecal_models.names import did_you_mean
 from glovecal_service.rest.effect.declarations import Declared, checked_declaration, declaration_document
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
@@ -108,7 +109,7 @@ def _payload(body: DetectabilityRequest, takes: Sequence[TakeRecord], layout: La
     unknown = [name for name in body.rotations or () if name not in layout.rotations]
     if unknown:
         raise BadInput(
-            f"no rotation {unknown[0]!r} in this layout; there are {', '.join(layout.rotations)}"
+            f"no rotation {unknown[0]!r} in this layout; {did_you_mean(unknown[0], layout.rotations)}"
         )  # fmt: skip
     own = [checked_declaration(item.declaration, takes, layout.sensors) for item in body.declarations]
     facts = body.model_dump(include={"effects", "rotations", "sizes_deg", "trials", "seed"})

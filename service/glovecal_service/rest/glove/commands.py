@@ -64,5 +64,6 @@ def _ask(session: zenoh.Session, parts: Parts, glove: str, body: GloveCommand) -
     except QueryRefused as refused:
         found["problem"] = str(refused).partition(": ")[2]
     except NoAnswer:
-        found["problem"] = f"no capture of glove {glove} answers; start it: glovecal capture --glove {glove}"
+        start = f"glovecal capture --device DEVICE --glove {glove}"
+        found["problem"] = f"no capture of glove {glove} answers; start it: {start}"
     return found

@@ -28,7 +28,7 @@ from glovecal_service.rest.http.request_types import (
     WearingName,
 )
 from glovecal_service.store.clock import now
-from glovecal_service.store.errors import NotFound
+from glovecal_service.store.layouts import no_layout
 from glovecal_service.store.records import GloveRecord, LayoutRecord
 
 router = APIRouter(prefix="/gloves", tags=["gloves"])
@@ -112,10 +112,11 @@ def list_gloves(store: StoreNeeded) -> dict[str, Any]:
 
 @router.get("/{layout}", response_model=LayoutView, summary="One layout", responses=problems())
 def get_layout(layout: NameInPath, store: StoreNeeded) -> LayoutView:
-    for record in store.layouts.list():
+    every = store.layouts.list()
+    for record in every:
         if record.name == layout:
             return _view(record)
-    raise NotFound(f"there is no layout {layout!r}")
+    raise no_layout(layout, (record.name for record in every))
 
 
 @router.put(
@@ -199,7 +200,7 @@ def _checked(content: bytes, content_type: str) -> LayoutBody:
             return LayoutBody.model_validate_json(content)
         return LayoutBody.model_validate(read_toml(content, "layout"))
     except ValidationError as error:
-        found = error.errors(include_input=False, include_url=False)
+        found = error.errors(include_url=False)
         raise RequestValidationError([{**item, "loc": ("body", *item["loc"])} for item in found]) from error
     except BadInput as error:
         raise BadLayout(str(error)) from error

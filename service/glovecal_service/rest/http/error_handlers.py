@@ -72,7 +72,7 @@ def problem_of(error: Exception) -> Problem:
 
 
 def invalid_request(errors: Sequence[Any]) -> Problem:
-    """422 from pydantic's findings. The input is left out: it may be huge, secret, or not JSON."""
+    """422 from pydantic's findings. Of the input names alone are shown: it may be huge, or secret."""
     fields = [
         {
             "location": plain_text(".".join(map(str, item["loc"])), 200),

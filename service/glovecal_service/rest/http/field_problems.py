@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
 from glovecal_models.errors import BadInput
-from glovecal_service.rest.http.request_types import MEANING
+from glovecal_models.names import did_you_mean
+from glovecal_service.rest.http.request_types import LONGEST_SHOWN, MEANING
 
 _WANTED = {
     "missing": "it is missing; give it",
@@ -45,14 +47,19 @@ _UNKNOWN = "it is not of the form that this route's description shows; give one 
 
 
 def what_is_right(finding: Mapping[str, Any]) -> str:
-    """A sentence without the value given, which may be huge, secret, or not JSON."""
-    context = finding.get("ctx") or {}
+    """A sentence that shows of the input names alone: it may be huge, secret, or not JSON."""
+    given, context = finding.get("input"), finding.get("ctx") or {}
+    is_name = isinstance(given, str) and given.isprintable() and 0 < len(given) <= LONGEST_SHOWN
     if isinstance(context.get("error"), BadInput):  # raised by a check of ours
         return str(context["error"])[:300]
     kind = finding["type"]
     if kind == "string_pattern_mismatch":
         pattern = context.get("pattern", "")
-        return MEANING.get(pattern, f"give text of the form {pattern}")
+        meaning = MEANING.get(pattern, f"give text of the form {pattern}")
+        return f"{given!r} is not allowed; {meaning}" if is_name else meaning
+    if kind == "literal_error" and is_name:
+        meant = did_you_mean(given, re.findall("'([^']*)'", context["expected"]))
+        return f"{given!r} is not known; {meant}"
     for ending in ("", *_ENDINGS):
         wanted = _WANTED.get(kind.removesuffix(ending) if ending else kind)
         if wanted is not None:

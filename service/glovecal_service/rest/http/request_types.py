@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import Path, Query
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, StringConstraints
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    StringConstraints,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
+
+from glovecal_models.names import did_you_mean
 
 ID = r"^[0-9a-f]{12}$"
 IDENTIFIER = r"^[a-z0-9][a-z0-9_-]{0,63}$"
@@ -14,6 +25,9 @@ CHANNEL = r"^[A-Za-z][A-Za-z0-9_]{0,63}$"
 ONE_LINE = r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]*$"
 SHA256 = r"^[0-9a-f]{64}$"
 SHA256_PREFIX = r"^[0-9a-f]{6,64}$"
+
+LONGEST_SHOWN = 64
+"""Of a value that somebody gave in the place of a name."""
 
 MEANING = {
     IDENTIFIER: "use a-z, 0-9, _ and -, at most 64, not starting with _ or -",
@@ -61,3 +75,14 @@ class StrictBody(BaseModel):
     """Takes exactly the documented fields and types: nothing is coerced, nothing is ignored."""
 
     model_config = ConfigDict(strict=True, extra="forbid")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _names_its_fields(cls, values: Any) -> Any:
+        known = [item.alias or name for name, item in cls.model_fields.items()]
+        unknown = [key for key in values if key not in known] if isinstance(values, dict) else []
+        if unknown:
+            key = str(unknown[0])[:LONGEST_SHOWN]
+            about = {"key": repr(key), "meant": did_you_mean(key, known)}
+            raise PydanticCustomError("unknown_field", "unknown key {key}; {meant}", about)
+        return values

@@ -8,6 +8,7 @@ from typing import Annotated
 from pydantic import Field
 
 from glovecal_models.errors import LayoutMismatch, NotTrainable
+from glovecal_models.names import did_you_mean
 from glovecal_service.jobs.model_work import trained_ids
 from glovecal_service.rest.http.request_types import TakeReference
 from glovecal_service.store.errors import Conflict, NotFound
@@ -67,7 +68,6 @@ def _one(every: Sequence[TakeRecord], wanted: str, subject: str) -> TakeRecord:
         ids = ", ".join(take.id for take in found[:MOST_SHOWN])
         raise Conflict(f"{len(found)} takes of {subject!r} are called {wanted!r}: {ids}; give the id of one")
     if not found:
-        there = ", ".join(f"{take.name} ({take.id})" for take in own[:MOST_SHOWN]) or "none"
-        more = f" and {len(own) - MOST_SHOWN} more" if len(own) > MOST_SHOWN else ""
-        raise NotFound(f"subject {subject!r} has no take {wanted!r}; there are {there}{more}")
+        meant = did_you_mean(wanted, (take.name for take in own))
+        raise NotFound(f"subject {subject!r} has no take {wanted!r}; {meant}")
     return found[0]

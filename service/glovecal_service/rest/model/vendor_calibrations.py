@@ -18,7 +18,7 @@ from glovecal_service.vendor_calibrations.line_model import MOST_CHARACTERS, rea
 
 router = APIRouter(prefix="/models", tags=["models"])
 
-FormatName = Literal["virtualhand", "asr", "shadow_xml", "shadow_yaml", "opengloves"]
+FormatName = Literal["virtualhand", "asr", "shadow_xml", "shadow_yaml", "opengloves", "lerobot"]
 
 
 class Calibration(StrictBody):

@@ -37,10 +37,12 @@ class Import:
     warnings: list[str]
     subject_created: bool
     """Whether the subject was not there before."""
+    replaced: set[str]
+    """Ids of those whose frames were here, and whose reference and names are now those of the file."""
 
     @property
     def imported(self) -> list[str]:
-        return [record.id for record in self.takes if record.id not in self.existing]
+        return [record.id for record in self.takes if record.id not in self.existing | self.replaced]
 
 
 def import_takes(
@@ -51,12 +53,15 @@ def import_takes(
     subject: str,
     layout: str | None,
     create_subject: bool = False,
+    replace: bool = False,
 ) -> Import:
     """Keep all takes that ``read`` finds. Without ``layout`` the file's columns make one.
 
     A file that another subject has already is refused: one recording is of one hand. With ``create_subject``
-    a subject that is not there is added with the takes. Raises BadInput (BadTakeTable, LayoutMismatch),
-    NotFound, Conflict, StorageFull; then nothing was imported, and no subject added.
+    a subject that is not there is added with the takes. With ``replace`` a take whose frames are here already
+    gets what this file says beside them, and keeps its id; else that is a Conflict. Raises BadInput
+    (BadTakeTable, LayoutMismatch), NotFound, Conflict, StorageFull; then nothing was imported, and no subject
+    added.
     """
     is_new = create_subject and subject not in {record.name for record in store.subjects.list()}
     if not is_new:
@@ -71,29 +76,45 @@ def import_takes(
         _require_fits(take, chosen)
     stored_before = store.takes.list(subject=subject, layout=chosen.name)
     stored = {item.name: item for item in stored_before if item.original_sha256 == original_sha256}
-    existing = {take.name: _same(take, stored[take.name]) for take in takes if take.name in stored}
-    new = [take for take in takes if take.name not in stored]
-    beside = _newest_measured(store, stored_before, new)
-    circle = unwrapped(new, [] if beside is None else [store.takes.load(beside.id)])
+    held = (
+        {take.name: store.takes.same_frames(take, subject) for take in takes}
+        if replace and not is_new
+        else {}
+    )
+    corrected = {name: record for name, record in held.items() if record is not None}
+    existing = {
+        take.name: _same(take, stored[take.name])
+        for take in takes
+        if take.name in stored and take.name not in corrected
+    }
+    changed = [take for take in takes if take.name not in existing]
+    beside = _newest_measured(store, stored_before, changed)
+    circle = unwrapped(changed, [] if beside is None else [store.takes.load(beside.id)])
     with ExitStack() as undo:
         if is_new:
             store.subjects.create(subject)
             undo.callback(store.subjects.remove, subject)
         added = store.takes.add_all(
-            circle.takes,
+            [take for take in circle.takes if take.name not in corrected],
             subject=subject,
             layout=chosen.name,
             source="import",
             original_sha256=original_sha256,
         )
         undo.pop_all()
-    by_name = existing | {record.name: record for record in added}
+    for take in circle.takes:
+        if take.name in corrected:
+            corrected[take.name] = store.takes.correct(
+                corrected[take.name].id, take, layout=chosen.name, original_sha256=original_sha256
+            )
+    by_name = existing | corrected | {record.name: record for record in added}
     return Import(
         chosen.name,
         [by_name[take.name] for take in takes],
         {record.id for record in existing.values()},
         [*alike_once(circle.sentences), *take_warnings(_now_unwrapped(takes, circle.takes))],
         is_new,
+        {record.id for record in corrected.values()},
     )
 
 
@@ -141,8 +162,8 @@ def _require_fits(take: Take, layout: Layout) -> None:
 def _same(take: Take, record: TakeRecord) -> TakeRecord:
     if len(take.reference_time_s) != record.reference_rows:
         raise Conflict(
-            f"take {take.name!r} of this file is here already ({record.id}) with another reference; "
-            f"attach the new one with PUT /v1/takes/{record.id}/reference"
+            f"take {take.name!r} of this file is here already ({record.id}) with another reference. To "
+            "replace it, import the file with --replace (over REST replace=true)"
         )
     return record
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Annotated
 
 from fastapi import APIRouter, Request
@@ -11,6 +11,7 @@ from fastapi.responses import FileResponse
 from pydantic import Field, FiniteFloat
 from starlette.background import BackgroundTask
 
+from glovecal_client.operating_system import name_for_a_file
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.skeleton import Handedness
 from glovecal_models.progress import Cancel
@@ -22,7 +23,7 @@ from glovecal_service.exports.motion_file import HandTake, MotionFile, write_mot
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.long_answers import in_process, in_time
-from glovecal_service.rest.http.request_types import ModelReference, StrictBody, TakeReference
+from glovecal_service.rest.http.request_types import ModelReference, StrictBody, TakeReference, Title
 from glovecal_service.store.errors import Conflict, NotFound
 
 router = APIRouter(prefix="/motion", tags=["takes"])
@@ -31,6 +32,8 @@ MOST_HANDS = 2
 LARGEST_SHIFT_S = 1e9
 LIMIT_S = 1800.0
 """An hour of one hand took 4 minutes on two loaded cores."""
+LONGEST_NAME = 50
+"""Characters of a file's name, four bytes each at most."""
 MarkerNames = Annotated[list[Annotated[str, Field(min_length=1, max_length=64)]], Field(max_length=4)]
 Shift = Annotated[FiniteFloat, Field(ge=-LARGEST_SHIFT_S, le=LARGEST_SHIFT_S)]
 
@@ -68,6 +71,9 @@ class Motion(StrictBody):
     format: Annotated[str, Field(pattern=r"^[a-z0-9]{1,16}$")] = Field(
         "trc", description=f"One of {', '.join(suffix[1:] for suffix in FORMATS)}."
     )
+    file_name: Annotated[Title, Field(min_length=1)] = Field(
+        "motion", description="That the file is to have; TRC names itself in its first line."
+    )
     shifts_s: Annotated[list[Shift], Field(max_length=MOST_HANDS)] = Field(
         default_factory=list,
         description="Added to each take's times. Not given: two takes are joined as `takes/hands` says.",
@@ -100,7 +106,8 @@ async def export_motion(body: Motion, request: Request, parts: PartsNeeded) -> F
     folder = tempfile.TemporaryDirectory(prefix="glovecal-motion-")
     try:
         chosen = format_of(f"motion.{body.format}")
-        path = Path(folder.name, f"motion{chosen.suffix}")
+        name = PurePosixPath(body.file_name).name.removesuffix(chosen.suffix)[:LONGEST_NAME] or "motion"
+        path = Path(folder.name, name_for_a_file(name + chosen.suffix))
 
         def write(cancelled: Cancel) -> None:
             asked = _asked(parts, body, path)

@@ -26,6 +26,7 @@ class ImportedTakes(BaseModel):
     takes: list[Take] = Field(description="All takes of the file, in its order.")
     imported: list[str] = Field(description="Ids of those that are new.")
     existing: list[str] = Field(description="Ids of those that the same file had brought before.")
+    replaced: list[str] = Field(description="Ids of those whose reference and names are now the file's.")
     layout: str
     original_sha256: str
     warnings: list[str] = Field(description="What `check` says of the takes; like sentences once.")
@@ -42,6 +43,9 @@ class ImportOptions(BaseModel):
     name: WearingName | None = Field(None, description="Name of the take; before the names of several.")
     wearing: WearingName | None = Field(None, description="The wearing, where the file does not say it.")
     equal_times: Literal["refuse", "spread"] = Field("refuse", description="Frames stamped in batches.")
+    replace: bool = Field(
+        False, description="Takes whose frames are here get the file's reference and names; else 409."
+    )
     reference_upload: str | None = Field(
         None, pattern=SHA256, description="A reference table sent before to `uploads`."
     )
@@ -81,11 +85,12 @@ async def add_takes(
         _import, parts, files, upload.sha256, options, limiter=parts.import_slots
     )
     parts.metrics.imported_takes.inc(len(result.imported))
-    response.status_code = 201 if result.imported else 200
+    response.status_code = 201 if result.imported or result.replaced else 200
     return {
         "takes": result.takes,
         "imported": result.imported,
         "existing": sorted(result.existing),
+        "replaced": sorted(result.replaced),
         "layout": result.layout,
         "original_sha256": upload.sha256,
         "subject_created": result.subject_created,
@@ -110,4 +115,5 @@ def _import(
             subject=options.subject,
             layout=options.layout,
             create_subject=options.create_subject,
+            replace=options.replace,
         )

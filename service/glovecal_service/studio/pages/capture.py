@@ -51,7 +51,9 @@ class CapturePage:
         self._main = ui.element("div").classes("capture")
         gloves = (await self._studio.service.get("/gloves"))["seen"]
         if not gloves:
-            ui.label("No glove was seen yet: glovecal capture starts one.").classes("studio-notice")
+            ui.label("No glove was seen yet. Run: glovecal capture --device DEVICE --glove NAME").classes(
+                "studio-notice"
+            )
             ui.timer(AGAIN_EVERY_S, self._again)
             return
         with self._main:

@@ -43,7 +43,9 @@ class LivePage:
         except ClientError as error:
             self._notice.set_text(f"The real-time process does not answer: {error}")
             return
-        self._notice.set_text("" if states else "No glove is connected: glovecal capture starts one.")
+        self._notice.set_text(
+            "" if states else "No glove is connected. Run: glovecal capture --device DEVICE --glove NAME"
+        )
         new = [glove for glove in states if glove not in self._cards]
         for glove in new:
             with self._gloves:
