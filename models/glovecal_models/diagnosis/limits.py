@@ -93,7 +93,7 @@ class DiagnosisLimits(SignificanceLimits):
         0.52,
         "degrees",
         "A slow error whose lower bound is above this is no healthy glove's. Beside a model's effects a cause"
-        " that changes between takes is named only where the slow error itself is larger.",
+        " that changes between takes, or a slip, is named only where the slow error itself is larger.",
         f"{_CLEAN}: 0.09 to 0.53; with an unknown cause of 1 degree 0.43 and more (2026-11-21). A healthy"
         " glove slips by 0.4 degrees, forgotten in 25 to 40 s.",
     )
@@ -115,7 +115,8 @@ class DiagnosisLimits(SignificanceLimits):
     healthy_floors: float = limit(
         1.45,
         "times the upper end of the noise floor's interval",
-        "A smoothed held-out error whose lower bound is above this is no healthy glove's.",
+        "A smoothed held-out error whose lower bound is above this is no healthy glove's. On a joint that an"
+        " effect acts on, an error of no more than so many floors is not called unexplained.",
         "Lower bounds of 11 simulated gloves without a cause: 0.69 to 1.16; of 10 with bumps of a second"
         " every 6 to 12 s on one sensor, 1 and 2 degrees, 1.57 to 3.5 (2026-11-22).",
     )

@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.known_effect import KnownEffect
+from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS
 from glovecal_models.diagnosis.text import diagnosis_sentences, residual_sentence
 from glovecal_models.effects.catalogue import effect
 from glovecal_models.layout import Layout
@@ -23,6 +24,7 @@ from glovecal_models.takes.take import Take
 SENSORS = ("I_MCP", "I_PIP")
 LAYOUT = Layout.from_columns("two", SENSORS, SENSORS)
 CREEP = KnownEffect(effect("creep"), SENSORS, (np.array([0.75, 3.0, 12.0]),) * 2)
+STICKS = KnownEffect(effect("hysteresis"), SENSORS, (np.array([8.0]),) * 2)
 PULL = KnownEffect(effect("cross_coupling"), ("I_MCP",), (np.zeros(0),))
 
 
@@ -103,6 +105,20 @@ def test_beside_an_effect_what_a_healthy_glove_slips_by_gets_no_name(healthy, co
         assert "temperature is not named: the slow error of I_PIP is" in " ".join(diagnosis_sentences(found))
 
 
+@pytest.mark.parametrize("healthy_deg", [0.52, 1.0])
+def test_beside_an_effect_a_slip_as_of_a_healthy_glove_is_not_found(healthy, healthy_deg):
+    """I_PIP's error walks the same way in each wearing, a slow error of 0.8 degrees."""
+    since = [number % 3 - 1.0 + (take.time_s - take.time_s[0]) / 60.0 for number, take in enumerate(healthy)]
+    takes = read_as(healthy, [1.3 * part for part in since])
+    limits = replace(DIAGNOSIS_LIMITS, healthy_deg=healthy_deg)
+    alone, beside = (
+        diagnose(takes, LAYOUT, known=known, effects=[], judge_residual=False, limits=limits)
+        for known in ([], [PULL])
+    )
+    assert [item.effect for item in alone.findings] == ["garment_slip"], "a first effect may be as small"
+    assert [item.effect for item in beside.findings] == ["garment_slip"] * (healthy_deg < 0.8)
+
+
 def test_takes_that_a_sagging_supply_moves_apart_contradict_no_reference():
     plan = SessionPlan(seed=6, sensors=SENSORS, wearings=3, takes_per_wearing=3, take_s=12.0)
     cause = Cause("supply_sag", strength_deg=9.0, form="gain_power")
@@ -112,3 +128,31 @@ def test_takes_that_a_sagging_supply_moves_apart_contradict_no_reference():
     found = diagnose(takes, LAYOUT, effects=[effect("supply_sag")], signatures=False, judge_residual=False)
     assert found.naming.ranked
     assert found.reference_problems == ()
+
+
+@pytest.mark.parametrize(("counts", "beside", "is_told"), [
+    (1.15, (), True), (1.15, (PULL,), True), (1.15, (STICKS,), False), (1.5, (STICKS,), True),
+])  # fmt: skip
+def test_beside_an_effect_an_error_of_a_healthy_gloves_floors_is_not_called_unexplained(
+    healthy, counts, beside, is_told
+):
+    """Takes read a little apart: as slips and the miss of a form do together. Another joint's effect misses
+    nothing here."""
+    apart = counts * np.random.default_rng(7).permutation(np.linspace(-1.5, 1.5, len(healthy)))
+    takes = read_as(healthy, [np.full(len(take.time_s), at) for take, at in zip(healthy, apart, strict=True)])
+    found = left_of(takes, *beside).residual
+    assert found.is_significant == is_told
+    assert found.obstacle is None
+
+
+@pytest.mark.parametrize("delayed", [(), (Cause("clock_offset", strength_deg=1.5, form="constant"),)])
+def test_what_is_left_of_a_hysteresis_of_another_form_is_no_delay(delayed):
+    """Plays miss a part of Bouc's and Wen's; a delay beside it saves more than that part."""
+    plan = SessionPlan(seed=4, sensors=SENSORS, wearings=2, takes_per_wearing=3, take_s=20.0)
+    sticks = Cause("hysteresis", strength_deg=4.0, form="bouc_wen")
+    takes = record_session(plan, (sticks, *delayed)).takes
+    delays = [effect("clock_offset"), effect("lag")]
+    found = diagnose(
+        takes, LAYOUT, known=[STICKS], effects=delays, signatures=False, judge_residual=False
+    )  # fmt: skip
+    assert [item.effect for item in found.naming.ranked[:1]] == [item.name for item in delayed]
