@@ -75,8 +75,8 @@ class MotionFile:
         labels = [hand.label for hand in self.hands]
         if len(set(labels)) < len(labels):
             raise BadInput(
-                "both takes are of the same hand; if one is not, say so, in the order of the takes: --hand right "
-                "--hand left"
+                "both takes are of the same hand; if one is not, say so, in the order of the takes: "
+                "--hand right --hand left"
             )
         if self.body is not None and (self.content, self.path.suffix) != ("joints", ".trc"):
             raise BadInput("markers of a body are joined to joints in a TRC file: content joints, format trc")

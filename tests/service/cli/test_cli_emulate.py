@@ -17,9 +17,9 @@ from cli_running import COMMAND
 from realtime_support import eventually
 
 from glovecal_client import Recording, open_router
-from glovecal_client.errors import DamagedLog
 from glovecal_client.capture.command import main as capture_alone
 from glovecal_client.capture.command import parse_options, run_capture
+from glovecal_client.errors import DamagedLog
 from glovecal_service.emulators.catalogue import PROTOCOLS
 from glovecal_service.emulators.cyberglove3 import EmulatedCyberGlove3, card_file
 
