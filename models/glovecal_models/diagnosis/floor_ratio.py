@@ -52,6 +52,11 @@ class FloorRatio:
         return self.is_judgeable and self.rmse_deg <= self.floor.high_deg
 
     @property
+    def is_healthy(self) -> bool:
+        """Whether the error is so few floors as a healthy glove's; False where that cannot be judged."""
+        return self.is_judgeable and self.times <= self.limits.healthy_floors
+
+    @property
     def exceeds(self) -> float:
         """Times the most that a healthy glove has; 0 where that cannot be judged."""
         return self.lower_times / self.limits.healthy_floors if self.is_judgeable else 0.0

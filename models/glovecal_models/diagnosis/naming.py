@@ -10,6 +10,7 @@ import numpy as np
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.effects.base.assessment import Assessment, over_joints
 from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.limits import SignificanceLimits
 from glovecal_models.effects.base.signature_effect import Finding
 
 
@@ -50,21 +51,22 @@ def beside_known(
 
     A named effect is right in its inputs and only nearly right in its form. What the form misses goes along
     with the same movements, so that another effect can grasp a part of it; a cause of its own saves more.
-    What no known effect leaves is not held against them.
+    Of what their forms leave an effect that it hardly looks like grasps less: it may save less.
     """
     if not saved:
         return list(found)
     unlike = set.intersection(*(set(item.rest_unlike) for item in known)) if known else set()
     alike = {name for item in known for name in item.rest_like}
     strict = replace(limits, beside_known_share=limits.beside_alike_share)
+    mild = replace(limits, beside_known_share=limits.beside_unlike_share)
+
+    def limits_of(item: Assessment) -> SignificanceLimits:
+        if item.effect in unlike:
+            return mild
+        return strict if item.effect in alike else item.limits
+
     return [
-        replace(
-            item,
-            known_saved_square=tuple(saved[name] for name in item.joints),
-            limits=strict if item.effect in alike else item.limits,
-        )
-        if item.effect not in unlike
-        else item
+        replace(item, known_saved_square=tuple(saved[name] for name in item.joints), limits=limits_of(item))
         for item in found
     ]
 

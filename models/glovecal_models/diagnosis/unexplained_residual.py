@@ -9,12 +9,15 @@ before a take, so the state of a memory starts as a guess, and the error of that
 has settled (``HistoryEffect.unsettled``): an offset of the take that slowly changes. It is the effect's own,
 neither noise nor another cause. Until then the mean and the straight line of the error are not judged, and
 stretches too short for a line not at all.
+
+On a joint that an effect acts on, what its learned form misses comes on top of what a healthy glove slips by.
+Where the whole error is then so few noise floors as a healthy glove's, nothing of it is called unexplained.
 """
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -144,12 +147,16 @@ def unexplained_residual(
     if not found.judged:
         return replace(found, obstacle="few stretches")
     found = replace(found, shared=shared_error(means, generator, limits))
-    ratios = [_ratio(*items, limits) for items in zip(slow, within, strict=True)]
+    healthy = _healthy_beside(found, known)
+    ratios = [
+        0.0 if name in healthy else _ratio(*items, limits)
+        for name, *items in zip(design.rotations, slow, within, strict=True)
+    ]
     exceeding = sorted((i for i, ratio in enumerate(ratios) if ratio > 1), key=lambda i: -ratios[i])
     exceeding = [i for i in exceeding if slow[i].lower_bound_deg > stated_deg.get(design.rotations[i], 0.0)]
-    is_shared = _is_shared(found) and not stated_deg
+    is_shared = _is_shared(found) and not stated_deg and len(healthy) < len(slow)
     if not exceeding and not is_shared and not above:
-        possible = None if stated_deg else _possible_excess(found)
+        possible = None if stated_deg else _possible_excess(found, healthy)
         return replace(found, excess=possible, obstacle="wide interval") if possible else found
     farthest = [design.rotations.index(name) for name in above]
     chosen = (list(dict.fromkeys([*exceeding, *farthest])) or list(range(len(slow))))[:MOST_JOINTS]
@@ -203,15 +210,28 @@ def _excess(found: UnexplainedResidual, joint: str) -> SlowExcess:
     return SlowExcess(joint, within, _healthy_within(within, limits), is_within_takes=True)
 
 
-def _possible_excess(found: UnexplainedResidual) -> SlowExcess | None:
-    """The largest error, where it may exceed a healthy glove's and there is too little of it to tell."""
+def _possible_excess(found: UnexplainedResidual, healthy: Set[str]) -> SlowExcess | None:
+    """The largest error, where it may exceed a healthy glove's and there is too little of it to tell;
+    ``healthy``: joints whose error is a healthy glove's."""
     limits = found.limits
-    judged = [(joint, item) for joint, item in found.slow.items() if _is_judgeable(item, limits)]
-    joint, worst = max(judged, key=lambda pair: pair[1].size_deg)
-    healthy = _healthy(worst, limits)
-    if worst.size_deg <= healthy or worst.stretches >= limits.enough_stretches:
+    judged = [
+        (joint, item)
+        for joint, item in found.slow.items()
+        if _is_judgeable(item, limits) and joint not in healthy
+    ]
+    if not judged:
         return None
-    return SlowExcess(joint, worst, healthy)
+    joint, worst = max(judged, key=lambda pair: pair[1].size_deg)
+    most = _healthy(worst, limits)
+    if worst.size_deg <= most or worst.stretches >= limits.enough_stretches:
+        return None
+    return SlowExcess(joint, worst, most)
+
+
+def _healthy_beside(found: UnexplainedResidual, known: Sequence[KnownEffect]) -> frozenset[str]:
+    """Joints that an effect acts on and whose error is so few floors as a healthy glove's."""
+    there = {name for item in known for name in item.joints}
+    return frozenset(name for name, item in found.floor_ratios.items() if name in there and item.is_healthy)
 
 
 def _healthy(item: SlowError, limits: DiagnosisLimits) -> float:

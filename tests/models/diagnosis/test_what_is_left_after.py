@@ -23,6 +23,7 @@ from glovecal_models.takes.take import Take
 SENSORS = ("I_MCP", "I_PIP")
 LAYOUT = Layout.from_columns("two", SENSORS, SENSORS)
 CREEP = KnownEffect(effect("creep"), SENSORS, (np.array([0.75, 3.0, 12.0]),) * 2)
+STICKS = KnownEffect(effect("hysteresis"), SENSORS, (np.array([8.0]),) * 2)
 PULL = KnownEffect(effect("cross_coupling"), ("I_MCP",), (np.zeros(0),))
 
 
@@ -112,3 +113,31 @@ def test_takes_that_a_sagging_supply_moves_apart_contradict_no_reference():
     found = diagnose(takes, LAYOUT, effects=[effect("supply_sag")], signatures=False, judge_residual=False)
     assert found.naming.ranked
     assert found.reference_problems == ()
+
+
+@pytest.mark.parametrize(("counts", "beside", "is_told"), [
+    (1.15, (), True), (1.15, (PULL,), True), (1.15, (STICKS,), False), (1.5, (STICKS,), True),
+])  # fmt: skip
+def test_beside_an_effect_an_error_of_a_healthy_gloves_floors_is_not_called_unexplained(
+    healthy, counts, beside, is_told
+):
+    """Takes read a little apart: as slips and the miss of a form do together. Another joint's effect misses
+    nothing here."""
+    apart = counts * np.random.default_rng(7).permutation(np.linspace(-1.5, 1.5, len(healthy)))
+    takes = read_as(healthy, [np.full(len(take.time_s), at) for take, at in zip(healthy, apart, strict=True)])
+    found = left_of(takes, *beside).residual
+    assert found.is_significant == is_told
+    assert found.obstacle is None
+
+
+@pytest.mark.parametrize("delayed", [(), (Cause("clock_offset", strength_deg=1.5, form="constant"),)])
+def test_what_is_left_of_a_hysteresis_of_another_form_is_no_delay(delayed):
+    """Plays miss a part of Bouc's and Wen's; a delay beside it saves more than that part."""
+    plan = SessionPlan(seed=4, sensors=SENSORS, wearings=2, takes_per_wearing=3, take_s=20.0)
+    sticks = Cause("hysteresis", strength_deg=4.0, form="bouc_wen")
+    takes = record_session(plan, (sticks, *delayed)).takes
+    delays = [effect("clock_offset"), effect("lag")]
+    found = diagnose(
+        takes, LAYOUT, known=[STICKS], effects=delays, signatures=False, judge_residual=False
+    )  # fmt: skip
+    assert [item.effect for item in found.naming.ranked[:1]] == [item.name for item in delayed]

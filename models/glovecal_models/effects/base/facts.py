@@ -131,7 +131,7 @@ class EffectFacts:
     rest_like: ClassVar[tuple[str, ...]] = ()
     """Effects that what the form of this one misses may look like: beside it they have to save more."""
     rest_unlike: ClassVar[tuple[str, ...]] = ()
-    """Effects that it does not: these only have to beat their control beside it."""
+    """Effects that it hardly does: these may save less."""
     caveat: ClassVar[str] = ""
     """What the same evidence may also mean, as the end of a sentence that names the effect."""
     drift_in_holds: ClassVar[HoldDrift | None] = None
