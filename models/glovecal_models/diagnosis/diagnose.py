@@ -41,7 +41,7 @@ from glovecal_models.diagnosis.unexplained_residual import (
 from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Motion
-from glovecal_models.effects.base.signature_effect import FoundBefore
+from glovecal_models.effects.base.signature_effect import Finding, FoundBefore
 from glovecal_models.effects.catalogue import candidates
 from glovecal_models.layout import Layout
 from glovecal_models.progress import Cancel, Report, stop_if
@@ -119,11 +119,8 @@ def diagnose(
     lacking = [item for item in every if item.name not in has]
     asked = signature_findings(takes, layout, problem.joints, naming, lacking, by_name, known, found_before)
     findings = tuple(asked) if signatures else ()
-    findings = tuple(
-        item
-        for item in findings
-        if by_name[item.effect].stage != "last" or is_beside_known(item, saved, limits.beside_known_share)
-    )
+    if known and any(by_name[item.effect].stage == "last" for item in findings):
+        findings = _last_beside_known(findings, design, saved, by_name)
     naming = beside_levels(naming, takes, findings, by_name)
     if signatures and not are_held_levels(takes):
         naming = beside_findings(naming, findings, layout)
@@ -189,6 +186,26 @@ def _beside_slip(
         else item
         for item in found
     ]
+
+
+def _last_beside_known(
+    findings: Sequence[Finding],
+    design: ForwardDesign,
+    saved: Mapping[str, float],
+    effects: Mapping[str, Effect],
+) -> tuple[Finding, ...]:
+    """The same; what is asked for last is found beside a model's effects only where it is larger than what
+    they may have left, and where a larger slow error is left than in a healthy glove, which slips too."""
+    slips = {design.rotations[joint] for joint in within_slip(design)}
+    return tuple(
+        item
+        for item in findings
+        if effects[item.effect].stage != "last"
+        or (
+            is_beside_known(item, saved, design.limits.beside_known_share)
+            and not slips.issuperset(item.where)
+        )
+    )
 
 
 def _apart_by(naming: Naming, known: Sequence[KnownEffect]) -> frozenset[str]:

@@ -93,7 +93,7 @@ class DiagnosisLimits(SignificanceLimits):
         0.52,
         "degrees",
         "A slow error whose lower bound is above this is no healthy glove's. Beside a model's effects a cause"
-        " that changes between takes is named only where the slow error itself is larger.",
+        " that changes between takes, or a slip, is named only where the slow error itself is larger.",
         f"{_CLEAN}: 0.09 to 0.53; with an unknown cause of 1 degree 0.43 and more (2026-11-21). A healthy"
         " glove slips by 0.4 degrees, forgotten in 25 to 40 s.",
     )

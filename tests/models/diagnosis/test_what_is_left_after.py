@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.known_effect import KnownEffect
+from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS
 from glovecal_models.diagnosis.text import diagnosis_sentences, residual_sentence
 from glovecal_models.effects.catalogue import effect
 from glovecal_models.layout import Layout
@@ -102,6 +103,20 @@ def test_beside_an_effect_what_a_healthy_glove_slips_by_gets_no_name(healthy, co
     assert alone.naming.ranked, "a first effect may be as small"
     if not is_named:
         assert "temperature is not named: the slow error of I_PIP is" in " ".join(diagnosis_sentences(found))
+
+
+@pytest.mark.parametrize("healthy_deg", [0.52, 1.0])
+def test_beside_an_effect_a_slip_as_of_a_healthy_glove_is_not_found(healthy, healthy_deg):
+    """I_PIP's error walks the same way in each wearing, a slow error of 0.8 degrees."""
+    since = [number % 3 - 1.0 + (take.time_s - take.time_s[0]) / 60.0 for number, take in enumerate(healthy)]
+    takes = read_as(healthy, [1.3 * part for part in since])
+    limits = replace(DIAGNOSIS_LIMITS, healthy_deg=healthy_deg)
+    alone, beside = (
+        diagnose(takes, LAYOUT, known=known, effects=[], judge_residual=False, limits=limits)
+        for known in ([], [PULL])
+    )
+    assert [item.effect for item in alone.findings] == ["garment_slip"], "a first effect may be as small"
+    assert [item.effect for item in beside.findings] == ["garment_slip"] * (healthy_deg < 0.8)
 
 
 def test_takes_that_a_sagging_supply_moves_apart_contradict_no_reference():

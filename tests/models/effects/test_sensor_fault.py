@@ -131,11 +131,23 @@ def sticky(counts, generator):
     return counts + 2 * plays @ np.array([0.3, 0.3, 0.4])
 
 
+def in_switches(counts, generator):
+    """Cloth of many switches, each with its own closing and opening angle (Preisach): it stands and jumps."""
+    closes = np.arange(30.0, 230.0, 6.0)
+    closes += generator.uniform(0, 6, len(closes))
+    opens, state = closes - 16.0, counts[0, :, None] > closes - 8.0
+    sums = np.empty_like(counts)
+    for frame, now in enumerate(counts[:, :, None]):
+        state = (state | (now >= closes)) & (now > opens)
+        sums[frame] = 30.0 + 6.0 * state.sum(axis=1)
+    return sums
+
+
 def clipped(counts, generator):
     return np.minimum(counts, 180)
 
 
-@pytest.mark.parametrize("distortion", [None, drift, coupled, sticky, clipped])
+@pytest.mark.parametrize("distortion", [None, drift, coupled, sticky, in_switches, clipped])
 def test_what_is_no_fault_is_not_called_one(glove, distortion):
     assert FAULT.find(glove.takes(shape_counts=distortion), glove.sensor_of) == ()
 

@@ -22,6 +22,9 @@ STUCK_DEG = 3.0
 SMOOTHED = 5
 RELEASED_SHARE = 0.5
 """A sensor that lets go makes up for this much at once; friction lets go without a jump."""
+RELEASED_OVER = 99.5
+"""Percentile of the sensor's other steps against the reference that letting go must exceed: cloth of many
+small switches stands and jumps all the time."""
 DROPOUT_S = 0.5
 DROPOUT_FRAMES = 3
 """At least; what is shorter is a spike."""
@@ -80,10 +83,18 @@ def shortly_stuck(
     least = max(STUCK_STEPS * smallest_step(readings), STUCK_DEG * gain)
     asked = smooth[end] - smooth[start]
     possible = np.flatnonzero(np.abs(asked) > least)
+    if not len(possible):
+        return found
+    steps = np.abs(np.diff(readings - smooth, prepend=np.nan))
+    elsewhere = np.isfinite(steps)
+    elsewhere[end[possible]] = False
+    usual = float(np.percentile(steps[elsewhere], RELEASED_OVER)) if elsewhere.any() else 0.0
     for first, after, missing in zip(start[possible], end[possible], asked[possible], strict=True):
         released = readings[after] - readings[after - 1]
         found[first:after] = (
-            others_move[first + 1 : after].mean() > 0.5 and released / missing > RELEASED_SHARE
+            others_move[first + 1 : after].mean() > 0.5
+            and released / missing > RELEASED_SHARE
+            and steps[after] > usual
         )
     return found
 
