@@ -57,16 +57,18 @@ def delay(square: float) -> Assessment:
 
 
 @pytest.mark.parametrize(
-    ("known", "is_named"),
+    ("known", "saved", "is_named"),
     [
-        (("creep",), True),
-        (("hysteresis",), True),
-        (("cross_coupling",), False),
-        (("creep", "cross_coupling"), False),
+        (("creep",), 2.5, True),
+        (("hysteresis",), 2.5, True),
+        (("hysteresis",), 5.0, False),
+        (("cross_coupling",), 2.5, False),
+        (("creep", "cross_coupling"), 2.5, False),
     ],
 )
-def test_a_delay_is_named_beside_what_leaves_nothing_like_it(known, is_named):
-    found = beside_known([delay(1.0)], {"I_PIP": 5.0}, [effect(name) for name in known])
+def test_a_delay_may_save_less_beside_what_leaves_hardly_anything_like_it(known, saved, is_named):
+    """6 or 3 % of what the model's effects save."""
+    found = beside_known([delay(1.0)], {"I_PIP": saved}, [effect(name) for name in known])
     assert bool(found[0].significant_joints) is is_named
     assert bool(found[0].within_known) is not is_named
 
