@@ -149,8 +149,8 @@ def unexplained_residual(
     found = replace(found, shared=shared_error(means, generator, limits))
     healthy = _healthy_beside(found, known)
     ratios = [
-        0.0 if name in healthy else _ratio(*items, limits)
-        for name, *items in zip(design.rotations, slow, within, strict=True)
+        0.0 if name in healthy else _ratio(over_all, inside, limits)
+        for name, over_all, inside in zip(design.rotations, slow, within, strict=True)
     ]
     exceeding = sorted((i for i, ratio in enumerate(ratios) if ratio > 1), key=lambda i: -ratios[i])
     exceeding = [i for i in exceeding if slow[i].lower_bound_deg > stated_deg.get(design.rotations[i], 0.0)]
