@@ -133,7 +133,7 @@ def test_databases_have_a_limit_together_and_leave_room_on_the_disk(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     """A database that nobody used for longest goes first; one that does not fit is not begun."""
-    monkeypatch.setattr(made, "MOST_BYTES", 3 * 20 * made.ENTRY_BYTES)
+    monkeypatch.setattr(made, "MOST_BYTES", 3.5 * 20 * made.ENTRY_BYTES)
     poses, found = generated_poses(50), []
     for seed in range(4):
         settings = DatabaseSettings(20, seed=seed)
