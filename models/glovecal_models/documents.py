@@ -33,7 +33,7 @@ def read_json(content: str | bytes, name: str) -> Any:
         )
     except json.JSONDecodeError as error:
         raise BadInput(
-            f"{name} is not JSON: it cannot be read from line {error.lineno}, column {error.colno} on; "
+            f"{name} is no JSON: it cannot be read from line {error.lineno}, column {error.colno} on; "
             "correct it there"
         ) from None
     except _BadNumber as error:
@@ -50,7 +50,7 @@ def read_toml(content: str | bytes, name: str) -> dict[str, Any]:
         found = re.search(r"at line (\d+), column (\d+)", str(error))
         place = f"line {found[1]}, column {found[2]}" if found else "its last line"
         raise BadInput(
-            f"{name} is not valid TOML: it cannot be read from {place} on; correct it there"
+            f"{name}: not valid TOML: it cannot be read from {place} on; correct it there"
         ) from None
     except ValueError:  # an integer of thousands of digits
         raise BadInput(f"{name} holds an integer that is too long; give finite numbers of 64 bits") from None

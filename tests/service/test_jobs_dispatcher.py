@@ -112,7 +112,7 @@ def test_a_refusal_is_passed_on_and_a_mistake_is_called_one(dispatched, ledger):
     refused = wait_for_job(store, create(store, ledger, [1], ending="refuse").id)
     assert (refused.state, refused.error) == ("failed", "sum to 1: the samples are all alike")
     broken = wait_for_job(store, create(store, ledger, [2], ending="break").id)
-    assert broken.error == "an error in Glovecal itself: ZeroDivisionError: a mistake in the program"
+    assert broken.error == "an error in Glovecal itself (ZeroDivisionError): the job's traceback tells where"
     assert refused.traceback is None, "its sentence says everything"
     assert broken.traceback is not None
     assert "in count\n" in broken.traceback, "the calls inside the worker process"

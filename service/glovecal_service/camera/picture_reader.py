@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from glovecal_client.capture.status import CaptureStatus
 from glovecal_client.clock import clock_ns, wall_ns
-from glovecal_client.errors import DeviceError, DeviceFinished
+from glovecal_client.errors import DeviceFinished, reason_of
 from glovecal_client.pictures.source import Picture, PictureSource
 from glovecal_service.camera.kept_pictures import KeptPictures
 from glovecal_service.camera.newest_picture import NewestPicture, NumberedPicture
@@ -115,7 +115,7 @@ class PictureReader:
 
     def _note_loss(self, error: Exception) -> bool:
         """Whether to open it again: a file that cannot be read will not come back."""
-        said = str(error) if isinstance(error, DeviceError) else f"{type(error).__name__}: {error}"
+        said = reason_of(error)
         self._source.close()
         self._kept.begin_anew()
         self.missing.begin_anew()

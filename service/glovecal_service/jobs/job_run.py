@@ -20,7 +20,6 @@ from glovecal_service.jobs.task_run import TaskOutcome, run_task
 from glovecal_service.jobs.time_left import TimeLeft
 from glovecal_service.jobs.workers import Workers, WorkersLost, finished, outcome
 from glovecal_service.operating_system import step_back_in_this_thread
-from glovecal_service.plain import reason_of
 from glovecal_service.store import Store
 from glovecal_service.store.errors import Conflict, StoreUnavailable
 from glovecal_service.store.records import JobRecord
@@ -111,7 +110,7 @@ class JobRun:
         except Exception as error:
             trace = traceback.format_exc()
             log.error("job failed", job=id, kind=self._job.kind, trace=trace)
-            message = f"an error in Glovecal itself, {reason_of(error)}; its traceback is kept with the job"
+            message = f"an error in Glovecal itself ({type(error).__name__}): the job's traceback tells where"
         return lambda: jobs.fail(id, attempt, message, trace)
 
     def _result(self) -> dict:

@@ -198,7 +198,10 @@ def _remove_takes(service: RestClient, subject: str) -> None:
 def measured_dimensions(length_mm: float | None, file: Path | None) -> dict[str, float]:
     """What was measured, in mm; the length given by itself counts. Raises Refusal that names the file."""
     try:
-        measured = {} if file is None else read_toml(file.read_bytes(), "it")
+        measured = {} if file is None else read_toml(file.read_bytes(), str(file))
+    except BadInput as error:
+        raise Refusal(str(error)) from error
+    try:
         wrong = [name for name, value in measured.items() if type(value) not in (int, float)]
         if wrong:
             raise BadInput(f"{wrong[0]} is {measured[wrong[0]]!r}; give a number of mm")
