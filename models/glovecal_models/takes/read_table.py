@@ -94,7 +94,10 @@ def _numbered_rows(reader, file: str) -> Iterator[tuple[int, list[str]]]:
             return
         except csv.Error as error:
             raise BadTakeTable(
-                "cannot be read as CSV from here on; a quote may be unclosed", file=file, line=begins
+                "cannot be read as CSV from here on; a quote may be unclosed, or a field larger than "
+                "131072 characters",
+                file=file,
+                line=begins,
             ) from error
         if row:
             yield begins, row
