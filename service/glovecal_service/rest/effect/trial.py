@@ -5,11 +5,11 @@ from __future__ import annotations
 from fastapi import APIRouter, Request
 from pydantic import BaseModel, Field
 
-from glovecal_models.diagnosis.effect_trial import EffectTrial
-from glovecal_models.diagnosis.effect_trial import try_effect as judge_effect
 from glovecal_models.effects.catalogue import DeclaredEffect
 from glovecal_models.errors import BadInput
 from glovecal_models.progress import Cancel
+from glovecal_service.jobs.effect_trial import EffectTrial
+from glovecal_service.jobs.effect_trial import try_effect as judge_effect
 from glovecal_service.jobs.model_work import is_short
 from glovecal_service.rest.effect.declarations import AskedEffect, asked_effect, declaration_document
 from glovecal_service.rest.http.answers import change_problems
