@@ -17,6 +17,8 @@ METHODS: tuple[Method, ...] = get_args(Method)
 rotation what fits it (``kernel_choice``), ``polynomial_gpr`` and ``general_gpr`` insist on a kind of kernel;
 ``two_shapes`` and ``template`` are calibrations by scale and offset (``template``).
 """
+OF_SHAPES: tuple[Method, ...] = ("two_shapes", "template")
+"""Methods that learn from hand shapes of which only the name is known."""
 LINEAR_METHODS: tuple[Method, ...] = ("raw", "linear", "two_shapes", "template")
 """Those whose regressors are planes."""
 """Called with a sentence and the fraction done, 0 to 1."""

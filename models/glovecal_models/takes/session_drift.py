@@ -24,6 +24,8 @@ SHAPES = {
     "o-pinky": "Touch the thumb's tip with the little finger's, like an o.",
 }
 """The five shapes of the calibration take (section 3.3.4), each with what to say to a person."""
+START, END = "start-", "end-"
+"""Takes of a sequence are named by its place and the shape: ``start-fist``."""
 HELD_S = 1.0
 """The stillest part of a take, whose median counts."""
 MOST_MOVING = 0.05
@@ -159,12 +161,26 @@ def held(take: Take) -> np.ndarray:
 
 def _stillest(take: Take) -> np.ndarray:
     """(N, S): readings of that second."""
-    asked = take.time_s >= take.start_s
-    time_s, readings = take.time_s[asked], take.readings[asked]
+    return take.readings[stillest(take)]
+
+
+def stillest(take: Take) -> slice:
+    """Frames of the stillest second of what was asked for."""
+    first = int(np.searchsorted(take.time_s, take.start_s))
+    time_s, readings = take.time_s[first:], take.readings[first:]
     frames = max(1, int(np.searchsorted(time_s, time_s[0] + HELD_S)))
+    step = max(1, frames // 10)
     spread = [
         float(readings[at : at + frames].std(axis=0).sum())
-        for at in range(0, max(1, len(readings) - frames + 1), max(1, frames // 10))
+        for at in range(0, max(1, len(readings) - frames + 1), step)
     ]
-    at = int(np.argmin(spread)) * max(1, frames // 10)
-    return readings[at : at + frames]
+    at = first + int(np.argmin(spread)) * step
+    return slice(at, at + frames)
+
+
+def shape_of(take: str) -> str | None:
+    """The shape that a take of this name holds; None for any other take."""
+    for place in (START, END):
+        if take.startswith(place) and take.removeprefix(place) in SHAPES:
+            return take.removeprefix(place)
+    return None

@@ -52,7 +52,7 @@ class TrainJob:
         layout = store.layouts.get(layout_name)
         parent = payload.get("parent")
         parent = None if parent is None else store.models.get(parent).id
-        records = _takes(store, payload.get("takes"), subject, layout_name)
+        records = _takes(store, payload.get("takes"), subject, layout_name, str(payload.get("method")))
         taught = TrainingTakes.of(store, records, layout, person, settings)
         plan = plan_training(taught.takes, taught.layout, subject, taught.settings)
 
@@ -128,9 +128,11 @@ def _stepper(plan: TrainingPlan) -> Callable[[int, Mapping[int, TaskResult]], St
     return step
 
 
-def _takes(store: Store, ids: Sequence[str] | None, subject: str, layout: str) -> list[TakeRecord]:
+def _takes(
+    store: Store, ids: Sequence[str] | None, subject: str, layout: str, method: str
+) -> list[TakeRecord]:
     if ids is None:
-        records = [take for take in store.takes.list(subject, layout) if take.teaches]
+        records = [take for take in store.takes.list(subject, layout) if take.teaches_by(method)]
         if not records:
             raise NotTrainable(
                 f"subject {subject!r} has no take with reference angles for layout {layout!r}; import one,"

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.calibration.training_settings import OF_SHAPES, TrainingSettings
 from glovecal_models.errors import NotTrainable
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.guided.guided_calibration import BASELINES, GuidedSamples, guided_samples
 from glovecal_models.sampling.guided.labelled_takes import LabelledTake
-from glovecal_models.sampling.template.named_takes import named_takes
+from glovecal_models.sampling.template.named_takes import named_takes, shape_take
 from glovecal_models.sampling.template.template_samples import TemplateSamples, template_samples
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.take_warnings import left_out_sentences
@@ -42,19 +42,21 @@ class TrainingTakes:
         A session with no reference system has an error estimate of its own.
         """
         _require_one_hand(records)
+        shapes = [record for record in records if record.hand_shape and settings.method in OF_SHAPES]
         sampled = [record for record in records if record.sampling and settings.method not in BASELINES]
         plain = tuple(
             store.takes.load(record.id)
             for record in records
-            if record not in sampled and (record.has_reference or not record.sampling)
+            if record not in (*sampled, *shapes) and (record.has_reference or not record.sampling)
         )
         incomplete = [*incomplete_sentences(records), *left_out_sentences(plain)]
-        if not sampled:
+        if not sampled and not shapes:
             return cls(plain, layout, settings, tuple(incomplete))
         taught = [
             LabelledTake.from_document(store.takes.load(record.id), record.sampling or {})
             for record in sampled
         ]
+        taught += [shape_take(store.takes.load(record.id), record.hand_shape or "") for record in shapes]
         measured = subject.skeleton() if subject.dimensions else None
         if settings.method == "two_shapes":
             return cls((*named_takes(taught, measured), *plain), layout, settings, tuple(incomplete))

@@ -7,10 +7,12 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any, Literal, get_args
 
+from glovecal_models.calibration.training_settings import OF_SHAPES
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import Handedness, Palm, Skeleton, hand_skeleton
 from glovecal_models.sampling.sampled_takes import is_labelled
 from glovecal_models.takes.known_latency import KnownLatency
+from glovecal_models.takes.session_drift import shape_of
 
 RecordingState = Literal["requested", "recording", "stopping", "repairing", "done", "failed"]
 """``repairing``: it is over and its take can be used, but frames may still come from the capture log."""
@@ -165,6 +167,15 @@ class TakeRecord:
         """Whether a calibration can learn from it: from angles, or as a part of a whole guided sampling (a
         check of a later wearing is none)."""
         return self.has_reference or (self.sampling is not None and is_labelled(self.sampling))
+
+    @property
+    def hand_shape(self) -> str | None:
+        """That of a session (``glovecal shapes``) which is held in it, where nothing else is known."""
+        return None if self.has_reference or self.sampling is not None else shape_of(self.name)
+
+    def teaches_by(self, method: str) -> bool:
+        """Whether a calibration of ``method`` can learn from it; those of hand shapes do from their names."""
+        return self.teaches or (method in OF_SHAPES and self.hand_shape is not None)
 
 
 def incomplete_sentences(takes: Iterable[TakeRecord]) -> list[str]:

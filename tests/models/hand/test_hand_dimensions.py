@@ -50,7 +50,7 @@ def test_a_measured_metacarpal_moves_the_knuckle_along_its_own_line() -> None:
             "I_proximal is 500 mm; with a hand of 190 mm it lies between 25",
         ),
         ({"I_proximal": 50}, "hand_length is missing: measure in mm from the wrist crease"),
-        ({"hand_length": 190, "index_length": 72}, "no dimension 'index_length'; known are hand_length"),
+        ({"hand_length": 190, "index_length": 72}, "no dimension 'index_length'; did you mean 'hand_length'"),
     ],
 )
 def test_no_hand_is_like_that(measured: dict[str, float], sentence: str) -> None:

@@ -13,9 +13,29 @@ from dataclasses import replace
 import numpy as np
 
 from glovecal_models.hand.skeleton import Skeleton, hand_skeleton
-from glovecal_models.sampling.guided.labelled_takes import LabelledTake
+from glovecal_models.sampling.guided.labelled_takes import LabelledTake, contact_of
+from glovecal_models.sampling.steps import usual_angles
 from glovecal_models.sampling.template.shapes import KnownAngle, merged, shape_angles, touching_angles
+from glovecal_models.takes.session_drift import stillest
 from glovecal_models.takes.take import Take
+
+POSES = {"flat": "flat", "spread": "spread", "fist": "fist", "o-index": "touch-I", "o-pinky": "touch-P"}
+"""Of the shapes of a session, whose takes have their names."""
+
+
+def shape_take(take: Take, shape: str) -> LabelledTake:
+    """The stillest second of a take in which one of the session's shapes was held, as a sampling has it."""
+    pose, rows = POSES[shape], stillest(take)
+    names = ["" for _ in take.time_s]
+    names[rows] = [pose] * len(names[rows])
+    shown = replace(take, poses=tuple(names))
+    if pose.startswith("touch-"):
+        return LabelledTake(shown, "ik", {pose: contact_of(("T", pose[-1]), None)})
+    angles = usual_angles()[pose]
+    reference = np.full((len(take.time_s), len(angles)), np.nan)
+    reference[rows] = list(angles.values())
+    known = replace(shown, rotations=tuple(angles), reference_time_s=take.time_s, reference=reference)
+    return LabelledTake(known, "fk_independent")
 
 
 def named_takes(takes: Sequence[LabelledTake], skeleton: Skeleton | None) -> list[Take]:

@@ -73,7 +73,7 @@ def train(
             "--no-wait needs a service that goes on after this command: set GLOVECAL_URL"
         )
     with connect() as service:
-        chosen, layout = _choose(service, subject, layout, take or [], leave_out or [])
+        chosen, layout = _choose(service, subject, layout, take or [], leave_out or [], method)
         body: dict[str, Any] = {"subject": subject, "layout": layout, "method": method, "takes": chosen}
         body |= {"activate": activate, "pseudo_inputs": pseudo_inputs, "samples": samples}
         body |= {"folds": folds, "seed": seed, "keep_dead": keep_dead}
@@ -115,15 +115,23 @@ def _say_model(result: dict[str, Any], document: dict[str, Any]) -> None:
 
 
 def _choose(
-    service: RestClient, subject: str, layout: str | None, wanted: list[str], left_out: list[str]
+    service: RestClient,
+    subject: str,
+    layout: str | None,
+    wanted: list[str],
+    left_out: list[str],
+    method: str,
 ) -> tuple[list[str], str]:
     """Ids of the takes to train on, and their layout."""
+    from glovecal_models.calibration.training_settings import OF_SHAPES
+
     service.get(f"/subjects/{subject}")
     rows = service.get("/takes", {"subject": subject})
     without = {row["id"] for row in find_takes(rows, left_out)}
-    chosen = find_takes(rows, wanted) or [row for row in rows if row["teaches"]]
+    teaching = [row for row in rows if row["teaches"] or (row["hand_shape"] and method in OF_SHAPES)]
+    chosen = find_takes(rows, wanted) or teaching
     for row in chosen:
-        if not row["teaches"]:
+        if row not in teaching:
             raise Refusal(
                 f"take {row['name']} ({row['id']}) has no reference angles; attach some with "
                 f"glovecal take reference {row['id']} FILE"
@@ -137,6 +145,13 @@ def _choose(
         besides = " besides those left out" if without else ""
         raise Refusal(
             f"subject {subject} has no take{of_layout} with reference angles{besides}; import some with "
-            "glovecal take import"
+            f"glovecal take import{_shapes_instead(rows, subject)}"
         )
     return [row["id"] for row in chosen], layouts[0]
+
+
+def _shapes_instead(rows: list[dict[str, Any]], subject: str) -> str:
+    """What takes of hand shapes are good for, where there are some."""
+    if not any(row["hand_shape"] for row in rows):
+        return ""
+    return f". From its hand shapes: glovecal train --subject {subject} --method template"

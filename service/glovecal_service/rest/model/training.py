@@ -86,7 +86,8 @@ def _prior(store: Store, body: Training) -> ModelRecord:
 
 def _chosen_takes(store: Store, body: Training) -> list[TakeRecord]:
     if body.takes is None:
-        takes = [t for t in store.takes.list(subject=body.subject, layout=body.layout) if t.teaches]
+        every = store.takes.list(subject=body.subject, layout=body.layout)
+        takes = [take for take in every if take.teaches_by(body.method)]
     else:
         takes = [store.takes.get(id) for id in dict.fromkeys(body.takes)]
     for take in takes:
@@ -98,7 +99,7 @@ def _chosen_takes(store: Store, body: Training) -> list[TakeRecord]:
             raise LayoutMismatch(
                 f"take {take.id} ({take.name!r}) has layout {take.layout!r}, not {body.layout!r}"
             )
-    if not any(take.teaches for take in takes):
+    if not any(take.teaches_by(body.method) for take in takes):
         of_layout = f" with layout {body.layout!r}" if body.layout is not None else ""
         raise NotTrainable(
             f"no take of subject {body.subject!r}{of_layout} has reference angles; "

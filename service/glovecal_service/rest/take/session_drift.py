@@ -8,7 +8,7 @@ from fastapi import APIRouter
 from pydantic import Field
 
 from glovecal_models.errors import BadInput
-from glovecal_models.takes.session_drift import SHAPES, session_drift
+from glovecal_models.takes.session_drift import END, SHAPES, START, session_drift
 from glovecal_service.rest.http.answers import change_problems, problems
 from glovecal_service.rest.http.dependencies import PartsNeeded
 from glovecal_service.rest.http.request_types import StrictBody, SubjectName, WearingName
@@ -16,9 +16,6 @@ from glovecal_service.store.records import TakeRecord
 from glovecal_service.views.session_drift import SessionDriftView, session_drift_view
 
 router = APIRouter(prefix="/takes/session-drift", tags=["takes"])
-
-START, END = "start-", "end-"
-"""Takes of a sequence are named by its place and the shape: ``start-fist``."""
 
 
 class SessionDriftRequest(StrictBody):

@@ -50,6 +50,9 @@ class Take(BaseModel):
     frames: int
     reference_rows: int
     teaches: bool = Field(description="Whether a calibration can learn from it.")
+    hand_shape: str | None = Field(
+        description="The session's shape that is held; methods template and two_shapes learn from it."
+    )
     duration_s: float
     simulated: bool
     recording: str | None
