@@ -84,7 +84,7 @@ class Diagnosis(Shown):
         return Table.of(COLUMNS, rows, after=self.sentences)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """What each effect saves of the held-out error beside what its control saves; gives the axes back."""
+        """What each effect saves of the smoothed error beside what its control saves; gives the axes back."""
         tried = self.inner.ranked_assessments
         axes = axes_for(ax, len(tried))
         errors = [item.rmse_deg for item in tried]
@@ -96,7 +96,7 @@ class Diagnosis(Shown):
             axes.barh(rows, saved, height=0.34, color=color, label=label)
         named_rows(axes, [item.effect + (" *" if item.significant_joints else "") for item in tried])
         axes.axvline(0.0, color="black", linewidth=0.6)
-        axes.set_xlabel("saved held-out error (degrees); *: significant")
+        axes.set_xlabel("saved of the smoothed error (degrees); *: significant")
         return finished(axes)
 
 

@@ -54,7 +54,7 @@ class CameraErrors:
         rmse = self.assessment.rmse_deg
         return (
             f"An error on {', '.join(self.joints)} goes along with the camera's stated deviation or"
-            " visibility: it is the camera's, not the glove's; without it the held-out error falls from"
+            " visibility: it is the camera's, not the glove's; without it the smoothed error falls from"
             f" {rmse.before:.2f} to {rmse.after:.2f} degrees (control: {rmse.control:.2f})."
         )
 

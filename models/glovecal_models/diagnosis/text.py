@@ -262,7 +262,7 @@ def action_sentence(action: Action) -> str:
     if action.effect is None or action.rmse_deg is None or not action.saves:
         return (
             f"{item.rotation}: the residual is associated with {item.phrase}; no effect of it reduces the"
-            " held-out error more than its control."
+            " smoothed error more than its control."
         )
     unnamed = "" if action.is_physical else " (no cause is claimed)"
     within = " That is no more than the model's own effects may have left there." * action.is_within_known

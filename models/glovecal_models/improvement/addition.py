@@ -10,6 +10,7 @@ import numpy as np
 from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.held_out_check import HeldOutErrors
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.model_recipe import trained_rotations
 from glovecal_models.effects.base.form_curve import LaneCurves
 from glovecal_models.effects.base.signature_effect import LiveCheck
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
@@ -71,6 +72,11 @@ class Addition:
     """Of an effect that widens the interval: the claim decides instead of the error."""
     control_rmse_deg: float | None = None
     """Held-out error of the rotations with its control instead; None where there is none."""
+
+    @property
+    def judges_all(self) -> bool:
+        """Whether the error that decides is that of all rotations, as a model's error is everywhere else."""
+        return set(self.judged) >= set(trained_rotations(self.model))
 
     @property
     def curves(self) -> dict[str, LaneCurves]:

@@ -37,10 +37,11 @@ def addition_sentence(addition: Addition) -> str:
             f"{_on(addition.effect, addition.rotations)} was undone: its control leaves"
             f" {addition.control_rmse_deg:.2f} degrees of held-out error, less than its own {after:.2f}."
         )
+    there = "" if addition.judges_all else " there"
     sentence = (
-        f"{name} reduces the held-out error from {before:.2f} to {after:.2f} degrees ({gain:.0f} %)."
+        f"{name} reduces the held-out error{there} from {before:.2f} to {after:.2f} degrees ({gain:.0f} %)."
         if addition.added
-        else f"{name} was undone: held-out error {before:.2f} degrees before, {after:.2f} after"
+        else f"{name} was undone: held-out error{there} {before:.2f} degrees before, {after:.2f} after"
         f" ({gain:+.0f} % saved, {100 * addition.least_gain:.0f} % needed)."
     )
     if addition.left_out:

@@ -98,7 +98,7 @@ def errors_beside_floors(rotations: Mapping[str, Mapping[str, Any]]) -> tuple[st
             rows, values = zip(*known, strict=True)
             axes.plot(values, rows, "|", color=FLOOR, markersize=11, markeredgewidth=3, label="noise floor")
         axes.set_yticks(range(len(names)), names)
-        axes.set_xlabel("held-out error, degrees")
+        axes.set_xlabel("smoothed error on held-out takes, degrees")
         axes.set_xlim(0, None)
         legend_above(axes)
 

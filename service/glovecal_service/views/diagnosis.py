@@ -59,7 +59,7 @@ class NamedEffectView(View):
     verdict: Verdict
     confidence_set: list[str] = Field(description="It, and all that these takes cannot tell from it.")
     parameters: dict[str, Any] = Field(description="Learned numbers, units in their names.")
-    saved_deg: float | None = Field(description="Held-out error saved; null: found by its signature.")
+    saved_deg: float | None = Field(description="Saved of the smoothed error; null: found by its signature.")
     control_saved_deg: float | None = Field(None, description="The same of its control.")
     method: str | None = Field(
         None, description="To be trained with: its base learns the effect by itself, a straight line cannot."
@@ -88,7 +88,7 @@ class NamedEffectView(View):
 class CandidateView(View):
     effect: str
     where: list[str] = Field(description="Rotations on which it beats its control significantly.")
-    rmse_before_deg: float | None = Field(description="Held-out error without it.")
+    rmse_before_deg: float | None = Field(description="Smoothed error on held-out takes without it.")
     rmse_after_deg: float | None = Field(description="With it.")
     rmse_control_deg: float | None = Field(None, description="With its control instead.")
     saved_share: dict[str, float | None] = Field({}, description="Of the squared error, for each rotation.")
@@ -212,7 +212,7 @@ class ActionView(View):
 class FloorRatioView(View):
     """An error that is left, beside its noise floor."""
 
-    rmse_deg: float | None = Field(description="Held-out error, readings and reference smoothed.")
+    rmse_deg: float | None = Field(description="Smoothed error on held-out takes.")
     times_floor: float | None = Field(description="Over the noise floor.")
     lower_times_floor: float | None = Field(
         description="Its lower 95 % bound over the upper end of the floor's interval."

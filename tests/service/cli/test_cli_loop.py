@@ -63,7 +63,7 @@ def test_an_effect_is_added_shown_and_taken_out(loop: tuple[Run, str, Path]) -> 
     run, model, _ = loop
     answer = run("add-effect", model, CAUSE, "-r", "I_PIP", "--activate")
     assert answer.code == 0, answer.err
-    assert "reduces the held-out error from" in answer.out
+    assert "reduces the held-out error" in answer.out
     assert f", made from {model[:12]}. Active." in answer.out
     child = answer.out.split("Model ")[1].split(",")[0]
     shown = run("model", "show", child).out

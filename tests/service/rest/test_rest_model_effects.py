@@ -114,7 +114,7 @@ def test_an_added_effect_is_a_child_and_comes_out_again(walk: Walk) -> None:
     lineage = walk.client.get(f"/models/{child['id']}/lineage")
     assert [row["id"] for row in lineage] == [child["id"], walk.model]
     told = walk.client.download(f"/jobs/{job['id']}/events").decode()
-    assert "reduces the held-out error from" in told
+    assert "reduces the held-out error there from" in told
     assert f'"after":{{"M_PIP":{result["after"]["M_PIP"]:.3f}'[:-2] in told.replace(" ", "")
 
     with pytest.raises(Refused, match="has hysteresis on all of these rotations already") as refused:

@@ -16,7 +16,7 @@ HEADS = ("Effect", "Error reduced by", "Error of the sensors", "With its control
 def candidate_table(candidates: Sequence[Mapping[str, Any]]) -> None:
     """``candidates``: of a diagnosis, the best first."""
     largest = max([0.01, *(_saved(item, "rmse_after_deg") for item in candidates)])
-    with table("Error of the sensors with each effect, on held-out takes", HEADS, "candidate-table"):
+    with table("Smoothed error of the sensors with each effect, on held-out takes", HEADS, "candidate-table"):
         for item in candidates:
             _row(item, largest)
 

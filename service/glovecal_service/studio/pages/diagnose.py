@@ -123,7 +123,7 @@ class DiagnosePage:
         view = None if named is None else await self._named(found, named)
         if found["candidates"]:
             with ui.element("section").classes("finding"):
-                heading(2, "Held-out error with each effect")
+                heading(2, "Smoothed error with each effect")
                 candidate_table(found["candidates"][:SHOWN_CANDIDATES])
                 bar_key()
         self._recorded(found)
@@ -219,7 +219,7 @@ def _has_gained(model: Mapping[str, Any], found: Mapping[str, Any], named: Mappi
 def _facts(named: Mapping[str, Any]) -> None:
     with ui.element("dl"):
         for name, value in (
-            ("saves on held-out takes", degrees(named["saved_deg"])),
+            ("saves of the smoothed error", degrees(named["saved_deg"])),
             ("its control saves", degrees(named["control_saved_deg"])),
             *_learned(named["parameters"]),
         ):
