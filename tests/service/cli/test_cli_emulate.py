@@ -44,7 +44,7 @@ def test_it_starts_says_how_to_capture_it_and_leaves_nothing(run, name: str, tmp
 
 
 def test_what_cannot_be_emulated_is_refused(run, tmp_path: Path) -> None:
-    assert "there are cyberglove, cyberglove3" in run("emulate", "powerglove").said
+    assert "did you mean 'cyberglove'? There are cyberglove, cyberglove3" in run("emulate", "powerglove").said
     assert (
         "homunculus has no fault 'battery'; there are unplug"
         in run("emulate", "homunculus", "--fault", "battery").said

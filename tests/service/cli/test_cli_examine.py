@@ -97,7 +97,7 @@ def test_what_cannot_be_examined_is_refused(eve: Run, run: Run) -> None:
 
     assert "does not tell which rotation was kept still" in refused("cross").said
     assert "layout 'plain' has no rotation 'X'" in refused("free", "--still", "free=X").said
-    assert "no proposal for I_MCP" in refused("still-IM_ABD", "--keep", "n", "--rotation", "I_MCP").said
+    assert "no proposal for 'I_MCP'" in refused("still-IM_ABD", "--keep", "n", "--rotation", "I_MCP").said
     assert "give both" in refused("still-IM_ABD", "--rotation", "I_MCP").said
     assert "write TAKE=ROTATION" in refused("--still", "free").said
     assert "there is no take 'nine'" in refused("nine").said
