@@ -115,8 +115,8 @@ class DiagnosisLimits(SignificanceLimits):
     healthy_floors: float = limit(
         1.45,
         "times the upper end of the noise floor's interval",
-        "A smoothed error on held-out takes whose lower bound is above this is no healthy glove's. On a joint that an"
-        " effect acts on, an error of no more than so many floors is not called unexplained.",
+        "A smoothed error on held-out takes whose lower bound is above this is no healthy glove's. On a joint"
+        " that an effect acts on, an error of no more than so many floors is not called unexplained.",
         "Lower bounds of 11 simulated gloves without a cause: 0.69 to 1.16; of 10 with bumps of a second"
         " every 6 to 12 s on one sensor, 1 and 2 degrees, 1.57 to 3.5 (2026-11-22).",
     )

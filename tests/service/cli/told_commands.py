@@ -58,7 +58,9 @@ def told(text: str) -> Iterator[tuple[str, bool]]:
         end = END.search(rest)
         line = rest[: end.start()] if end else rest
         before = text[: found.start()]
-        is_advice = bool(ADVICE.search(before)) or (not before and end is None and ARGUMENT.search(rest))
+        is_advice = bool(ADVICE.search(before)) or (
+            not before and end is None and bool(ARGUMENT.search(rest))
+        )
         yield re.sub(r" \.\.\.$", "", line).rstrip(" .?"), is_advice
 
 

@@ -48,8 +48,9 @@ _UNKNOWN = "it is not of the form that this route's description shows; give one 
 
 def what_is_right(finding: Mapping[str, Any]) -> str:
     """A sentence that shows of the input names alone: it may be huge, secret, or not JSON."""
-    given, context = finding.get("input"), finding.get("ctx") or {}
-    is_name = isinstance(given, str) and given.isprintable() and 0 < len(given) <= LONGEST_SHOWN
+    context = finding.get("ctx") or {}
+    given = text if isinstance(text := finding.get("input"), str) else ""
+    is_name = given.isprintable() and 0 < len(given) <= LONGEST_SHOWN
     if isinstance(context.get("error"), BadInput):  # raised by a check of ours
         return str(context["error"])[:300]
     kind = finding["type"]
