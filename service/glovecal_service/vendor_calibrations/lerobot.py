@@ -28,7 +28,7 @@ from glovecal_service.vendor_calibrations.calibration_format import (
 from glovecal_service.vendor_calibrations.opengloves import JOINTS
 
 PARTS = {"cmc": "CMC", "mcp": "MCP", "pip": "PIP", "dip": "DIP", "mcp_flexion": "MCP", "mcp_abduction": "ABD"}
-JOINTS_OF = dict.fromkeys(FINGERS, ("mcp_abduction", "mcp_flexion", "dip"))
+JOINTS_OF: dict[str, tuple[str, ...]] = dict.fromkeys(FINGERS, ("mcp_abduction", "mcp_flexion", "dip"))
 JOINTS_OF["T"] = ("cmc", "mcp", "pip", "dip")
 SENSORS = {
     f"{FINGERS[letter]}_{part}": f"{letter}_{PARTS[part]}"
