@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import logging
 import multiprocessing
+import os
 import signal
 import socket
 import sys
@@ -32,6 +33,7 @@ from glovecal_service.operating_system import FORKS, children_context
 from glovecal_service.plain import reason_of
 from glovecal_service.restarts import Restarts
 from glovecal_service.settings import Settings
+from glovecal_service.store.data_folder_lock import DataFolderLock, FolderInUse
 from glovecal_service.store.store import Store
 
 FIRST_DELAY_S = 0.1
@@ -126,10 +128,21 @@ def serve(settings: Settings) -> int:
         Part("recorder", recorder),
         Part("web", web, ("REST", settings.host, settings.port)),
     ]
+    try:
+        with DataFolderLock(settings.data) as lock:
+            return _serve(settings, parts, lock)
+    except FolderInUse as error:
+        problem = _ports_problem(parts) or str(error)
+    print(f"glovecal serve: {problem}", file=sys.stderr)
+    return 1
+
+
+def _serve(settings: Settings, parts: list[Part], lock: DataFolderLock) -> int:
     problem = _why_not(settings, parts)
     if problem:
         print(f"glovecal serve: {problem}", file=sys.stderr)
         return 1
+    lock.say_who(f"process {os.getpid()} on {socket.gethostname()}, http://{settings.host}:{settings.port}")
     stopped = Event()
     handle_signals(lambda *_: stopped.set(), *STOP_SIGNALS, *HANG_UP)
     import glovecal_service.realtime.process  # noqa: F401  # for the processes, also those after a crash
@@ -161,14 +174,17 @@ def _supervise(parts: list[Part], settings: Settings, lifeline: Lifeline, stoppe
 
 def _why_not(settings: Settings, parts: list[Part]) -> str:
     """Why the service cannot start here, "" if it can. Also brings the store up to date, once for all."""
-    for part in parts:
-        if problem := _port_problem(part):
-            return problem
+    if problem := _ports_problem(parts):
+        return problem
     try:
         Store.open(settings).close()
     except (GlovecalError, OSError) as error:
         return f"the store cannot be opened: {reason_of(error)}"
     return ""
+
+
+def _ports_problem(parts: list[Part]) -> str:
+    return next(filter(None, map(_port_problem, parts)), "")
 
 
 def _zenoh_address(settings: Settings) -> tuple[str, int]:

@@ -7,7 +7,7 @@ import sys
 import time
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ from test_cyberglove_driver import in_layout_order
 
 from glovecal_client.capture.device import Device, Reading, build_device
 from glovecal_client.capture.reopening_device import ReopeningDevice
+from glovecal_client.capture.stream.links import TcpPlace
 from glovecal_client.errors import DeviceLost
 from glovecal_models.layout import Layout
 from glovecal_service.emulators.catalogue import PROTOCOLS, faults_of
@@ -380,3 +381,34 @@ class OneJoint:
 
     def bent(self, _time_s: float) -> Mapping[str, float]:
         return defaultdict(float, {self._bent: 1.0})
+
+
+
+def test_a_glove_that_dials_in_is_not_kept_out_by_connections_that_say_nothing() -> None:
+    port = free_port(socket.SOCK_STREAM)
+    place = TcpPlace("127.0.0.1", port)
+    with ExitStack() as strangers:
+        strangers.callback(place.close)
+        with pytest.raises(DeviceLost, match="no glove has connected"):
+            place.open()
+        for _ in range(20):
+            strangers.enter_context(socket.create_connection(("127.0.0.1", port)))
+        with socket.create_connection(("127.0.0.1", port)) as glove:
+            glove.sendall(b"A100\n")
+            link = place.open()
+            strangers.callback(link.close)
+            assert link.read(1.0) == b"A100\n"
+        silent = place.open()
+        strangers.callback(silent.close)
+        assert silent.read(0.0) == b"", "it may be a glove that waits to be asked"
+
+
+def test_a_connection_that_was_closed_again_is_no_glove() -> None:
+    port = free_port(socket.SOCK_STREAM)
+    place = TcpPlace("127.0.0.1", port)
+    with pytest.raises(DeviceLost, match="no glove has connected"):
+        place.open()
+    socket.create_connection(("127.0.0.1", port)).close()
+    with pytest.raises(DeviceLost, match="no glove has connected"):
+        place.open()
+    place.close()

@@ -23,7 +23,10 @@ from glovecal_client.keys import all_services
 from glovecal_client.pose_subscriber import PoseSubscriber
 from glovecal_client.queries import ask_json
 from glovecal_client.session import open_client
+from glovecal_service.serve import serve
 from glovecal_service.settings import Settings
+from glovecal_service.store import data_folder_lock
+from glovecal_service.store.data_folder_lock import DataFolderLock
 
 
 def free_port() -> int:
@@ -199,6 +202,24 @@ def test_what_cannot_start_is_tried_more_and_more_rarely_and_says_why(
     for one in (*children(process), process.pid):  # as a terminal does that is closed
         os.kill(one, signal.SIGHUP)
     assert process.wait(120) == 0
+
+
+def test_a_second_service_on_the_same_folder_is_refused_by_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Both would write the same recordings. The folder is free again once the first has ended."""
+    monkeypatch.setattr(data_folder_lock, "ENDS_WITHIN_S", 0.2)
+    settings = Settings(
+        data=tmp_path, database=None, artifacts=None, zenoh=free_endpoint(), port=free_port(), site="lab"
+    )
+    with DataFolderLock(tmp_path) as first:
+        first.say_who("process 4711 on studio, http://127.0.0.1:8600")
+        assert serve(settings) == 1
+    told = capsys.readouterr().err
+    assert f"another service runs on the data folder {tmp_path} (process 4711 on studio" in told
+    assert "stop that one, or choose another folder with GLOVECAL_DATA" in told
+    with DataFolderLock(tmp_path):
+        assert not (tmp_path / data_folder_lock.WHO).exists()
 
 
 @pytest.mark.parametrize("taken", ["REST", "zenoh"])

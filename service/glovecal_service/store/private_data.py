@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from glovecal_client.private_files import make_private
+from glovecal_service.store.data_folder_lock import LOCK, WHO
 
 FOLDERS = frozenset(
     {"artifacts", "cameras", "capture", "films", "fits", "owners", "recordings", "uploads", "videos"}
@@ -21,7 +22,7 @@ def close_to_others(data: Path, database_files: Sequence[Path]) -> None:
     home, that others have to pass. What another user owns stays as it is, with a warning.
     """
     entries = list(data.iterdir())
-    ours = [entry for entry in entries if entry.name in FOLDERS or entry in database_files]
+    ours = [entry for entry in entries if entry.name in (*FOLDERS, LOCK, WHO) or entry in database_files]
     places = [data] if len(ours) == len(entries) else ours
     closed = 0
     for place in (*places, *database_files):

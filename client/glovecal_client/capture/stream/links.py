@@ -22,6 +22,8 @@ LOOPBACK = "127.0.0.1"
 _AT_MOST = 65536
 _DIAL_IN_S = 1.0
 """How long one opening waits for a glove to connect; the port stays open between openings."""
+_MOST_SILENT = 64
+"""Connections that say nothing; the oldest goes when there are more."""
 
 
 class Link(Protocol):
@@ -86,7 +88,9 @@ class SerialPlace:
 class TcpPlace:
     """A port at which a glove connects: in wireless gloves the glove is the client.
 
-    The port stays open when a glove is lost, so that one that connects only once is not turned away.
+    The port stays open when a glove is lost, so that one that connects only once is not turned away. Whoever
+    speaks first has it: others that connected and say nothing do not keep it out. A glove may wait to be
+    asked, so where nobody speaks the newest silent one is tried.
     """
 
     silent_s: float = 5.0
@@ -96,25 +100,68 @@ class TcpPlace:
         self.name: str = f"tcp:{host}:{port}"
         self._address = host, port
         self._listener: socket.socket | None = None
+        self._silent: list[socket.socket] = []
+        """Connected and not heard yet, oldest first."""
+        weakref.finalize(self, _close_all, self._silent)
 
     def open(self) -> Link:
-        if self._listener is None:
-            self._listener = _bound(self.name, self._address, socket.SOCK_STREAM)
-            self._listener.listen(1)
-            weakref.finalize(self, self._listener.close)
-        ready, _, _ = select.select([self._listener], [], [], _DIAL_IN_S)
-        if not ready:
+        listener = self._listening()
+        until = time.monotonic() + _DIAL_IN_S
+        while ready := select.select([listener, *self._silent], [], [], max(0.0, until - time.monotonic()))[
+            0
+        ]:
+            if listener in ready:
+                self._accept(listener)
+            for connection in [one for one in self._silent if one in ready]:
+                self._silent.remove(connection)
+                if _speaks(connection):
+                    return self._link(connection)
+                connection.close()
+        if not self._silent:
             raise DeviceLost(
                 f"no glove has connected to {self.name} yet: is it switched on, and is this computer's "
                 f"address in its settings?{_only_here(self._address[0])}"
             )
-        connection, peer = self._listener.accept()
-        return _TcpLink(connection, f"{self.name} (glove at {peer[0]})")
+        return self._link(self._silent.pop())
+
+    def _listening(self) -> socket.socket:
+        if self._listener is None:
+            self._listener = _bound(self.name, self._address, socket.SOCK_STREAM)
+            self._listener.listen(_MOST_SILENT)
+            weakref.finalize(self, self._listener.close)
+        return self._listener
+
+    def _accept(self, listener: socket.socket) -> None:
+        self._silent.append(listener.accept()[0])
+        if len(self._silent) > _MOST_SILENT:
+            self._silent.pop(0).close()
+
+    def _link(self, connection: socket.socket) -> Link:
+        try:
+            peer = connection.getpeername()[0]
+        except OSError as error:
+            connection.close()
+            raise DeviceLost(f"{self.name}: the glove that connected is gone already") from error
+        return _TcpLink(connection, f"{self.name} (glove at {peer})")
 
     def close(self) -> None:
+        _close_all(self._silent)
         if self._listener is not None:
             self._listener.close()
             self._listener = None
+
+
+def _speaks(connection: socket.socket) -> bool:
+    """Whether something came from a connection that ``select`` found ready; False: it was closed."""
+    try:
+        return bool(connection.recv(1, socket.MSG_PEEK))
+    except OSError:
+        return False
+
+
+def _close_all(connections: list[socket.socket]) -> None:
+    while connections:
+        connections.pop().close()
 
 
 class _TcpLink:
