@@ -183,6 +183,16 @@ def test_processes_that_never_come_back_are_replaced(dispatched, ledger, monkeyp
     assert result_of(store, job.id)["sums"] == [1, 3, 6]
 
 
+def test_an_answer_that_comes_too_late_is_not_missed(dispatched, ledger, monkeypatch):
+    """The result is on disk, so nobody has to wait for the word that it is, nor to fit again."""
+    store, dispatcher = dispatched
+    client = dispatcher.workers._started()
+    monkeypatch.setattr(workers, "FETCH_WITHIN_S", 1e-6)
+    assert result_of(store, create(store, ledger, [1, 2, 3, 4, 5, 6]).id)["sums"] == [1, 3, 6, 10, 15, 21]
+    assert sorted(noted(ledger, "done")) == [1, 2, 3, 4, 5, 6]
+    assert dispatcher.workers._client is client
+
+
 def test_a_result_that_went_with_its_process_is_not_waited_for_for_ever(
     dispatched, ledger, monkeypatch, tmp_path
 ):

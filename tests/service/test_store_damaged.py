@@ -152,3 +152,14 @@ def _occurrences(content: bytes, wanted: bytes) -> list[int]:
         found.append(place)
         place = content.find(wanted, place + 1)
     return found
+
+
+def test_a_connection_that_outlives_the_store_is_closed_when_it_is_given_back(sqlite_store: Store) -> None:
+    """A thread that was not waited for any longer may still have one."""
+    with sqlite_store.database.read() as connection:
+        used = connection.connection.dbapi_connection
+        sqlite_store.close()
+        assert used is not None
+        used.cursor().execute("SELECT 1").close()
+    with pytest.raises(sqlite3.ProgrammingError, match="closed"):
+        used.cursor()

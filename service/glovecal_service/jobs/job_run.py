@@ -185,12 +185,23 @@ class JobRun:
                 self._workers.check()
                 for future in finished(list(running), WATCH_S):
                     number = running.pop(future)
-                    self._take(plan, number, outcome(future, plan.tasks[number]), results)
+                    self._take(plan, number, self._outcome(future, plan.tasks[number]), results)
         except WorkersLost:
             raise
         except BaseException:
             self._leave(list(running))
             raise
+
+    def _outcome(self, future: Future, task: Task) -> TaskOutcome:
+        """Of a finished future. An answer that is lost, or late on a busy computer, is not missed where the
+        task's result is on disk. Raises as ``outcome``.
+        """
+        try:
+            return outcome(future, task)
+        except WorkersLost:
+            if self._finished.get(task.key) is None:
+                raise
+            return TaskOutcome(task.key, 0.0)
 
     def _leave(self, running: list[Future]) -> None:
         """An error or a cancel: the fits in flight are told to stop, and given a moment to do so."""

@@ -27,6 +27,7 @@ from sqlalchemy.exc import (
     NoSuchModuleError,
     StatementError,
 )
+from sqlalchemy.pool import ConnectionPoolEntry
 
 from glovecal_client.installation import not_installed
 from glovecal_models.errors import BadInput
@@ -87,6 +88,8 @@ class Database:
             yield connection
 
     def close(self) -> None:
+        """A connection that some thread still uses is closed when it gives it back."""
+        event.listen(self.engine, "checkin", _close_late)
         self.engine.dispose()
 
     @contextmanager
@@ -159,6 +162,10 @@ def _switch_to_write_ahead_log(cursor: sqlite3.Cursor) -> None:
             if error.sqlite_errorcode & 0xFF != sqlite3.SQLITE_BUSY or time.monotonic() > deadline:
                 raise
             time.sleep(0.01)
+
+
+def _close_late(_connection: object, record: ConnectionPoolEntry) -> None:
+    record.invalidate()
 
 
 def _begin_sqlite(connection: Connection) -> None:
