@@ -149,7 +149,7 @@ def service_and_capture(folder: Path) -> Iterator[dict[str, list[int]]]:
             return process.pid
 
         served = start(serve)
-        eventually(lambda: "Glovecal is running" in log.read_text(), "the service is there")
+        eventually(lambda: "Glovecal is running" in log.read_text(), "the service is there", 300)
         captured = start(capture)
         children = Path(f"/proc/{served}/task/{served}/children").read_text().split()
         real_time, recorder, *_ = sorted(map(int, children))
