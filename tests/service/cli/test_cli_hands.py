@@ -35,7 +35,7 @@ def test_a_hand_that_cannot_be_is_refused_with_a_sentence(run, tmp_path: Path) -
     assert run("subject", "add", "anna").code == 0
     small = run("subject", "measure", "anna", "--hand-length-mm", 19)
     assert (small.code, "lies between 60 and 300 mm" in small.said) == (1, True)
-    assert "give --hand-length-mm or --dimensions" in run("subject", "measure", "anna").said
+    assert "give --hand-length-mm, --dimensions or --hand" in run("subject", "measure", "anna").said
     file = tmp_path / "anna.toml"
     for content, sentence in [
         ("hand_length = 'long'", "anna.toml: hand_length is 'long'; give a number of mm"),
