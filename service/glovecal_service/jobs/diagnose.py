@@ -6,6 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
+from glovecal_models.calibration.artifact import load
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.model_recipe import declared_effects, repaired_takes, requested_effects
 from glovecal_models.calibration.training_settings import LINEAR_METHODS
@@ -15,6 +18,7 @@ from glovecal_models.comparison.odd_takes import fitting, odd_takes
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.known_effect import known_effects
 from glovecal_models.effects.catalogue import effect_of_declaration, known_by_name
+from glovecal_models.errors import BadInput
 from glovecal_models.progress import Report
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.take_warnings import left_out_sentences
@@ -23,9 +27,15 @@ from glovecal_service.jobs.job_kind import JobPlan, Step, Task, TaskResult
 from glovecal_service.jobs.model_work import ModelWork, takes_of, text_in
 from glovecal_service.jobs.task_key import task_key
 from glovecal_service.store import Store
-from glovecal_service.store.records import JobRecord
+from glovecal_service.store.errors import DamagedArtifact
+from glovecal_service.store.records import JobRecord, ModelRecord, TakeRecord
 from glovecal_service.views.diagnosis import DiagnosisResult, DiagnosisView
 from glovecal_service.views.training import effect_view
+
+
+FITS_DEG, FITS, OF_ITS_ERROR = 3.0, 3.0, 0.5
+"""Another subject's model fits an odd take with an error of at most so many degrees, or so many times the other
+takes' error, and so much of its own."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +64,7 @@ class DiagnoseJob:
 
         def finish(results: Sequence[TaskResult]) -> dict[str, Any]:
             named = [{"id": take.id, "name": take.name} for take in takes]
-            odd = [{**item, "id": takes[item.pop("place")].id} for item in results[0].facts["odd_takes"]]
+            odd = [_odd_take(store, record, on, takes, item) for item in results[0].facts["odd_takes"]]
             facts = {**results[0].facts, "model": record.id, "method": record.method, "takes": named}
             facts["odd_takes"] = odd
             facts["left_out"] = left_out_sentences(on.takes)
@@ -94,6 +104,36 @@ def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> T
         )
     facts = [{**asdict(item), "sentence": item.sentence} for item in odd]
     return TaskResult({}, {**DiagnosisView.of(found).document(), "odd_takes": facts})
+
+
+def _odd_take(
+    store: Store, record: ModelRecord, on: ModelWork, takes: Sequence[TakeRecord], facts: dict[str, Any]
+) -> dict[str, Any]:
+    """With its id, and whose model fits it, where that is another subject's."""
+    place = facts.pop("place")
+    most_deg = min(OF_ITS_ERROR * facts["error_deg"], max(FITS_DEG, FITS * facts["usual_deg"]))
+    whose = _model_that_fits(store, record, on.takes[place], most_deg)
+    if whose is not None:
+        facts |= {"how": "another subject", "sentence": f"{facts['sentence']} {whose}"}
+    return {**facts, "id": takes[place].id}
+
+
+def _model_that_fits(store: Store, own: ModelRecord, take: Take, most_deg: float) -> str | None:
+    """A sentence on the active model of another subject whose error on the take is smallest, and at most
+    ``most_deg``; None where there is none."""
+    best: tuple[float, str] | None = None
+    for subject in {item.subject for item in store.models.list(layout=own.layout)} - {own.subject}:
+        active = store.models.active(subject, own.layout)
+        if active is None:
+            continue
+        try:
+            found = residuals(load(store.models.load_bytes(active.id)), [take])
+        except (BadInput, DamagedArtifact):  # it measures nothing of the take, or is told of elsewhere
+            continue
+        error = float(np.sqrt(np.nanmean(found.stacked("error") ** 2)))
+        if error <= most_deg and (best is None or error < best[0]):
+            best = error, f"{subject}'s model {active.id[:12]} fits it: {error:.1f} degrees."
+    return None if best is None else best[1]
 
 
 def floors_of(model: CalibrationModel, takes: Sequence[Take]) -> dict[str, NoiseFloor]:

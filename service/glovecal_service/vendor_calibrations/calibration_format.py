@@ -58,6 +58,8 @@ class FoundLines:
     """By sensor, which has the name of its rotation; a finger's sensor may be read for several."""
     left_out: Mapping[str, str] = field(default_factory=dict)
     """Why a sensor in the file has no line."""
+    doubts: Mapping[str, str] = field(default_factory=dict)
+    """What the file says of a sensor and its line does not."""
 
 
 Read = Callable[[str, Counts, Handedness], FoundLines]

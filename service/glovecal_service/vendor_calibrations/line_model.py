@@ -76,7 +76,7 @@ def _without_steep(found: FoundLines, counts: Counts) -> FoundLines:
         if abs(line.gain) > most
     }
     flat = {name: line for name, line in found.lines.items() if name not in steep}
-    return require_lines(FoundLines(flat, {**found.left_out, **steep}), "the calibration")
+    return require_lines(FoundLines(flat, {**found.left_out, **steep}, found.doubts), "the calibration")
 
 
 def _rotation(item: Correspondence, lines: Mapping[str, SensorLine], layout: Layout) -> RotationModel | None:

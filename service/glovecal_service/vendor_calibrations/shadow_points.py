@@ -2,7 +2,8 @@
 
 Raw is (reading - lowest) / (highest - lowest). The driver goes through all points, piece by piece; here a
 line goes through them by least squares, and a sensor that is more than ``MOST_OFF_DEG`` from it is left out
-rather than bent. Points whose raw values hardly differ are a sensor that was switched off.
+rather than bent; what a line misses by less is told. Points whose raw values hardly differ are a sensor that
+was switched off.
 """
 
 from __future__ import annotations
@@ -25,13 +26,15 @@ OURS = {sensor: name for name, sensor in NAMES.items()}
 LEAST_SPAN = 0.01
 """Of raw values between which a line goes."""
 MOST_OFF_DEG = 5.0
+TOLD_OFF_DEG = 1.0
+"""A line farther from its points is told of: the driver would go through them."""
 Points = Sequence[tuple[float, float]]
 """Raw value and degrees."""
 
 
 def lines_through(points: Mapping[str, Points], counts: Counts) -> FoundLines:
     """``points`` by Shadow's name of the joint."""
-    lines, left_out = {}, {}
+    lines, left_out, doubts = {}, {}, {}
     for name, own in points.items():
         if name not in NAMES:
             left_out[name] = "no such joint is known"
@@ -43,15 +46,17 @@ def lines_through(points: Mapping[str, Points], counts: Counts) -> FoundLines:
         gain, start = np.polyfit(table[:, 0], table[:, 1], 1)
         off = float(np.abs(gain * table[:, 0] + start - table[:, 1]).max())
         if off > MOST_OFF_DEG or not np.isfinite(off) or gain == 0:
-            left_out[sensor] = f"its points are up to {off:.0f} degrees from a line"
+            left_out[sensor] = f"its {len(table)} points are up to {off:.0f} degrees from a line"
             continue
         span = counts.highest - counts.lowest
         line = SensorLine(float(gain) / span, counts.lowest - span * float(start / gain))
         if np.isfinite(line.zero):
             lines[sensor] = line
+            if off > TOLD_OFF_DEG:
+                doubts[sensor] = f"the line misses its {len(table)} points by up to {off:.1f} degrees"
         else:
             left_out[sensor] = "its points tell no line"
-    return FoundLines(lines, left_out)
+    return FoundLines(lines, left_out, doubts)
 
 
 def points_of(line: SensorLine, counts: Counts) -> Points:

@@ -319,7 +319,7 @@ class OddTakeView(View):
     sentence: str
     how: str = Field(
         description="What makes it fit: shift, signs, sensors or rotations (columns in another order),"
-        " columns (either), gains, own map; level: its readings lie elsewhere; nothing."
+        " columns (either), gains, own map, another subject; level: its readings lie elsewhere; nothing."
     )
     error_deg: float = Field(description="Of a line through the other takes.")
     usual_deg: float = Field(description="The same of the other takes, at most.")

@@ -151,6 +151,24 @@ def test_shadow_leaves_out_what_is_no_line_or_was_switched_off() -> None:
     assert found.left_out["G_Elbow"] == "no such joint is known"
 
 
+@pytest.mark.parametrize(("off_deg", "is_told"), [(0.3, False), (4.0, True), (16.0, True)])
+def test_a_line_of_shadow_that_misses_its_three_points_is_told(off_deg: float, is_told: bool) -> None:
+    points = {
+        "G_IndexMPJ": [(0.2, 0.0), (0.5, 45.0 + off_deg), (0.8, 90.0)],
+        "G_IndexPIJ": [(0.2, 0.0), (0.8, 90.0)],
+    }
+    text = repr(
+        {"cyberglove_calibration": [[name, [list(each) for each in own]] for name, own in points.items()]}
+    )
+    _, found = read_model(text, FORMATS["shadow_yaml"], LAYOUT22, "anna", "right")
+    told = {**found.left_out, **found.doubts}
+    assert ("I_MCP" in told) == is_told
+    assert "I_PIP" not in told
+    if is_told:
+        assert "3 points" in told["I_MCP"]
+        assert f"{off_deg * 2 / 3:.0f}" in told["I_MCP"]
+
+
 def test_both_styles_of_yaml_say_the_same() -> None:
     flow = "{'cyberglove_calibration': [\n['G_IndexMPJ', [[0.3,0.0],[0.5,90.0]]],\n]}"
     block = "cyberglove_calibration:\n- - G_IndexMPJ\n  - - - 0.3\n      - 0.0  # 1\n    - [0.5, 90.0]\n"

@@ -31,6 +31,8 @@ def imported_calibration(
         raise Refusal(f"{file} is not UTF-8 text; save it as UTF-8") from error
     body = {"format": form, "text": text, "layout": layout, "subject": subject}
     answer = service.post("/models/calibrations", body | {"create_subject": create_subject})
+    for sensor, doubt in answer.pop("doubts").items():
+        err.print(f"{sensor}: {doubt}.", style="yellow")
     return answer, answer.pop("left_out")
 
 

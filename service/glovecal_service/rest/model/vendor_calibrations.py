@@ -33,6 +33,9 @@ class ImportedCalibration(ImportedModel):
     left_out: dict[str, str] = Field(
         description="Sensors of the file that the layout does not read, and why."
     )
+    doubts: dict[str, str] = Field(
+        description="Sensors whose line misses points of the file, and by how much."
+    )
 
 
 class CalibrationFile(BaseModel):
@@ -61,7 +64,7 @@ def import_calibration(body: Calibration, response: Response, parts: PartsNeeded
     options = ModelImport(subject=body.subject, create_subject=body.create_subject)
     answer = import_artifact(parts, dump(model), options)
     response.status_code = 201 if answer["is_new"] else 200
-    return answer | {"left_out": dict(found.left_out)}
+    return answer | {"left_out": dict(found.left_out), "doubts": dict(found.doubts)}
 
 
 @router.get(
