@@ -18,7 +18,7 @@ from glovecal_models.comparison.odd_takes import fitting, odd_takes
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.known_effect import known_effects
 from glovecal_models.effects.catalogue import effect_of_declaration, known_by_name
-from glovecal_models.errors import BadInput
+from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.progress import Report
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.take_warnings import left_out_sentences
@@ -27,15 +27,13 @@ from glovecal_service.jobs.job_kind import JobPlan, Step, Task, TaskResult
 from glovecal_service.jobs.model_work import ModelWork, takes_of, text_in
 from glovecal_service.jobs.task_key import task_key
 from glovecal_service.store import Store
-from glovecal_service.store.errors import DamagedArtifact
 from glovecal_service.store.records import JobRecord, ModelRecord, TakeRecord
 from glovecal_service.views.diagnosis import DiagnosisResult, DiagnosisView
 from glovecal_service.views.training import effect_view
 
-
 FITS_DEG, FITS, OF_ITS_ERROR = 3.0, 3.0, 0.5
-"""Another subject's model fits an odd take with an error of at most so many degrees, or so many times the other
-takes' error, and so much of its own."""
+"""Another subject's model fits an odd take with an error of at most so many degrees, or so many times that of
+the other takes, and so much of its own."""
 
 
 @dataclass(frozen=True)
