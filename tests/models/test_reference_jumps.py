@@ -83,7 +83,7 @@ def test_no_row_of_a_healthy_take_is_left_out(motion: TakeMotion, rate_hz):
 def test_angles_set_one_by_one_jump_and_stay_whole():
     take = bent(6)
     steps = np.repeat(np.tile([0.0, 60.0, 20.0, 90.0, 0.0], 36), 5)[:, None]
-    assert without_jumps(replace(take, reference=np.repeat(steps, 4, axis=1))).left_out == ()
+    assert without_jumps(replace(take, reference=np.repeat(steps, 4, axis=1))).excluded == ()
 
 
 def test_a_step_that_stays_is_told_and_kept():

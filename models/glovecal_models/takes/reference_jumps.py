@@ -54,20 +54,20 @@ def reference_jumps(take: Take) -> tuple[ReferenceJump, ...]:
         for column, rotation in enumerate(take.rotations)
         for jump in _jumps_of(take, rotation, take.reference[:, column])
     ]
-    return (*take.left_out, *found)
+    return (*take.excluded, *found)
 
 
 def without_jumps(take: Take) -> Take:
-    """The take without the angles that jump and come back; ``left_out`` keeps what they were. The same take
+    """The take without the angles that jump and come back; ``excluded`` keeps what they were. The same take
     where there are none."""
-    found = [jump for jump in reference_jumps(take)[len(take.left_out) :] if jump.comes_back]
+    found = [jump for jump in reference_jumps(take)[len(take.excluded) :] if jump.comes_back]
     if not found:
         return take
     reference = take.reference.copy()
     for jump in found:
         inside = (take.reference_time_s >= jump.start_s) & (take.reference_time_s <= jump.end_s)
         reference[inside, take.rotations.index(jump.rotation)] = np.nan
-    return replace(take, reference=reference, left_out=(*take.left_out, *found))
+    return replace(take, reference=reference, excluded=(*take.excluded, *found))
 
 
 def _jumps_of(take: Take, rotation: str, column: np.ndarray) -> Iterator[ReferenceJump]:
@@ -202,7 +202,7 @@ def jump_sentences(take: Take, jumps: Sequence[ReferenceJump]) -> list[str]:
         sentences.append(
             f"{who}: reference angles jump away and back while the sensors do not, by up to"
             f" {max(jump.size_deg for jump in away):.0f} degrees (at {at}{more} s; take check lists all)."
-            f" Left out of training and of errors: {', '.join(each)}."
+            f" Excluded from training and errors: {', '.join(each)}."
         )
     return sentences + [
         f"{who}: the reference of {jump.rotation} steps by {jump.size_deg:.0f} degrees at {jump.start_s:.2f}"

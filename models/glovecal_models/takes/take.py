@@ -63,7 +63,7 @@ class Take:
     reference_sd: np.ndarray | None = None
     """Standard deviation of each reference angle as its source states it, shape (R, len(rotations)), degrees;
     NaN where no angle was measured, and in whole columns that state none. None: nothing is stated."""
-    left_out: tuple[ReferenceJump, ...] = ()
+    excluded: tuple[ReferenceJump, ...] = ()
     """Angles that were measured and are NaN in ``reference``, as they jump away and come back."""
 
     def __post_init__(self) -> None:

@@ -18,9 +18,9 @@ def take_warnings(takes: Sequence[Take]) -> list[str]:
     return alike_once([each for take in takes if len(take.time_s) for each in check_take(take).sentences])
 
 
-def left_out_sentences(takes: Sequence[Take]) -> list[str]:
-    """On reference angles that are left out of the takes, as they jump away and come back."""
-    return alike_once([each for take in takes for each in jump_sentences(take, take.left_out)])
+def excluded_sentences(takes: Sequence[Take]) -> list[str]:
+    """On reference angles that are excluded, as they jump away and come back."""
+    return alike_once([each for take in takes for each in jump_sentences(take, take.excluded)])
 
 
 def alike_once(sentences: Sequence[str]) -> list[str]:

@@ -21,7 +21,7 @@ from glovecal_models.effects.catalogue import effect_of_declaration, known_by_na
 from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.progress import Report
 from glovecal_models.takes.take import Take
-from glovecal_models.takes.take_warnings import left_out_sentences
+from glovecal_models.takes.take_warnings import excluded_sentences
 from glovecal_service.jobs.ceiling import known_ceiling
 from glovecal_service.jobs.job_kind import JobPlan, Step, Task, TaskResult
 from glovecal_service.jobs.model_work import ModelWork, takes_of, text_in
@@ -62,10 +62,12 @@ class DiagnoseJob:
 
         def finish(results: Sequence[TaskResult]) -> dict[str, Any]:
             named = [{"id": take.id, "name": take.name} for take in takes]
-            odd = [_odd_take(store, record, on, takes, item) for item in results[0].facts["odd_takes"]]
+            odd = [
+                _odd_take(store, record, on, takes, item) for item in results[0].facts.get("odd_takes", ())
+            ]
             facts = {**results[0].facts, "model": record.id, "method": record.method, "takes": named}
             facts["odd_takes"] = odd
-            facts["left_out"] = left_out_sentences(on.takes)
+            facts["excluded"] = excluded_sentences(on.takes)
             facts["model_effects"] = [effect_view(item) for item in on.model.effects]
             facts["ceiling"] = known_ceiling(store, record)
             return DiagnosisResult.model_validate(facts).document()

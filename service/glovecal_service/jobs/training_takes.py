@@ -14,7 +14,7 @@ from glovecal_models.sampling.guided.labelled_takes import LabelledTake
 from glovecal_models.sampling.template.named_takes import named_takes, shape_take
 from glovecal_models.sampling.template.template_samples import TemplateSamples, template_samples
 from glovecal_models.takes.take import Take
-from glovecal_models.takes.take_warnings import left_out_sentences
+from glovecal_models.takes.take_warnings import excluded_sentences
 from glovecal_service.store import Store
 from glovecal_service.store.records import SubjectRecord, TakeRecord, incomplete_sentences
 
@@ -49,7 +49,7 @@ class TrainingTakes:
             for record in records
             if record not in (*sampled, *shapes) and (record.has_reference or not record.sampling)
         )
-        incomplete = [*incomplete_sentences(records), *left_out_sentences(plain)]
+        incomplete = [*incomplete_sentences(records), *excluded_sentences(plain)]
         if not sampled and not shapes:
             return cls(plain, layout, settings, tuple(incomplete))
         taught = [

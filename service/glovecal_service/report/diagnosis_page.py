@@ -90,7 +90,7 @@ def diagnosis_page(
     ]
     notes = [
         *_warned("Takes set aside", [item["sentence"] for item in found.get("odd_takes") or ()]),
-        *_warned("Left out of the reference", found.get("left_out")),
+        *_warned("Excluded from the reference", found.get("excluded")),
         *_warned("Problems of the reference", found.get("reference_problems")),
         *_warned("Found in the recording", [item["sentence"] for item in found.get("findings") or ()]),
         *next_take_note(found.get("next_take")),

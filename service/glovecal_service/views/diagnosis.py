@@ -334,8 +334,8 @@ class DiagnosisResult(DiagnosisView):
     odd_takes: list[OddTakeView] = Field(
         [], description="Takes that do not fit the others; nothing else was judged on them."
     )
-    left_out: list[str] = Field(
-        [], description="On reference angles that jump away and come back: left out everywhere."
+    excluded: list[str] = Field(
+        [], description="On reference angles that jump away and come back: they neither train nor score."
     )
     takes: list[TakeNamed] = Field([])
     model_effects: list[EffectView] = Field([], description="What the model has learned already.")

@@ -91,7 +91,7 @@ def diagnose(
 def print_diagnosis(found: Mapping[str, Any]) -> None:
     """For people, the measurement itself first."""
     _print_sentences("Set aside:", [item["sentence"] for item in found.get("odd_takes") or ()])
-    _print_sentences("Left out of the reference:", found.get("left_out"))
+    _print_sentences("Excluded from the reference:", found.get("excluded"))
     _print_sentences("Check the reference first:", found.get("reference_problems"))
     _print_sentences("Found in the recording:", [item["sentence"] for item in found.get("findings") or ()])
     rotations = found.get("rotations") or {}

@@ -34,7 +34,7 @@ JUMPS = {
     "end_s": "to (s)",
     "rows": "rows",
     "size_deg": "by (deg)",
-    "left_out": "left out",
+    "excluded": "excluded",
 }
 CONFLICT = 409
 """The service's answer when a take is two tables."""
@@ -77,7 +77,7 @@ def check(take: Take, as_json: AsJson = False) -> None:
     )
     if found["jumps"]:
         out.print()
-        jumps = [{**item, "left_out": item["comes_back"]} for item in found["jumps"]]
+        jumps = [{**item, "excluded": item["comes_back"]} for item in found["jumps"]]
         print_table(jumps, JUMPS, empty="")
     for sentence in found["sentences"]:
         err.print(sentence, style="yellow")

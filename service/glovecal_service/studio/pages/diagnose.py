@@ -185,7 +185,7 @@ class DiagnosePage:
     def _recorded(self, found: Mapping[str, Any]) -> None:
         """What is known by a signature in the recording, and problems of the reference."""
         told = [item["sentence"] for item in (*found.get("odd_takes", ()), *found["findings"])]
-        told += [*found.get("left_out", ()), *found["reference_problems"]]
+        told += [*found.get("excluded", ()), *found["reference_problems"]]
         named = found["named"]
         told = [sentence for sentence in told if named is None or sentence != named["sentence"]]
         if told:
