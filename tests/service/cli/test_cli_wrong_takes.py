@@ -84,10 +84,10 @@ def test_wild_angles_are_told_by_take_with_times_and_spoil_nothing(run, diagnose
     np.testing.assert_allclose(back.reference, wild(bent(1)).reference, err_msg="what was recorded is kept")
 
 
-def test_a_take_in_reverse_order_is_named_and_the_next_command_runs(run, diagnosed):
+def test_a_take_of_other_columns_is_named_and_the_next_command_runs(run, diagnosed):
     ids, _, trained, diagnosis = diagnosed(*[lambda take: take] * 3, reversed_sensors)
-    assert "reverse order" in " ".join(trained.split())
-    assert "reverse order" in diagnosis
+    assert "I_PIP and R_PIP are exchanged" in " ".join(trained.split())
+    assert "I_PIP and R_PIP are exchanged" in diagnosis
     assert "cross_coupling on" not in diagnosis
     command = diagnosis.splitlines()[-1].removeprefix("Next: glovecal ")
     assert command == f"train --subject anna --method linear --leave-out {ids[3]}"
