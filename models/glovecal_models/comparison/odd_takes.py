@@ -275,8 +275,9 @@ def _explained(place: int, take: Take, sums: _Sums, line: _Line, usual: float) -
     """The simplest change that makes the take fit."""
     error = sums.error(line)
     least = MADE_TO_FIT * max(usual, 1.0)
-    tried = list(_changes(sums, line))
-    fits = [(how, left, change) for how, left, change in tried if left <= least and left < CLEARLY * error]
+    fits: list[tuple[How, float, str]] = [
+        item for item in _changes(sums, line) if item[1] <= least and item[1] < CLEARLY * error
+    ]
     if not fits:
         return OddTake(place, take.name, error, usual, "nothing", error, "")
     best = min(left for _, left, _ in fits)
@@ -338,12 +339,12 @@ def _turned(sums: _Sums, line: _Line) -> tuple[How, float, str]:
     """Rotations of the other sign."""
     angles, names = sums.angles.copy(), []
     square, cross, variance = sums.products
-    for place in np.flatnonzero(sums.told & line.told):
+    for place in map(int, np.flatnonzero(sums.told & line.told)):
         along = float(line.weight[place] @ cross[place])
         left = variance[place] + float(line.weight[place] @ square[place] @ line.weight[place])
         if left + 2 * along < CLEARLY**2 * (left - 2 * along):
             angles[:, place] *= -1
-            names.append(sums.layout.rotations[place])
+            names.append(sums.layout.rotations[int(place)])
     if not names:
         return "signs", np.inf, ""
     what = (
@@ -395,7 +396,9 @@ def _of_order(
     elif len(moved) == 2:
         text = f"Its {what} {names[moved[0]]} and {names[moved[1]]} are exchanged"
     else:
-        pairs = ", ".join(f"{names[order[place]]} is {names[place]}" for place in moved)
+        pairs = ", ".join(
+            f"{names[now]} is {names[place]}" for place, now in enumerate(order.tolist()) if now != place
+        )
         text = f"Its {what} stand in another order: {pairs}"
     return how, changed(order).error(line), text
 
