@@ -383,7 +383,6 @@ class OneJoint:
         return defaultdict(float, {self._bent: 1.0})
 
 
-
 def test_a_glove_that_dials_in_is_not_kept_out_by_connections_that_say_nothing() -> None:
     port = free_port(socket.SOCK_STREAM)
     place = TcpPlace("127.0.0.1", port)
