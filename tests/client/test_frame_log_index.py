@@ -23,7 +23,7 @@ def found(index: LogIndex, first: int, last: int, count: int = NO_BOUND, size: i
     return [decode_frame(payload).sequence for payload in payloads]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     sequences=st.sets(st.integers(0, 400), max_size=300).map(sorted),
     split=st.integers(0, 300),

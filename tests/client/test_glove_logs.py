@@ -106,7 +106,7 @@ def test_a_megabyte_of_random_bytes_gives_no_frame_of_a_cyberglove() -> None:
 
 
 @PROTOCOLS
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(wild=st.lists(st.binary(max_size=200), max_size=12))
 def test_wild_bytes_raise_nothing_and_the_next_good_record_is_found(name: str, wild: list[bytes]) -> None:
     device, records = CASES[name].device(), records_of(name)
@@ -118,7 +118,7 @@ def test_wild_bytes_raise_nothing_and_the_next_good_record_is_found(name: str, w
 
 
 @PROTOCOLS
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(data=st.data())
 def test_pieces_do_not_matter(name: str, data: st.DataObject) -> None:
     records = records_of(name)[:8]

@@ -54,7 +54,7 @@ def test_every_label_and_stamp_comes_back(tmp_path: Path) -> None:
     source.close()
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_whatever_is_cut_or_flipped_what_lies_before_is_read(tmp_path: Path, data: st.DataObject) -> None:
     whole, hurt = tmp_path / "whole.labels", tmp_path / "hurt.labels"

@@ -141,7 +141,7 @@ def test_where_nodes_do_not_suffice_the_mean_is_still_exact() -> None:
     np.testing.assert_allclose(fitted.predict(inputs).mean, mean, atol=1e-3)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(
     count=st.integers(40, 90),
     dimensions=st.integers(1, 10),

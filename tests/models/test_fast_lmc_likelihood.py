@@ -108,7 +108,7 @@ def test_low_rank_value_is_the_exact_one_with_few_nodes() -> None:
     assert approximate.nlml == pytest.approx(exact.nlml, abs=0.01)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(
     st.integers(12, 120),
     st.integers(1, 4),
@@ -133,7 +133,7 @@ def test_certificate_brackets_the_exact_likelihood(
     assert certificate.lower - slack <= exact.nlml <= certificate.upper + slack
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.integers(1, 60), st.integers(1, 3), st.floats(0.05, 5.0), st.integers(0, 10**6))
 def test_pivoted_cholesky_leaves_what_it_says(count: int, dimensions: int, length: float, seed: int) -> None:
     points = np.random.default_rng(seed).standard_normal((count, dimensions)) / length

@@ -164,7 +164,7 @@ def test_far_away_is_flagged_uncertain() -> None:
     assert (flags & EXTRAPOLATING).all()
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.integers(0, 17), st.sampled_from([np.nan, np.inf, -np.inf]), st.integers(1, 4))
 def test_readings_that_are_not_finite_are_refused(sensor: int, value: float, frames: int) -> None:
     readings = np.full((frames, 18), 100.0)

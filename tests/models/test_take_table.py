@@ -192,7 +192,7 @@ def take_lists(draw) -> list[Take]:
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(takes=take_lists())
 def test_round_trip_gives_back_every_digit(tmp_path_factory, suffix, takes):
     path = tmp_path_factory.mktemp("round") / f"export{suffix}"

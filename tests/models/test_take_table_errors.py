@@ -214,7 +214,7 @@ def test_damaged_parquet_is_refused(tmp_path):
         read_takes(path)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     st.one_of(
         st.binary(max_size=200),
@@ -251,7 +251,7 @@ def good_parquet(tmp_path_factory) -> bytes:
     return path.read_bytes()
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(st.tuples(st.integers(4, 10**6), st.integers(0, 255)), min_size=1, max_size=3))
 def test_parquet_with_changed_bytes_is_read_or_refused(tmp_path_factory, good_parquet, changes):
     content = bytearray(good_parquet)

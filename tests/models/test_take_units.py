@@ -41,7 +41,7 @@ def test_radians_are_told_with_the_sensor_that_moves():
     assert "multiply by 57.2958" in sentence
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.floats(0.0, 2.5), st.sampled_from([60.0, 500.0, 3000.0]), st.integers(0, 1000))
 def test_a_small_motion_in_degrees_is_not_told(degrees: float, rest: float, seed: int):
     sentences = check_take(moving(degrees, rest=rest, counts=rest / 100, seed=seed)).sentences
@@ -101,7 +101,7 @@ wild = st.one_of(
 )
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(st.lists(st.tuples(wild, wild, wild), min_size=1, max_size=8, unique_by=lambda row: row[0]))
 def test_any_finite_numbers_are_refused_with_their_place_or_can_be_checked(tmp_path_factory, rows):
     path = tmp_path_factory.mktemp("wild") / "t.csv"

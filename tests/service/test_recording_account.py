@@ -177,7 +177,7 @@ def check(story: Story, settlement: Settlement, stop_ns: int) -> None:
             assert key in recorded | lacking, "a number that was given is told of"
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150)
 @example(before=[("received", 3), ("lost in no time", 1500), ("received", 2)], after=[("received", 1)])
 @example(
     before=[("unreachable", 0), ("received", 3), ("jumped", 5000), ("lost", 2), ("received", 2)],

@@ -68,7 +68,7 @@ hostile = st.sampled_from(
 )
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(name=hostile | st.text(max_size=70) | st.from_regex(IDENTIFIER))
 def test_a_name_is_kept_as_it_is_or_refused(sqlite_store, name):
     if IDENTIFIER.match(name):

@@ -93,7 +93,7 @@ def test_the_takes_of_a_file_are_kept_all_or_none(anna):
 numbers = st.floats(allow_nan=False, allow_infinity=False, width=64)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(data=st.data(), frames=st.integers(1, 6), rows=st.integers(0, 4))
 def test_any_take_survives_its_file(data, frames, rows):
     def times(count):
@@ -192,7 +192,7 @@ def test_a_take_that_trained_a_model_stays(anna):
     assert [record.id for record in anna.takes.list()] == [trained.id]
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(id=st.text(max_size=70))
 def test_no_text_is_an_id_by_accident(sqlite_store, id):
     for get in (sqlite_store.takes.get, sqlite_store.jobs.get, sqlite_store.recordings.get):

@@ -80,7 +80,7 @@ def test_without_samples_the_variance_is_the_assumed_one() -> None:
     assert PosteriorVariance(own, u, []).variance == pytest.approx(own.alone(u))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seed=st.integers(0, 10_000), steps=st.integers(1, 4))
 def test_a_step_never_teaches_less_than_nothing_nor_more_than_there_is(seed: int, steps: int) -> None:
     own = process("T_MCP")

@@ -120,7 +120,7 @@ def is_whole(angle: AngleTerms) -> None:
     st.integers(0, FRAMES - 1),
     st.booleans(),
 )
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_terms_add_up_to_what_is_served(
     names: list[str], seed: int, wearing: str, frame: int, extra: bool
 ) -> None:

@@ -34,7 +34,7 @@ LINEAR = trained("linear")
 READINGS = TAKES[0].readings[:50]
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.floats(0.5, 2.0), st.floats(-90, 90))
 def test_an_angle_is_scaled_and_shifted_and_comes_back(scale, offset_deg):
     change = Refinement(scale, offset_deg)

@@ -61,7 +61,7 @@ def test_without_a_pose_the_prior_stays() -> None:
         np.testing.assert_array_equal(shift.covariance, PRIOR.covariance)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 10_000), st.integers(1, 8), st.randoms(use_true_random=False))
 def test_order_does_not_matter_and_one_by_one_is_all_at_once(seed: int, count: int, shuffle) -> None:
     witnesses = poses(seed, count, known=0.7)
@@ -74,7 +74,7 @@ def test_order_does_not_matter_and_one_by_one_is_all_at_once(seed: int, count: i
         np.testing.assert_allclose(shift.covariance, covariance, rtol=0, atol=1e-8)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 10_000))
 def test_every_pose_takes_uncertainty_away(seed: int) -> None:
     shift = PRIOR

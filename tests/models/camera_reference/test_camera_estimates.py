@@ -90,7 +90,7 @@ def test_an_archive_that_would_unpack_too_large_is_refused_before_it_is_unpacked
         read_estimates(tmp_path / "e.npz")
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.binary(max_size=300), st.integers(0, 3000))
 def test_damaged_files_are_refused_or_read_whole(tmp_path_factory, noise: bytes, place: int):
     folder = tmp_path_factory.mktemp("e")

@@ -55,7 +55,7 @@ def test_a_deviation_that_cannot_be_is_refused_with_its_row(wrong):
         take(reference_sd=np.ones((6, 1)))
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([".csv", ".parquet"]), st.booleans())
 def test_a_table_gives_back_what_was_written(tmp_path_factory, seed, suffix, own_clock):
     random = np.random.default_rng(seed)

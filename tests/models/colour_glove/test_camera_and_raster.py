@@ -39,7 +39,7 @@ def test_it_projects_as_opencv_does():
     assert np.allclose(camera.project(points), found[:, 0], atol=1e-8)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 10_000))
 def test_undistorting_is_the_inverse(seed):
     camera = Camera(distortion=LENS)
@@ -80,7 +80,7 @@ def by_rays(vertices: np.ndarray, triangles: np.ndarray, camera: Camera) -> np.n
     return depth
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.integers(0, 10_000))
 def test_depths_are_those_of_rays_also_where_triangles_meet(seed):
     rng = np.random.default_rng(seed)

@@ -26,7 +26,7 @@ def frames(skin: HandSkin, angles: np.ndarray) -> HandFrames:
     return forward_kinematics(skin.skeleton, np.array([all_angles]))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 10_000))
 def test_a_state_is_what_its_26_numbers_say(seed):
     state = drawn(seed)
@@ -57,7 +57,7 @@ def test_no_state_of_a_hand_is_refused(angles, rotation, position, named):
         HandState(angles, rotation, position)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000), st.sampled_from(["right", "left"]))
 def test_skin_bound_to_one_joint_moves_with_it(seed, hand):
     skin, state = hand_skin(hand_skeleton(hand=hand)), drawn(seed)

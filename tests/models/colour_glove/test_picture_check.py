@@ -118,7 +118,7 @@ def test_the_limit_is_above_what_the_database_leaves_open(check):
     assert np.mean(beyond) < 0.02
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     st.integers(0, 2**32 - 1), st.integers(1, 90), st.integers(1, 90), st.integers(1, 30), st.integers(0, 10)
 )

@@ -74,7 +74,7 @@ def test_what_faces_away_from_the_camera_is_hidden_anyway(side):
     assert np.count_nonzero(fronts != all_of_them) < 10
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000))
 def test_a_turn_and_its_vector_are_scipys(seed):
     rng = np.random.default_rng(seed)
@@ -87,7 +87,7 @@ def test_a_turn_and_its_vector_are_scipys(seed):
     assert np.allclose(here.moved(step).step_from(here)[20:23], back, atol=1e-6)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000))
 def test_a_step_leads_from_one_state_to_the_other(seed):
     first, second = state(seed), state(seed + 1)

@@ -34,7 +34,7 @@ def blocks(seed: int) -> np.ndarray:
     return image
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 10_000))
 def test_transforms_are_scipys(seed):
     image = blocks(seed)
@@ -60,7 +60,7 @@ def slow_distance(first: np.ndarray, second: np.ndarray) -> float:
     return (one_way(first, second) + one_way(second, first)) / 2
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(st.integers(0, 10_000))
 def test_the_distance_is_the_papers_words(seed):
     first, second = blocks(seed), blocks(seed + 1)
@@ -80,7 +80,7 @@ def test_images_that_are_none_are_refused(database: PoseDatabase):
         lookup.neighbours(database.tiny[0], 0)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 10_000))
 def test_a_window_follows_the_glove_wherever_it_is_and_however_large(seed):
     rng = np.random.default_rng(seed)

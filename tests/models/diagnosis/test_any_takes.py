@@ -23,9 +23,6 @@ from glovecal_models.takes.take import Take
 NAMES = ("A", "B", "C")
 KINDS = ("moves", "wanders", "still", "still but once", "steps", "same as A", "exact line")
 SHAPES = settings(
-    derandomize=True,
-    deadline=None,
-    database=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
     phases=(Phase.explicit, Phase.generate),
 )

@@ -37,7 +37,7 @@ def test_the_rigid_hand_knows_nothing_of_the_joint() -> None:
 
 
 @given(WILD)
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_with_a_flat_palm_both_hands_are_equal(angles: np.ndarray) -> None:
     angles = angles.copy()
     angles[:, ARCH] = 0.0
@@ -58,7 +58,7 @@ def test_the_jacobian_is_the_slope_of_finite_differences(skeleton) -> None:
 
 
 @given(WILD)
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_the_left_hand_mirrors_the_right(angles: np.ndarray) -> None:
     right, left = forward_kinematics(RIGHT, angles), forward_kinematics(LEFT, angles)
     np.testing.assert_allclose(left.tips_mm, right.tips_mm @ MIRROR, atol=1e-9)

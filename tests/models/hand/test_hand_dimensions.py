@@ -18,7 +18,7 @@ def test_nothing_measured_is_an_assumed_hand_and_says_so() -> None:
 
 
 @given(st.floats(60, 300), st.floats(0.6, 1.6))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_what_is_measured_stays_and_the_rest_follows_the_length(length: float, wider: float) -> None:
     breadth = 0.45 * length * wider
     hand = HandDimensions.from_measured(

@@ -41,7 +41,7 @@ def bone_lengths(frames: HandFrames) -> np.ndarray:
 
 
 @given(WILD)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_frames_stay_orthonormal_and_bones_rigid_whatever_the_angles(angles: np.ndarray) -> None:
     frames = forward_kinematics(RIGHT, angles)
     squares = frames.orientations.swapaxes(-1, -2) @ frames.orientations
@@ -52,7 +52,7 @@ def test_frames_stay_orthonormal_and_bones_rigid_whatever_the_angles(angles: np.
 
 
 @given(WILD)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_the_left_hand_mirrors_the_right(angles: np.ndarray) -> None:
     right, left = forward_kinematics(RIGHT, angles), forward_kinematics(LEFT, angles)
     np.testing.assert_allclose(left.tips_mm, right.tips_mm @ MIRROR, atol=1e-9)
@@ -61,7 +61,7 @@ def test_the_left_hand_mirrors_the_right(angles: np.ndarray) -> None:
 
 
 @given(WILD)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_many_frames_at_once_equal_each_by_itself(angles: np.ndarray) -> None:
     together = forward_kinematics(RIGHT, angles)
     slopes = tip_jacobian(RIGHT, together)

@@ -27,7 +27,7 @@ def test_ours_said_as_a_post_rotation_is_the_same_hand(order: str) -> None:
 
 
 @given(st.tuples(ANGLE, ANGLE, ANGLE), st.sampled_from(ORDERS))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_both_axes_are_of_one_frame_and_angles_come_back(
     angles: tuple[float, float, float], order: str
 ) -> None:

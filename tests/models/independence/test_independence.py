@@ -212,7 +212,7 @@ def test_a_rotation_that_sensors_share_has_none_of_its_own():
     assert (item.rotation, item.sensor) == ("KNEE", "A")
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(
     gain=st.lists(st.floats(0.2, 50).flatmap(lambda g: st.sampled_from([g, -g])), min_size=4, max_size=4),
     zero=st.lists(st.floats(-1000, 1000), min_size=4, max_size=4),
@@ -232,7 +232,7 @@ def test_per_cents_do_not_depend_on_a_sensors_units(gain: list[float], zero: lis
         assert second.std_pct == pytest.approx(first.std_pct, rel=1e-3)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     frames=st.integers(1, 60),
     values=st.sampled_from(["still", "steps", "noise", "huge"]),

@@ -47,7 +47,7 @@ def assert_within_limits(chains: TipChains, angles: np.ndarray) -> None:
 
 
 @given(arrays(float, (1, 2, 3), elements=st.floats(-1e4, 1e4)), FINGER)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_limits_are_kept_whatever_is_asked_for(places: np.ndarray, finger: str) -> None:
     chains = CHAINS[finger]
     found = follow(chains, TipPlaces(("T", finger), places), HandShape.at_rest(chains.rotations))
@@ -56,7 +56,7 @@ def test_limits_are_kept_whatever_is_asked_for(places: np.ndarray, finger: str) 
 
 
 @given(SEED, FINGER)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_the_tips_of_a_reachable_hand_are_reached(seed: int, finger: str) -> None:
     chains = CHAINS[finger]
     tips = chains.tips_mm(wild_shape(chains, seed).centre_deg)
@@ -66,7 +66,7 @@ def test_the_tips_of_a_reachable_hand_are_reached(seed: int, finger: str) -> Non
 
 
 @given(SEED, FINGER)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_tips_touch_from_anywhere(seed: int, finger: str) -> None:
     chains = CHAINS[finger]
     found = follow(chains, Touch(("T", finger)), wild_shape(chains, seed))
@@ -75,7 +75,7 @@ def test_tips_touch_from_anywhere(seed: int, finger: str) -> None:
 
 
 @given(SEED, FINGER)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_the_solution_is_a_fixed_point(seed: int, finger: str) -> None:
     chains, touch, shape = CHAINS[finger], Touch(("T", finger)), near_shape(finger, seed)
     found = follow(chains, touch, shape)
@@ -85,7 +85,7 @@ def test_the_solution_is_a_fixed_point(seed: int, finger: str) -> None:
 
 
 @given(SEED, FINGER)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_a_left_hand_does_what_the_right_does(seed: int, finger: str) -> None:
     """Angles of a mirrored hand are the same; its tips are mirrored."""
     right, left = CHAINS[finger], TipChains(LEFT, ("T", finger))

@@ -102,7 +102,7 @@ def test_twice_the_pullback_is_the_gradient_of_a_symmetric_matrix(covariance: Co
 
 
 @every
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 10**6), dimensions=st.integers(1, 6))
 def test_every_matrix_is_symmetric_and_positive_semidefinite(covariance, seed, dimensions) -> None:
     theta, a, _, _ = some_points(covariance, dimensions, seed)

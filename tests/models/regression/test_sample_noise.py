@@ -40,7 +40,7 @@ def both(inputs, target, variance) -> tuple[ProcessRegressor, ProcessRegressor]:
     return alike, with_stated_variance(alike, inputs, target, variance)
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(st.integers(0, 10_000), st.floats(0.0, 30.0))
 def test_equal_variances_change_nothing(seed, variance):
     inputs, _, target, _ = samples(60, 2, seed)

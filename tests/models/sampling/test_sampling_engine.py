@@ -204,7 +204,7 @@ def test_a_protocol_has_steps_of_different_names() -> None:
 EVENT = st.sampled_from([*EVENTS, "still", "move", "nothing", "kill"])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.tuples(EVENT, st.floats(0.02, 3.0)), max_size=25))
 def test_whatever_happens_the_document_tells_all(happenings) -> None:
     """The phase is always one of the machine's, the step is the protocol's, and JSON holds everything."""

@@ -111,7 +111,11 @@ def test_taps_on_a_key_measure_the_glove_and_live_poses_say_so(settings, session
     before = eventually(lambda: _meta(session, keys), "pose meta")
     assert before["glove_latency_s"] is None
     reach = {"GLOVECAL_DATA": str(settings.data), "GLOVECAL_ZENOH": settings.zenoh}
-    said = _tap_in_a_terminal(reach, tapped)
+    code, said = 1, "taps are alike"
+    for _ in range(5):  # keys come late on a busy computer, which is told: tapped again, as a person does
+        if code and "taps are alike" in said:
+            code, said = _tap_in_a_terminal(reach, tapped)
+    assert code == 0, said
     assert f"{TAPS} of {TAPS}" in said
     assert "Keyboards report a key 5 to 20 ms after it was hit" in said
     (glove,) = glovecal(reach, "glove", "list", "--json").json["seen"]
@@ -160,8 +164,8 @@ def _meta(session: zenoh.Session, keys: GloveKeys, *, known: bool = False) -> di
     return None
 
 
-def _tap_in_a_terminal(reach: dict[str, str], glove: TappedGlove) -> str:
-    """What the command shows while a key is pressed at the times at which the finger hits it."""
+def _tap_in_a_terminal(reach: dict[str, str], glove: TappedGlove) -> tuple[int, str]:
+    """The command's code, and what it shows while a key is pressed at the times at which a finger hits it."""
     ours, theirs = pty.openpty()
     command = [*COMMAND, "take", "latency", GLOVE, "--taps", str(TAPS)]
     surroundings = environment(reach) | {"TERM": "xterm"}
@@ -187,8 +191,7 @@ def _tap_in_a_terminal(reach: dict[str, str], glove: TappedGlove) -> str:
     eventually(lambda: read(0.05) and process.poll() is not None, "the command ends")
     read(0.2)
     os.close(ours)
-    assert process.returncode == 0, shown
-    return shown
+    return process.returncode, shown
 
 
 def test_a_table_of_frames_and_a_file_of_key_times_will_do(tmp_path: Path):

@@ -137,7 +137,7 @@ def test_a_file_that_is_no_model_changes_nothing(
     assert list((tmp_path / "elsewhere" / "uploads").iterdir()) == []
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_a_manifest_with_anything_in_it_is_refused_or_works(elsewhere: RestClient, kept, data) -> None:
     manifest = read_manifest(ARTIFACT)

@@ -40,7 +40,7 @@ NOT_WORKING = {"GET /v1/health/ready": 503}
 """Real time is another process, which these tests do without."""
 OPERATIONS = [each for each in operations(DOCUMENT) if each.path not in ENDLESS]
 WILD = settings(
-    max_examples=8, derandomize=True, deadline=None, database=None,
+    max_examples=8,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )  # fmt: skip
 FOREIGN = re.compile(

@@ -45,7 +45,7 @@ LINE = st.builds(
 @pytest.mark.parametrize("name", [name for name in FORMATS if name != "lerobot"])
 @pytest.mark.parametrize("hand", ["right", "left"])
 @given(data=st.data())
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_what_is_written_is_read_again(name: str, hand, data: st.DataObject) -> None:
     form, layout = FORMATS[name], LAYOUT_OF[name]
     lines = data.draw(st.dictionaries(st.sampled_from(layout.sensors), LINE, min_size=1))
@@ -61,7 +61,7 @@ def test_what_is_written_is_read_again(name: str, hand, data: st.DataObject) -> 
 @given(
     text=st.text(max_size=400) | st.from_regex(r"([0-3] +-?[0-9.]+ +-?[0-9.e]+ +0\n){0,30}", fullmatch=True)
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_wild_text_is_refused_with_a_sentence(name: str, text: str) -> None:
     try:
         model, _ = read_model(text, FORMATS[name], LAYOUT_OF[name], "anna", "right")
@@ -72,7 +72,7 @@ def test_wild_text_is_refused_with_a_sentence(name: str, text: str) -> None:
 
 @pytest.mark.parametrize("name", FORMATS)
 @given(data=st.data())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_damaged_files_give_finite_lines_or_a_sentence(name: str, data: st.DataObject) -> None:
     form, layout = FORMATS[name], LAYOUT_OF[name]
     text = form.write(dict.fromkeys(layout.sensors, SensorLine(0.7, 80.0)), EIGHT, "right")
