@@ -58,16 +58,19 @@ class Engine:
         self._folder = folder
         self._podman = ["podman", "--root", str(folder / "images"), "--runroot", str(folder / "run")]
 
-    def __call__(self, *arguments: str, check: bool = True, timeout_s: float = 3600.0) -> str:
-        """What ``podman ARGUMENTS`` printed. Raises Failed unless ``check`` is off."""
-        done = subprocess.run(
-            [*self._podman, *arguments],
-            env=os.environ | {"CONTAINERS_CONF": str(self._folder / "containers.conf")},
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=timeout_s,
-        )
+    def __call__(self, *arguments: str, check: bool = True, timeout_s: float = 4 * 3600.0) -> str:
+        """What ``podman ARGUMENTS`` printed. Raises Failed unless ``check`` is off, or late."""
+        try:
+            done = subprocess.run(
+                [*self._podman, *arguments],
+                env=os.environ | {"CONTAINERS_CONF": str(self._folder / "containers.conf")},
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                timeout=timeout_s,
+            )
+        except subprocess.TimeoutExpired as error:
+            raise Failed(f"podman {arguments[0]} did not end within {timeout_s:.0f} s") from error
         if check and done.returncode:
             raise Failed(f"podman {' '.join(arguments)[:200]}: exit code {done.returncode}\n{_last(done)}")
         return done.stdout
