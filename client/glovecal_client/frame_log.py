@@ -7,6 +7,7 @@ again at once and kept in memory, in order, until there is room.
 
 from __future__ import annotations
 
+import errno
 import threading
 from collections import deque
 from collections.abc import Mapping
@@ -49,7 +50,7 @@ class FrameLog:
         file = FileIO(path, "xb", opener=open_private)
         try:
             if file.write(head) != len(head):
-                raise OSError(f"{path}: no room for the header")
+                raise OSError(errno.ENOSPC, f"{path}: no room for the header")
             sync_file(file)
         except OSError:
             file.close()
@@ -103,7 +104,7 @@ class FrameLog:
         written = self._file.write(record)
         if written != len(record):
             self._cut_back()
-            raise OSError(f"no room: {written} of {len(record)} bytes written")
+            raise OSError(errno.ENOSPC, f"no room: {written} of {len(record)} bytes written")
         self.good_bytes += len(record)
         self.records += 1
 

@@ -142,4 +142,4 @@ def diagnose(
             cancelled=cancelled,
             report=report,
         )
-    return Diagnosis(found, tuple(item.set_aside for item in odd))
+    return Diagnosis(found, tuple(item.told for item in odd if item.is_set_aside))

@@ -29,7 +29,10 @@ def read_json(content: str | bytes, name: str) -> Any:
     """The value; its numbers are finite and fit 64 bits. Raises BadInput; ``name`` begins the sentence."""
     try:
         return json.loads(
-            _text(content, name), parse_float=_finite, parse_int=_integer, parse_constant=_not_finite
+            _text(content, f"{name} is no JSON: it"),
+            parse_float=_finite,
+            parse_int=_integer,
+            parse_constant=_not_finite,
         )
     except json.JSONDecodeError as error:
         raise BadInput(
@@ -39,13 +42,13 @@ def read_json(content: str | bytes, name: str) -> Any:
     except _BadNumber as error:
         raise BadInput(f"{name} holds the number {error.shown}; give finite numbers of 64 bits") from None
     except RecursionError:
-        raise BadInput(f"{name} is nested too deeply to be read; give a few levels") from None
+        raise BadInput(f"{name} is no JSON: it is nested too deeply; give a few levels") from None
 
 
 def read_toml(content: str | bytes, name: str) -> dict[str, Any]:
     """The table. Raises BadInput; ``name`` begins the sentence."""
     try:
-        return tomllib.loads(_text(content, name))
+        return tomllib.loads(_text(content, f"{name}: not valid TOML: it"))
     except tomllib.TOMLDecodeError as error:
         found = re.search(r"at line (\d+), column (\d+)", str(error))
         place = f"line {found[1]}, column {found[2]}" if found else "its last line"
@@ -55,16 +58,16 @@ def read_toml(content: str | bytes, name: str) -> dict[str, Any]:
     except ValueError:  # an integer of thousands of digits
         raise BadInput(f"{name} holds an integer that is too long; give finite numbers of 64 bits") from None
     except RecursionError:
-        raise BadInput(f"{name} is nested too deeply to be read; give a few levels") from None
+        raise BadInput(f"{name}: not valid TOML: it is nested too deeply; give a few levels") from None
 
 
-def _text(content: str | bytes, name: str) -> str:
+def _text(content: str | bytes, what: str) -> str:
     if isinstance(content, str):
         return content
     try:
         return content.decode("utf-8")
     except UnicodeDecodeError as error:
-        raise BadInput(f"{name} is not UTF-8 text from byte {error.start} on; save it as UTF-8") from None
+        raise BadInput(f"{what} is not UTF-8 text from byte {error.start} on; save it as UTF-8") from None
 
 
 class _BadNumber(Exception):

@@ -149,7 +149,7 @@ def test_bad_options_are_refused(tmp_path: Path, device: str, options: dict, sen
 def test_table_that_is_not_utf8_is_refused(tmp_path: Path) -> None:
     path = table(tmp_path)
     path.write_bytes(TABLE.encode() + b"0.02,\xff,1,2,,\n" * 2)
-    with pytest.raises(BadOption, match="utf-8"):
+    with pytest.raises(BadOption, match="not UTF-8 text; save it as UTF-8"):
         ReplayDevice(path)
 
 
@@ -191,7 +191,7 @@ def test_a_table_is_replayed_as_it_is_imported(tmp_path: Path) -> None:
         ("sep=,\n" + TABLE, "remove the lines above"),
         (
             TABLE.replace("10.00,", "s,,raw,raw,deg,V\n10.00,", 1),
-            "'raw' is no number; remove this line if it",
+            "'s' is no number; remove this line if it",
         ),
         (TABLE.replace("10.01,", "# a cable moved\n10.01,", 1), "line 3 has 1 values, the header 6; remove"),
     ],

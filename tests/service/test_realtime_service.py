@@ -122,6 +122,7 @@ def test_a_glove_of_the_other_hand_is_told_with_its_first_frames(
     session: zenoh.Session, settings: Settings, store: Store
 ) -> None:
     model_id = store_model(store, "anna", degrees_per_count=0.5)
+    store.subjects.measure("anna", {}, hand="right")
     glove = WireGlove(session, settings, "g-left", subject="anna")
     glove.say_meta(hand="left")
     eventually(lambda: served(session, glove, model_id), "the glove is served")

@@ -53,8 +53,16 @@ def open_recording(path: Path) -> ReplayedFrames:
         with path.open("rb") as file:
             is_log = file.read(len(MAGIC)) == MAGIC
         return _FrameLogRecording(path) if is_log else _TableRecording(path)
-    except (OSError, DamagedLog, BadName, UnicodeDecodeError, csv.Error) as error:
+    except (OSError, DamagedLog, BadName) as error:
         raise BadOption(f"replay of {path}: {reason_of(error)}") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise BadOption(f"replay of {path}: {_no_table(error)}") from error
+
+
+def _no_table(error: UnicodeDecodeError | csv.Error) -> str:
+    if isinstance(error, UnicodeDecodeError):
+        return "it is not UTF-8 text; save it as UTF-8"
+    return "a field there is too long, or holds a NUL byte; correct the table there"
 
 
 class _FrameLogRecording:
@@ -135,7 +143,7 @@ class _TableRecording:
                 for line, row in itertools.islice(_filled_rows(file), 1, None):
                     yield self._frame(row, line)
             except (csv.Error, UnicodeDecodeError) as error:
-                raise BadOption(f"replay of {self._path}: after line {line}: {reason_of(error)}") from error
+                raise BadOption(f"replay of {self._path}: after line {line}: {_no_table(error)}") from error
 
     def _frame(self, row: list[str], line: int) -> ReplayedFrame:
         if len(row) != len(self._header):

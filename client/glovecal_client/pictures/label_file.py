@@ -12,6 +12,7 @@ A record that is incomplete or damaged ends the file: everything from there on i
 
 from __future__ import annotations
 
+import errno
 import json
 import struct
 import zlib
@@ -72,7 +73,7 @@ class LabelWriter:
         if self._file.write(record) != len(record):
             self._file.truncate(before)
             self._file.seek(before)
-            raise OSError(f"{self.path}: no room")
+            raise OSError(errno.ENOSPC, f"{self.path}: no room")
 
 
 class LabelFilePictures:

@@ -29,7 +29,7 @@ FORMAT = "glovecal.model.v1"
 LARGEST_HEADER_BYTES = 8 << 20
 LARGEST_NUMBER = 1e15
 """Of an array: more than any trained weight or precision has come to, and far inside what float32 holds."""
-MOST_EFFECTS, MOST_TAKES, MOST_SAMPLES = 1000, 100_000, 10_000_000
+MOST_EFFECTS, MOST_TAKES, MOST_STORED_SAMPLES = 1000, 100_000, 10_000_000
 
 
 def model_id(artifact: bytes) -> str:
@@ -192,7 +192,7 @@ def _restore_rotation(
         held_out_rmse_deg=None
         if held_out is None
         else _within(held_out, LARGEST_DEG, f"{rotation}: held_out_rmse_deg"),
-        samples=int(_within(item["samples"], MOST_SAMPLES, f"{rotation}: samples")),
+        samples=int(_within(item["samples"], MOST_STORED_SAMPLES, f"{rotation}: samples")),
     )
 
 

@@ -40,7 +40,7 @@ VIEW_PX, VIEW_FOCAL_PX, VIEW_DISTANCE_MM = 128, 230.0, 500.0
 FORMAT = 1
 """Of the folder; part of the hash."""
 ENTRY_BYTES = 18_000
-MOST_BYTES = 8_000_000_000
+MOST_DATABASE_BYTES = 8_000_000_000
 """Of all databases in a folder: four of 100,000 entries, twenty of the usual size."""
 SPARED_BYTES = 500_000_000
 """Is left to recordings."""
@@ -164,8 +164,8 @@ def pose_database(
 
 
 def _make_room(folder: Path, needed: int) -> None:
-    """Remove databases, those used longest ago first, until all together keep below ``MOST_BYTES`` with the
-    one to come, and what killed builders left. Raises BadInput where the disk has no room for it then.
+    """Remove databases, those used longest ago first, until all together keep below ``MOST_DATABASE_BYTES``
+    with the one to come, and what killed builders left. Raises BadInput where the disk has no room for it then.
 
     One that is removed is built again when it is asked for."""
     kept = 0
@@ -174,7 +174,7 @@ def _make_room(folder: Path, needed: int) -> None:
         kept += sum(file.stat().st_size for file in place.iterdir())
         is_whole = (place / "database.json").exists()
         abandoned = not is_whole and time.time() - _used_at(place) > ABANDONED_AFTER_S
-        if abandoned or (is_whole and kept + needed > MOST_BYTES):
+        if abandoned or (is_whole and kept + needed > MOST_DATABASE_BYTES):
             shutil.rmtree(place, ignore_errors=True)
     free = shutil.disk_usage(folder).free
     if free < needed + SPARED_BYTES:

@@ -22,19 +22,21 @@ from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
 FEWEST_TAKES = 3
-FEWEST_ROWS = 60
-MOST_ROWS = 1500
+FEWEST_TELLING_ROWS = 60
+MOST_COMPARED_ROWS = 1500
 """Of a longer take every second, third ... row."""
 LEAST_ROTATION_SD_DEG = 3.0
 """A rotation that moved less in a take tells nothing of it."""
 LEAST_ODD_DEG = 5.0
 TIMES_USUAL = 2.5
 """An odd take's error over the largest of the other takes, without it."""
-LEAST_SHARE = 0.35
+LEAST_ODD_SHARE = 0.35
 """Of what its angles vary by, which the line must leave of an odd take."""
 LEAST_LEVEL_DEG, LEAST_LEVEL_OTHER_WEARING_DEG, TIMES_LEVEL = 20.0, 30.0, 3.0
 """How far the readings of a take may lie elsewhere, and times the others': a glove that is put on again is
 off by 15 degrees."""
+LEVEL_TOLD_SHARE = 0.5
+"""Of what its angles vary by, which the line may leave of a take whose level is judged."""
 MOST_SUSPECTS = 5
 MADE_TO_FIT = 1.6
 """Times the others' largest error: a take that is left with less fits."""
@@ -42,6 +44,8 @@ CLEARLY = 0.8
 """Of the error that another change leaves: with more they are not told apart."""
 RIDGE = 1e-3
 LONGEST_SHIFT_S, SHIFT_STEP_S = 3.0, 1 / 30
+OWN_CLOCK_SHARE = 0.5
+"""Of the error of a take's own line, what is left once its clocks agree."""
 KEPT = 0.9
 """An assignment must save so much more than a column's own place; cycles that do not are put back."""
 
@@ -80,8 +84,13 @@ class OddTake:
         return f"{start} {self.change}; {self.fitted_deg:.1f} degrees then."
 
     @property
-    def set_aside(self) -> str:
-        return f"{self.sentence} It is set aside."
+    def is_set_aside(self) -> bool:
+        """A clock is repaired where it is found, by whoever asked: its take stays."""
+        return self.how != "shift"
+
+    @property
+    def told(self) -> str:
+        return f"{self.sentence} It is set aside." if self.is_set_aside else self.sentence
 
 
 def odd_takes(takes: Sequence[Take], layout: Layout) -> tuple[OddTake, ...]:
@@ -113,8 +122,8 @@ def odd_takes(takes: Sequence[Take], layout: Layout) -> tuple[OddTake, ...]:
 
 
 def fitting(items: Sequence[Item], odd: Sequence[OddTake]) -> list[Item]:
-    """Of ``items``, one for each take, those of takes that fit."""
-    places = {item.place for item in odd}
+    """Of ``items``, one for each take, those of takes that are not set aside."""
+    places = {item.place for item in odd if item.is_set_aside}
     return [item for place, item in enumerate(items) if place not in places]
 
 
@@ -133,7 +142,7 @@ class _Sums:
     @classmethod
     def of(cls, take: Take, layout: Layout) -> _Sums:
         order = [take.sensors.index(name) for name in layout.sensors]
-        some = slice(None, None, 1 + len(take.time_s) // MOST_ROWS)
+        some = slice(None, None, 1 + len(take.time_s) // MOST_COMPARED_ROWS)
         angles = take.reference_at_frames(layout.rotations)
         return cls(layout, take.time_s[some], take.readings[some][:, order], angles[some])
 
@@ -141,7 +150,7 @@ class _Sums:
     def told(self) -> np.ndarray:
         """(R,) whether the take tells of a rotation."""
         known = np.isfinite(self.angles)
-        enough = known.sum(axis=0) >= FEWEST_ROWS
+        enough = known.sum(axis=0) >= FEWEST_TELLING_ROWS
         spread = np.array([part[mask].std() if mask.any() else 0.0 for part, mask in
                            zip(self.angles.T, known.T, strict=True)])  # fmt: skip
         return enough & (spread >= LEAST_ROTATION_SD_DEG)
@@ -231,7 +240,7 @@ def _errors(sums: Sequence[_Sums], without: int | None = None) -> list[float]:
 
 def _is_odd(take: _Sums, line: _Line, usual: float) -> bool:
     error = take.error(line)
-    return error >= max(LEAST_ODD_DEG, TIMES_USUAL * max(usual, 1.0), LEAST_SHARE * take.spread(line))
+    return error >= max(LEAST_ODD_DEG, TIMES_USUAL * max(usual, 1.0), LEAST_ODD_SHARE * take.spread(line))
 
 
 def _farthest(takes: Sequence[Take], sums: Sequence[_Sums]) -> tuple[int, OddTake] | None:
@@ -245,6 +254,8 @@ def _farthest(takes: Sequence[Take], sums: Sequence[_Sums]) -> tuple[int, OddTak
     least = LEAST_LEVEL_DEG if worn_alike else LEAST_LEVEL_OTHER_WEARING_DEG
     if off[best] < max(least, TIMES_LEVEL * others):
         return None
+    if sums[best].error(lines[best]) > LEVEL_TOLD_SHARE * sums[best].spread(lines[best]):
+        return None  # a line that does not follow the angles tells no level
     change = "Its readings lie elsewhere at the same angles. Another person, another glove, or another zero?"
     error = sums[best].error(lines[best])
     return best, OddTake(best, takes[best].name, off[best], others, "level", error, change)
@@ -297,6 +308,7 @@ def _lower(text: str) -> str:
 def _changes(sums: _Sums, line: _Line) -> Iterator[tuple[How, float, str]]:
     """How, the error that is left, and a sentence's beginning: the simplest first."""
     yield _shifted(sums, line)
+    yield _own_clock(sums)
     yield _turned(sums, line)
     yield _other_sensors(sums, line)
     yield _other_rotations(sums, line)
@@ -327,12 +339,37 @@ def _shifted(sums: _Sums, line: _Line) -> tuple[How, float, str]:
         error = float(np.sqrt(np.mean(squares)))
         if error < best:
             best, best_shift = error, float(shift)
-    word = "later" if best_shift > 0 else "earlier"
+    return "shift", best if abs(best_shift) > step else np.inf, _of_clock(best_shift)
+
+
+def _own_clock(sums: _Sums) -> tuple[How, float, str]:
+    """A line of its own that fits once the clocks agree: of no use where all clocks are off."""
+    step = max(SHIFT_STEP_S, float(np.median(np.diff(sums.time_s))))
+    longest = min(LONGEST_SHIFT_S, 0.25 * float(sums.time_s[-1] - sums.time_s[0]))
+
+    def left(shift: float) -> float:
+        moved = np.full_like(sums.angles, np.nan)
+        for place in np.flatnonzero(sums.told):
+            known = np.isfinite(sums.angles[:, place])
+            at = sums.time_s[known]
+            moved[:, place] = np.interp(sums.time_s + shift, at, sums.angles[known, place], np.nan, np.nan)
+        shifted = replace(sums, angles=moved)
+        return shifted.error(_Line.through([shifted])) if shifted.is_told else np.inf
+
+    shifts = np.arange(-longest, longest + step / 2, step)
+    errors = [left(float(shift)) for shift in shifts]
+    best = int(np.argmin(errors))
+    if abs(shifts[best]) <= step or errors[best] > OWN_CLOCK_SHARE * left(0.0):
+        return "shift", np.inf, ""
+    return "shift", errors[best], _of_clock(float(shifts[best]))
+
+
+def _of_clock(shift: float) -> str:
+    word = "later" if shift > 0 else "earlier"
     return (
-        "shift", best if abs(best_shift) > step else np.inf,
-        f"Its reference is {abs(best_shift):.2f} s {word} than its readings; moved by that it fits:"
-        " glovecal take clocks finds and repairs it",
-    )  # fmt: skip
+        f"Its reference is {abs(shift):.2f} s {word} than its readings; moved by that it fits:"
+        " glovecal take clocks finds and repairs it"
+    )
 
 
 def _turned(sums: _Sums, line: _Line) -> tuple[How, float, str]:

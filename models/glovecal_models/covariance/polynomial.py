@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from glovecal_models.covariance.base import Covariance, Pullback
-from glovecal_models.errors import DamagedArtifact
+from glovecal_models.errors import BadInput, DamagedArtifact
 
 _HIGHEST_DEGREE = 8
 
@@ -23,7 +23,7 @@ class Polynomial(Covariance):
 
     def __init__(self, degree: int) -> None:
         if isinstance(degree, bool) or not isinstance(degree, int) or not 1 <= degree <= _HIGHEST_DEGREE:
-            raise ValueError(f"degree is {degree!r}, expected a whole number from 1 to {_HIGHEST_DEGREE}")
+            raise BadInput(f"degree is {degree!r}, expected a whole number from 1 to {_HIGHEST_DEGREE}")
         self.degree = degree
 
     def parameter_names(self, dimensions: int) -> list[str]:
@@ -74,10 +74,8 @@ class Polynomial(Covariance):
     def from_settings(cls, settings: Mapping[str, Any]) -> Covariance:
         try:
             return cls(settings.get("degree"))  # pyright: ignore[reportArgumentType]  checked inside
-        except ValueError:
-            raise DamagedArtifact(
-                "polynomial covariance: its parameters are not what they should be"
-            ) from None
+        except BadInput as error:
+            raise DamagedArtifact(f"polynomial covariance: {error}") from error
 
     def __repr__(self) -> str:
         return f"Polynomial({self.degree})"

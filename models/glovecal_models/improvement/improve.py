@@ -67,8 +67,8 @@ def improve(
     """Train, then add what the diagnosis names while it pays. Raises NotTrainable, BadInput, Cancelled.
 
     Takes that do not fit the others are set aside first. Errors are on ``holdout`` when given, else on
-    held-out takes. ``ceiling``: see at the end whether anything
-    is left to gain from what was recorded; needs the extra ``ceiling`` of this package.
+    held-out takes. ``ceiling``: see at the end whether anything is left to gain from what was recorded; needs
+    the extra ``ceiling`` of this package.
     """
     settings = settings or TrainingSettings()
     odd = odd_takes(takes, layout)
@@ -190,7 +190,7 @@ class _Loop:
         self._say("done", 1.0)
         return Improvement(
             tuple(self.steps), floors, stopped, self.diagnosis, tuple(self.trials), scale,
-            (*(item.set_aside for item in self.odd_takes), *take_warnings(self.takes)), self.usable,
+            (*(item.told for item in self.odd_takes), *take_warnings(self.takes)), self.usable,
             self.takes[0].duration_s if len(self.takes) == 1 and not self.holdout else None, found,
         )  # fmt: skip
 

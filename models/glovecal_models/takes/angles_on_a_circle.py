@@ -23,7 +23,7 @@ FAR_APART_DEG = 300.0
 """What takes must span together where none of them passes the place where angles begin again."""
 LEAST_EMPTY_DEG = 60.0
 """Of the circle: a joint that covers more than the rest is not told from one that turns."""
-BINS = 72
+CIRCLE_BINS = 72
 STRAY_SHARE = 0.002
 """Of the rows; an arc with fewer in each of its bins of 5 degrees counts as empty."""
 SMOOTH_DEG = 20.0
@@ -94,14 +94,14 @@ def _whole_turns(columns: Sequence[np.ndarray], known: Sequence[np.ndarray]) -> 
 
 def _middle_of_the_empty_arc(angles: np.ndarray) -> float | None:
     """Degrees; None where the joint leaves no arc of the circle empty."""
-    counts, edges = np.histogram(np.mod(angles, TURN_DEG), BINS, (0.0, TURN_DEG))
+    counts, edges = np.histogram(np.mod(angles, TURN_DEG), CIRCLE_BINS, (0.0, TURN_DEG))
     free = counts <= STRAY_SHARE * len(angles)
     if free.all() or not free.any():
         return None
     first = int(np.argmin(free))
     edge = np.flatnonzero(np.diff(np.concatenate([[0], np.roll(free, -first).astype(int), [0]])))
     start, end = max(zip(edge[::2], edge[1::2], strict=True), key=lambda run: run[1] - run[0])
-    width = TURN_DEG / BINS
+    width = TURN_DEG / CIRCLE_BINS
     if (end - start) * width < LEAST_EMPTY_DEG:
         return None
     return float(edges[first]) + 0.5 * (start + end) * width

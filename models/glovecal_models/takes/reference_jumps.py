@@ -20,8 +20,8 @@ import numpy as np
 from glovecal_models.takes.reading_faults import median_of_five
 from glovecal_models.takes.take import ReferenceJump, Take
 
-LEAST_DEG = 8.0
-SPREADS = 8.0
+LEAST_JUMP_AWAY_DEG = 8.0
+JUMP_SPREADS = 8.0
 """Times the robust spread of the steps that the readings do not show."""
 TIMES_MOVED = 2.0
 """Times the largest step that the readings show within ``AROUND_S``."""
@@ -38,7 +38,7 @@ STAYS_S, STAYS_SHARE = 0.25, 0.6
 """A step stays where means over so long on its two sides differ by so much of it."""
 GAP_S, GAP_ROWS = 0.1, 3.0
 """A longer pause of the reference, and one of more rows: the joint may have moved in it."""
-FEWEST_ROWS = 30
+FEWEST_JUMP_ROWS = 30
 MOSTLY_HELD = 0.8
 """Share of the rows that repeat the one before: angles set one by one do jump."""
 SHOWN_R2 = 0.5
@@ -73,7 +73,7 @@ def without_jumps(take: Take) -> Take:
 def _jumps_of(take: Take, rotation: str, column: np.ndarray) -> Iterator[ReferenceJump]:
     rows = np.flatnonzero(np.isfinite(column))
     angle, time = column[rows], take.reference_time_s[rows]
-    if len(rows) < FEWEST_ROWS or np.abs(np.diff(angle)).max() <= LEAST_DEG:
+    if len(rows) < FEWEST_JUMP_ROWS or np.abs(np.diff(angle)).max() <= LEAST_JUMP_AWAY_DEG:
         return
     if (np.diff(angle) == 0).mean() > MOSTLY_HELD:
         return
@@ -82,7 +82,7 @@ def _jumps_of(take: Take, rotation: str, column: np.ndarray) -> Iterator[Referen
     rest = angle - shown
     steps = np.diff(rest)
     spread = 1.4826 * float(np.median(np.abs(steps - np.median(steps))))
-    limit = max(LEAST_DEG, SPREADS * spread) + TIMES_MOVED * _largest_near(time, moved)
+    limit = max(LEAST_JUMP_AWAY_DEG, JUMP_SPREADS * spread) + TIMES_MOVED * _largest_near(time, moved)
     jumps = 1 + np.flatnonzero(np.abs(np.diff(angle)) > limit)
     pause = max(GAP_S, GAP_ROWS * float(np.median(np.diff(time))))
     ends = [0, *(1 + np.flatnonzero(np.diff(time) > pause)), len(time)]
@@ -129,7 +129,7 @@ def _stretches(
 def _comes_back(rest: np.ndarray, at: int, left: float, limit: float) -> int | None:
     """The first row that is near where the angle ``left`` at ``at``, and came there at once."""
     away = np.abs(rest[at:] - left)
-    near = away[1:] <= max(0.5 * LEAST_DEG, min(BACK_SHARE * float(away[0]), limit))
+    near = away[1:] <= max(0.5 * LEAST_JUMP_AWAY_DEG, min(BACK_SHARE * float(away[0]), limit))
     at_once = np.abs(np.diff(rest[at:])) >= AT_ONCE_SHARE * away[:-1]
     if not near.any():
         return None

@@ -102,7 +102,7 @@ def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> T
             cancelled=cancelled,
             report=report,
         )
-    facts = [{**asdict(item), "sentence": item.sentence} for item in odd]
+    facts = [{**asdict(item), "sentence": item.sentence} for item in odd if item.is_set_aside]
     return TaskResult({}, {**DiagnosisView.of(found).document(), "odd_takes": facts})
 
 

@@ -172,10 +172,10 @@ class Takes:
         )
         return self._replace(earlier, take, _of_another_reference(earlier) | dict(facts or {}))
 
-    def same_frames(self, take: Take, subject: str) -> TakeRecord | None:
-        """The take of ``subject`` with exactly these frames, whatever it is called."""
+    def same_frames(self, take: Take, subject: str, layout: str) -> TakeRecord | None:
+        """The take of ``subject`` and ``layout`` with exactly these frames, whatever it is called."""
         with self._database.read() as connection:
-            return _with_frames(connection, subject, frames_hash(take))
+            return _with_frames(connection, subject, layout, frames_hash(take))
 
     def correct(self, id: str, take: Take, *, layout: str, original_sha256: str) -> TakeRecord:
         """Give a take all that its corrected file says beside the frames, which are the same.
@@ -303,7 +303,7 @@ def _check_keepable(take: Take) -> None:
 
 def _insert(connection: Connection, take: Take, record: TakeRecord) -> None:
     values = {**record.__dict__, "frames_sha256": frames_hash(take)}
-    if here := _with_frames(connection, record.subject, values["frames_sha256"]):
+    if here := _with_frames(connection, record.subject, record.layout, values["frames_sha256"]):
         raise Conflict(
             f"subject {record.subject!r} has exactly the frames of {take.name!r} already: take {here.name} "
             f"({here.id}). To replace its reference and names, import the file with --replace (over REST "
@@ -317,8 +317,9 @@ def _insert(connection: Connection, take: Take, record: TakeRecord) -> None:
         ) from error
 
 
-def _with_frames(connection: Connection, subject: str, digest: str) -> TakeRecord | None:
-    same = (tables.takes.c.subject == subject) & (tables.takes.c.frames_sha256 == digest)
+def _with_frames(connection: Connection, subject: str, layout: str, digest: str) -> TakeRecord | None:
+    of = tables.takes.c
+    same = (of.subject == subject) & (of.layout == layout) & (of.frames_sha256 == digest)
     row = connection.execute(select(tables.takes).where(same)).first()
     return None if row is None else _record(sound_row(tables.takes, row))
 

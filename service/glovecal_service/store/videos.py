@@ -18,7 +18,7 @@ from glovecal_service.store.errors import NotFound
 
 LARGEST_PICTURE = 1_000_000
 LARGEST_ABOUT = 2_000_000
-MADE_BY = "glovecal record --video makes one"
+MADE_BY = "one is made by glovecal record GLOVE NAME --video SOURCE"
 JPEG_BEGINS = b"\xff\xd8\xff"
 Line = Annotated[str, Field(max_length=300)]
 

@@ -133,7 +133,7 @@ def test_databases_have_a_limit_together_and_leave_room_on_the_disk(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     """A database that nobody used for longest goes first; one that does not fit is not begun."""
-    monkeypatch.setattr(made, "MOST_BYTES", 3.5 * 20 * made.ENTRY_BYTES)
+    monkeypatch.setattr(made, "MOST_DATABASE_BYTES", 3.5 * 20 * made.ENTRY_BYTES)
     poses, found = generated_poses(50), []
     for seed in range(4):
         settings = DatabaseSettings(20, seed=seed)
@@ -142,7 +142,7 @@ def test_databases_have_a_limit_together_and_leave_room_on_the_disk(
     assert [place.exists() for place in found] == [False, True, True, True]
     free = shutil.disk_usage(tmp_path).free
     monkeypatch.setattr(made, "ENTRY_BYTES", free)
-    monkeypatch.setattr(made, "MOST_BYTES", 100 * free)
+    monkeypatch.setattr(made, "MOST_DATABASE_BYTES", 100 * free)
     with pytest.raises(BadInput, match=r"takes .* GB, and .* free some disk space, or ask for fewer entries"):
         pose_database(SKIN, PATTERN, poses, tmp_path, DatabaseSettings(20, seed=9), workers=1)
     assert sorted(tmp_path.iterdir()) == sorted(found[1:])

@@ -55,7 +55,8 @@ def test_one_delay_of_all_takes_is_a_set_and_taps_decide(late):
     assert found.next_take is not None
     assert found.next_take.motion == "taps"
     said = " ".join(diagnosis_sentences(found))
-    assert "If it is the glove, live poses are 50 ms late: glovecal take latency" in said
+    assert "If it is the glove, live poses are 50 ms late." in said
+    assert "glovecal take latency GLOVE" in said
     assert "Offset of the reference clock: -0.050 s." in said
 
 

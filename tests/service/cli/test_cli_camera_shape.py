@@ -68,7 +68,7 @@ def test_a_shape_is_read_as_it_was_written_and_another_file_is_refused(tmp_path:
         ({"hand": "both"}, "'both', expected right or left"),
         ({"sizes_mm": {"hand_length": 190.0}}, "sizes_mm must name"),
         ({"radii_mm": {"T_distal": [1.0]}}, "two numbers"),
-        ({"size_sd": float("nan")}, "size_sd of size_sd is nan"),
+        ({"size_sd": float("nan")}, "holds the number NaN"),
         ({"format": "another"}, "is no hand's shape"),
         ({"more": 1}, "is no hand's shape"),
     ):

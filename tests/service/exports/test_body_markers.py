@@ -99,7 +99,7 @@ def test_what_is_no_trc_is_told_by_line(tmp_path: Path, text: str, says: str) ->
 
 def test_markers_that_are_not_there_are_named() -> None:
     body = BodyMarkers(TIME_S, {name: np.tile(place, (60, 1)) for name, place in ARM.items()})
-    with pytest.raises(BadInput, match="no marker 'ELBOW'; there are RAD, ULN, ELB"):
+    with pytest.raises(BadInput, match="no marker 'ELBOW'; did you mean 'ELB'"):
         hand_frame(body.places_mm, ("RAD", "ULN", "ELBOW"), "glove", is_left=False)
     with pytest.raises(BadInput, match="needs the markers wrist at the thumb's side"):
         hand_frame(body.places_mm, ("RAD", "ULN"), "optical", is_left=False)

@@ -65,13 +65,14 @@ def test_ten_times_as_many_frames_need_no_more_memory(
 def test_an_export_in_a_process_of_its_own_is_the_same(
     stored: StoredService, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked = {"takes": [stored.known["take"]], "content": "joints", "format": "csv"}
+    asked = {"takes": [stored.known["take"]], "hands": ["right"], "content": "joints", "format": "csv"}
+    before = psutil.Process().children()
     here = stored.http.post("/motion", json=asked)
     monkeypatch.setattr("glovecal_service.exports.motion_file.SHORT", 10)
     beside = stored.http.post("/motion", json=asked)
     assert (here.status_code, beside.status_code) == (200, 200)
     assert beside.content == here.content
-    assert psutil.Process().children() == []
+    assert set(psutil.Process().children()) <= set(before)
 
 
 def test_an_answer_has_a_limit_and_leaves_no_process(
@@ -82,13 +83,14 @@ def test_an_answer_has_a_limit_and_leaves_no_process(
     for _ in range(20):
         deep = f"lowpass({deep}, a + b)"
     text = f"name = deep; columns = {deep}; parameter a s 0.1 5 = 1; parameter b s 0.1 5 = 1"
+    before = psutil.Process().children()
     answer = stored.http.post(
         f"/models/{stored.known['model']}/try-effect", json={"effect": {"declaration": text}}
     )
     assert answer.status_code == 422, answer.text
     assert answer.json()["type"].endswith("takes-too-long")
     assert re.search("longer than 0.2 s; ask for less", answer.json()["detail"])
-    assert psutil.Process().children() == []
+    assert set(psutil.Process().children()) <= set(before)
 
 
 def test_markers_by_the_hundred_thousand_are_refused_before_they_are_read(tmp_path: Path) -> None:

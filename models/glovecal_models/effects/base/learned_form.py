@@ -209,6 +209,8 @@ class LearnedForm:
                 for end in ("low", "high")
             )
             terms = tuple(FormTerm.from_document(item) for item in document["terms"])
+        except BadInput:
+            raise
         except (KeyError, TypeError, ValueError) as error:
             raise BadInput("not a learned form: something in it is missing, or no number") from error
         named = {name for term in terms for name in term.inputs}

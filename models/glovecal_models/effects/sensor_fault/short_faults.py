@@ -33,7 +33,7 @@ DROPOUT_SHARE = 0.05
 DROPOUT_SPREADS = 8.0
 """Times the robust spread of a frame's change against the reference."""
 BEFORE_FRAMES = 5
-READING_SHARE = 0.5
+SHOWN_IN_READING = 0.5
 """Of a jump against the reference, which the reading's own jump must be: else the reference jumps."""
 ALIKE = 0.5
 """The jump back is between this share of the jump away and its inverse."""
@@ -124,7 +124,7 @@ def small_dropouts(
     limit = max(DROPOUT_SPREADS * spread, 4.0 * smallest_step(readings), DROPOUT_SHARE * span)
     own = np.diff(readings, prepend=readings[:1])
     own -= median_of_five(np.pad(own, 2, mode="symmetric"))
-    shown = own * np.sign(jump) >= READING_SHARE * np.abs(jump)
+    shown = own * np.sign(jump) >= SHOWN_IN_READING * np.abs(jump)
     places = 1 + np.flatnonzero((np.abs(jump) > limit)[1:] & shown[1:])
     level = np.cumsum(change)
     at = 0

@@ -155,7 +155,7 @@ def get_picture(
         raise Conflict(str(refused).partition(": ")[2]) from refused
     except (NoAnswer, BadName) as error:
         raise NotFound(
-            f"no camera of glove {glove} answers; start it: glovecal camera track SOURCE"
+            f"no camera of glove {glove} answers; start it: glovecal camera track SOURCE --glove {glove}"
         ) from error
     return Response(sample.payload.to_bytes(), media_type="image/jpeg", headers={"Cache-Control": "no-store"})
 

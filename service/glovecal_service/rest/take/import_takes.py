@@ -77,7 +77,7 @@ def import_takes(
     stored_before = store.takes.list(subject=subject, layout=chosen.name)
     stored = {item.name: item for item in stored_before if item.original_sha256 == original_sha256}
     held = (
-        {take.name: store.takes.same_frames(take, subject) for take in takes}
+        {take.name: store.takes.same_frames(take, subject, chosen.name) for take in takes}
         if replace and not is_new
         else {}
     )
