@@ -24,7 +24,7 @@ class Takes(Shown, list[Take]):
 
     def __init__(self, takes: Iterable[Take] = (), sentences: Sequence[str] = ()) -> None:
         super().__init__(takes)
-        self.sentences = tuple(sentences)
+        self.sentences: tuple[str, ...] = tuple(sentences)
         """What was done to the takes on reading them, and what looks wrong."""
 
     def table(self) -> Table:

@@ -11,6 +11,7 @@ import pytest
 
 import glovecal
 from glovecal_models.effects.catalogue import effect
+from glovecal_models.effects.sensor_fault.sensor_fault import SensorFault
 from glovecal_models.takes.angles_on_a_circle import unwrapped
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.write_table import write_takes
@@ -116,7 +117,9 @@ def test_no_sensor_is_blamed_where_its_reading_is_smooth(kind):
     if kind == "jumps while the hand rests":
         still = [slice(300, 400), np.arange(300, 400) >= 350]
         takes = [rested(take, *still) for take in takes]
-    assert effect("sensor_fault").find(takes, dict(zip(SENSORS, SENSORS, strict=True))) == ()
+    fault = effect("sensor_fault")
+    assert isinstance(fault, SensorFault)
+    assert fault.find(takes, dict(zip(SENSORS, SENSORS, strict=True))) == ()
 
 
 def rested(take: Take, rest: slice, away: np.ndarray) -> Take:

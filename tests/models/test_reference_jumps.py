@@ -36,7 +36,7 @@ def with_wild_rows(take: Take, share: float, longest: int = 1) -> tuple[Take, np
     wild = np.zeros(take.reference.shape, dtype=bool)
     reference = take.reference.copy()
     while wild.mean() < share:
-        start, column = random.integers(1, len(wild) - longest - 1), random.integers(wild.shape[1])
+        start, column = random.integers(1, len(wild) - longest - 1), random.integers(len(take.rotations))
         rows = slice(start, start + random.integers(1, longest + 1))
         if not wild[max(rows.start - 3, 0) : rows.stop + 3, column].any():
             wild[rows, column] = True

@@ -165,7 +165,7 @@ def pose_database(
 
 def _make_room(folder: Path, needed: int) -> None:
     """Remove databases, those used longest ago first, until all together keep below ``MOST_DATABASE_BYTES``
-    with the one to come, and what killed builders left. Raises BadInput where the disk has no room for it then.
+    with the one to come, and what killed builders left. Raises BadInput where the disk has no room then.
 
     One that is removed is built again when it is asked for."""
     kept = 0

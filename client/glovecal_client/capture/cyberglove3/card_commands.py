@@ -94,6 +94,7 @@ def _text(link: Link, query: bytes) -> str:
 
     What is left of an echo that lost a byte cannot be told from the beginning of a file's name.
     """
+    heard = b""
     for _ in range(_WHOLE_ECHO_TRIES):
         heard = question(link, query, _TEXT_END)
         if heard.startswith(query):

@@ -61,7 +61,7 @@ def import_calibration(body: Calibration, response: Response, parts: PartsNeeded
         hand = "right"
     layout = parts.store.layouts.get(body.layout)
     model, found = read_model(body.text, calibration_format(body.format), layout, body.subject, hand)
-    options = ModelImport(subject=body.subject, create_subject=body.create_subject)
+    options = ModelImport(subject=body.subject, create_subject=body.create_subject, id=None)
     answer = import_artifact(parts, dump(model), options)
     response.status_code = 201 if answer["is_new"] else 200
     return answer | {"left_out": dict(found.left_out), "doubts": dict(found.doubts)}
