@@ -180,8 +180,12 @@ class LiveRecording:
     def finish(self, stop_wall_ns: int | None, patience: Patience) -> Settlement:
         """Stop: fetch or wait for everything captured up to the stop, close the file; as in ``reconcile``."""
         patience.wait(ON_THE_WAY_S)
-        if stop_wall_ns is not None and self.file.clock_ahead_ns is not None:
-            self._end_ns = stop_wall_ns + self.file.clock_ahead_ns
+        ahead_ns = self.file.clock_ahead_ns
+        if ahead_ns is None:  # capture did not answer when the recording began
+            with suppress(NoAnswer):
+                ahead_ns = self._log.standing().clock_ahead_ns
+        if stop_wall_ns is not None and ahead_ns is not None:
+            self._end_ns = stop_wall_ns + ahead_ns
         self._stop_listening()
         outcome = reconcile(self.file, self._log, stop_wall_ns, patience)
         self._finish_pre_roll(patience)
