@@ -350,6 +350,8 @@ def _exported(run: Run, folder: Path, take: str) -> Path:
 def test_a_take_becomes_a_motion_file(anna: Run, tmp_path: Path) -> None:
     take = anna("take", "list", "--json").json[0]["name"]
     file = tmp_path / "hand.trc"
+    assert "nobody said which hand" in anna("take", "motion", file, take, "--content", "raw").said
+    assert anna("subject", "measure", "anna", "--hand", "right").code == 0
     made = anna("take", "motion", file, take, "--content", "raw")
     assert made.code == 0, made.err
     assert made.out.strip() == f"Wrote {file}."

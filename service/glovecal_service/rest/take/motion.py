@@ -160,8 +160,6 @@ def _hand(parts: Parts, take: str, model: str | None, content: Content, hand: Ha
             )
         artifact = parts.store.models.load_bytes(chosen.id)
     side = hand or record.known_hand or subject.known_hand
-    if side is None and content == "raw":
-        side = "right"  # readings are of a glove; the label tells two of them apart
     if side is None:
         raise Conflict(
             f"nobody said which hand take {record.name} is of: name it with --hand left or --hand right, or "
