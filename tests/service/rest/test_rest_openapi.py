@@ -12,6 +12,8 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 from glovecal_client.rest import RestClient
 from glovecal_service.rest.http.health import REALTIME_ALIVE
 from glovecal_service.settings import Settings
@@ -45,6 +47,7 @@ parameters = {{ "path.id" = "{job}" }}
 """
 
 
+@pytest.mark.slow  # a minute; test_rest_wild_bodies.py holds every route's refusals in the usual run
 def test_schemathesis(
     serve: Callable[..., str], settings: Settings, write_table: Callable[..., Path]
 ) -> None:
