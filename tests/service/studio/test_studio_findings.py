@@ -95,7 +95,7 @@ def test_every_effect_has_the_picture_of_rest_and_an_expression_is_tried(
     expect(problem).to_contain_text("img src", timeout=PATIENCE_MS)
     assert page.locator("img").count() == 0
     expression.fill("name = mine; columns = lowpss(own, 1)")
-    expect(problem).to_contain_text("no function 'lowpss'", timeout=PATIENCE_MS)
+    expect(problem).to_contain_text("no function 'lowpss'", timeout=4 * PATIENCE_MS)
     page.wait_for_timeout(200)
     assert seen.complaints == []
 
