@@ -18,7 +18,9 @@ from typing import Literal, TypeVar
 
 import numpy as np
 
+from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
 from glovecal_models.layout import Layout
+from glovecal_models.takes.clock_scan import LOOKS_LIKE_LAG_S, aligned, clock_offsets
 from glovecal_models.takes.take import Take
 
 FEWEST_TAKES = 3
@@ -27,25 +29,8 @@ MOST_COMPARED_ROWS = 1500
 """Of a longer take every second, third ... row."""
 LEAST_ROTATION_SD_DEG = 3.0
 """A rotation that moved less in a take tells nothing of it."""
-LEAST_ODD_DEG = 5.0
-TIMES_USUAL = 2.5
-"""An odd take's error over the largest of the other takes, without it."""
-LEAST_ODD_SHARE = 0.35
-"""Of what its angles vary by, which the line must leave of an odd take."""
-LEAST_LEVEL_DEG, LEAST_LEVEL_OTHER_WEARING_DEG, TIMES_LEVEL = 20.0, 30.0, 3.0
-"""How far the readings of a take may lie elsewhere, and times the others': a glove that is put on again is
-off by 15 degrees."""
-LEVEL_TOLD_SHARE = 0.5
-"""Of what its angles vary by, which the line may leave of a take whose level is judged."""
 MOST_SUSPECTS = 5
-MADE_TO_FIT = 1.6
-"""Times the others' largest error: a take that is left with less fits."""
-CLEARLY = 0.8
-"""Of the error that another change leaves: with more they are not told apart."""
 RIDGE = 1e-3
-LONGEST_SHIFT_S, SHIFT_STEP_S = 3.0, 1 / 30
-OWN_CLOCK_SHARE = 0.5
-"""Of the error of a take's own line, what is left once its clocks agree."""
 KEPT = 0.9
 """An assignment must save so much more than a column's own place; cycles that do not are put back."""
 
@@ -93,7 +78,9 @@ class OddTake:
         return f"{self.sentence} It is set aside." if self.is_set_aside else self.sentence
 
 
-def odd_takes(takes: Sequence[Take], layout: Layout) -> tuple[OddTake, ...]:
+def odd_takes(
+    takes: Sequence[Take], layout: Layout, limits: ComparisonLimits = COMPARISON_LIMITS
+) -> tuple[OddTake, ...]:
     """The worst first; none among fewer than three takes, and never half of them or more."""
     if not all(set(layout.sensors) <= set(take.sensors) for take in takes):
         return ()  # whoever works with them says which sensor is missing
@@ -103,17 +90,17 @@ def odd_takes(takes: Sequence[Take], layout: Layout) -> tuple[OddTake, ...]:
     left, out = list(told), list[int]()
     found: list[OddTake] = []
     while not found and len(out) < most and len(left) >= FEWEST_TAKES:
-        suspect = _suspect([sums[number] for number in left])
+        suspect = _suspect([sums[number] for number in left], limits)
         if suspect is None:
             break
         out.append(left.pop(suspect))
         rest = [sums[number] for number in left]
         line, usual = _Line.through(rest), max(_errors(rest))
-        if all(_is_odd(sums[number], line, usual) for number in out):
-            found = [_explained(number, takes[number], sums[number], line, usual) for number in out]
+        if all(_is_odd(sums[number], line, usual, limits) for number in out):
+            found = [_explained(number, takes[number], sums[number], line, usual, limits) for number in out]
     left = left if found else told
     while len(left) >= FEWEST_TAKES and len(found) < most:
-        far = _farthest([takes[number] for number in left], [sums[number] for number in left])
+        far = _farthest([takes[number] for number in left], [sums[number] for number in left], limits)
         if far is None:
             break
         place, odd_level = far
@@ -220,10 +207,10 @@ class _Line:
         return cls(weight, told)
 
 
-def _suspect(sums: Sequence[_Sums]) -> int | None:
+def _suspect(sums: Sequence[_Sums], limits: ComparisonLimits) -> int | None:
     """Place of the take without which the others agree best; None where all agree."""
     errors = _errors(sums)
-    if max(errors) < LEAST_ODD_DEG:
+    if max(errors) < limits.odd_least_deg:
         return None
     # It is among those that are farthest off: the others are only as far off as it pulls the line.
     suspects = np.argsort(errors)[::-1][:MOST_SUSPECTS]
@@ -238,12 +225,16 @@ def _errors(sums: Sequence[_Sums], without: int | None = None) -> list[float]:
     ]
 
 
-def _is_odd(take: _Sums, line: _Line, usual: float) -> bool:
+def _is_odd(take: _Sums, line: _Line, usual: float, limits: ComparisonLimits) -> bool:
     error = take.error(line)
-    return error >= max(LEAST_ODD_DEG, TIMES_USUAL * max(usual, 1.0), LEAST_ODD_SHARE * take.spread(line))
+    return error >= max(
+        limits.odd_least_deg, limits.odd_times * max(usual, 1.0), limits.odd_share * take.spread(line)
+    )
 
 
-def _farthest(takes: Sequence[Take], sums: Sequence[_Sums]) -> tuple[int, OddTake] | None:
+def _farthest(
+    takes: Sequence[Take], sums: Sequence[_Sums], limits: ComparisonLimits
+) -> tuple[int, OddTake] | None:
     """Place of the take whose readings lie elsewhere at the same angles, far beyond the others'."""
     lines = [_Line.through(sums, [place]) for place in range(len(sums))]
     levels = [_levels(sums, line) for line in lines]
@@ -251,10 +242,10 @@ def _farthest(takes: Sequence[Take], sums: Sequence[_Sums]) -> tuple[int, OddTak
     best = int(np.argmax(off))
     others = max(_off(np.delete(levels[best], best, axis=0), other) for other in range(len(sums) - 1))
     worn_alike = [take.wearing for take in takes].count(takes[best].wearing) > 1
-    least = LEAST_LEVEL_DEG if worn_alike else LEAST_LEVEL_OTHER_WEARING_DEG
-    if off[best] < max(least, TIMES_LEVEL * others):
+    least = limits.odd_level_deg if worn_alike else limits.odd_level_other_wearing_deg
+    if off[best] < max(least, limits.odd_level_times * others):
         return None
-    if sums[best].error(lines[best]) > LEVEL_TOLD_SHARE * sums[best].spread(lines[best]):
+    if sums[best].error(lines[best]) > limits.odd_level_told_share * sums[best].spread(lines[best]):
         return None  # a line that does not follow the angles tells no level
     change = "Its readings lie elsewhere at the same angles. Another person, another glove, or another zero?"
     error = sums[best].error(lines[best])
@@ -282,19 +273,25 @@ def _off(levels: np.ndarray, place: int) -> float:
     return float(np.sqrt(np.mean(away**2)))
 
 
-def _explained(place: int, take: Take, sums: _Sums, line: _Line, usual: float) -> OddTake:
+def _explained(
+    place: int, take: Take, sums: _Sums, line: _Line, usual: float, limits: ComparisonLimits
+) -> OddTake:
     """The simplest change that makes the take fit."""
     error = sums.error(line)
-    least = MADE_TO_FIT * max(usual, 1.0)
+    least = limits.odd_fitted_times * max(usual, 1.0)
     fits: list[tuple[How, float, str]] = [
-        item for item in _changes(sums, line) if item[1] <= least and item[1] < CLEARLY * error
+        item
+        for item in _changes(take, sums, line, limits)
+        if item[1] <= least and item[1] < limits.odd_alike_share * error
     ]
     if not fits:
         return OddTake(place, take.name, error, usual, "nothing", error, "")
     best = min(left for _, left, _ in fits)
-    how, left, change = next(item for item in fits if CLEARLY * item[1] <= max(best, 0.5 * least))
+    how, left, change = next(
+        item for item in fits if limits.odd_alike_share * item[1] <= max(best, 0.5 * least)
+    )
     columns = [item for item in fits if item[0] in ("sensors", "rotations")]
-    if how == "sensors" and len(columns) == 2 and columns[1][1] * CLEARLY < left:
+    if how == "sensors" and len(columns) == 2 and columns[1][1] * limits.odd_alike_share < left:
         return OddTake(
             place, take.name, error, usual, "columns", left, f"{change}, or {_lower(columns[1][2])}"
         )
@@ -305,11 +302,12 @@ def _lower(text: str) -> str:
     return text[0].lower() + text[1:]
 
 
-def _changes(sums: _Sums, line: _Line) -> Iterator[tuple[How, float, str]]:
+def _changes(
+    take: Take, sums: _Sums, line: _Line, limits: ComparisonLimits
+) -> Iterator[tuple[How, float, str]]:
     """How, the error that is left, and a sentence's beginning: the simplest first."""
-    yield _shifted(sums, line)
-    yield _own_clock(sums)
-    yield _turned(sums, line)
+    yield _of_clock(take, sums, line)
+    yield _turned(sums, line, limits)
     yield _other_sensors(sums, line)
     yield _other_rotations(sums, line)
     yield _other_gains(sums, line)
@@ -320,66 +318,34 @@ def _changes(sums: _Sums, line: _Line) -> Iterator[tuple[How, float, str]]:
     )  # fmt: skip
 
 
-def _shifted(sums: _Sums, line: _Line) -> tuple[How, float, str]:
-    step = max(SHIFT_STEP_S, float(np.median(np.diff(sums.time_s))))
-    longest = min(LONGEST_SHIFT_S, 0.25 * float(sums.time_s[-1] - sums.time_s[0]))
-    time = np.arange(sums.time_s[0], sums.time_s[-1], step)
-    shown = (sums.readings - sums.readings.mean(axis=0)) @ line.weight.T
-    told = np.flatnonzero(sums.told & line.told)
-    at = np.column_stack([np.interp(time, sums.time_s, shown[:, place]) for place in told])
-    angles = [sums.angles[:, place] for place in told]
-    known = [np.isfinite(part) for part in angles]
-    best, best_shift = np.inf, 0.0
-    for shift in np.arange(-longest, longest + step / 2, step):
-        squares = []
-        for column, (part, mask) in enumerate(zip(angles, known, strict=True)):
-            there = np.interp(time + shift, sums.time_s[mask], part[mask], np.nan, np.nan)
-            away = there - at[:, column]
-            squares.append(np.nanvar(away))
-        error = float(np.sqrt(np.mean(squares)))
-        if error < best:
-            best, best_shift = error, float(shift)
-    return "shift", best if abs(best_shift) > step else np.inf, _of_clock(best_shift)
+def _of_clock(take: Take, sums: _Sums, line: _Line) -> tuple[How, float, str]:
+    """Its clocks agree once its reference is moved, as ``take clocks`` would.
 
-
-def _own_clock(sums: _Sums) -> tuple[How, float, str]:
-    """A line of its own that fits once the clocks agree: of no use where all clocks are off."""
-    step = max(SHIFT_STEP_S, float(np.median(np.diff(sums.time_s))))
-    longest = min(LONGEST_SHIFT_S, 0.25 * float(sums.time_s[-1] - sums.time_s[0]))
-
-    def left(shift: float) -> float:
-        moved = np.full_like(sums.angles, np.nan)
-        for place in np.flatnonzero(sums.told):
-            known = np.isfinite(sums.angles[:, place])
-            at = sums.time_s[known]
-            moved[:, place] = np.interp(sums.time_s + shift, at, sums.angles[known, place], np.nan, np.nan)
-        shifted = replace(sums, angles=moved)
-        return shifted.error(_Line.through([shifted])) if shifted.is_told else np.inf
-
-    shifts = np.arange(-longest, longest + step / 2, step)
-    errors = [left(float(shift)) for shift in shifts]
-    best = int(np.argmin(errors))
-    if abs(shifts[best]) <= step or errors[best] > OWN_CLOCK_SHARE * left(0.0):
+    Where the others' clocks are off, too, the line through them tells nothing; a line of its own does.
+    """
+    [found] = clock_offsets([take])
+    if found.verdict != "offset":
         return "shift", np.inf, ""
-    return "shift", errors[best], _of_clock(float(shifts[best]))
-
-
-def _of_clock(shift: float) -> str:
-    word = "later" if shift > 0 else "earlier"
+    changed = _Sums.of(aligned(take, found.offset_s), sums.layout)
+    error = changed.error(line)
+    if abs(found.offset_s) > abs(LOOKS_LIKE_LAG_S):
+        error = min(error, changed.error(_Line.through([changed])))
+    word = "later" if found.offset_s > 0 else "earlier"
     return (
-        f"Its reference is {abs(shift):.2f} s {word} than its readings; moved by that it fits:"
-        " glovecal take clocks finds and repairs it"
-    )
+        "shift", error,
+        f"Its reference is {abs(found.offset_s):.2f} s {word} than its readings; moved by that it fits:"
+        " glovecal take clocks finds and repairs it",
+    )  # fmt: skip
 
 
-def _turned(sums: _Sums, line: _Line) -> tuple[How, float, str]:
+def _turned(sums: _Sums, line: _Line, limits: ComparisonLimits) -> tuple[How, float, str]:
     """Rotations of the other sign."""
     angles, names = sums.angles.copy(), []
     square, cross, variance = sums.products
     for place in map(int, np.flatnonzero(sums.told & line.told)):
         along = float(line.weight[place] @ cross[place])
         left = variance[place] + float(line.weight[place] @ square[place] @ line.weight[place])
-        if left + 2 * along < CLEARLY**2 * (left - 2 * along):
+        if left + 2 * along < limits.odd_alike_share**2 * (left - 2 * along):
             angles[:, place] *= -1
             names.append(sums.layout.rotations[int(place)])
     if not names:

@@ -111,10 +111,10 @@ def test_taps_on_a_key_measure_the_glove_and_live_poses_say_so(settings, session
     before = eventually(lambda: _meta(session, keys), "pose meta")
     assert before["glove_latency_s"] is None
     reach = {"GLOVECAL_DATA": str(settings.data), "GLOVECAL_ZENOH": settings.zenoh}
-    code, said = 1, "taps are alike"
-    for _ in range(5):  # keys come late on a busy computer, which is told: tapped again, as a person does
-        if code and "taps are alike" in said:
-            code, said = _tap_in_a_terminal(reach, tapped)
+    for _ in range(5):
+        code, said = _tap_in_a_terminal(reach, tapped)
+        if code == 0 or "taps are alike" not in said:
+            break  # else keys came late, on a busy computer: tapped again, as a person does
     assert code == 0, said
     assert f"{TAPS} of {TAPS}" in said
     assert "Keyboards report a key 5 to 20 ms after it was hit" in said
