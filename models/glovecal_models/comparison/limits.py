@@ -147,7 +147,7 @@ class ComparisonLimits:
         0.5,
         "share of the standard deviation of its angles",
         "A level is judged only where the line leaves less of a take.",
-        "Four real takes of an ankle whose clocks are 0.4 to 0.8 s off: lines that follow nothing tell no level.",
+        "Four real takes of an ankle with clocks 0.4 to 0.8 s off; their lines follow nothing.",
     )
     odd_fitted_times: float = limit(
         1.6, "times the largest error of the others", "A change that leaves more makes no take fit.", _ODD
