@@ -46,7 +46,7 @@ class Settings(BaseSettings):
     """Serve the pages below ``/studio``."""
     upload_limit_mb: Annotated[int, Field(ge=1)] = 256
     keep_days: Annotated[float, Field(gt=0, le=36500)] = 90.0
-    """How long uploads that no take came from, films and ledgers of finished recordings are kept."""
+    """How long uploads that no take came from, films and ledgers of recordings that became takes are kept."""
 
     @field_validator("site")
     @classmethod

@@ -36,13 +36,14 @@ def test_old_files_go_and_what_a_take_came_from_stays(store: Store, store_settin
     store.subjects.create("anna")
     source = sha256("the take's file")
     store.takes.add(make_take(1), subject="anna", layout=LAYOUT.name, source="import", original_sha256=source)
-    for glove in ("left", "right"):
+    gloves = ("left", "right", "third")
+    for glove in gloves:
         store.gloves.seen(glove, META)
     recordings = [
-        store.recordings.request(glove, name="walk", subject="anna", wearing="w")
-        for glove in ("left", "right")
+        store.recordings.request(glove, name="walk", subject="anna", wearing="w") for glove in gloves
     ]
     store.recordings.update(recordings[0].id, state="done", sent=1, missing=0)
+    store.recordings.update(recordings[2].id, state="failed", sentence="no take came of it")
     gone = [
         old(settings.uploads_folder / sha256("forgotten"), 31),
         old(settings.films_folder / "20260101-120000-001.mkv", 31),
@@ -53,11 +54,12 @@ def test_old_files_go_and_what_a_take_came_from_stays(store: Store, store_settin
         old(settings.uploads_folder / sha256("new"), 29),
         old(settings.films_folder / "20260101-120000-002.mkv", 1),
         old(settings.recordings_folder / f"{recordings[1].id}.run", 1000),
+        old(settings.recordings_folder / f"{recordings[2].id}.run", 1000),
         old(settings.data / "unknown.txt", 1000),
     ]
     assert sweep(store, settings).files == 3
     assert [file.exists() for file in gone] == [False] * 3
-    assert [file.exists() for file in kept] == [True] * 5
+    assert [file.exists() for file in kept] == [True] * 6
     assert len(store.takes.load(store.takes.list()[0].id).time_s) == 300
 
 

@@ -28,7 +28,7 @@ from glovecal_models.regression.kernel_scores import choice_of
 FORMAT = "glovecal.model.v1"
 LARGEST_HEADER_BYTES = 8 << 20
 LARGEST_NUMBER = 1e15
-"""Of an array: more than any trained weight or precision has come to, and far inside what float32 holds."""
+"""Of an array. Chosen: far inside what float32, in which poses travel, holds."""
 MOST_EFFECTS, MOST_TAKES, MOST_STORED_SAMPLES = 1000, 100_000, 10_000_000
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -34,6 +35,8 @@ from glovecal_service.views.training import effect_view
 FITS_DEG, FITS, OF_ITS_ERROR = 3.0, 3.0, 0.5
 """Another subject's model fits an odd take with an error of at most so many degrees, or so many times that of
 the other takes, and so much of its own."""
+MOST_ASKED = 20
+"""Subjects whose models are tried: each is loaded and predicts the take."""
 
 
 @dataclass(frozen=True)
@@ -120,9 +123,10 @@ def _odd_take(
 
 def _model_that_fits(store: Store, own: ModelRecord, take: Take, most_deg: float) -> str | None:
     """A sentence on the active model of another subject whose error on the take is smallest, and at most
-    ``most_deg``; None where there is none."""
+    ``most_deg``; None where there is none. Of many subjects those are asked whose models are newest."""
     best: tuple[float, str] | None = None
-    for subject in {item.subject for item in store.models.list(layout=own.layout)} - {own.subject}:
+    newest = dict.fromkeys(item.subject for item in reversed(store.models.list(layout=own.layout)))
+    for subject in itertools.islice((one for one in newest if one != own.subject), MOST_ASKED):
         active = store.models.active(subject, own.layout)
         if active is None:
             continue

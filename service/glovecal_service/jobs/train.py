@@ -183,6 +183,8 @@ def _odd_sentences(taught: TrainingTakes, records: Sequence[TakeRecord]) -> list
         return []
     return [
         f"{item.sentence} To train without it: --leave-out {records[item.place].id}"
+        if item.is_set_aside
+        else item.sentence
         for item in odd_takes(taught.takes, taught.layout)
     ]
 

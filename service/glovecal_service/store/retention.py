@@ -2,7 +2,8 @@
 
 Kept whatever their age: database, artifacts, and each upload that a stored take came from. Swept
 ``GLOVECAL_KEEP_DAYS`` after they were last written: uploads that no take came from, films (a take's video is
-a copy in ``videos``), and the ledgers of recordings that are over, whose frames are in their takes.
+a copy in ``videos``), and the ledgers of recordings that became takes. One that failed has its frames
+nowhere else, and stays.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from glovecal_service.store.errors import DamagedRows, StoreError
 from glovecal_service.store.store import Store
 
 DAY_S = 86_400.0
-ENDED = ("done", "failed")
+BECAME_A_TAKE = "done"
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ def _ledgers(store: Store, settings: Settings) -> Iterator[Path]:
         rows = store.recordings.list()
     except DamagedRows as error:
         rows = error.sound
-    over = {row.id for row in rows if row.state in ENDED}
+    over = {row.id for row in rows if row.state == BECAME_A_TAKE}
     for file in settings.recordings_folder.glob("*"):
         if file.is_file() and file.name.partition(".")[0] in over:
             yield file
