@@ -12,6 +12,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.rotations import FINGERS
 from glovecal_models.hand.skeleton import Handedness
@@ -41,10 +42,7 @@ RIGHT = '{"index_mcp_flexion": {"drive_mode": 0, "range_min": 1450, "range_max":
 
 
 def read(text: str, counts: Counts, hand: Handedness) -> FoundLines:
-    try:
-        document = json.loads(text)
-    except (ValueError, RecursionError):
-        raise BadInput(f"not valid JSON; expected {RIGHT}") from None
+    document = read_json(text, "the calibration")
     if not isinstance(document, dict):
         raise BadInput(f"expected {RIGHT}")
     lines, left_out = {}, {}

@@ -42,8 +42,6 @@ _WANTED = {
 }
 """By the type of a finding, without its ending ``_type``, ``_parsing`` and the like; filled in from its
 context."""
-OURS = ("unknown_field",)
-"""Findings of our own checks, in our own words."""
 _ENDINGS = ("_type", "_parsing_size", "_parsing", "_from_float")
 _UNKNOWN = "it is not of the form that this route's description shows; give one that is"
 
@@ -56,8 +54,6 @@ def what_is_right(finding: Mapping[str, Any]) -> str:
     if isinstance(context.get("error"), BadInput):  # raised by a check of ours
         return str(context["error"])[:300]
     kind = finding["type"]
-    if kind in OURS:
-        return str(finding["msg"])[:300]
     if kind == "string_pattern_mismatch":
         pattern = context.get("pattern", "")
         meaning = MEANING.get(pattern, f"give text of the form {pattern}")

@@ -14,8 +14,8 @@ from pydantic import (
     StringConstraints,
     model_validator,
 )
-from pydantic_core import PydanticCustomError
 
+from glovecal_models.errors import BadInput
 from glovecal_models.names import did_you_mean
 
 ID = r"^[0-9a-f]{12}$"
@@ -83,6 +83,5 @@ class StrictBody(BaseModel):
         unknown = [key for key in values if key not in known] if isinstance(values, dict) else []
         if unknown:
             key = str(unknown[0])[:LONGEST_SHOWN]
-            about = {"key": repr(key), "meant": did_you_mean(key, known)}
-            raise PydanticCustomError("unknown_field", "unknown key {key}; {meant}", about)
+            raise BadInput(f"unknown key {key!r}; {did_you_mean(key, known)}")
         return values
