@@ -6,9 +6,10 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NoReturn
 
 import psutil
 import pytest
@@ -18,10 +19,12 @@ PATIENCE_S = 120.0
 
 
 @contextmanager
-def _demo() -> Iterator[tuple[subprocess.Popen[bytes], list[psutil.Process]]]:
+def _demo(
+    not_here: Callable[[str], NoReturn],
+) -> Iterator[tuple[subprocess.Popen[bytes], list[psutil.Process]]]:
     """The small demo, and all processes below it once its service is one of them."""
     if not (ROOT / ".tools").is_dir() or not (ROOT / ".venv").is_dir():
-        pytest.skip("the verbs of do.py were never run in this folder: python3 do.py glovecal effects")
+        not_here("the verbs of do.py were never run in this folder: python3 do.py glovecal effects")
     command = [sys.executable, "do.py", "demo", "--smoke"]
     verb = subprocess.Popen(
         command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
@@ -50,8 +53,8 @@ def _words(process: psutil.Process) -> list[str]:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a process is told to stop by a signal")
-def test_a_demo_that_is_told_to_stop_stops_its_service() -> None:
-    with _demo() as (verb, below):
+def test_a_demo_that_is_told_to_stop_stops_its_service(not_here: Callable[[str], NoReturn]) -> None:
+    with _demo(not_here) as (verb, below):
         verb.send_signal(signal.SIGTERM)
         assert verb.wait(PATIENCE_S) != 0
         assert [process for process in below if "serve" in _words(process)] == []
