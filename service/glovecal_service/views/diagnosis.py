@@ -318,7 +318,7 @@ class OddTakeView(View):
     take: str = Field(description="Its name.")
     sentence: str
     how: str = Field(
-        description="What makes it fit: shift, signs, sensors or rotations (columns in another order),"
+        description="What makes it fit: signs, sensors or rotations (columns in another order),"
         " columns (either), gains, own map, another subject; level: its readings lie elsewhere; nothing."
     )
     error_deg: float = Field(description="Of a line through the other takes.")
