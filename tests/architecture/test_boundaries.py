@@ -80,6 +80,13 @@ def test_a_page_of_the_studio_computes_nothing_that_rest_cannot_give():
             assert not wrong, f"{path.relative_to(ROOT)} imports {wrong}"
 
 
+def test_a_page_of_the_studio_has_time_on_a_busy_computer():
+    """The library gives a page three seconds, then tells the user about its own programming interface."""
+    studio = SOURCES["service"] / "studio"
+    for path in sorted(studio.rglob("*.py")):
+        assert path == studio / "shell.py" or "ui.page(" not in path.read_text(encoding="utf-8"), path
+
+
 @pytest.mark.parametrize("distribution", ["models", "client"])
 def test_every_module_imports_without_what_it_must_not_need(distribution):
     """Optional extras (pyarrow, pyserial, httpx) must not be needed just to import a module."""

@@ -170,9 +170,11 @@ def _sensors(take: Take, moved: np.ndarray) -> Sequence[GloveFinding]:
 
 def _jumps(take: Take, low: np.ndarray, high: np.ndarray) -> Sequence[GloveFinding]:
     found = []
+    unknown = np.full(len(take.time_s), np.nan)
     for name, readings, begin, end in zip(take.sensors, take.readings.T, low, high, strict=True):
         span = float(end - begin) if np.isfinite(end - begin) and end > begin else float(np.ptp(readings))
-        jumps = int((np.diff((spikes(readings, span) | dropouts(readings, span)).astype(int)) > 0).sum())
+        faults = spikes(take.time_s, readings, span, unknown) | dropouts(take.time_s, readings, span, unknown)
+        jumps = int((np.diff(faults.astype(int)) > 0).sum())
         if jumps >= FEW_JUMPS:
             found.append((name, jumps))
     if not found:

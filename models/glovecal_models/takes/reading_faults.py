@@ -1,14 +1,17 @@
 """Faults that readings show by themselves: spikes, dropouts, standing still, and frames played again.
 
 The first three work on the readings (N,) of one sensor in one take and give a mask (N,) of the frames
-concerned. A driver that has no data plays its ring buffer again: whole runs of frames then equal those of a
-moment before, in all columns, while the hand moves. The way back is the length of the buffer and always the
-same; frames that happen to be equal lie any way back.
+concerned. A quick movement at a low rate looks like a spike or a dropout too: what the reference shows as
+well was the joint, and where there is none, the frames must come fast enough to show a movement begin.
+
+A driver that has no data plays its ring buffer again: whole runs of frames then equal those of a moment
+before, in all columns, while the hand moves. The way back is the length of the buffer and always the same;
+frames that happen to be equal lie any way back.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -28,10 +31,22 @@ FEWEST_REPLAYED, LEAST_SHARE_REPLAYED = 20, 0.01
 """Of all takes' frames: a slow movement of coarse readings comes back the way it went for half a percent."""
 BEYOND_OTHERS = 5.0
 """Times more often than any other way back."""
+SHOWN_WITHIN_S = 0.1
+"""Before or after the readings: a sensor may be slow, and a reference has its own clock."""
+MADE_SHARE = 0.4
+"""Of an excursion or a step: where the reference shows so much of it, the joint may have made all of it."""
+WIDEST_FRAME_S = 1.0 / 45.0
+"""A tap of a finger is half over in 25 ms: of frames further apart a single one may be all of it."""
+TIMES_BESIDE = 2.0
+"""The steps before and after, which a step without a reference must exceed: a movement gathers speed."""
 
 
-def spikes(readings: np.ndarray, span: float) -> np.ndarray:
-    """Excursions of one or two frames that come back; ``span`` is the sensor's range in readings."""
+def spikes(time_s: np.ndarray, readings: np.ndarray, span: float, asked: np.ndarray) -> np.ndarray:
+    """Excursions of one or two frames that come back, and that the joint did not make.
+
+    ``span`` is the sensor's range in readings, ``asked`` (N,) the reference, as large as the
+    readings; NaN without one.
+    """
     if len(readings) < 5 or span <= 0:
         return np.zeros(len(readings), dtype=bool)
     # A frame is no farther from a median over five than two steps take it: mostly that is too little already.
@@ -45,7 +60,38 @@ def spikes(readings: np.ndarray, span: float) -> np.ndarray:
     limit = max(SPIKE_SPREADS * spread, 3.0 * smallest_step(readings), least)
     found = away > limit
     # Where a level changes for good, the frames beside the step are no spikes.
-    return found & ~_longer_than(found, 2)
+    found &= ~_longer_than(found, 2)
+    if not found.any():
+        return found
+    excursions = np.abs(asked - median_of_five(np.pad(asked, 2, mode="edge")))
+    for first, after in _runs(found):
+        shown = _shown(time_s, excursions, first, after)
+        if np.isnan(shown):
+            found[first:after] = _begins_and_ends_at_once(time_s, readings, first, after)
+        elif shown >= MADE_SHARE * float(away[first:after].max()):
+            found[first:after] = False
+    return found
+
+
+def _shown(time_s: np.ndarray, moved: np.ndarray, first: int, after: int) -> float:
+    """The most that the reference shows around these frames; NaN where it was not measured."""
+    begin = np.searchsorted(time_s, time_s[first] - SHOWN_WITHIN_S)
+    end = np.searchsorted(time_s, time_s[after - 1] + SHOWN_WITHIN_S, side="right")
+    around = moved[min(begin, first) : max(end, after)]
+    known = np.isfinite(around)
+    return float(around[known].max()) if 2 * known.sum() > len(around) else np.nan
+
+
+def _begins_and_ends_at_once(time_s: np.ndarray, readings: np.ndarray, first: int, after: int) -> bool:
+    """Whether no movement does what ``readings`` do here, as far as frames of this rate can tell."""
+    begin, end = max(first - 2, 0), min(after + 2, len(readings))
+    if float(np.diff(time_s[begin:end]).max()) > WIDEST_FRAME_S:
+        return False
+    steps = np.abs(np.diff(readings[begin:end]))
+    before, into = steps[: first - begin][:-1], steps[: first - begin][-1:]
+    out, later = steps[after - 1 - begin :][:1], steps[after - 1 - begin :][1:]
+    beside = float(np.concatenate([before, later]).max(initial=0.0))
+    return bool((np.concatenate([into, out]) > TIMES_BESIDE * beside).all())
 
 
 def median_of_five(padded: np.ndarray) -> np.ndarray:
@@ -58,8 +104,11 @@ def median_of_five(padded: np.ndarray) -> np.ndarray:
     return np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), middle))
 
 
-def dropouts(readings: np.ndarray, span: float) -> np.ndarray:
-    """Runs of two frames or more at one constant value, entered and left by a jump."""
+def dropouts(time_s: np.ndarray, readings: np.ndarray, span: float, asked: np.ndarray) -> np.ndarray:
+    """Runs of two frames or more at one constant value, entered and left by a jump that no joint made.
+
+    ``span`` and ``asked`` as for ``spikes``.
+    """
     found = np.zeros(len(readings), dtype=bool)
     start, end = constant_runs(readings)
     if span <= 0:
@@ -68,9 +117,15 @@ def dropouts(readings: np.ndarray, span: float) -> np.ndarray:
     start, end = start[inside], end[inside]
     entered = np.abs(readings[start] - readings[start - 1])
     left = np.abs(readings[end] - readings[end - 1])
-    jumps = np.minimum(entered, left) > JUMP_SHARE * span
-    for first, after in zip(start[jumps], end[jumps], strict=True):
-        found[first:after] = True
+    step = np.minimum(entered, left)
+    jumps = step > JUMP_SHARE * span
+    steps = np.abs(np.diff(asked, prepend=np.nan))
+    for first, after, height in zip(start[jumps], end[jumps], step[jumps], strict=True):
+        shown = _shown(time_s, steps, first, after + 1)
+        if np.isnan(shown):
+            found[first:after] = _begins_and_ends_at_once(time_s, readings, first, after)
+        else:
+            found[first:after] = shown < MADE_SHARE * height
     return found
 
 
@@ -104,11 +159,16 @@ def constant_runs(readings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _longer_than(mask: np.ndarray, frames: int) -> np.ndarray:
     """The part of ``mask`` that stands in runs of more than so many frames."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
     result = np.zeros(len(mask), dtype=bool)
-    for start, end in zip(edges[::2], edges[1::2], strict=True):
+    for start, end in _runs(mask):
         result[start:end] = end - start > frames
     return result
+
+
+def _runs(mask: np.ndarray) -> Iterator[tuple[int, int]]:
+    """First frame of each run of ``mask``, and the frame after it."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
 
 
 def smallest_step(values: np.ndarray) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 
 from nicegui import ui
 
@@ -22,6 +23,12 @@ NAVIGATION = (
     ("effects", "Effects"),
 )
 """Address below ``/studio`` and name of each page, in the order of the walk."""
+
+
+PATIENCE_S = 60.0
+"""A busy computer takes longer than the library's three seconds to ask for all that stands on a page."""
+page = partial(ui.page, response_timeout=PATIENCE_S)
+"""Registers the page of an address below ``/studio``."""
 
 
 @contextmanager

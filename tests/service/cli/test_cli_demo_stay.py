@@ -75,7 +75,7 @@ def test_the_page_opens_the_glove_moves_and_ctrl_c_leaves_nothing(tmp_path: Path
         )
         url, _, model = address.partition("/studio/compare?models=")
         assert address in demo.said
-        assert httpx.get(address).is_success
+        assert httpx.get(address, timeout=60.0).is_success
         (active,) = httpx.get(f"{url}/v1/models").json()
         assert active["active"]
         assert active["id"].startswith(model)

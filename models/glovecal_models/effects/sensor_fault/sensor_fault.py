@@ -39,6 +39,8 @@ from glovecal_models.effects.sensor_fault.live_check import live_check
 from glovecal_models.effects.sensor_fault.reading_errors import ReadingErrors, reading_errors
 from glovecal_models.effects.sensor_fault.short_faults import (
     FEWEST,
+    LEAST_OF_RANGE,
+    as_large_as_readings,
     expected_readings,
     shortly_stuck,
     small_dropouts,
@@ -50,7 +52,6 @@ from glovecal_models.takes.take import Take
 REFERENCE_MOVES_DEG = 10.0
 """The reference must travel so far while a sensor stands still."""
 LEAST_SPIKES = 3
-LEAST_OF_RANGE = (0.5, 99.5)
 EXPLAINED_BY = {"switching": ("spikes", "dropouts", "jump"), "hum": ("spikes",)}
 TIMES_PER_FAULT = 4
 """A dropout has two switches; with more than so many switches, or seconds of a tone, for each other fault,
@@ -129,26 +130,28 @@ def _faults(
 ) -> list[Finding]:
     columns = [take.readings[:, take.sensors.index(sensor)] for take in takes]
     low, high = (float(v) for v in np.percentile(np.concatenate(columns), LEAST_OF_RANGE))
-    short = _short_faults(takes, changes, sensor, rotation, low, high)
+    angles = [take.reference_at_frames([rotation])[:, 0] for take in takes]
+    asked = np.split(as_large_as_readings(np.concatenate(angles), low, high), _ends(columns))
+    short = _short_faults(takes, changes, sensor, angles, asked, low, high)
     stretches: dict[str, list[Stretch]] = {kind: [] for kind in SensorFault.kinds}
     frames = dict.fromkeys(SensorFault.kinds, 0)
     jumps, sound_angles = [], []
-    for take, readings, brief in zip(takes, columns, short, strict=True):
-        angles = take.reference_at_frames([rotation])[:, 0]
+    for take, readings, angle, shown, brief in zip(takes, columns, angles, asked, short, strict=True):
+        time_s, span = take.time_s, high - low
         masks = {
-            "stuck": stuck(take.time_s, readings, low, high, angles / REFERENCE_MOVES_DEG) | brief["stuck"],
-            "dropouts": dropouts(readings, high - low) | brief["dropouts"],
+            "stuck": stuck(time_s, readings, low, high, angle / REFERENCE_MOVES_DEG) | brief["stuck"],
+            "dropouts": dropouts(time_s, readings, span, shown) | brief["dropouts"],
         }
         masks["dropouts"] &= ~masks["stuck"]
-        masks["spikes"] = spikes(readings, high - low) & ~masks["dropouts"]
+        masks["spikes"] = spikes(time_s, readings, span, shown) & ~masks["dropouts"]
         for kind, mask in masks.items():
             stretches[kind] += stretches_of(take, mask)
             frames[kind] += int(mask.sum())
         margin = GRADUAL_SHARE * (high - low)
         inside = (readings >= low + margin) & (readings <= high - margin)
         broken = masks["stuck"] | masks["dropouts"] | masks["spikes"]
-        sound_angles.append(np.where(broken | ~inside, np.nan, angles))
-        jump = gain_jump(take.time_s, readings, np.where(broken, np.nan, angles), inside)
+        sound_angles.append(np.where(broken | ~inside, np.nan, angle))
+        jump = gain_jump(take.time_s, readings, np.where(broken, np.nan, angle), inside)
         if jump is not None:
             jumps.append(jump)
             frames["jump"] += int((take.time_s >= jump.at_s).sum())
@@ -280,20 +283,20 @@ def _short_faults(
     takes: Sequence[Take],
     changes: Sequence[_Changes],
     sensor: str,
-    rotation: str,
+    angles: Sequence[np.ndarray],
+    asked: Sequence[np.ndarray],
     low: float,
     high: float,
 ) -> list[dict[str, np.ndarray]]:
     """For each take a mask (N,) of each kind; empty where there are too few of that kind in all takes."""
     columns = [take.readings[:, take.sensors.index(sensor)] for take in takes]
-    angles = [take.reference_at_frames([rotation])[:, 0] for take in takes]
-    expected, gain = expected_readings(np.concatenate(columns), np.concatenate(angles))
-    parts = np.split(expected, np.cumsum([len(column) for column in columns])[:-1])
+    whole, gain = expected_readings(np.concatenate(columns), np.concatenate(angles))
+    expected = np.split(whole, _ends(columns))
     found = []
-    for take, change, column, part in zip(takes, changes, columns, parts, strict=True):
+    for take, change, column, part, shown in zip(takes, changes, columns, expected, asked, strict=True):
         moving = change.of_others(take.sensors.index(sensor))
         held = shortly_stuck(take.time_s, column, low, high, part, gain, moving)
-        away = small_dropouts(take.time_s, column, high - low, part, moving)
+        away = small_dropouts(take.time_s, column, high - low, part, shown, moving)
         found.append({"stuck": held, "dropouts": away})
     for kind in ("stuck", "dropouts"):
         masks = [each[kind] for each in found]
@@ -301,6 +304,10 @@ def _short_faults(
             for mask in masks:
                 mask[:] = False
     return found
+
+
+def _ends(columns: Sequence[np.ndarray]) -> np.ndarray:
+    return np.cumsum([len(column) for column in columns])[:-1]
 
 
 @dataclass(frozen=True)

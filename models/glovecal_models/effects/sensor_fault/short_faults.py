@@ -11,10 +11,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.takes.reading_faults import GRADUAL_SHARE, constant_runs, median_of_five, smallest_step
+from glovecal_models.takes.reading_faults import (
+    GRADUAL_SHARE,
+    MADE_SHARE,
+    SHOWN_WITHIN_S,
+    constant_runs,
+    median_of_five,
+    smallest_step,
+)
 
 FEWEST = 3
 """Of either kind, in all takes together."""
+LEAST_OF_RANGE = (0.5, 99.5)
 SHORT_STUCK_FRAMES, SHORT_STUCK_S = 6, 0.08
 STUCK_STEPS = 3.0
 """Of the converter: the reference must ask for so much more or less while a value stays."""
@@ -46,6 +54,20 @@ def expected_readings(readings: np.ndarray, angles: np.ndarray) -> tuple[np.ndar
         return np.full(len(readings), np.nan), 0.0
     gain, offset = straight_line(angles[known], readings[known])
     return gain * angles + offset, abs(gain)
+
+
+def as_large_as_readings(angles: np.ndarray, low: float, high: float) -> np.ndarray:
+    """The reference (N,) scaled to the range of the readings; NaN without one.
+
+    For sizes of movements alone: unlike a line through both, it is as large where the sensor trails.
+    """
+    known = np.isfinite(angles)
+    if known.sum() < 100:
+        return np.full(len(angles), np.nan)
+    least, most = np.percentile(angles[known], LEAST_OF_RANGE)
+    return (
+        angles * (high - low) / (most - least) if most - least > STUCK_DEG else np.full(len(angles), np.nan)
+    )
 
 
 def straight_line(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
@@ -102,11 +124,17 @@ def shortly_stuck(
 
 
 def small_dropouts(
-    time_s: np.ndarray, readings: np.ndarray, span: float, expected: np.ndarray, others_move: np.ndarray
+    time_s: np.ndarray,
+    readings: np.ndarray,
+    span: float,
+    expected: np.ndarray,
+    asked: np.ndarray,
+    others_move: np.ndarray,
 ) -> np.ndarray:
     """Pieces of three frames to half a second that stand off, entered and left by jumps of about one size.
 
-    ``span`` is the sensor's range in readings; ``others_move`` (N,): no repeated frame.
+    ``span`` is the sensor's range in readings; ``asked`` (N,) the reference as large as the readings, which
+    tells the joint's own movements; ``others_move`` (N,): no repeated frame.
     """
     found = np.zeros(len(readings), dtype=bool)
     change = np.diff(readings - expected, prepend=np.nan)
@@ -125,6 +153,7 @@ def small_dropouts(
     own = np.diff(readings, prepend=readings[:1])
     own -= median_of_five(np.pad(own, 2, mode="symmetric"))
     shown = own * np.sign(jump) >= SHOWN_IN_READING * np.abs(jump)
+    shown &= _quickest_asked(time_s, asked) < MADE_SHARE * np.abs(jump)
     places = 1 + np.flatnonzero((np.abs(jump) > limit)[1:] & shown[1:])
     level = np.cumsum(change)
     at = 0
@@ -142,3 +171,13 @@ def small_dropouts(
         # Both jumps are used up, by a spike too: its way back is not the beginning of a dropout.
         at += 2 if not lasts or held > ALIKE else 1
     return found
+
+
+def _quickest_asked(time_s: np.ndarray, asked: np.ndarray) -> np.ndarray:
+    """(N,): the largest step that ``asked`` makes around each frame, beyond a movement that lasts."""
+    from scipy.ndimage import maximum_filter1d  # slow to load, as above
+
+    steps = np.nan_to_num(np.diff(asked, prepend=asked[:1]))
+    steps -= median_of_five(np.pad(steps, 2, mode="symmetric"))
+    around = round(SHOWN_WITHIN_S / float(np.median(np.diff(time_s))))
+    return maximum_filter1d(np.abs(steps), 2 * around + 1)

@@ -10,7 +10,7 @@ from nicegui import ui
 from glovecal_service.studio.heading import heading
 from glovecal_service.studio.pages.camera_card import STAGES, CameraCard
 from glovecal_service.studio.service import Refusal
-from glovecal_service.studio.shell import shell
+from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
 
 EVERY_S = 0.5
@@ -29,7 +29,7 @@ KEPT = {
 def add(studio: Studio) -> None:
     """``/studio/cameras``."""
 
-    @ui.page("/cameras")
+    @page("/cameras")
     async def cameras() -> None:
         with shell(studio, "cameras", "Cameras"):
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/compare.css">')

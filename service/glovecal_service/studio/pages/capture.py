@@ -11,7 +11,7 @@ from glovecal_service.studio.pages.capture_sampling import SamplingPage
 from glovecal_service.studio.pages.capture_session import SessionPage
 from glovecal_service.studio.pages.capture_start import SamplingForm, WearingForm
 from glovecal_service.studio.service import Refusal
-from glovecal_service.studio.shell import shell
+from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
 
 MODES = {
@@ -21,14 +21,12 @@ MODES = {
     "session": "Session",
 }
 AGAIN_EVERY_S = 2.0
-PATIENCE_S = 30.0
-"""A busy computer takes longer than the library's three seconds to ask for all that stands on the page."""
 
 
 def add(studio: Studio) -> None:
     """``/studio/capture``: ``sampling`` follows that one, ``proposal`` is a diagnosis that wants a take."""
 
-    @ui.page("/capture", response_timeout=PATIENCE_S)
+    @page("/capture")
     async def capture(mode: str = "", sampling: str = "", proposal: str = "") -> None:
         wanted = mode if mode in MODES else "recording" if proposal else "sampling"
         with shell(studio, "capture", "Capture"):

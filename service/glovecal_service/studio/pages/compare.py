@@ -22,7 +22,7 @@ from glovecal_service.studio.comparison.replayed_hand import ReplayedHand
 from glovecal_service.studio.comparison.rotation_errors import RotationErrors
 from glovecal_service.studio.heading import heading
 from glovecal_service.studio.service import Refusal
-from glovecal_service.studio.shell import shell
+from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
 
 NOTHING = "Nothing to compare yet: train a model, and record takes with measured angles."
@@ -33,7 +33,7 @@ POINTS = 4000
 def add(studio: Studio) -> None:
     """``/studio/compare``."""
 
-    @ui.page("/compare")
+    @page("/compare")
     async def compare(models: str = "", takes: str = "", rotation: str = "", column: str = "") -> None:
         with shell(studio, "compare", "Compare"):
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/compare.css">')

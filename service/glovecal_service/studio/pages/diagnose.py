@@ -17,7 +17,7 @@ from glovecal_service.studio.heading import heading
 from glovecal_service.studio.job_watch import JobWatch
 from glovecal_service.studio.pages.model_select import model_select
 from glovecal_service.studio.service import Refusal
-from glovecal_service.studio.shell import shell
+from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
 
 SHOWN_CANDIDATES = 6
@@ -27,7 +27,7 @@ MOST_PARAMETERS = 4
 def add(studio: Studio) -> None:
     """``/studio/diagnose``."""
 
-    @ui.page("/diagnose")
+    @page("/diagnose")
     async def diagnose(model: str = "") -> None:
         with shell(studio, "diagnose", "Diagnose"):
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/findings.css">')

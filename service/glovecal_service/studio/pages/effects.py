@@ -13,7 +13,7 @@ from glovecal_service.studio.findings.schematic_view import schematic_view
 from glovecal_service.studio.heading import heading
 from glovecal_service.studio.pages.own_expression import OwnExpression
 from glovecal_service.studio.service import Refusal, Service
-from glovecal_service.studio.shell import shell
+from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
 
 WHAT_IT_DOES = {
@@ -28,7 +28,7 @@ WHAT_IT_DOES = {
 def add(studio: Studio) -> None:
     """``/studio/effects``."""
 
-    @ui.page("/effects")
+    @page("/effects")
     async def effects(model: str = "") -> None:
         with shell(studio, "effects", "Effects"):
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/findings.css">')

@@ -18,7 +18,7 @@ from glovecal_service.studio.heading import heading
 from glovecal_service.studio.job_watch import JobWatch
 from glovecal_service.studio.pages.model_select import model_select
 from glovecal_service.studio.service import Refusal
-from glovecal_service.studio.shell import shell
+from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
 
 EVERY_S = 1.0
@@ -31,7 +31,7 @@ SIDES: tuple[tuple[Side, str], ...] = (("back", "Back"), ("palm", "Palm"), ("sid
 def add(studio: Studio) -> None:
     """``/studio/fall``."""
 
-    @ui.page("/fall")
+    @page("/fall")
     async def fall(model: str = "") -> None:
         with shell(studio, "fall", "Error fall"):
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/compare.css">')

@@ -7,7 +7,7 @@ from starlette.concurrency import run_in_threadpool
 
 from glovecal_client.errors import ClientError
 from glovecal_service.studio.pages.glove_card import GloveCard
-from glovecal_service.studio.shell import shell
+from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
 
 EVERY_S = 0.5
@@ -16,8 +16,8 @@ EVERY_S = 0.5
 def add(studio: Studio) -> None:
     """``/studio/live``, also the first page."""
 
-    @ui.page("/")
-    @ui.page("/live")
+    @page("/")
+    @page("/live")
     async def live() -> None:
         with shell(studio, "live", "Live"):
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/compare.css">')

@@ -15,7 +15,7 @@ from glovecal_service.studio.pages.gloves_table import gloves_table
 from glovecal_service.studio.pages.model_parts import ModelParts
 from glovecal_service.studio.pages.takes_table import TakesTable
 from glovecal_service.studio.service import Refusal
-from glovecal_service.studio.shell import shell
+from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
 
 EVERY_S = 2.0
@@ -24,7 +24,7 @@ EVERY_S = 2.0
 def add(studio: Studio) -> None:
     """``/studio/models``."""
 
-    @ui.page("/models")
+    @page("/models")
     async def models() -> None:
         with shell(studio, "models", "Models and subjects"):
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/findings.css">')
