@@ -20,6 +20,7 @@ from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.calibration.unseen_wearing import unseen_wearing
 from glovecal_models.progress import Cancel
 from glovecal_models.regression.kernel_scores import keeping_choice
+from glovecal_models.regression.regressor import RuleRegressor
 
 
 def child_model(
@@ -50,8 +51,10 @@ def child_model(
     estimate: dict[str, Any] = {
         "how": "whole takes left out" if len(takes.takes) > 1 else "stretches of the only take left out",
         "folds": max(settings.folds, 2),
-        "rmse_deg": errors.overall_deg,
     }
+    of_all = _of_all(takes, rotations, errors)
+    if of_all is not None:
+        estimate["rmse_deg"] = of_all.overall_deg
     if unseen.rmse_deg is not None:
         estimate["rmse_unseen_wearing_deg"] = unseen.rmse_deg
     return replace(
@@ -66,6 +69,24 @@ def child_model(
         simulated=parent.simulated or any(take.simulated for take in takes.takes),
         unseen_wearing=unseen,
     )
+
+
+def _of_all(
+    takes: PreparedTakes, rotations: Sequence[RotationModel], errors: HeldOutErrors
+) -> HeldOutErrors | None:
+    """``errors``, and what is known of rotations that were not learned anew; None where one is not known.
+
+    A model's error is of all its rotations, whichever of them an effect was added to.
+    """
+    square, count = {}, {}
+    for item in rotations:
+        if item.rotation in errors.square or isinstance(item.regressor, RuleRegressor):
+            continue
+        if item.held_out_rmse_deg is None:
+            return None
+        count[item.rotation] = sum(int(np.isfinite(part).sum()) for part in takes.target(item.rotation))
+        square[item.rotation] = count[item.rotation] * item.held_out_rmse_deg**2
+    return HeldOutErrors(square, count).with_those_of(errors)
 
 
 def _renewed(before: RotationModel, fresh: RotationModel | None) -> RotationModel:

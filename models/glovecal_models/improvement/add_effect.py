@@ -138,7 +138,12 @@ def add_effect(
     )
     mine = [item.described() for item in fit.effects if item.name == name]
     described = {key: value for each in mine for key, value in each.items()}
-    return replace(undone, added=True, model=child, wanted=tuple(wanted), parameters=described, live=live)
+    parent_deg, child_deg = (item.error_estimate.get("rmse_deg") for item in (model, child))
+    of_all = None if parent_deg is None or child_deg is None else (float(parent_deg), float(child_deg))
+    return replace(
+        undone, added=True, model=child, wanted=tuple(wanted), parameters=described, live=live,
+        of_all_deg=of_all,
+    )  # fmt: skip
 
 
 def _not_worse(

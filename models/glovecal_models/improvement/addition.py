@@ -73,6 +73,9 @@ class Addition:
     control_rmse_deg: float | None = None
     """Held-out error of the rotations with its control instead; None where there is none."""
 
+    of_all_deg: tuple[float, float] | None = None
+    """Held-out error of the model over all its rotations before and after; None where one is not known."""
+
     @property
     def judges_all(self) -> bool:
         """Whether the error that decides is that of all rotations, as a model's error is everywhere else."""

@@ -44,6 +44,9 @@ def addition_sentence(addition: Addition) -> str:
         else f"{name} was undone: held-out error{there} {before:.2f} degrees before, {after:.2f} after"
         f" ({gain:+.0f} % saved, {100 * addition.least_gain:.0f} % needed)."
     )
+    if there and addition.added and addition.of_all_deg is not None:
+        parent, child = addition.of_all_deg
+        sentence += f" Over all rotations it was {parent:.2f} and is {child:.2f} degrees."
     if addition.left_out:
         sentence += f" It raises the error of {', '.join(addition.left_out)}, where it was left out."
     return sentence if addition.live is None else f"{sentence} {addition.live.sentence}"

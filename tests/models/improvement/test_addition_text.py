@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -38,6 +39,8 @@ def test_the_error_of_some_rotations_is_not_told_as_the_models() -> None:
     assert addition_sentence(addition("I_PIP")) == (
         "hysteresis on I_PIP reduces the held-out error there from 4.00 to 2.00 degrees (50 %)."
     )
+    of_all = addition_sentence(replace(addition("I_PIP"), of_all_deg=(2.92, 1.58)))
+    assert of_all.endswith("2.00 degrees (50 %). Over all rotations it was 2.92 and is 1.58 degrees.")
     everywhere = addition_sentence(addition("I_PIP", "M_PIP"))
     assert "reduces the held-out error from 2.92 to 1.58 degrees (46 %)" in everywhere
     assert "held-out error there 4.00 degrees before" in addition_sentence(addition("I_PIP", added=False))
