@@ -57,6 +57,8 @@ class LiveRecording:
         self._held: deque[tuple[Frame, bytes, bool]] = deque(maxlen=HELD_LIMIT)
         """Frames with their messages, and whether they were counted as refused."""
         self._repair_at = 0.0
+        self._met = False
+        """Whether a frame has come."""
         self._end_ns: int | None = None
         """Once its end was asked for: by capture's clock, as far as that is known."""
         self._log = CaptureLog(session, keys)
@@ -158,9 +160,13 @@ class LiveRecording:
             self.file.add(each, bytes_of_it)
 
     def repair_now_and_then(self) -> None:
-        """Twice a second at most, ask capture for what is missing, and who it is if it did not say so."""
+        """Twice a second at most, ask capture for what is missing, and who it is if it did not say so.
+
+        The first frame asks at once: a capture that ends within half a second cannot be asked any more.
+        """
         now = time.monotonic()
-        if now < self._repair_at:
+        met, self._met = self._met, self.file.first_frame is not None
+        if now < self._repair_at and met == self._met:
             return
         self._repair_at = now + REPAIR_AFTER_S
         if not self.file.capture and self.file.first_frame is not None:

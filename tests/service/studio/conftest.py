@@ -17,7 +17,7 @@ from playwright.sync_api import Browser
 sys.path.insert(0, str(Path(__file__).parent))
 
 from realtime_support import free_endpoint, part_of_service, store_model
-from studio_support import Open, Opened, running_browser
+from studio_support import PATIENCE_MS, Open, Opened, running_browser
 from unpacked_example import unpacked_example
 
 from glovecal_service.serve import real_time, web
@@ -82,6 +82,7 @@ def opened(browser: Browser, address: str) -> Iterator[Open]:
         context = browser.new_context(
             viewport={"width": 1280, "height": 800}, device_scale_factor=0.5, color_scheme="light"
         )
+        context.set_default_timeout(PATIENCE_MS)
         contexts.append(context)
         seen = Opened(context.new_page())
 
@@ -93,7 +94,7 @@ def opened(browser: Browser, address: str) -> Iterator[Open]:
         seen.page.on("pageerror", lambda error: seen.complaints.append(str(error)))
         seen.page.on("request", lambda request: seen.asked.append(request.url))
         seen.page.goto(f"{at}/studio/{name}")
-        seen.page.wait_for_selector("h1", timeout=60_000)
+        seen.page.wait_for_selector("h1")
         return seen
 
     yield open_page

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import zenoh
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, expect, sync_playwright
 from realtime_support import WireGlove
 
 from glovecal_client.rest import RestClient
@@ -31,6 +31,9 @@ FLAGS = (
     "--enable-unsafe-swiftshader",
 )  # fmt: skip
 
+PATIENCE_MS = 120_000
+"""For whatever a page is to show: on a busy computer service, browser and drawing wait in turn."""
+
 STREAMING = {"state": "streaming", "sentence": "", "rate_hz": 60.0}
 
 
@@ -40,6 +43,7 @@ def running_browser(*flags: str) -> Iterator[Browser]:
     chromium = shutil.which("chromium")
     if chromium is None:
         raise FileNotFoundError("Chromium is not installed (Debian: apt-get install chromium)")
+    expect.set_options(timeout=PATIENCE_MS)
     with sync_playwright() as running:
         browser = running.chromium.launch(executable_path=chromium, args=[*FLAGS, *flags])
         yield browser

@@ -14,7 +14,6 @@ from studio_support import Open, Opened
 from glovecal_client.rest import RestClient
 
 pytestmark = pytest.mark.needs_chromium
-PATIENCE_MS = 30_000
 TAKES = ("w2-t3", "w3-t2")
 
 
@@ -40,7 +39,7 @@ def corrected(client: RestClient) -> dict:
 def filled(opened: Open, address: str) -> Opened:
     seen = opened(address)
     for selector in (".stretch", ".term-table", ".rotation-button"):
-        seen.page.locator(selector).first.wait_for(timeout=PATIENCE_MS)
+        seen.page.locator(selector).first.wait_for()
     return seen
 
 
@@ -163,9 +162,9 @@ def test_a_bad_stretch_is_replayed_on_the_hand_beside_its_ghost(
     shown.nth(chosen).press("Enter")
     body = {"take": takes[stretch["number"]], "from_s": stretch["start_s"], "to_s": stretch["end_s"]}
     answer = client.post(f"/models/{model}/replay", body)
-    expect(page.get_by_text(answer["sentence"])).to_be_visible(timeout=PATIENCE_MS)
+    expect(page.get_by_text(answer["sentence"])).to_be_visible()
     slider = page.get_by_role("slider", name="Moment of the stretch")
-    expect(slider).to_have_value(str(len(answer["time_s"]) - 1), timeout=PATIENCE_MS)
+    expect(slider).to_have_value(str(len(answer["time_s"]) - 1))
     assert canvas.screenshot() != before
     played = canvas.screenshot()
     slider.focus()
@@ -195,18 +194,18 @@ def test_moving_cursor_a_explains_that_moment_and_a_column_is_chosen(
     page = filled(opened, f"compare?models={model[:12]}&takes={TAKES[0]}&rotation=I_PIP&column=speed").page
     body = {"takes": takes[:1], "rotation": "I_PIP"}
     by_speed = client.post(f"/models/{model}/residual", body | {"column": "speed"})["sentence"]
-    expect(page.get_by_text(by_speed)).to_be_visible(timeout=PATIENCE_MS)
+    expect(page.get_by_text(by_speed)).to_be_visible()
     page.get_by_role("combobox", name="Column").click()
     page.get_by_role("option", name="The angle of I_MCP").click()
     by_joint = client.post(f"/models/{model}/residual", body | {"column": "joint I_MCP"})["sentence"]
-    expect(page.get_by_text(by_joint)).to_be_visible(timeout=PATIENCE_MS)
+    expect(page.get_by_text(by_joint)).to_be_visible()
     assert asked(page)["column"] == "joint I_MCP"
 
     cursor(page, "A").press("End")
     series = client.post(f"/models/{model}/series", body)["takes"][0]
     moment = {"take": takes[0], "at_s": series["time_s"][-1], "rotations": ["I_PIP"]}
     [angle] = client.post(f"/models/{model}/explain", moment)["rotations"]
-    expect(page.locator(".term-sum")).to_contain_text(f"{angle['degrees']:.2f}°", timeout=PATIENCE_MS)
+    expect(page.locator(".term-sum")).to_contain_text(f"{angle['degrees']:.2f}°")
 
 
 def test_a_take_of_another_layout_is_refused_and_names_are_text(
@@ -231,5 +230,5 @@ def test_a_take_of_another_layout_is_refused_and_names_are_text(
     expect(option).to_contain_text("layout lone")
     before = asked(page)
     option.click()
-    expect(notice).to_contain_text("which layout", timeout=PATIENCE_MS)
+    expect(notice).to_contain_text("which layout")
     assert asked(page) == before

@@ -20,7 +20,6 @@ from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 
 pytestmark = pytest.mark.needs_chromium
-PATIENCE_MS = 30_000
 SMALL = dump(replace(model_with(HYSTERESIS, CREEP), layout=replace(LAYOUT, name="three-bends-elsewhere")))
 ARTIFACT = safetensors.numpy.save(
     safetensors.numpy.load(SMALL) | {"spare": np.zeros(1_150_000)},
@@ -45,7 +44,7 @@ def test_a_model_is_taken_apart_by_keyboard(opened: Open, address: str, remember
     seen = opened("models")
     version = seen.page.locator(f'[data-model="{remembering}"]')
     version.get_by_role("button", name="Take apart").press("Enter")
-    expect(version.get_by_role("heading", name="Effect 1: creep")).to_be_visible(timeout=PATIENCE_MS)
+    expect(version.get_by_role("heading", name="Effect 1: creep")).to_be_visible()
     [effect] = found["effect_details"]
     learned = version.get_by_role("region", name="What creep learned").locator("tbody tr")
     expect(learned.locator("th")).to_have_text(list(effect["parameters"]))
@@ -76,7 +75,7 @@ def test_a_model_is_imported_and_a_file_that_is_none_refused(
         with page.expect_file_chooser() as chooser:
             page.get_by_role("button", name="Import a model").press("Enter")
         chooser.value.set_files(file)
-        expect(notice).to_contain_text(said, timeout=PATIENCE_MS)
+        expect(notice).to_contain_text(said)
     added = [each for each in httpx.get(f"{address}/v1/models").json() if each not in before]
     assert [(each["id"], each["active"]) for each in added] == [(model_id(ARTIFACT), False)]
     expect(page.locator(f'[data-model="{model_id(ARTIFACT)}"]')).to_be_visible()
@@ -91,18 +90,16 @@ def test_takes_have_their_quality_and_gloves_their_layouts(
     page = opened("models").page
     takes = httpx.get(f"{address}/v1/takes").json()
     rows = page.get_by_role("region", name="Takes and their quality").locator("tbody tr")
-    expect(rows).to_have_count(len(takes), timeout=PATIENCE_MS)
+    expect(rows).to_have_count(len(takes))
     for take in takes[:2]:
         check = httpx.get(f"{address}/v1/takes/{take['id']}/check").json()
         row = page.locator(f'[data-take="{take["id"]}"]')
-        expect(row.locator(".take-quality")).to_contain_text(
-            f"{check['rate_hz']:.1f} Hz", timeout=PATIENCE_MS
-        )
+        expect(row.locator(".take-quality")).to_contain_text(f"{check['rate_hz']:.1f} Hz")
         for sentence in check["sentences"][:2]:
             expect(row).to_contain_text(sentence)
     layouts = page.get_by_role("region", name="Layouts").last.locator("tbody th")
     gloves = httpx.get(f"{address}/v1/gloves").json()
-    expect(layouts).to_have_text([each["name"] for each in gloves["layouts"]], timeout=PATIENCE_MS)
+    expect(layouts).to_have_text([each["name"] for each in gloves["layouts"]])
     seen = page.get_by_role("region", name="Gloves seen").last.locator("tbody th").all_inner_texts()
     assert [text.removesuffix(" (simulated)") for text in seen] == [each["name"] for each in gloves["seen"]]
     assert "seen-once (simulated)" in seen

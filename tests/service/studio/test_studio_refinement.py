@@ -27,7 +27,6 @@ from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 
 pytestmark = pytest.mark.needs_chromium
-PATIENCE_MS = 60_000
 
 
 @pytest.fixture(scope="module")
@@ -60,31 +59,31 @@ def test_a_slider_makes_a_version_and_undo_takes_it_back(
     with moving(session, settings, "refined", "refined-by-hand"):
         seen = opened("live")
         page, card = seen.page, seen.page.get_by_role("region", name="Glove refined")
-        expect(card.locator(".state-word").first).to_have_text("ok", timeout=PATIENCE_MS)
+        expect(card.locator(".state-word").first).to_have_text("ok")
         card.get_by_text("Refine by hand").click()
         slider = card.get_by_role("slider", name="Offset, degrees")
         slider.locator('[tabindex="0"]').press("ArrowRight")
-        expect(card.locator(".refine-said")).to_contain_text("+0.5 degrees", timeout=PATIENCE_MS)
+        expect(card.locator(".refine-said")).to_contain_text("+0.5 degrees")
         child = active(address)
         assert child != line
         found = httpx.get(f"{address}/v1/models/{child}").json()
         assert found["parent"] == line
         assert found["held_out_rmse_deg"] is None
         assert "Its error was not measured." in found["facts"]["sentences"][0]
-        expect(card.locator(".refine-value").last).to_have_text("0.5", timeout=PATIENCE_MS)
+        expect(card.locator(".refine-value").last).to_have_text("0.5")
         page.wait_for_timeout(300)
         assert serious(page) == []
         slider.locator('[tabindex="0"]').press("ArrowRight")
-        expect(card.locator(".refine-said")).to_contain_text("+1 degrees", timeout=PATIENCE_MS)
+        expect(card.locator(".refine-said")).to_contain_text("+1 degrees")
         second = httpx.get(f"{address}/v1/models/{active(address)}").json()
         assert second["parent"] == child
         assert "+0.5 degrees" in second["facts"]["sentences"][0], "what is new beside the first"
         card.get_by_role("button", name="Undo").click()
-        expect(card.locator(".refine-value").last).to_have_text("0.5", timeout=PATIENCE_MS)
+        expect(card.locator(".refine-value").last).to_have_text("0.5")
         assert active(address) == child
         card.get_by_role("button", name="Undo").click()
-        expect(card.locator(".refine-value").last).to_have_text("0", timeout=PATIENCE_MS)
-        expect(card.locator(".refine-said")).to_contain_text("Taken back", timeout=PATIENCE_MS)
+        expect(card.locator(".refine-value").last).to_have_text("0")
+        expect(card.locator(".refine-said")).to_contain_text("Taken back")
         assert active(address) == line
         assert seen.complaints == []
 
@@ -108,12 +107,12 @@ def test_the_takes_video_beside_the_sliders(
     with moving(session, settings, "refined", "refined-by-hand"):
         seen = opened("live")
         page, card = seen.page, seen.page.get_by_role("region", name="Glove refined")
-        expect(card.locator(".state-word").first).to_have_text("ok", timeout=PATIENCE_MS)
+        expect(card.locator(".state-word").first).to_have_text("ok")
         card.get_by_text("Refine by hand").click()
         card.get_by_label("Beside the video of take").click()
         page.get_by_role("option", name="fist").click()
         picture = card.locator(".video-picture")
-        expect(picture).to_be_visible(timeout=PATIENCE_MS)
+        expect(picture).to_be_visible()
         page.wait_for_function("document.querySelector('.video-picture').naturalWidth > 0")
         for _ in range(4):
             card.get_by_role("button", name="One picture on").click()
@@ -123,7 +122,7 @@ def test_the_takes_video_beside_the_sliders(
         slider = card.get_by_role("slider", name="Offset, degrees")
         for _ in range(3):
             slider.locator('[tabindex="0"]').press("ArrowRight")
-            expect(card.locator(".refine-said")).to_contain_text("degrees", timeout=PATIENCE_MS)
+            expect(card.locator(".refine-said")).to_contain_text("degrees")
         expect(picture).to_have_attribute("src", f"/v1/videos/{take}/pictures/4")
         page.wait_for_timeout(500)
         assert hand.screenshot() != before, "the hand beside the picture follows the slider"

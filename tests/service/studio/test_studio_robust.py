@@ -19,7 +19,6 @@ from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 
 pytestmark = pytest.mark.needs_chromium
-PATIENCE_MS = 90_000
 SUBJECT = "bertha"
 
 
@@ -49,7 +48,7 @@ def named(model: str) -> re.Pattern[str]:
 
 def calibrated(page: Page, glove: str) -> None:
     word = page.get_by_role("region", name=f"Glove {glove}").locator(".state-word")
-    expect(word).to_have_text("ok", timeout=PATIENCE_MS)
+    expect(word).to_have_text("ok")
 
 
 @pytest.mark.slow
@@ -63,9 +62,9 @@ def test_a_page_says_that_its_service_is_gone_and_goes_on_with_the_next(
         page = opened("live", at=f"http://127.0.0.1:{port}").page
         calibrated(page, "patient")
         running.close()
-        expect(page.get_by_text("Connection lost.")).to_be_visible(timeout=PATIENCE_MS)
+        expect(page.get_by_text("Connection lost.")).to_be_visible()
         with part_of_service(web, own):
-            expect(page.get_by_text("Connection lost.")).to_be_hidden(timeout=PATIENCE_MS)
+            expect(page.get_by_text("Connection lost.")).to_be_hidden()
             calibrated(page, "patient")
             canvas = page.get_by_role("region", name="Glove patient").locator(".hand-view canvas")
             first = canvas.screenshot()
@@ -89,13 +88,13 @@ def test_a_model_that_is_activated_elsewhere_is_shown_on_every_open_page(
         listed = opened("models").page
         activate(address, later)
         for choice in choices:
-            expect(choice).to_have_value(named(later), timeout=PATIENCE_MS)
+            expect(choice).to_have_value(named(later))
         word = listed.locator(f'[data-model="{later}"]').get_by_text("active", exact=True)
-        expect(word).to_be_visible(timeout=PATIENCE_MS)
+        expect(word).to_be_visible()
         with Store.open(settings) as store:
             made = store_model(store, SUBJECT, degrees_per_count=0.6)
         for choice in choices:
-            expect(choice).to_have_value(named(made), timeout=PATIENCE_MS)
+            expect(choice).to_have_value(named(made))
         assert [seen.complaints for seen in tabs] == [[], []]
         active = [each["id"] for each in httpx.get(f"{address}/v1/models").json() if each["active"]]
         assert made in active
@@ -108,7 +107,7 @@ def test_a_job_is_cancelled_from_the_drawer_and_every_open_page_is_told(opened: 
     body = {"subject": "anna", "layout": takes[0]["layout"], "method": "lmc_gpr", "activate": False}
     job = httpx.post(f"{address}/v1/models/train", json=body).raise_for_status().json()
     drawer = other.get_by_role("button", name="Jobs (1 running)")
-    drawer.click(timeout=PATIENCE_MS)
+    drawer.click()
     other.get_by_role("dialog").get_by_role("button", name="Cancel").wait_for()
     for scheme in ("dark", "light"):
         other.emulate_media(color_scheme=scheme)
@@ -116,11 +115,11 @@ def test_a_job_is_cancelled_from_the_drawer_and_every_open_page_is_told(opened: 
         assert serious(other) == []
     other.get_by_role("dialog").get_by_role("button", name="Cancel").click()
     for page in (one, other):
-        expect(page.get_by_text("train: cancelled").first).to_be_visible(timeout=PATIENCE_MS)
+        expect(page.get_by_text("train: cancelled").first).to_be_visible()
     assert httpx.get(f"{address}/v1/jobs/{job['id']}").json()["state"] == "cancelled"
 
 
 def test_a_model_that_is_not_there_is_said_so(opened: Open) -> None:
     for name in ("diagnose", "fall"):
         page = opened(f"{name}?model=0123456789abcdef").page
-        expect(page.get_by_text("There is no model 0123456789ab.")).to_be_visible(timeout=PATIENCE_MS)
+        expect(page.get_by_text("There is no model 0123456789ab.")).to_be_visible()

@@ -27,7 +27,6 @@ pytestmark = [
     pytest.mark.needs_chromium,
     pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are a POSIX thing"),
 ]
-PATIENCE_MS = 60_000
 GLOVES = ("cg3-left", "cg3-right")
 
 
@@ -65,18 +64,14 @@ def test_warm_up_clocks_and_cards_of_both_gloves(
     seen = [each["name"] for each in httpx.get(f"{address}/v1/gloves").json()["seen"]]
     page = opened("capture?mode=session").page
     for name in GLOVES:
-        expect(page.get_by_text(re.compile(rf"{name}: not warm yet, 20 of 20 minutes"))).to_be_visible(
-            timeout=PATIENCE_MS
-        )
+        expect(page.get_by_text(re.compile(rf"{name}: not warm yet, 20 of 20 minutes"))).to_be_visible()
     page.get_by_role("button", name="Set clocks").click()
-    expect(page.get_by_text(re.compile(r"The clock of cg3-\w+ is .* ms ahead of that of"))).to_be_visible(
-        timeout=PATIENCE_MS
-    )
+    expect(page.get_by_text(re.compile(r"The clock of cg3-\w+ is .* ms ahead of that of"))).to_be_visible()
     page.get_by_role("button", name="Start on all").click()
     row = page.get_by_role("row", name=GLOVES[0])
-    expect(row).to_contain_text("TAKE1.DAT", timeout=PATIENCE_MS)
+    expect(row).to_contain_text("TAKE1.DAT")
     page.get_by_role("button", name="Stop", exact=True).click()
-    expect(row).to_contain_text("7.4", timeout=PATIENCE_MS)  # V: the status that comes with the end
+    expect(row).to_contain_text("7.4")  # V: the status that comes with the end
     for glove in gloves.values():
         assert len(glove.card["TAKE1.DAT"]) > 1000
     assert set(GLOVES) <= set(seen)

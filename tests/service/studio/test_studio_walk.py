@@ -45,7 +45,7 @@ def test_a_model_made_elsewhere_appears_without_a_reload(
     store = Store.open(settings)
     made = store_model(store, "made-elsewhere", degrees_per_count=0.7)
     store.close()
-    expect(page.locator(f'[data-model="{made}"]')).to_be_visible(timeout=20_000)
+    expect(page.locator(f'[data-model="{made}"]')).to_be_visible()
 
 
 def test_a_diagnosis_of_before_is_shown_with_what_to_do(opened: Open, address: str) -> None:
