@@ -6,10 +6,12 @@ import asyncio
 import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import cache
 from importlib.metadata import version
 
-from fastapi import FastAPI
+from fastapi import APIRouter, FastAPI
 from starlette.concurrency import run_in_threadpool
+from starlette.routing import BaseRoute
 
 from glovecal_models.threads import pin_blas_to_one_thread
 from glovecal_service.jobs.dispatcher import Dispatcher
@@ -167,15 +169,26 @@ def create_app(
         redoc_url=None,
         openapi_url=f"{PREFIX}/openapi.json",
         redirect_slashes=False,
+        routes=_routes(),
     )
-    routers = [("", front.router), *((PREFIX, noun.router) for noun in ROUTERS)]
-    for prefix, router in routers:
-        app.include_router(router, prefix=prefix)
-    app.state.allowed_methods = AllowedMethods(routers)
+    app.state.allowed_methods = AllowedMethods(_routers())
     install_error_handlers(app)
     install_openapi(app, layouts.LayoutBody)
     _guard(app, settings, metrics, body_patience_s)
     return app
+
+
+def _routers() -> list[tuple[str, APIRouter]]:
+    return [("", front.router), *((PREFIX, noun.router) for noun in ROUTERS)]
+
+
+@cache
+def _routes() -> list[BaseRoute]:
+    """Of all applications in a process: a command makes one, and what a route takes is worked out slowly."""
+    every = APIRouter()
+    for prefix, router in _routers():
+        every.include_router(router, prefix=prefix)
+    return every.routes
 
 
 async def _sweep_hourly(store: Store, settings: Settings) -> None:
